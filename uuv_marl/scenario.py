@@ -1,0 +1,348 @@
+"""Scenario: everything that fixes a simulation but the seed; frozen, validated, in SI units and degrees.
+
+The numbers and their sources are in ``scenarios/*.toml``; nothing here has a default value that matters.
+Symbols of the vehicle are Fossen's; resistances (X_u, Y_v, ...) are positive, as in the paper's Eq. 4.
+"""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from uuv_marl import scenario_checks
+
+MAX_RANGE_M = 4096.0
+"""Positions in a percept saturate here, so that observation bounds are finite."""
+NOMINAL_VEHICLES = 54
+"""The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
+_MAX_SECTOR_DEG = 120.0
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+NonPositive = Annotated[float, Field(le=0, allow_inf_nan=False)]
+Channel = Literal["compass", "link"]
+
+
+class Section(BaseModel):
+    """A part of a scenario: immutable, no unknown fields, no silent conversion."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True)
+
+
+class Swarm(Section):
+    """How many."""
+
+    num_vehicles: Annotated[int, Field(gt=0, le=16384)]
+    """Vehicles at the start."""
+
+
+class Start(Section):
+    """Two rectangles side by side behind the trajectory's first point, aligned with its first leg."""
+
+    length_m: Positive
+    """Side along the first leg, of each rectangle, for up to 54 vehicles."""
+    width_m: Positive
+    """Side across the first leg."""
+    gap_m: NonNegative
+    """Between the two."""
+    spacing_m: Positive
+    """Smallest distance between two vehicles at the start."""
+    speed_min_mps: NonNegative
+    """Lowest initial surge speed; uniform, with uniform heading."""
+    speed_max_mps: NonNegative
+    """Highest initial surge speed."""
+
+    def sides(self, num_vehicles: int) -> tuple[float, float]:
+        """Length and width [m] of one rectangle for a swarm of this size."""
+        scale = growth(num_vehicles)
+        return self.length_m * scale, self.width_m * scale
+
+    def lattice(self, num_vehicles: int) -> tuple[int, int, float]:
+        """Columns, rows and row distance [m] of the hexagonal lattice at ``spacing_m`` in one rectangle."""
+        length, width = self.sides(num_vehicles)
+        row_m = self.spacing_m * math.sqrt(3) / 2
+        columns = math.floor((width - self.spacing_m / 2) / self.spacing_m) + 1
+        return max(columns, 1), math.floor(length / row_m) + 1, row_m
+
+
+class Trajectory(Section):
+    """The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest."""
+
+    speed_mps: Positive
+    """Speed along the polyline."""
+    waypoints_m: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=2)] | None = None
+    """North and east of each corner; absent where ``random_field`` draws them."""
+
+    @property
+    def duration_s(self) -> float:
+        """Time to the end of the fixed polyline; the bound on any task time."""
+        points = self.waypoints_m or ()
+        return sum(math.dist(a, b) for a, b in zip(points, points[1:], strict=False)) / self.speed_mps
+
+
+class Obstacle(Section):
+    """A disc."""
+
+    centre_m: tuple[Finite, Finite]
+    """North and east of the centre."""
+    radius_m: Positive
+    """Radius."""
+
+
+class RandomField(Section):
+    """Distribution of trajectories and obstacles, one draw per episode."""
+
+    legs: tuple[int, int]
+    """Fewest and most legs."""
+    leg_length_m: tuple[Positive, Positive]
+    """Shortest and longest leg."""
+    turn_max_deg: Annotated[float, Field(ge=0, le=150)]
+    """Sharpest turn between legs."""
+    obstacles: tuple[int, int]
+    """Fewest and most obstacles wished for; where the field is full there are fewer."""
+    radius_m: tuple[Positive, Positive]
+    """Smallest and largest radius."""
+    offset_max_m: NonNegative
+    """Largest distance of an obstacle's centre from the trajectory."""
+    end_clear_m: Positive
+    """Radius kept free around the end, for up to 54 vehicles."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in ("legs", "leg_length_m", "obstacles", "radius_m"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ValueError(f"random_field.{name} must be [low, high] with low <= high, got [{low}, {high}]")
+        if self.legs[0] < 1 or self.legs[1] > 8:
+            raise ValueError(f"random_field.legs must lie within 1 to 8, got {list(self.legs)}")
+        if self.obstacles[0] < 0 or self.obstacles[1] > 64:
+            raise ValueError(f"random_field.obstacles must lie within 0 to 64, got {list(self.obstacles)}")
+        return self
+
+
+class Vehicle(Section):
+    """Parameters of Eq. 3-4. Dimensions follow from the force or moment and the velocities they multiply."""
+
+    m_kg: Positive
+    I_z_kgm2: Positive
+    x_G_m: Finite
+    X_udot_kg: NonPositive
+    Y_vdot_kg: NonPositive
+    Y_rdot_kgm: Finite
+    N_rdot_kgm2: NonPositive
+    X_u: NonNegative
+    Y_v: NonNegative
+    Y_r: Finite
+    N_v: Finite
+    N_r: NonNegative
+    X_uu: NonNegative
+    Y_vv: NonNegative
+    Y_rr: Finite
+    N_rv: Finite
+    N_rr: NonNegative
+
+
+class Actuators(Section):
+    """Limits of thrust and torque, the same for every policy."""
+
+    max_force_n: Positive
+    """Surge force at full action, ahead or astern."""
+    max_torque_nm: Positive
+    """Yaw torque at full action."""
+    lever_arm_m: Positive
+    """Turns the sideways component of a desired force into a torque (Eq. 22)."""
+    yaw_damping_nms: NonNegative
+    """Inner loop: torque -c r, added within the torque limit."""
+
+
+class SonarArray(Section):
+    """One fan, split into equal sub-sectors; the nearest vehicle of each is heard."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """Unique within the suite."""
+    kind: Literal["active", "passive"]
+    """Only active arrays hear obstacles."""
+    mounting_deg: Finite
+    """Direction of the fan's axis, clockwise from the bow."""
+    aperture_deg: Annotated[float, Field(gt=0, le=360)]
+    """Width of the fan."""
+    range_m: Annotated[float, Field(gt=0, le=MAX_RANGE_M)]
+    """Vehicles nearer than this, and obstacles whose surface is, are heard."""
+    sub_sectors: Annotated[int, Field(gt=0, le=64)]
+    """k_a (Eq. 12)."""
+
+
+class Sonar(Section):
+    """What a vehicle hears."""
+
+    echo_reports: Literal["centre", "surface"]
+    """What an echo's position is: the obstacle's centre, or the nearest point of its surface in the beam."""
+    obstacles_hide_vehicles: bool
+    """Whether an obstacle on the line of sight silences a vehicle."""
+    channels: tuple[Channel, ...]
+    """Granted beyond the percept: ``compass`` (heading), ``link`` (neighbours' identity and velocity)."""
+    arrays: Annotated[tuple[SonarArray, ...], Field(min_length=1)]
+    """The suite; their order is the order of sub-sectors in the percept."""
+
+    @property
+    def num_sectors(self) -> int:
+        """Sub-sectors of all arrays."""
+        return sum(array.sub_sectors for array in self.arrays)
+
+    @property
+    def num_active_sectors(self) -> int:
+        """Sub-sectors of the active arrays."""
+        return sum(array.sub_sectors for array in self.arrays if array.kind == "active")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        names = [array.name for array in self.arrays]
+        if len(set(names)) < len(names):
+            raise ValueError(f"sonar.arrays must have different names, got {names}")
+        if len(set(self.channels)) < len(self.channels):
+            raise ValueError(f"sonar.channels must name each channel once, got {list(self.channels)}")
+        for array in self.arrays:
+            width = array.aperture_deg / array.sub_sectors
+            if width > _MAX_SECTOR_DEG:
+                raise ValueError(
+                    f"sonar.arrays.{array.name}.sub_sectors must leave sub-sectors of at most {_MAX_SECTOR_DEG:g} deg, "
+                    f"got {width:g} deg; use at least {math.ceil(array.aperture_deg / _MAX_SECTOR_DEG)}"
+                )
+        return self
+
+
+class Timing(Section):
+    """Three clocks."""
+
+    control_hold_s: Positive
+    """t_r: body forces are held this long."""
+    integration_step_s: Positive
+    """Runge-Kutta step; divides the control hold."""
+    decision_period_s: Positive
+    """A policy acts this often, a multiple of the control hold; the force is held in the world frame meanwhile."""
+
+    @property
+    def holds_per_decision(self) -> int:
+        """Control holds in a decision period."""
+        return round(self.decision_period_s / self.control_hold_s)
+
+    @property
+    def steps_per_hold(self) -> int:
+        """Integration steps in a control hold."""
+        return round(self.control_hold_s / self.integration_step_s)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for long, short in (("control_hold_s", "integration_step_s"), ("decision_period_s", "control_hold_s")):
+            ratio = getattr(self, long) / getattr(self, short)
+            if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
+                raise ValueError(
+                    f"timing.{long} must be a whole multiple of timing.{short} = {getattr(self, short):g}, "
+                    f"got {getattr(self, long):g}; change either"
+                )
+        return self
+
+
+class Constraints(Section):
+    """The distances of Eq. 7."""
+
+    s_l_m: Positive
+    """Largest distance of a vehicle from l(t)."""
+    s_o_m: Positive
+    """Smallest distance from an obstacle's surface."""
+    s_u_m: Positive
+    """Smallest distance between vehicles."""
+
+
+class Contact(Section):
+    """What counts as a collision: two hulls, or a hull and an obstacle, overlap."""
+
+    hull_radius_m: Positive
+    """Vehicles collide closer than twice this; with an obstacle at this surface distance."""
+    ends_vehicle: bool
+    """Whether a vehicle that collides is lost."""
+
+
+class Arrival(Section):
+    """When the task is done."""
+
+    radius_m: Positive
+    """The swarm's centre this close to the end of the trajectory, with l(t) at rest there ..."""
+    dwell_s: NonNegative
+    """... for so long."""
+    spread_m: Positive
+    """Every vehicle this close to the end, for up to 54 vehicles."""
+
+
+class TimeLimit(Section):
+    """When it is given up."""
+
+    factor: Positive
+    """Times the trajectory's duration ..."""
+    extra_s: NonNegative
+    """... plus this."""
+
+
+class Disturbance(Section):
+    """What goes wrong."""
+
+    loss_times_s: tuple[NonNegative, ...]
+    """At each of these times a vehicle, drawn by the seed, is lost."""
+
+
+class Reward(Section):
+    """Weights of the terms in ``envs/reward.py``."""
+
+    tracking: NonNegative
+    obstacle: NonNegative
+    spacing: NonNegative
+    effort: NonNegative
+    collision: NonNegative
+    arrival: NonNegative
+
+
+class Scenario(Section):
+    """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
+
+    name: str
+    """Set by the loader: the file's name."""
+    title: str
+    """One line."""
+    source: str
+    """Where it comes from."""
+    version: Annotated[int, Field(gt=0)]
+    """Raised by any change of its numbers."""
+    swarm: Swarm
+    start: Start
+    trajectory: Trajectory
+    obstacles: tuple[Obstacle, ...] = ()
+    random_field: RandomField | None = None
+    vehicle: Vehicle
+    actuators: Actuators
+    sonar: Sonar
+    timing: Timing
+    constraints: Constraints
+    contact: Contact
+    arrival: Arrival
+    time_limit: TimeLimit
+    disturbance: Disturbance
+    reward: Reward
+
+    @property
+    def max_obstacles(self) -> int:
+        """Most obstacles that a world of this scenario can hold."""
+        return self.random_field.obstacles[1] if self.random_field else len(self.obstacles)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        scenario_checks.check_start(self)
+        scenario_checks.check_course(self)
+        scenario_checks.check_losses(self)
+        scenario_checks.check_vehicle(self)
+        return self
+
+
+def growth(num_vehicles: int) -> float:
+    """Factor on lengths that keeps the density of the paper's 54 vehicles in larger swarms."""
+    return max(1.0, math.sqrt(num_vehicles / NOMINAL_VEHICLES))

@@ -1,0 +1,152 @@
+"""What one field of a scenario demands of another, and what the physics demands of both.
+
+Every message names the field, its value and the remedy.
+"""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from uuv_marl.scenario import Scenario
+
+RK4_LIMIT = 2.78
+"""Classical Runge-Kutta is stable on the negative real axis up to this product of rate and step."""
+SAMPLED_LIMIT = 2.0
+"""A sampled damping loop overshoots without end above this product of rate and hold."""
+
+
+def check_start(scenario: "Scenario") -> None:
+    """The vehicles fit into the start area at their spacing."""
+    start, n = scenario.start, scenario.swarm.num_vehicles
+    if start.speed_min_mps > start.speed_max_mps:
+        raise ValueError(
+            f"start.speed_min_mps must not exceed start.speed_max_mps = {start.speed_max_mps:g}, "
+            f"got {start.speed_min_mps:g}"
+        )
+    if start.spacing_m < 2 * scenario.contact.hull_radius_m:
+        raise ValueError(
+            f"start.spacing_m must be at least two hull radii = {2 * scenario.contact.hull_radius_m:g}, "
+            f"got {start.spacing_m:g}; raise it or lower contact.hull_radius_m"
+        )
+    columns, rows, _ = start.lattice(n)
+    needed = math.ceil(n / 2)
+    if columns * rows < needed:
+        raise ValueError(
+            f"start.spacing_m = {start.spacing_m:g} leaves room for {columns * rows} vehicles in each start rectangle, "
+            f"but {needed} are needed; lower it, or raise start.length_m or start.width_m"
+        )
+
+
+def check_course(scenario: "Scenario") -> None:
+    """One trajectory, and no obstacle on its start or end."""
+    points = scenario.trajectory.waypoints_m
+    if (points is None) == (scenario.random_field is None):
+        raise ValueError(
+            "trajectory.waypoints_m is needed, unless random_field draws the trajectory; "
+            f"got {'neither' if points is None else 'both'}"
+        )
+    if points is None:
+        if scenario.obstacles:
+            raise ValueError("obstacles must be empty where random_field draws them")
+        return
+    for k, (a, b) in enumerate(zip(points, points[1:], strict=False)):
+        if math.dist(a, b) < 1e-6:
+            raise ValueError(f"trajectory.waypoints_m must differ from one to the next, got {list(a)} twice at {k}")
+    for k, obstacle in enumerate(scenario.obstacles):
+        where = f"obstacles.{k} at {list(obstacle.centre_m)} m, radius {obstacle.radius_m:g} m,"
+        clear = scenario.constraints.s_o_m
+        if start_distance(scenario, points[0], points[1], obstacle.centre_m) < obstacle.radius_m + clear:
+            raise ValueError(f"{where} lies on the start; keep {clear:g} m from the two start rectangles")
+        if math.dist(obstacle.centre_m, points[-1]) < obstacle.radius_m + clear:
+            raise ValueError(f"{where} lies on the trajectory's end; keep {clear:g} m from it")
+
+
+def start_distance(
+    scenario: "Scenario", first: tuple[float, float], second: tuple[float, float], point: tuple[float, float]
+) -> float:
+    """Distance [m] of a point from the rectangle that holds both start rectangles; 0 inside."""
+    length, width = scenario.start.sides(scenario.swarm.num_vehicles)
+    leg = math.dist(first, second)
+    ahead = ((second[0] - first[0]) / leg, (second[1] - first[1]) / leg)
+    offset = (point[0] - first[0], point[1] - first[1])
+    along = offset[0] * ahead[0] + offset[1] * ahead[1]
+    across = abs(-offset[0] * ahead[1] + offset[1] * ahead[0])
+    return math.hypot(max(along, -length - along, 0.0), max(across - width - scenario.start.gap_m / 2, 0.0))
+
+
+def check_losses(scenario: "Scenario") -> None:
+    """Losses in order, and somebody left."""
+    times, n = scenario.disturbance.loss_times_s, scenario.swarm.num_vehicles
+    if list(times) != sorted(times):
+        raise ValueError(f"disturbance.loss_times_s must not fall, got {list(times)}; sort them")
+    if len(times) >= n:
+        raise ValueError(
+            f"disturbance.loss_times_s loses {len(times)} of {n} vehicles; "
+            "at least one must remain: shorten it or raise swarm.num_vehicles"
+        )
+
+
+def check_vehicle(scenario: "Scenario") -> None:
+    """Inertia positive, damping dissipative, and neither too fast for its time step."""
+    p, limits, timing = scenario.vehicle, scenario.actuators, scenario.timing
+    m_23 = p.m_kg * p.x_G_m - p.Y_rdot_kgm
+    inertia = np.array([[p.m_kg - p.Y_vdot_kg, m_23], [m_23, p.I_z_kgm2 - p.N_rdot_kgm2]])
+    if np.linalg.eigvalsh(inertia)[0] <= 0:
+        raise ValueError(
+            f"vehicle.x_G_m = {p.x_G_m:g} and vehicle.Y_rdot_kgm = {p.Y_rdot_kgm:g} couple sway and yaw so strongly "
+            "that the inertia matrix is not positive definite; lower them"
+        )
+    _check_dissipation(scenario)
+
+    # Damping rates are largest at the largest speeds that full force and torque can hold.
+    u = max(_terminal(p.X_u, p.X_uu, limits.max_force_n), scenario.start.speed_max_mps)
+    r = _terminal(p.N_r, p.N_rr, limits.max_torque_nm)
+    slope = np.array(
+        [
+            [p.Y_v + 2 * p.Y_vv * u, -p.Y_r - 2 * p.Y_rr * r],
+            [-p.N_v - p.N_rv * r, p.N_r + 2 * p.N_rr * r],
+        ]
+    )
+    sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(inertia, slope))).max())
+    surge = (p.X_u + 2 * p.X_uu * u) / (p.m_kg - p.X_udot_kg)
+    rate, h = max(sway_yaw, surge), timing.integration_step_s
+    if not rate * h < RK4_LIMIT:
+        raise ValueError(
+            f"timing.integration_step_s = {h:g} is too long for this vehicle, whose damping acts at {rate:.3g} per s "
+            f"at full speed, so that Runge-Kutta diverges; use at most {RK4_LIMIT / rate:.2g}, "
+            "or lower the vehicle's resistances"
+        )
+    yaw = limits.yaw_damping_nms / inertia[1, 1]
+    if not yaw * timing.control_hold_s < SAMPLED_LIMIT:
+        raise ValueError(
+            f"actuators.yaw_damping_nms = {limits.yaw_damping_nms:g} is unstable when held for "
+            f"timing.control_hold_s = {timing.control_hold_s:g}; use less than "
+            f"{SAMPLED_LIMIT * inertia[1, 1] / timing.control_hold_s:.4g}"
+        )
+
+
+def _check_dissipation(scenario: "Scenario") -> None:
+    """nu . D(nu) nu >= 0 for every nu, linear and non-linear part each."""
+    p = scenario.vehicle
+    if (p.Y_r + p.N_v) ** 2 > 4 * p.Y_v * p.N_r:
+        raise ValueError(
+            f"vehicle.Y_r + vehicle.N_v = {p.Y_r + p.N_v:g} lets linear damping add energy; "
+            f"keep its size within 2 sqrt(Y_v N_r) = {2 * math.sqrt(p.Y_v * p.N_r):g}"
+        )
+    coupling = abs(p.Y_rr + p.N_rv)
+    # Y_vv s^3 - c s + N_rr >= 0 for all s = |v / r| >= 0; the minimum lies at s = sqrt(c / (3 Y_vv)).
+    bound = 3 * (p.Y_vv * p.N_rr**2 / 4) ** (1 / 3)
+    if coupling > bound:
+        raise ValueError(
+            f"vehicle.Y_rr + vehicle.N_rv = {p.Y_rr + p.N_rv:g} lets quadratic damping add energy; "
+            f"keep its size within {bound:g}"
+        )
+
+
+def _terminal(linear: float, quadratic: float, force: float) -> float:
+    """Speed at which linear plus quadratic resistance equals the force."""
+    if quadratic == 0:
+        return force / linear if linear > 0 else math.inf
+    return (-linear + math.sqrt(linear**2 + 4 * quadratic * force)) / (2 * quadratic)

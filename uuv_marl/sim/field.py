@@ -1,0 +1,65 @@
+"""Trajectories and obstacles of a world: the scenario's own, or a random field drawn by the world's generator."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.scenario import RandomField, Scenario, growth
+from uuv_marl.scenario_checks import start_distance
+
+Float64 = NDArray[np.float64]
+_TRIES_PER_OBSTACLE = 32
+
+
+class Field(NamedTuple):
+    """Waypoints (point, 2) [m] and obstacles (obstacle, 3): centre north, east and radius [m]."""
+
+    waypoints: Float64
+    obstacles: Float64
+
+
+def draw_field(scenario: Scenario, rng: np.random.Generator) -> Field:
+    """The world's trajectory and obstacles."""
+    if scenario.random_field is None:
+        obstacles = [(*obstacle.centre_m, obstacle.radius_m) for obstacle in scenario.obstacles]
+        return Field(np.array(scenario.trajectory.waypoints_m), np.array(obstacles, np.float64).reshape(-1, 3))
+    waypoints = _polyline(scenario.random_field, rng)
+    return Field(waypoints, _obstacles(scenario, scenario.random_field, waypoints, rng))
+
+
+def _polyline(field: RandomField, rng: np.random.Generator) -> Float64:
+    legs = int(rng.integers(field.legs[0], field.legs[1] + 1))
+    lengths = rng.uniform(*field.leg_length_m, legs)
+    turns = rng.uniform(-1.0, 1.0, legs) * math.radians(field.turn_max_deg)
+    turns[0] = rng.uniform(-math.pi, math.pi)
+    headings = np.cumsum(turns)
+    steps = lengths[:, None] * np.stack([np.cos(headings), np.sin(headings)], axis=1)
+    return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+
+
+def _obstacles(scenario: Scenario, field: RandomField, waypoints: Float64, rng: np.random.Generator) -> Float64:
+    """Discs whose gaps are all at least 2 (s_o + s_u): grown by half of that they stay disjoint, so that the free
+    water around them is connected and some path keeps s_o + s_u from every surface."""
+    gap = 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
+    end_clear = max(field.end_clear_m * growth(scenario.swarm.num_vehicles), gap)
+    wanted = int(rng.integers(field.obstacles[0], field.obstacles[1] + 1))
+    first, second = (float(waypoints[0, 0]), float(waypoints[0, 1])), (float(waypoints[1, 0]), float(waypoints[1, 1]))
+    placed: list[tuple[float, float, float]] = []
+    for _ in range(wanted * _TRIES_PER_OBSTACLE):
+        if len(placed) == wanted:
+            break
+        leg = int(rng.integers(len(waypoints) - 1))
+        share, offset = rng.random(), rng.uniform(-1.0, 1.0) * field.offset_max_m
+        radius = rng.uniform(*field.radius_m)
+        step = waypoints[leg + 1] - waypoints[leg]
+        across = np.array([-step[1], step[0]]) / np.hypot(*step)
+        x, y = (float(value) for value in waypoints[leg] + share * step + offset * across)
+        if (
+            start_distance(scenario, first, second, (x, y)) >= radius + gap
+            and math.hypot(x - waypoints[-1, 0], y - waypoints[-1, 1]) >= radius + end_clear
+            and all(math.hypot(x - a, y - b) >= radius + other + gap for a, b, other in placed)
+        ):
+            placed.append((x, y, radius))
+    return np.array(placed, np.float64).reshape(-1, 3)

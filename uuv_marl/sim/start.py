@@ -1,0 +1,68 @@
+"""Initial states: two groups behind the trajectory's first point, at a guaranteed spacing."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+
+Float64 = NDArray[np.float64]
+_TRIES_PER_VEHICLE = 64
+
+
+def start_state(scenario: Scenario, waypoints: Float64, rng: np.random.Generator) -> tuple[Float64, Float64]:
+    """Pose eta (vehicle, 3) and velocity nu (vehicle, 3), drawn from the scenario's start. Section 5.1.
+
+    The first half of the vehicles, and the odd one, form the port group.
+    """
+    n, start = scenario.swarm.num_vehicles, scenario.start
+    length, width = start.sides(n)
+    num_port = (n + 1) // 2
+    port = _group(scenario, num_port, rng)
+    starboard = _group(scenario, n - num_port, rng)
+    along = np.concatenate([port[:, 0], starboard[:, 0]]) - length
+    across = np.concatenate([port[:, 1] - start.gap_m / 2 - width, starboard[:, 1] + start.gap_m / 2])
+    ahead = (waypoints[1] - waypoints[0]) / np.hypot(*(waypoints[1] - waypoints[0]))
+    eta, nu = np.zeros((n, 3)), np.zeros((n, 3))
+    eta[:, 0] = waypoints[0, 0] + along * ahead[0] - across * ahead[1]
+    eta[:, 1] = waypoints[0, 1] + along * ahead[1] + across * ahead[0]
+    eta[:, 2] = rng.uniform(-math.pi, math.pi, n)
+    nu[:, 0] = rng.uniform(start.speed_min_mps, start.speed_max_mps, n)
+    return eta, nu
+
+
+def _group(scenario: Scenario, count: int, rng: np.random.Generator) -> Float64:
+    """Places (vehicle, 2) in one rectangle [0, length] x [0, width]: random, or on a lattice where random jams."""
+    n, start = scenario.swarm.num_vehicles, scenario.start
+    length, width = start.sides(n)
+    candidates = rng.random((count * _TRIES_PER_VEHICLE, 2)) * (length, width)
+    places = np.empty((count, 2))
+    if _scatter(candidates, start.spacing_m, places) == count:
+        return places
+    columns, rows, row_m = start.lattice(n)
+    row, column = np.divmod(rng.permutation(columns * rows)[:count], columns)
+    lattice = np.stack([row * row_m, (column + 0.5 * (row % 2)) * start.spacing_m], axis=1)
+    # A hair's breadth wider, so that rounding never brings two vehicles below the spacing.
+    return lattice * (1.0 + 1e-12)
+
+
+@compiled
+def _scatter(candidates: Float64, spacing: float, places: Float64) -> int:
+    """Fill ``places`` with the candidates that keep their distance from all before them; how many were found."""
+    found = 0
+    for k in range(candidates.shape[0]):
+        if found == places.shape[0]:
+            break
+        free = True
+        for m in range(found):
+            dx = candidates[k, 0] - places[m, 0]
+            dy = candidates[k, 1] - places[m, 1]
+            if dx * dx + dy * dy < spacing * spacing:
+                free = False
+                break
+        if free:
+            places[found] = candidates[k]
+            found += 1
+    return found

@@ -1,0 +1,230 @@
+"""Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
+
+import os
+from collections.abc import Sequence
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.scenario import Scenario, growth
+from uuv_marl.sim.disturbance import draw_losses, loss_ticks
+from uuv_marl.sim.field import draw_field
+from uuv_marl.sim.sonar import Survey, suite
+from uuv_marl.sim.start import start_state
+from uuv_marl.sim.trajectory import arrival_times
+from uuv_marl.sim.vehicle import plant
+from uuv_marl.sim.world import Course, Facts, Rules, State, observe_world, step_world, step_worlds
+
+Float32 = NDArray[np.float32]
+ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
+"""Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``)."""
+
+_threads_of_parent = False
+
+
+def _note_fork() -> None:
+    global _threads_of_parent  # noqa: PLW0603 - set once, in a forked child
+    try:
+        numba.threading_layer()
+    except ValueError:
+        return
+    _threads_of_parent = True
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_note_fork)
+
+
+class Swarm:
+    """Worlds of one scenario, each with its own random stream.
+
+    ``state``, ``course`` and ``facts`` hold the arrays, first axis the world; they and the percepts returned are
+    buffers that the next ``step`` or ``reset`` overwrites. A world's run depends on its seed and actions alone.
+
+    Args:
+        scenario: what to simulate.
+        num_worlds: how many worlds a call steps. One world runs serially, several run on Numba's threads.
+    """
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
+        if num_worlds < 1:
+            raise ValueError(f"num_worlds must be at least 1, got {num_worlds}")
+        self.scenario = scenario
+        self.num_worlds = num_worlds
+        self.num_vehicles = scenario.swarm.num_vehicles
+        self.layout = PerceptLayout.of(scenario)
+        self._plant = plant(scenario)
+        self._suite = suite(scenario)
+        self._rules = _rules(scenario)
+        self._rngs: list[np.random.Generator | None] = [None] * num_worlds
+        self._ready = np.zeros(num_worlds, np.bool_)
+        self._allocate(num_worlds, self.num_vehicles, max(scenario.max_obstacles, 1))
+
+    def _allocate(self, worlds: int, n: int, m: int) -> None:
+        field = self.scenario.random_field
+        points = field.legs[1] + 1 if field else len(self.scenario.trajectory.waypoints_m or ())
+        radii, sectors = len(self._rules.arrival_radii), self.scenario.sonar.num_sectors
+        losses = len(self._rules.loss_ticks)
+        self.state = State(
+            eta=np.zeros((worlds, n, 3)),
+            nu=np.zeros((worlds, n, 3)),
+            before=np.zeros((worlds, n, 2)),
+            alive=np.zeros((worlds, n), np.bool_),
+            tick=np.zeros(worlds, np.int64),
+            dwell=np.zeros((worlds, radii), np.int64),
+        )
+        self.course = Course(
+            waypoints=np.zeros((worlds, points, 2)),
+            times=np.zeros((worlds, points)),
+            last=np.zeros(worlds, np.int64),
+            obstacles=np.zeros((worlds, m, 3)),
+            num_obstacles=np.zeros(worlds, np.int64),
+            losses=np.zeros((worlds, losses), np.int64),
+        )
+        self.facts = Facts(
+            time_s=np.zeros(worlds),
+            reference=np.zeros((worlds, 4)),
+            centre=np.zeros((worlds, 2)),
+            spacing=np.zeros((worlds, n)),
+            min_spacing=np.zeros(worlds),
+            max_spacing=np.zeros(worlds),
+            clearance=np.zeros((worlds, n)),
+            obstacle_clearance=np.zeros((worlds, m)),
+            contacts=np.zeros((worlds, n), np.int64),
+            collisions=np.zeros(worlds, np.int64),
+            lost=np.zeros((worlds, n), np.bool_),
+            effort=np.zeros((worlds, n)),
+            saturated=np.zeros(worlds),
+            arrival_s=np.full((worlds, radii), np.nan),
+        )
+        self._found = Survey(
+            heading=np.zeros((worlds, n, 2)),
+            nearest=np.zeros((worlds, n, sectors)),
+            heard=np.zeros((worlds, n, sectors), np.int32),
+            spacing=np.zeros((worlds, n)),
+            clearance=np.zeros((worlds, n)),
+            obstacle_clearance=np.zeros((worlds, m)),
+            contacts=np.zeros((worlds, n), np.int64),
+            extremes=np.zeros((worlds, 3)),
+        )
+        self._forces = np.zeros((worlds, n, 3))
+        self._flat = np.zeros((worlds, n, self.layout.size), np.float32)
+
+    @property
+    def percept(self) -> Percept:
+        """What every vehicle knows now, shape (world, vehicle, ...)."""
+        return Percept(self._flat, self.layout)
+
+    @property
+    def heard(self) -> NDArray[np.int32]:
+        """Index of the vehicle heard in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
+        return self._found.heard
+
+    @property
+    def duration_s(self) -> NDArray[np.float64]:
+        """Time that l(t) takes to its end, the bound on any task time, shape (world,)."""
+        return self.course.times[np.arange(self.num_worlds), self.course.last]
+
+    @property
+    def time_limit_s(self) -> NDArray[np.float64]:
+        """When a world is given up, shape (world,)."""
+        limit = self.scenario.time_limit
+        return limit.factor * self.duration_s + limit.extra_s
+
+    @property
+    def arrived(self) -> NDArray[np.bool_]:
+        """Worlds whose task is done, shape (world,)."""
+        return ~np.isnan(self.facts.arrival_s[:, 0])
+
+    @property
+    def timed_out(self) -> NDArray[np.bool_]:
+        """Worlds at or past their time limit, shape (world,)."""
+        return self.facts.time_s >= self.time_limit_s - 1e-9
+
+    def reset(self, seed: int | Sequence[int] | None = None, worlds: Sequence[int] | None = None) -> Percept:
+        """Start worlds anew.
+
+        Args:
+            seed: world w starts from ``seed + w``; or one seed for each of ``worlds``; without a seed each world's
+                own stream goes on, from fresh entropy where it has none.
+            worlds: which ones, default all.
+        """
+        chosen = range(self.num_worlds) if worlds is None else worlds
+        if isinstance(seed, Sequence) and len(seed) != len(chosen):
+            raise ValueError(f"seed must hold one seed for each of {len(chosen)} worlds, got {len(seed)}")
+        for k, w in enumerate(chosen):
+            if seed is not None:
+                self._rngs[w] = np.random.default_rng(seed[k] if isinstance(seed, Sequence) else seed + w)
+            self._reset_world(w, self._rngs[w] or np.random.default_rng())
+        return self.percept
+
+    def _reset_world(self, w: int, rng: np.random.Generator) -> None:
+        self._rngs[w] = rng
+        field = draw_field(self.scenario, rng)
+        state, course = self.state, self.course
+        points, m = len(field.waypoints), len(field.obstacles)
+        course.waypoints[w, :points], course.waypoints[w, points:] = field.waypoints, field.waypoints[-1]
+        times = arrival_times(field.waypoints, self.scenario.trajectory.speed_mps)
+        course.times[w, :points], course.times[w, points:] = times, times[-1]
+        course.last[w] = points - 1
+        course.obstacles[w, :m], course.obstacles[w, m:] = field.obstacles, 0.0
+        course.num_obstacles[w] = m
+        state.eta[w], state.nu[w] = start_state(self.scenario, field.waypoints, rng)
+        state.before[w] = state.eta[w, :, :2]
+        course.losses[w] = draw_losses(self.scenario, rng)
+        state.alive[w], state.tick[w] = True, 0
+        self._ready[w] = True
+        observe_world(
+            w, state, course, self.facts, self._rules, self._suite, self._found, self.layout.offsets, self._flat
+        )
+
+    def step(self, action: Float32, active: NDArray[np.bool_] | None = None) -> Percept:
+        """Advance by one decision period.
+
+        Args:
+            action: shares of full surge force and yaw torque, float32, shape (world, vehicle, 2); projected onto the
+                unit disc. Entries of lost vehicles are ignored.
+            active: worlds to step, shape (world,); the others stay as they are. Default all.
+        """
+        expected = (self.num_worlds, self.num_vehicles, 2)
+        if action.shape != expected or action.dtype != np.float32:
+            raise ValueError(f"action must be float32 of shape {expected}, got {action.dtype} of shape {action.shape}")
+        if not np.isfinite(action).all():
+            w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action))[0])
+            raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
+        running = np.ones(self.num_worlds, np.bool_) if active is None else active
+        if not self._ready[running].all():
+            raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
+        arrays = (
+            np.ascontiguousarray(action), self._forces, self.state, self.course, self.facts, self._plant, self._rules,
+            self._suite, self._found, self.layout.offsets, self._flat,
+        )  # fmt: skip
+        if self.num_worlds == 1:
+            if running[0]:
+                step_world(0, *arrays)
+        else:
+            if _threads_of_parent:
+                raise RuntimeError(
+                    "several worlds can't be stepped in a process forked after Numba's threads had started; "
+                    "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
+                )
+            step_worlds(running, *arrays)
+        return self.percept
+
+
+def _rules(scenario: Scenario) -> Rules:
+    timing = scenario.timing
+    return Rules(
+        hold_s=timing.control_hold_s,
+        step_s=timing.integration_step_s,
+        holds=timing.holds_per_decision,
+        steps=timing.steps_per_hold,
+        hull=scenario.contact.hull_radius_m,
+        contact_ends=scenario.contact.ends_vehicle,
+        dwell_ticks=round(scenario.arrival.dwell_s / timing.control_hold_s),
+        spread=scenario.arrival.spread_m * growth(scenario.swarm.num_vehicles),
+        arrival_radii=np.array([scenario.arrival.radius_m, *ARRIVAL_RADII_M]),
+        loss_ticks=loss_ticks(scenario),
+    )

@@ -1,0 +1,28 @@
+"""The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest at its end."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.compiled import compiled
+
+Float64 = NDArray[np.float64]
+
+
+def arrival_times(waypoints: Float64, speed: float) -> Float64:
+    """Time [s] at which l(t) passes each waypoint. ``waypoints`` [m] has shape (point, 2); the result (point,)."""
+    legs = np.hypot(*np.diff(waypoints, axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(legs)]) / speed
+
+
+@compiled
+def reference(t: float, waypoints: Float64, times: Float64, last: int) -> tuple[float, float, float, float]:
+    """Position [m] and velocity [m/s] of l(t), north and east; points beyond index ``last`` are padding."""
+    if t >= times[last]:
+        return waypoints[last, 0], waypoints[last, 1], 0.0, 0.0
+    k = 0
+    while t >= times[k + 1]:
+        k += 1
+    duration = times[k + 1] - times[k]
+    v_x = (waypoints[k + 1, 0] - waypoints[k, 0]) / duration
+    v_y = (waypoints[k + 1, 1] - waypoints[k, 1]) / duration
+    return waypoints[k, 0] + v_x * (t - times[k]), waypoints[k, 1] + v_y * (t - times[k]), v_x, v_y
