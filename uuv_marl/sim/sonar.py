@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.percept import Offsets
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
-from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.compiled import compiled, compiled_inline
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -108,29 +108,43 @@ def _unit(degrees: float) -> tuple[float, float]:
     return math.cos(radians), math.sin(radians)
 
 
-@compiled
+@compiled_inline
 def cross(a_x: float, a_y: float, b_x: float, b_y: float) -> float:
     """Positive where b is clockwise of a, by less than half a turn."""
     return a_x * b_y - a_y * b_x
 
 
-@compiled
-def hear(b_x: float, b_y: float, squared: float, other: int, nearest: Float64, heard: Int32, suite: Suite) -> None:
-    """Keep the vehicle ``other`` at body position b where it is the nearest of its sub-sector. Eq. 8-9, 13-15."""
-    for fan in range(suite.fan_range.shape[0]):
-        if squared >= suite.fan_range[fan] * suite.fan_range[fan]:
-            continue
-        first, end = suite.fan_first[fan], suite.fan_first[fan + 1]
-        if cross(suite.lower[first, 0], suite.lower[first, 1], b_x, b_y) <= 0.0:
-            continue
-        if cross(suite.upper[end - 1, 0], suite.upper[end - 1, 1], b_x, b_y) > 0.0:
-            continue
-        k = first
-        for inner in range(first, end - 1):
-            k += int(cross(suite.upper[inner, 0], suite.upper[inner, 1], b_x, b_y) > 0.0)
-        if squared < nearest[k]:
-            nearest[k] = squared
-            heard[k] = other
+@compiled_inline
+def hear(
+    i: int,
+    j: int,
+    b_x: float,
+    b_y: float,
+    squared: float,
+    lower: Float64,
+    upper: Float64,
+    fan_first: Int64,
+    fan_range: Float64,
+    nearest: Float64,
+    heard: Int32,
+) -> None:
+    """Vehicle i keeps vehicle j, at body position b, where j is the nearest of its sub-sector. Eq. 8-9, 13-15.
+
+    Arrays one by one, whole and not by row: a tuple of them, or a slice, costs more than the arithmetic.
+    """
+    for fan in range(fan_range.shape[0]):
+        first, end = fan_first[fan], fan_first[fan + 1]
+        if (
+            squared < fan_range[fan] * fan_range[fan]
+            and cross(lower[first, 0], lower[first, 1], b_x, b_y) > 0.0
+            and cross(upper[end - 1, 0], upper[end - 1, 1], b_x, b_y) <= 0.0
+        ):
+            k = first
+            for inner in range(first, end - 1):
+                k += int(cross(upper[inner, 0], upper[inner, 1], b_x, b_y) > 0.0)
+            if squared < nearest[i, k]:
+                nearest[i, k] = squared
+                heard[i, k] = j
 
 
 @compiled
@@ -217,9 +231,15 @@ def survey_world(
                     found.contacts[j] += 1
                     began += 1.0
             if listens and not (suite.obstacles_hide and hidden(x, y, dx, dy, obstacles, num_obstacles)):
-                hear(c_i * dx + s_i * dy, c_i * dy - s_i * dx, squared, j, found.nearest[i], found.heard[i], suite)
+                hear(
+                    i, j, c_i * dx + s_i * dy, c_i * dy - s_i * dx, squared,
+                    suite.lower, suite.upper, suite.fan_first, suite.fan_range, found.nearest, found.heard,
+                )  # fmt: skip
                 c_j, s_j = found.heading[j, 0], found.heading[j, 1]
-                hear(-c_j * dx - s_j * dy, s_j * dx - c_j * dy, squared, i, found.nearest[j], found.heard[j], suite)
+                hear(
+                    j, i, -c_j * dx - s_j * dy, s_j * dx - c_j * dy, squared,
+                    suite.lower, suite.upper, suite.fan_first, suite.fan_range, found.nearest, found.heard,
+                )  # fmt: skip
         for k in range(num_obstacles):
             gap = math.hypot(obstacles[k, 0] - x, obstacles[k, 1] - y) - obstacles[k, 2]
             found.clearance[i] = min(found.clearance[i], gap)

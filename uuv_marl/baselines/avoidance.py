@@ -1,0 +1,55 @@
+"""Forces that the comparators share: passing an obstacle on the vehicle's own side, and the drag they make up for."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.policy import Limits
+from uuv_marl.percept import Offsets
+from uuv_marl.sim.compiled import compiled
+
+Float32 = NDArray[np.float32]
+
+
+@compiled
+def bump(share: float) -> float:
+    """1 at 0, falling smoothly to 0 at 1 and beyond (a raised cosine)."""
+    if share >= 1.0:
+        return 0.0
+    return 0.5 * (1.0 + math.cos(math.pi * max(share, 0.0)))
+
+
+@compiled
+def pass_obstacle(
+    row: Float32, at: Offsets, repulsion: float, repulsion_range: float, tangential: float, tangential_range: float
+) -> tuple[float, float]:
+    """Force [N] from the nearest echo: away from it, and sideways while the vehicle moves towards it.
+
+    The nearest echo acts as a beta-agent (Olfati-Saber 2006). The sideways push goes to the side on which the
+    vehicle already passes, port if dead ahead. Strengths in N, ranges in m.
+    """
+    nearest, reach = -1, math.inf
+    for a in range(at.echo_range - at.echo):
+        if row[at.echo + a] > 0.0 and row[at.echo_range + a] < reach:
+            nearest, reach = a, float(row[at.echo_range + a])
+    if nearest < 0:
+        return 0.0, 0.0
+    n_x, n_y = float(row[at.echo_position + 2 * nearest]), float(row[at.echo_position + 2 * nearest + 1])
+    distance = math.hypot(n_x, n_y)
+    n_x, n_y = (n_x / distance, n_y / distance) if distance > 0.0 else (1.0, 0.0)
+    g_x, g_y = float(row[at.velocity]), float(row[at.velocity + 1])
+    speed = math.hypot(g_x, g_y)
+    g_x, g_y = (g_x / speed, g_y / speed) if speed > 0.1 else (1.0, 0.0)
+    towards = max(g_x * n_x + g_y * n_y, 0.0)
+    side = 1.0 if g_x * n_y - g_y * n_x >= 0.0 else -1.0
+    away = repulsion * bump(reach / repulsion_range)
+    push = tangential * towards * bump(reach / tangential_range) * side
+    return -away * n_x + push * n_y, -away * n_y - push * n_x
+
+
+@compiled
+def own_drag(row: Float32, at: Offsets, limits: Limits) -> float:
+    """Surge resistance at the vehicle's own speed [N]."""
+    u = float(row[at.velocity])
+    return (limits.X_u + limits.X_uu * abs(u)) * u

@@ -1,0 +1,151 @@
+"""The paper's controller (Eq. 18-22), from positions alone, and the strongest hand-made form of the same law."""
+
+import math
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.percept import Offsets, Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+
+Float32 = NDArray[np.float32]
+Int64 = NDArray[np.int64]
+
+FEED_FORWARD = 1.2
+"""Of ``bio_inspired_plus``: a little more than the drag, since it acts along the reference and not along the bow."""
+_MAX_EXPONENT = 50.0
+_MIN_DISTANCE_M = 0.5
+
+
+class Gains(NamedTuple):
+    """Eq. 18-21; the defaults are Table 1."""
+
+    zeta_l: float = 30.0
+    """Attraction to the reference point [N/m]. Table 1."""
+    zeta_n: float = 0.8
+    """Weight of neighbours [N/m]. Table 1."""
+    delta_n: float = 60.0
+    """Distance at which neighbours neither attract nor repel [m]. Table 1."""
+    zeta_o: float = 8.0
+    """Weight of obstacles [N/m]. Table 1."""
+    delta_o: float = 80.0
+    """Decay length of their repulsion [m]. Table 1."""
+    feed_forward: float = 0.0
+    """Multiple of the drag at the reference's velocity that is pushed in advance; none in the paper."""
+
+
+ObstacleTerm = Literal["per_echo", "per_obstacle"]
+
+
+class BioInspired(Policy):
+    """Attraction to l(t), attraction and repulsion among neighbours, repulsion from obstacles. Eq. 18-22.
+
+    Args:
+        gains: Table 1 by default.
+        obstacle_term: Eq. 21's sum runs over echoes, or over obstacles. Adjacent sub-sectors that echo count as one
+            obstacle where their positions agree (centres) or follow without a gap (surfaces); its nearest echo counts.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        num_worlds: int = 1,
+        *,
+        gains: Gains | None = None,
+        obstacle_term: ObstacleTerm = "per_echo",
+    ) -> None:
+        super().__init__(scenario, num_worlds)
+        self.gains = gains or Gains()
+        self._once = obstacle_term == "per_obstacle"
+        self._centres = scenario.sonar.echo_reports == "centre"
+
+    def act(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        action = np.empty((*percept.flat.shape[:2], 2), np.float32)
+        _act(percept.flat, self.layout.offsets, self.gains, self.limits, self._once, self._centres, action, self.clamps)
+        return action
+
+
+class BioInspiredPlus(BioInspired):
+    """The same law with feed-forward of the reference's velocity, yaw damping, and tuned gains."""
+
+    yaw_damping_nms: ClassVar[float] = 600.0
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+        super().__init__(
+            scenario, num_worlds, gains=gains or Gains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)
+        )
+
+
+@compiled
+def bounded_exp(length: float, distance: float) -> tuple[float, int]:
+    """exp(length / distance) [1], with the distance kept above 0.5 m and the exponent below 50; 1 if either bound."""
+    clamped = int(distance < _MIN_DISTANCE_M)
+    exponent = length / max(distance, _MIN_DISTANCE_M)
+    if exponent > _MAX_EXPONENT:
+        return math.exp(_MAX_EXPONENT), 1
+    return math.exp(exponent), clamped
+
+
+@compiled
+def neighbour_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]:
+    """Force [N] from a neighbour at p, relative to the vehicle [m]; zero at delta_n. One term of Eq. 20."""
+    value, clamped = bounded_exp(g.delta_n, math.hypot(p_x, p_y))
+    weight = -g.zeta_n * (value - math.e)
+    return weight * p_x, weight * p_y, clamped
+
+
+@compiled
+def obstacle_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]:
+    """Force [N] from an obstacle at p, relative to the vehicle [m]. One term of Eq. 21."""
+    value, clamped = bounded_exp(g.delta_o, math.hypot(p_x, p_y))
+    weight = -g.zeta_o * value
+    return weight * p_x, weight * p_y, clamped
+
+
+@compiled
+def counts_once(row: Float32, a: int, num_active: int, at: Offsets, centres: bool) -> bool:
+    """Whether active sub-sector a holds the echo that stands for its whole obstacle: the nearest, first of equals."""
+    reach = row[at.echo_range + a]
+    for side in (-1, 1):
+        other = a + side
+        while 0 <= other < num_active and row[at.echo + other] > 0.0:
+            if centres and (
+                row[at.echo_position + 2 * other] != row[at.echo_position + 2 * a]
+                or row[at.echo_position + 2 * other + 1] != row[at.echo_position + 2 * a + 1]
+            ):
+                break
+            theirs = row[at.echo_range + other]
+            if theirs < reach or (theirs == reach and side < 0):
+                return False
+            other += side
+    return True
+
+
+@compiled
+def _act(
+    flat: Float32, at: Offsets, g: Gains, limits: Limits, once: bool, centres: bool, action: Float32, clamps: Int64
+) -> None:
+    sectors = at.neighbour - at.heard
+    num_active = at.echo_range - at.echo
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            row = flat[w, i]
+            v_x, v_y = row[at.reference_velocity], row[at.reference_velocity + 1]
+            drag = g.feed_forward * (limits.X_u + limits.X_uu * math.hypot(v_x, v_y))
+            f_x = g.zeta_l * row[at.reference] + drag * v_x
+            f_y = g.zeta_l * row[at.reference + 1] + drag * v_y
+            for k in range(sectors):
+                if row[at.heard + k] > 0.0:
+                    d_x, d_y, c = neighbour_force(row[at.neighbour + 2 * k], row[at.neighbour + 2 * k + 1], g)
+                    f_x, f_y = f_x + d_x, f_y + d_y
+                    clamps[w] += c
+            for a in range(num_active):
+                if row[at.echo + a] > 0.0 and (not once or counts_once(row, a, num_active, at, centres)):
+                    d_x, d_y, c = obstacle_force(row[at.echo_position + 2 * a], row[at.echo_position + 2 * a + 1], g)
+                    f_x, f_y = f_x + d_x, f_y + d_y
+                    clamps[w] += c
+            write_action(f_x, f_y, limits, action[w, i])

@@ -1,0 +1,106 @@
+"""What a policy is: percepts in, actions out, memory behind ``reset``; and the channels that it needs beyond them."""
+
+import abc
+import json
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.vehicle import project
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+
+class Limits(NamedTuple):
+    """What a vehicle knows of itself: actuators' limits and surge resistance. SI units."""
+
+    max_force: float
+    max_torque: float
+    lever_arm: float
+    X_u: float
+    X_uu: float
+
+
+class PolicyError(ValueError):
+    """A policy that can't drive this scenario; the message names the remedy."""
+
+
+class Policy(abc.ABC):
+    """Maps the percepts of any number of worlds to actions.
+
+    Args:
+        scenario: gives the vehicle's limits, the decision period and the percept's layout.
+        num_worlds: first axis of the percepts.
+
+    Raises:
+        PolicyError: the scenario does not grant the channels or the inner loop that the policy declares.
+    """
+
+    channels: ClassVar[tuple[str, ...]] = ()
+    """Channels needed beyond the percept: ``compass``, ``link``."""
+    yaw_damping_nms: ClassVar[float] = 0.0
+    """Inner loop that the policy was designed with [N m s]."""
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
+        name = type(self).__name__
+        missing = [channel for channel in self.channels if channel not in scenario.sonar.channels]
+        if missing:
+            raise PolicyError(
+                f"{name} needs the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)}, which scenario "
+                f"{scenario.name!r} does not grant; override sonar.channels with {list(self.channels)}"
+            )
+        if scenario.actuators.yaw_damping_nms != self.yaw_damping_nms:
+            raise PolicyError(
+                f"{name} is designed for a yaw damping of {self.yaw_damping_nms:g} N m s, scenario {scenario.name!r} "
+                f"has {scenario.actuators.yaw_damping_nms:g}; override actuators.yaw_damping_nms with "
+                f"{self.yaw_damping_nms:g}"
+            )
+        actuators = scenario.actuators
+        self.scenario = scenario
+        self.num_worlds = num_worlds
+        self.layout = PerceptLayout.of(scenario)
+        self.limits = Limits(
+            actuators.max_force_n,
+            actuators.max_torque_nm,
+            actuators.lever_arm_m,
+            scenario.vehicle.X_u,
+            scenario.vehicle.X_uu,
+        )
+        self.clamps: Int64 = np.zeros(num_worlds, np.int64)
+        """How often a numerical clamp bound since the reset, shape (world,)."""
+
+    def reset(self, seed: int | Sequence[int] = 0, worlds: Sequence[int] | None = None) -> None:
+        """Forget the past of these worlds (default all); seeds as in ``Swarm.reset``."""
+        chosen = list(range(self.num_worlds) if worlds is None else worlds)
+        seeds = [seed + w for w in chosen] if isinstance(seed, int) else list(seed)
+        self.clamps[chosen] = 0
+        self.forget(chosen, seeds)
+
+    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:
+        """Hook: clear the memory of these worlds."""
+
+    @abc.abstractmethod
+    def act(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2), float32, within the unit disc, from percepts (world, vehicle, ...)."""
+
+
+@compiled
+def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
+    """The action for a desired body-frame force [N]: thrust along x, torque by the lever arm along y. Eq. 22."""
+    a_x, a_y = project(f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque)
+    out[0], out[1] = a_x, a_y
+
+
+def tuned(name: str) -> Mapping[str, float]:
+    """The best parameters that tuning found for a policy; all its trials are in the same shipped file."""
+    text = resources.files("uuv_marl.baselines").joinpath("tuned", f"{name}.json").read_text(encoding="utf-8")
+    data: dict[str, Any] = json.loads(text)
+    return data["best"]

@@ -1,0 +1,115 @@
+"""Policies by name, for a swarm or for an environment."""
+
+import difflib
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
+from uuv_marl.baselines.floors import Idle, Random
+from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.sdc import Sdc, SdcInformed
+from uuv_marl.baselines.sff import Sff, SffInformed
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+
+Float32 = NDArray[np.float32]
+
+POLICIES: dict[str, type[Policy]] = {
+    "bio_inspired": BioInspired,
+    "bio_inspired_plus": BioInspiredPlus,
+    "sff": Sff,
+    "sdc": Sdc,
+    "sff_informed": SffInformed,
+    "sdc_informed": SdcInformed,
+    "random": Random,
+    "idle": Idle,
+}
+"""Every policy that ships with the package."""
+
+
+class SwarmEnv(Protocol):
+    """What ``make`` needs of an environment: ours, or a wrapper whose ``unwrapped`` is ours."""
+
+    @property
+    def unwrapped(self) -> Any:
+        """The environment below all wrappers, with ``scenario`` and ``possible_agents``."""
+        ...
+
+
+class EnvPolicy:
+    """A policy that drives a PettingZoo parallel environment from its observations alone.
+
+    ``policy.reset(seed)`` after every ``env.reset``; then ``actions = policy(observations)``.
+    """
+
+    def __init__(self, policy: Policy, agents: Sequence[str]) -> None:
+        self.policy = policy
+        self._agents = list(agents)
+
+    def reset(self, seed: int = 0) -> None:
+        """Forget the episode before. The seed matters to policies that draw."""
+        self.policy.reset(seed)
+
+    def __call__(self, observations: Mapping[str, Float32]) -> dict[str, Float32]:
+        """An action for every agent that has an observation."""
+        layout = self.policy.layout
+        rows = np.zeros((1, len(self._agents), layout.size), np.float32)
+        for i, agent in enumerate(self._agents):
+            if agent in observations:
+                rows[0, i] = observations[agent]
+        actions = self.policy.act(Percept.from_observation(rows, layout))[0]
+        return {agent: actions[i] for i, agent in enumerate(self._agents) if agent in observations}
+
+
+def policy_class(name: str) -> type[Policy]:
+    """A policy's class by its name. Raises PolicyError with the nearest name."""
+    if name not in POLICIES:
+        near = difflib.get_close_matches(name, POLICIES, n=1, cutoff=0.4)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise PolicyError(f"policy {name!r} is unknown; {hint}There are {', '.join(POLICIES)}")
+    return POLICIES[name]
+
+
+def granted(name: str, scenario: Scenario) -> Scenario:
+    """The scenario with the channels and the inner loop that a policy declares, and no others."""
+    policy = policy_class(name)
+    return load_scenario(
+        scenario,
+        overrides={
+            "sonar.channels": list(policy.channels),
+            "actuators.yaw_damping_nms": policy.yaw_damping_nms,
+        },
+    )
+
+
+@overload
+def make(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
+@overload
+def make(name: str, target: SwarmEnv, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
+def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **parameters: object) -> Policy | EnvPolicy:
+    """A policy by name.
+
+    Args:
+        name: one of ``POLICIES``.
+        target: a scenario, for a policy that maps ``Percept`` to actions; or a parallel environment of ours, wrapped
+            or not, for one that maps its observation dictionaries to action dictionaries.
+        num_worlds: worlds stepped together; 1 for an environment.
+        parameters: keyword arguments of the policy, such as ``gains``.
+
+    Raises:
+        PolicyError: unknown name or parameter, or the target lacks what the policy declares (see ``granted``).
+    """
+    constructor: Callable[..., Policy] = policy_class(name)
+    known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
+    unknown = [key for key in parameters if key not in known]
+    if unknown:
+        raise PolicyError(f"policy {name!r} has no parameter {unknown[0]!r}; it has {', '.join(known) or 'none'}")
+    if isinstance(target, Scenario):
+        return constructor(target, num_worlds, **parameters)
+    env = target.unwrapped
+    return EnvPolicy(constructor(env.scenario, 1, **parameters), env.possible_agents)

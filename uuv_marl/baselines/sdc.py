@@ -1,0 +1,195 @@
+"""A comparator in the style of single-informed distributed consensus (SDC), which the paper only names: a reconstruction.
+
+Every vehicle holds a slot of a hexagonal lattice relative to the neighbours it hears; one of them (or all) also
+relative to l(t). The error is kept within a shrinking funnel (prescribed performance), and a velocity coordination
+term, a short-range repulsion and an obstacle term are added.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
+from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.percept import Offsets, Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+SLOT_PITCH_M = 12.0
+"""Distance between neighbouring slots."""
+_MAX_XI = 0.99
+
+
+class Gains(NamedTuple):
+    """Free parameters, found by tuning."""
+
+    consensus: float
+    """Force per unit of transformed error [N]."""
+    rho_0: float
+    """Half width of the funnel at the start [m]."""
+    rho_inf: float
+    """And in the end [m]."""
+    kappa: float
+    """How fast it shrinks [1/s]."""
+    reference: float
+    """Weight of l(t) in an informed vehicle's error, all neighbours together weighing 1 [1]."""
+    velocity: float
+    """Velocity coordination [N s/m]."""
+    short: float
+    """Largest short-range repulsion per neighbour [N]."""
+    short_range: float
+    """Where it ends [m]."""
+    repulsion: float
+    """Largest repulsion from an obstacle [N]."""
+    repulsion_range: float
+    """Where it ends [m]."""
+    tangential: float
+    """Largest sideways push [N]."""
+    tangential_range: float
+    """Where it ends [m]."""
+    drag: float
+    """Share of the vehicle's own drag that it makes up for [1]."""
+    reference_velocity: float = 0.0
+    """Damping towards the reference's velocity [N s/m]; 0 where it is not used."""
+
+
+class Sdc(Policy):
+    """Distributed consensus with prescribed performance; one vehicle alone reads the reference, its position only.
+
+    Slots are assigned before the mission, centrally, from the first percepts of a world; from then on every vehicle
+    acts on its own percept. The informed vehicle is the one whose slot is nearest to the lattice's centre.
+    """
+
+    channels: ClassVar[tuple[str, ...]] = ("compass", "link")
+    tuned_as: ClassVar[str] = "sdc"
+    all_informed: ClassVar[bool] = False
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+        super().__init__(scenario, num_worlds)
+        self.gains = gains or Gains(**tuned(self.tuned_as))
+        n = scenario.swarm.num_vehicles
+        self._lattice = hexagonal_slots(n)
+        self._slots = np.zeros((num_worlds, n, 2))
+        self._informed = np.zeros((num_worlds, n), np.bool_)
+        self._decisions = np.zeros(num_worlds, np.int64)
+
+    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:  # noqa: ARG002 - nothing is drawn
+        """Slots are assigned anew at the next decision, the funnel opens again."""
+        self._decisions[list(worlds)] = 0
+
+    def act(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        for w in np.flatnonzero(self._decisions == 0):
+            self._assign(int(w), Percept(percept.flat[w], percept.layout))
+        action = np.empty((*percept.flat.shape[:2], 2), np.float32)
+        g = self.gains
+        rho = (g.rho_0 - g.rho_inf) * np.exp(
+            -g.kappa * self.scenario.timing.decision_period_s * self._decisions
+        ) + g.rho_inf
+        _act(
+            percept.flat, self.layout.offsets, g, self.limits, self._slots, self._informed, rho, action, self.clamps
+        )  # fmt: skip
+        self._decisions += 1
+        return action
+
+    def _assign(self, w: int, percept: Percept) -> None:
+        """Each vehicle's slot, so that the sum of squared ways from the start is smallest."""
+        compass, to_reference = percept["compass"].astype(np.float64), percept["reference"].astype(np.float64)
+        c, s = compass[:, 0], compass[:, 1]
+        places = -np.stack(
+            [c * to_reference[:, 0] - s * to_reference[:, 1], s * to_reference[:, 0] + c * to_reference[:, 1]], axis=1
+        )
+        places -= places.mean(axis=0)
+        cost = ((places[:, None, :] - self._lattice[None, :, :]) ** 2).sum(axis=-1)
+        _, slot = linear_sum_assignment(cost)
+        self._slots[w] = self._lattice[slot]
+        self._informed[w] = self.all_informed
+        self._informed[w, int(np.argmin((self._slots[w] ** 2).sum(axis=-1)))] = True
+
+
+class SdcInformed(Sdc):
+    """The same, every vehicle reading the reference's position and velocity."""
+
+    tuned_as: ClassVar[str] = "sdc_informed"
+    all_informed: ClassVar[bool] = True
+
+
+def hexagonal_slots(n: int) -> Float64:
+    """The n points of a hexagonal lattice nearest to its centre, their mean at zero [m], shape (vehicle, 2)."""
+    reach = math.ceil(math.sqrt(n)) + 2
+    row, column = (axis.ravel() for axis in np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    points = SLOT_PITCH_M * np.stack([row * math.sqrt(3) / 2, column + 0.5 * (row % 2)], axis=1)
+    # Rounded, so that points at equal distances keep their order on every machine.
+    nearest = points[np.argsort(np.round((points**2).sum(axis=1), 6), kind="stable")[:n]]
+    return nearest - nearest.mean(axis=0)
+
+
+@compiled
+def _act(
+    flat: Float32,
+    at: Offsets,
+    g: Gains,
+    limits: Limits,
+    slots: Float64,
+    informed: Bool,
+    rho: Float64,
+    action: Float32,
+    clamps: Int64,
+) -> None:
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            f_x, f_y, clamped = _force(flat[w, i], at, g, limits, slots[w], i, informed[w, i], rho[w])
+            clamps[w] += clamped
+            write_action(f_x, f_y, limits, action[w, i])
+
+
+@compiled
+def _force(
+    row: Float32, at: Offsets, g: Gains, limits: Limits, slots: Float64, i: int, informed: bool, rho: float
+) -> tuple[float, float, int]:
+    u, v = float(row[at.velocity]), float(row[at.velocity + 1])
+    c, s = float(row[at.compass]), float(row[at.compass + 1])
+    z_x, z_y, w_x, w_y, near_x, near_y, num = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
+    for k in range(at.neighbour - at.heard):
+        if row[at.heard + k] == 0.0:
+            continue
+        p_x, p_y = float(row[at.neighbour + 2 * k]), float(row[at.neighbour + 2 * k + 1])
+        j = int(row[at.link_identity + k]) - 1
+        d_x, d_y = slots[j, 0] - slots[i, 0], slots[j, 1] - slots[i, 1]
+        z_x, z_y = z_x + c * d_x + s * d_y - p_x, z_y + c * d_y - s * d_x - p_y
+        w_x, w_y = w_x + row[at.link_velocity + 2 * k] - u, w_y + row[at.link_velocity + 2 * k + 1] - v
+        distance = max(math.hypot(p_x, p_y), 0.1)
+        away = g.short * bump(distance / g.short_range) / distance
+        near_x, near_y, num = near_x - away * p_x, near_y - away * p_y, num + 1
+    weight = 0.0
+    if num > 0:
+        z_x, z_y, w_x, w_y, weight = z_x / num, z_y / num, w_x / num, w_y / num, 1.0
+    if informed:
+        e_x = -c * slots[i, 0] - s * slots[i, 1] - row[at.reference]
+        e_y = -c * slots[i, 1] + s * slots[i, 0] - row[at.reference + 1]
+        z_x, z_y, weight = z_x + g.reference * e_x, z_y + g.reference * e_y, weight + g.reference
+    f_x, f_y, clamped = g.drag * own_drag(row, at, limits), 0.0, 0
+    if weight > 0.0:
+        size = math.hypot(z_x, z_y) / weight
+        xi = size / rho
+        if xi > _MAX_XI:
+            xi, clamped = _MAX_XI, 1
+        # 0.5 ln((1 + xi) / (1 - xi)) against the error's direction.
+        strength = g.consensus * math.atanh(xi) / max(size * weight, 1e-9)
+        f_x, f_y = f_x - strength * z_x, f_y - strength * z_y
+    f_x += g.velocity * w_x + near_x
+    f_y += g.velocity * w_y + near_y
+    if informed:
+        f_x += g.reference_velocity * (row[at.reference_velocity] - u)
+        f_y += g.reference_velocity * (row[at.reference_velocity + 1] - v)
+    o_x, o_y = pass_obstacle(row, at, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
+    return f_x + o_x, f_y + o_y, clamped

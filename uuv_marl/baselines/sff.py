@@ -1,0 +1,178 @@
+"""A comparator in the style of self-organised fission and fusion (SFF), which the paper only names: a reconstruction.
+
+Neighbours' positions are predicted from their history; a clustering term acts on the predictions, a hybrid velocity
+term follows the neighbours' mean or, once an obstacle echoes, the one whose motion changed most; a splitting term
+passes obstacles on either side; and the vehicle is pulled to l(t).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
+from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.percept import Offsets, Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+HORIZON_S = 1.0
+"""How far ahead neighbours are predicted."""
+_MAX_RATE_MPS = 8.0
+
+
+class Gains(NamedTuple):
+    """Free parameters, found by tuning."""
+
+    pull: float
+    """Largest pull to l(t) [N]."""
+    pull_length: float
+    """Distance at which the pull is 0.7 of that [m]."""
+    cluster: float
+    """Largest clustering force per neighbour [N]."""
+    cluster_distance: float
+    """Where it changes sign [m]."""
+    cluster_width: float
+    """Length of its transition [m]."""
+    cluster_range: float
+    """Where it ends [m]."""
+    velocity: float
+    """Velocity coordination [N s/m]."""
+    blend: float
+    """Weight of the neighbour whose motion changed most, while an obstacle echoes [1]."""
+    repulsion: float
+    """Largest repulsion from an obstacle [N]."""
+    repulsion_range: float
+    """Where it ends [m]."""
+    tangential: float
+    """Largest sideways push [N]."""
+    tangential_range: float
+    """Where it ends [m]."""
+    drag: float
+    """Share of the vehicle's own drag that it makes up for [1]."""
+    reference_velocity: float = 0.0
+    """Damping towards the reference's velocity [N s/m]; 0 where it is not used."""
+
+
+class Memory(NamedTuple):
+    """What each vehicle remembers of the decision before."""
+
+    identity: Float32
+    """Who was heard in each sub-sector, 0 for nobody, shape (world, vehicle, sector)."""
+    position: Float64
+    """Where, in the body frame of then [m], shape (world, vehicle, sector, 2)."""
+    velocity: Float64
+    """And how it moved [m/s], shape (world, vehicle, sector, 2)."""
+
+
+class Sff(Policy):
+    """Self-organised fission and fusion, neighbours' velocity over the link, the reference's velocity unused."""
+
+    channels: ClassVar[tuple[str, ...]] = ("link",)
+    tuned_as: ClassVar[str] = "sff"
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+        super().__init__(scenario, num_worlds)
+        self.gains = gains or Gains(**tuned(self.tuned_as))
+        shape = (num_worlds, scenario.swarm.num_vehicles, scenario.sonar.num_sectors)
+        self._memory = Memory(np.zeros(shape, np.float32), np.zeros((*shape, 2)), np.zeros((*shape, 2)))
+
+    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:  # noqa: ARG002 - nothing is drawn
+        """Nobody has been heard yet."""
+        self._memory.identity[list(worlds)] = 0.0
+
+    def act(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        action = np.empty((*percept.flat.shape[:2], 2), np.float32)
+        period = self.scenario.timing.decision_period_s
+        _act(percept.flat, self.layout.offsets, self.gains, self.limits, period, self._memory, action)
+        return action
+
+
+class SffInformed(Sff):
+    """The same, every vehicle using the reference's velocity."""
+
+    tuned_as: ClassVar[str] = "sff_informed"
+
+
+@compiled
+def clustering(d: float, g: Gains) -> float:
+    """Attraction [N] at distance d [m]; negative repels. Olfati-Saber's phi_alpha with a transition of set width."""
+    z = (d - g.cluster_distance) / g.cluster_width
+    return g.cluster * bump(d / g.cluster_range) * z / math.sqrt(1.0 + z * z)
+
+
+@compiled
+def _recall(identity: float, known: Float32) -> int:
+    for k in range(known.shape[0]):
+        if known[k] == identity:
+            return k
+    return -1
+
+
+@compiled
+def _act(
+    flat: Float32, at: Offsets, g: Gains, limits: Limits, period: float, memory: Memory, action: Float32
+) -> None:
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            f_x, f_y = _force(
+                flat[w, i], at, g, limits, period, memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
+            )
+            write_action(f_x, f_y, limits, action[w, i])
+
+
+@compiled
+def _force(
+    row: Float32, at: Offsets, g: Gains, limits: Limits, period: float, who: Float32, where: Float64, moved: Float64
+) -> tuple[float, float]:
+    sectors = at.neighbour - at.heard
+    u, v, r = float(row[at.velocity]), float(row[at.velocity + 1]), float(row[at.yaw_rate])
+    c, s = math.cos(r * period), math.sin(r * period)
+    l_x, l_y = float(row[at.reference]), float(row[at.reference + 1])
+    pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
+    f_x, f_y = pull * l_x + g.drag * own_drag(row, at, limits), pull * l_y
+    mean_x, mean_y, num = 0.0, 0.0, 0
+    change, leader_x, leader_y = -1.0, 0.0, 0.0
+    for k in range(sectors):
+        if row[at.heard + k] == 0.0:
+            continue
+        p_x, p_y = float(row[at.neighbour + 2 * k]), float(row[at.neighbour + 2 * k + 1])
+        v_x, v_y = float(row[at.link_velocity + 2 * k]), float(row[at.link_velocity + 2 * k + 1])
+        q_x, q_y = p_x, p_y
+        old = _recall(row[at.link_identity + k], who)
+        if old >= 0:
+            # The frame has turned by r * period since then.
+            rate_x = (p_x - c * where[old, 0] - s * where[old, 1]) / period
+            rate_y = (p_y - c * where[old, 1] + s * where[old, 0]) / period
+            slow = HORIZON_S * min(1.0, _MAX_RATE_MPS / max(math.hypot(rate_x, rate_y), 1e-9))
+            q_x, q_y = p_x + slow * rate_x, p_y + slow * rate_y
+            turn_x = v_x - c * moved[old, 0] - s * moved[old, 1]
+            turn_y = v_y - c * moved[old, 1] + s * moved[old, 0]
+            if math.hypot(turn_x, turn_y) > change:
+                change, leader_x, leader_y = math.hypot(turn_x, turn_y), v_x, v_y
+        distance = max(math.hypot(q_x, q_y), 0.1)
+        attraction = clustering(distance, g)
+        f_x, f_y = f_x + attraction * q_x / distance, f_y + attraction * q_y / distance
+        mean_x, mean_y, num = mean_x + v_x, mean_y + v_y, num + 1
+    echoes = False
+    for a in range(at.echo_range - at.echo):
+        echoes = echoes or row[at.echo + a] > 0.0
+    if num > 0:
+        share = g.blend if echoes and change >= 0.0 else 0.0
+        f_x += g.velocity * ((1.0 - share) * mean_x / num + share * leader_x - u)
+        f_y += g.velocity * ((1.0 - share) * mean_y / num + share * leader_y - v)
+    f_x += g.reference_velocity * (row[at.reference_velocity] - u)
+    f_y += g.reference_velocity * (row[at.reference_velocity + 1] - v)
+    o_x, o_y = pass_obstacle(row, at, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
+    for k in range(sectors):
+        who[k] = row[at.link_identity + k]
+        where[k, 0], where[k, 1] = row[at.neighbour + 2 * k], row[at.neighbour + 2 * k + 1]
+        moved[k, 0], moved[k, 1] = row[at.link_velocity + 2 * k], row[at.link_velocity + 2 * k + 1]
+    return f_x + o_x, f_y + o_y

@@ -1,0 +1,89 @@
+"""Run a policy on a scenario over seeds."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines import make
+from uuv_marl.benchmark.metrics import Meter, Metrics
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.swarm import Swarm
+
+Float32 = NDArray[np.float32]
+
+BATCH = 32
+"""Seeds stepped together."""
+
+
+class Run(NamedTuple):
+    """One episode."""
+
+    seed: int
+    metrics: Metrics
+    series: dict[str, Float32]
+    """Samples over time, see ``Meter.series``."""
+    routes: Float32
+    """Positions [m], shape (time, vehicle, 2); NaN once a vehicle is lost."""
+    obstacles: Float32
+    """Centre north, east and radius [m], shape (obstacle, 3)."""
+    waypoints: Float32
+    """Corners of the trajectory [m], shape (point, 2)."""
+
+
+class Progress(NamedTuple):
+    """How far a batch is: simulated seconds done, and at most to do, summed over its seeds."""
+
+    done_s: float
+    total_s: float
+
+
+def evaluate(
+    scenario: Scenario, policy: str, seeds: Sequence[int], **parameters: object
+) -> Iterator[Run | Progress]:
+    """Episodes of a policy on a scenario, each as soon as it ends, with progress in between.
+
+    The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed
+    alone, not on the seeds beside it. ``parameters`` go to the policy.
+    """
+    for first in range(0, len(seeds), BATCH):
+        yield from _batch(scenario, policy, seeds[first : first + BATCH], parameters)
+
+
+def _batch(
+    scenario: Scenario, policy: str, seeds: Sequence[int], parameters: dict[str, object]
+) -> Iterator[Run | Progress]:
+    swarm = Swarm(scenario, len(seeds))
+    actor = make(policy, scenario, len(seeds), **parameters)
+    percept = swarm.reset(list(seeds))
+    actor.reset(list(seeds))
+    meter = Meter(swarm)
+    active = np.ones(len(seeds), np.bool_)
+    meter.update(active)
+    routes = [_positions(swarm)]
+    limits = swarm.time_limit_s
+    report_every = max(1, round(2.0 / scenario.timing.decision_period_s))
+    while active.any():
+        percept = swarm.step(actor.act(percept), active)
+        meter.update(active)
+        routes.append(_positions(swarm))
+        ended = active & (swarm.arrived | swarm.timed_out)
+        for w in (int(index) for index in np.flatnonzero(ended)):
+            course, num = swarm.course, int(swarm.course.num_obstacles[w])
+            yield Run(
+                seed=seeds[w],
+                metrics=meter.metrics(w, int(actor.clamps[w])),
+                series=meter.series(w),
+                routes=np.array([positions[w] for positions in routes]),
+                obstacles=course.obstacles[w, :num].astype(np.float32),
+                waypoints=course.waypoints[w, : int(course.last[w]) + 1].astype(np.float32),
+            )
+        active &= ~ended
+        if len(routes) % report_every == 0:
+            done = np.where(active, swarm.facts.time_s, limits)
+            yield Progress(float(done.sum()), float(limits.sum()))
+
+
+def _positions(swarm: Swarm) -> Float32:
+    return np.where(swarm.state.alive[:, :, None], swarm.state.eta[:, :, :2], np.nan).astype(np.float32)

@@ -1,0 +1,121 @@
+"""The metrics, one definition each. Distances are taken from the start to arrival, or to the time limit."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.swarm import ARRIVAL_RADII_M, Swarm
+
+Float64 = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+Metrics = dict[str, float | int | None | dict[str, float]]
+
+
+class Sample(NamedTuple):
+    """What is measured at one step of every world, shape (world,) each, lengths in m."""
+
+    time_s: Float64
+    min_spacing_m: Float64
+    """Smallest distance between two vehicles."""
+    max_spacing_m: Float64
+    """Largest distance between two vehicles."""
+    centre_error_m: Float64
+    """Distance of the swarm's centre from l(t)."""
+    order_parameter: Float64
+    """Length of the mean heading vector: 1 aligned, 0 disordered."""
+    within_s_l: Float64
+    """1 where every vehicle is within s_l of l(t). Eq. 7."""
+    within_s_o: Float64
+    """1 where every vehicle keeps s_o from every obstacle's surface. Eq. 7."""
+    within_s_u: Float64
+    """1 where all vehicles keep s_u from each other. Eq. 7."""
+    effort: Float64
+    """Mean squared action of the living, share of full force."""
+    saturation: Float64
+    """Share of actions at the actuators' limit."""
+
+
+def measure(swarm: Swarm) -> Sample:
+    """The sample of a swarm as it stands."""
+    facts, state, constraints = swarm.facts, swarm.state, swarm.scenario.constraints
+    alive = state.alive
+    living = np.maximum(alive.sum(axis=1), 1)
+    psi = state.eta[:, :, 2]
+    order = np.hypot((np.cos(psi) * alive).sum(axis=1), (np.sin(psi) * alive).sum(axis=1)) / living
+    away = np.hypot(*np.moveaxis(state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
+    return Sample(
+        time_s=facts.time_s.copy(),
+        min_spacing_m=facts.min_spacing.copy(),
+        max_spacing_m=facts.max_spacing.copy(),
+        centre_error_m=np.hypot(*(facts.centre - facts.reference[:, :2]).T),
+        order_parameter=order,
+        within_s_l=(np.where(alive, away, 0.0).max(axis=1) <= constraints.s_l_m).astype(np.float64),
+        within_s_o=(facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m).astype(np.float64),
+        within_s_u=(facts.min_spacing >= constraints.s_u_m).astype(np.float64),
+        effort=(facts.effort * alive).sum(axis=1) / living,
+        saturation=facts.saturated.copy(),
+    )
+
+
+class Meter:
+    """Gathers samples of a batch of worlds and sums up each when it ends."""
+
+    def __init__(self, swarm: Swarm) -> None:
+        self._swarm = swarm
+        self._samples: list[Sample] = []
+        self._clearances: list[Float64] = []
+        self._collisions = np.zeros(swarm.num_worlds, np.int64)
+
+    def update(self, active: Bool) -> None:
+        """Measure the swarm after a reset or step of the ``active`` worlds."""
+        self._samples.append(measure(self._swarm))
+        self._clearances.append(self._swarm.facts.obstacle_clearance.copy())
+        self._collisions += np.where(active, self._swarm.facts.collisions, 0)
+
+    def series(self, world: int) -> dict[str, NDArray[np.float32]]:
+        """A world's samples over time: every field of ``Sample``, and ``obstacle_distance_m`` (time, obstacle)."""
+        columns = {
+            name: np.array([getattr(sample, name)[world] for sample in self._samples], np.float32)
+            for name in Sample._fields
+        }
+        num = int(self._swarm.course.num_obstacles[world])
+        distances = np.array([clearance[world, :num] for clearance in self._clearances], np.float32)
+        return {**columns, "obstacle_distance_m": distances.reshape(len(self._samples), num)}
+
+    def metrics(self, world: int, clamps: int) -> Metrics:
+        """A world's metrics, as ``results.json`` keeps them; null where there is nothing to measure."""
+        facts = self._swarm.facts
+        table = {name: np.array([getattr(s, name)[world] for s in self._samples]) for name in Sample._fields}
+        clearance = min(float(clearance[world].min()) for clearance in self._clearances)
+        all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
+        later = {
+            f"time_within_{radius:g}_m_s": _number(facts.arrival_s[world, 1 + k])
+            for k, radius in enumerate(ARRIVAL_RADII_M)
+        }
+        return {
+            "task_time_s": _number(facts.arrival_s[world, 0]),
+            **later,
+            "duration_s": float(self._swarm.duration_s[world]),
+            "min_obstacle_distance_m": _number(clearance),
+            "min_spacing_m": _number(table["min_spacing_m"].min()),
+            "mean_min_spacing_m": _number(table["min_spacing_m"].mean()),
+            "max_spacing_m": _number(table["max_spacing_m"].max()),
+            "centre_error_m": _number(table["centre_error_m"].mean()),
+            "order_parameter": _number(table["order_parameter"].mean()),
+            "collisions": int(self._collisions[world]),
+            "constraint_share": {
+                "all": float(all_three.mean()),
+                "s_l": float(table["within_s_l"].mean()),
+                "s_o": float(table["within_s_o"].mean()),
+                "s_u": float(table["within_s_u"].mean()),
+            },
+            "effort": float(table["effort"][1:].mean()),
+            "clamps": clamps,
+            "saturation_share": float(table["saturation"][1:].mean()),
+            "vehicles_lost": int((~self._swarm.state.alive[world]).sum()),
+        }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,143 @@
+"""Fair tuning: the same optimiser, evaluations, seeds and objective for every hand-made policy with free gains."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from uuv_marl.baselines import granted
+from uuv_marl.baselines import bio_inspired, sdc, sff
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.scenario import Scenario
+
+TRIALS = 300
+SEEDS = (10_000, 10_001, 10_002, 10_003)
+"""Of the tuning range 10,000-99,999; the benchmark never uses them."""
+SCENARIO = "single_obstacle"
+_COLLISION_COST_S = 50.0
+_CLEARANCE_COST_S_PER_M = 20.0
+
+
+class Range(NamedTuple):
+    """Where a parameter may lie."""
+
+    low: float
+    high: float
+    log: bool = False
+
+
+_OBSTACLE = {
+    "repulsion": Range(300.0, 6000.0, log=True),
+    "repulsion_range": Range(5.0, 60.0),
+    "tangential": Range(300.0, 6000.0, log=True),
+    "tangential_range": Range(20.0, 100.0),
+    "drag": Range(0.0, 1.0),
+}
+_BIO = {
+    "zeta_l": Range(20.0, 200.0, log=True),
+    "zeta_n": Range(0.3, 6.0, log=True),
+    "delta_n": Range(30.0, 100.0),
+    "zeta_o": Range(0.5, 40.0, log=True),
+    "delta_o": Range(40.0, 200.0),
+}
+_SFF = {
+    "pull": Range(300.0, 6000.0, log=True),
+    "pull_length": Range(20.0, 150.0),
+    "cluster": Range(100.0, 3000.0, log=True),
+    "cluster_distance": Range(10.0, 30.0),
+    "cluster_width": Range(3.0, 25.0),
+    "cluster_range": Range(20.0, 100.0),
+    "velocity": Range(30.0, 3000.0, log=True),
+    "blend": Range(0.0, 1.0),
+    **_OBSTACLE,
+}
+_SDC = {
+    "consensus": Range(300.0, 20000.0, log=True),
+    "rho_0": Range(50.0, 300.0),
+    "rho_inf": Range(10.0, 100.0),
+    "kappa": Range(0.003, 0.3, log=True),
+    "reference": Range(0.2, 10.0, log=True),
+    "velocity": Range(30.0, 6000.0, log=True),
+    "short": Range(300.0, 6000.0, log=True),
+    "short_range": Range(6.0, 14.0),
+    **_OBSTACLE,
+}
+_INFORMED = {"reference_velocity": Range(30.0, 3000.0, log=True)}
+
+SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
+    "bio_inspired_plus": (
+        _BIO,
+        lambda **gains: bio_inspired.Gains(**gains, feed_forward=bio_inspired.FEED_FORWARD),
+    ),
+    "sff": (_SFF, sff.Gains),
+    "sff_informed": (_SFF | _INFORMED, sff.Gains),
+    "sdc": (_SDC, sdc.Gains),
+    "sdc_informed": (_SDC | _INFORMED, sdc.Gains),
+}
+"""Free parameters of every tuned policy, and how they become its gains."""
+
+
+def cost(run: Run, scenario: Scenario) -> float:
+    """What tuning minimises for one seed [s]: the task's time; the time limit and more where it fails.
+
+    A collision, and each metre of clearance below s_o, cost more than any time they could save.
+    """
+    metrics = run.metrics
+    time = metrics["task_time_s"]
+    if not isinstance(time, float):
+        limit = scenario.time_limit
+        duration = metrics["duration_s"]
+        error = metrics["centre_error_m"]
+        assert isinstance(duration, float)  # noqa: S101 - always measured
+        time = limit.factor * duration + limit.extra_s + (error if isinstance(error, float) else 0.0)
+    collisions, clearance = metrics["collisions"], metrics["min_obstacle_distance_m"]
+    assert isinstance(collisions, int)  # noqa: S101 - always counted
+    short = max(0.0, scenario.constraints.s_o_m - clearance) if isinstance(clearance, float) else 0.0
+    return time + _COLLISION_COST_S * collisions + _CLEARANCE_COST_S_PER_M * short
+
+
+def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], None]) -> Path:
+    """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
+
+    Writes ``output/POLICY.json`` with the best parameters and every trial, and keeps Optuna's journal beside it.
+    ``report`` is called with the number of trials done and the best cost [s].
+    """
+    import optuna  # noqa: PLC0415 - an extra
+    from optuna.storages.journal import JournalFileBackend  # noqa: PLC0415
+
+    from uuv_marl.scenario_files import load_scenario  # noqa: PLC0415
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    space, gains = SPACES[policy]
+    scenario = granted(policy, load_scenario(SCENARIO))
+    output.mkdir(parents=True, exist_ok=True)
+    storage = optuna.storages.JournalStorage(JournalFileBackend(str(output / f"{policy}.journal")))
+
+    def objective(trial: optuna.Trial) -> float:
+        drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.items()}
+        runs = [run for run in evaluate(scenario, policy, SEEDS, gains=gains(**drawn)) if isinstance(run, Run)]
+        return sum(cost(run, scenario) for run in runs) / len(runs)
+
+    done = len(optuna.create_study(storage=storage, study_name=policy, load_if_exists=True).trials)
+    while done < trials:
+        # One sampler seed per trial: a resumed search draws what an uninterrupted one draws.
+        sampler = optuna.samplers.TPESampler(seed=done, multivariate=True, n_startup_trials=60)
+        study = optuna.load_study(study_name=policy, storage=storage, sampler=sampler)
+        study.optimize(objective, n_trials=1)
+        done += 1
+        report(done, study.best_value)
+    study = optuna.load_study(study_name=policy, storage=storage)
+    result = {
+        "policy": policy,
+        "objective": "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
+        "scenario": SCENARIO,
+        "seeds": list(SEEDS),
+        "optimiser": f"Optuna {optuna.__version__} TPESampler(multivariate), seed = trial number",
+        "space": {name: {"low": r.low, "high": r.high, "log": r.log} for name, r in space.items()},
+        "best": {name: float(f"{value:.4g}") for name, value in study.best_params.items()},
+        "best_cost_s": study.best_value,
+        "trials": [[round(t.value or 0.0, 2), *(float(f"{v:.4g}") for v in t.params.values())] for t in study.trials],
+    }
+    path = output / f"{policy}.json"
+    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    return path
