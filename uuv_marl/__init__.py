@@ -1,1 +1,33 @@
+"""Swarms of unmanned underwater vehicles: a PettingZoo environment, reference controllers and a benchmark.
+
+``parallel_env()`` and ``env()`` make environments, ``load_scenario(name)`` a configuration,
+``baselines.make(name, env)`` a controller. ``uuv-marl --help`` shows the command line.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from uuv_marl import baselines, uuv_swarm_v0
+    from uuv_marl.envs.parallel_env import env, parallel_env
+    from uuv_marl.scenario_files import load_scenario, scenario_names
+
+__all__ = ["__version__", "baselines", "env", "load_scenario", "parallel_env", "scenario_names", "uuv_swarm_v0"]
+
+_HOMES = {
+    "env": "uuv_marl.envs.parallel_env",
+    "parallel_env": "uuv_marl.envs.parallel_env",
+    "load_scenario": "uuv_marl.scenario_files",
+    "scenario_names": "uuv_marl.scenario_files",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use, so that ``import uuv_marl`` is quick and needs only what is used."""
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    if name in ("baselines", "uuv_swarm_v0"):
+        return importlib.import_module(f"uuv_marl.{name}")
+    raise AttributeError(f"module 'uuv_marl' has no attribute {name!r}")

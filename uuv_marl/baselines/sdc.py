@@ -1,8 +1,9 @@
 """A comparator in the style of single-informed distributed consensus (SDC), which the paper only names: a reconstruction.
 
-Every vehicle holds a slot of a hexagonal lattice relative to the neighbours it hears; one of them (or all) also
-relative to l(t). The error is kept within a shrinking funnel (prescribed performance), and a velocity coordination
-term, a short-range repulsion and an obstacle term are added.
+Every vehicle holds a slot of a hexagonal lattice relative to its predecessors: the neighbours it hears whose slots are
+nearer to the informed vehicle's. So what the one informed vehicle reads of l(t) spreads outwards along a directed
+graph. The error is kept within a shrinking funnel (prescribed performance), and a velocity coordination term, a
+short-range repulsion and an obstacle term are added.
 """
 
 import math
@@ -22,7 +23,6 @@ from uuv_marl.sim.compiled import compiled
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 SLOT_PITCH_M = 12.0
 """Distance between neighbouring slots."""
@@ -41,7 +41,7 @@ class Gains(NamedTuple):
     kappa: float
     """How fast it shrinks [1/s]."""
     reference: float
-    """Weight of l(t) in an informed vehicle's error, all neighbours together weighing 1 [1]."""
+    """Weight of l(t) in an informed vehicle's error, all predecessors together weighing 1 [1]."""
     velocity: float
     """Velocity coordination [N s/m]."""
     short: float
@@ -58,18 +58,20 @@ class Gains(NamedTuple):
     """Where it ends [m]."""
     drag: float
     """Share of the vehicle's own drag that it makes up for [1]."""
-    reference_velocity: float = 0.0
-    """Damping towards the reference's velocity [N s/m]; 0 where it is not used."""
+    reference_velocity: float
+    """Damping of informed vehicles towards the reference's velocity [N s/m]."""
 
 
 class Sdc(Policy):
-    """Distributed consensus with prescribed performance; one vehicle alone reads the reference, its position only.
+    """Distributed consensus with prescribed performance; one vehicle alone reads the reference.
 
     Slots are assigned before the mission, centrally, from the first percepts of a world; from then on every vehicle
     acts on its own percept. The informed vehicle is the one whose slot is nearest to the lattice's centre.
     """
 
     channels: ClassVar[tuple[str, ...]] = ("compass", "link")
+    yaw_damping_nms: ClassVar[float] = 600.0
+    """Without it the informed vehicle runs away from the others and the swarm never arrives."""
     tuned_as: ClassVar[str] = "sdc"
     all_informed: ClassVar[bool] = False
 
@@ -79,7 +81,7 @@ class Sdc(Policy):
         n = scenario.swarm.num_vehicles
         self._lattice = hexagonal_slots(n)
         self._slots = np.zeros((num_worlds, n, 2))
-        self._informed = np.zeros((num_worlds, n), np.bool_)
+        self._depth = np.zeros((num_worlds, n))
         self._decisions = np.zeros(num_worlds, np.int64)
 
     def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:  # noqa: ARG002 - nothing is drawn
@@ -96,7 +98,8 @@ class Sdc(Policy):
             -g.kappa * self.scenario.timing.decision_period_s * self._decisions
         ) + g.rho_inf
         _act(
-            percept.flat, self.layout.offsets, g, self.limits, self._slots, self._informed, rho, action, self.clamps
+            percept.flat, self.layout.offsets, g, self.limits, self._slots, self._depth, self.all_informed, rho,
+            action, self.clamps,
         )  # fmt: skip
         self._decisions += 1
         return action
@@ -112,12 +115,13 @@ class Sdc(Policy):
         cost = ((places[:, None, :] - self._lattice[None, :, :]) ** 2).sum(axis=-1)
         _, slot = linear_sum_assignment(cost)
         self._slots[w] = self._lattice[slot]
-        self._informed[w] = self.all_informed
-        self._informed[w, int(np.argmin((self._slots[w] ** 2).sum(axis=-1)))] = True
+        root = self._slots[w, np.argmin((self._slots[w] ** 2).sum(axis=-1))]
+        # Rounded, so that slots equally far from the informed one are peers, not predecessors of each other.
+        self._depth[w] = np.round(np.hypot(*(self._slots[w] - root).T), 6)
 
 
 class SdcInformed(Sdc):
-    """The same, every vehicle reading the reference's position and velocity."""
+    """The same, every vehicle reading the reference."""
 
     tuned_as: ClassVar[str] = "sdc_informed"
     all_informed: ClassVar[bool] = True
@@ -140,36 +144,52 @@ def _act(
     g: Gains,
     limits: Limits,
     slots: Float64,
-    informed: Bool,
+    depth: Float64,
+    all_informed: bool,
     rho: Float64,
     action: Float32,
     clamps: Int64,
 ) -> None:
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            f_x, f_y, clamped = _force(flat[w, i], at, g, limits, slots[w], i, informed[w, i], rho[w])
+            informed = all_informed or depth[w, i] == 0.0
+            f_x, f_y, clamped = _force(flat[w, i], at, g, limits, slots[w], depth[w], i, informed, rho[w])
             clamps[w] += clamped
             write_action(f_x, f_y, limits, action[w, i])
 
 
 @compiled
 def _force(
-    row: Float32, at: Offsets, g: Gains, limits: Limits, slots: Float64, i: int, informed: bool, rho: float
+    row: Float32,
+    at: Offsets,
+    g: Gains,
+    limits: Limits,
+    slots: Float64,
+    depth: Float64,
+    i: int,
+    informed: bool,
+    rho: float,
 ) -> tuple[float, float, int]:
     u, v = float(row[at.velocity]), float(row[at.velocity + 1])
     c, s = float(row[at.compass]), float(row[at.compass + 1])
+    # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.
+    follows = False
+    for k in range(at.neighbour - at.heard):
+        follows = follows or (row[at.heard + k] > 0.0 and depth[int(row[at.link_identity + k]) - 1] < depth[i])
     z_x, z_y, w_x, w_y, near_x, near_y, num = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for k in range(at.neighbour - at.heard):
         if row[at.heard + k] == 0.0:
             continue
         p_x, p_y = float(row[at.neighbour + 2 * k]), float(row[at.neighbour + 2 * k + 1])
-        j = int(row[at.link_identity + k]) - 1
-        d_x, d_y = slots[j, 0] - slots[i, 0], slots[j, 1] - slots[i, 1]
-        z_x, z_y = z_x + c * d_x + s * d_y - p_x, z_y + c * d_y - s * d_x - p_y
-        w_x, w_y = w_x + row[at.link_velocity + 2 * k] - u, w_y + row[at.link_velocity + 2 * k + 1] - v
         distance = max(math.hypot(p_x, p_y), 0.1)
         away = g.short * bump(distance / g.short_range) / distance
-        near_x, near_y, num = near_x - away * p_x, near_y - away * p_y, num + 1
+        near_x, near_y = near_x - away * p_x, near_y - away * p_y
+        j = int(row[at.link_identity + k]) - 1
+        if depth[j] < depth[i] or not follows:
+            d_x, d_y = slots[j, 0] - slots[i, 0], slots[j, 1] - slots[i, 1]
+            z_x, z_y = z_x + c * d_x + s * d_y - p_x, z_y + c * d_y - s * d_x - p_y
+            w_x, w_y = w_x + row[at.link_velocity + 2 * k] - u, w_y + row[at.link_velocity + 2 * k + 1] - v
+            num += 1
     weight = 0.0
     if num > 0:
         z_x, z_y, w_x, w_y, weight = z_x / num, z_y / num, w_x / num, w_y / num, 1.0

@@ -96,8 +96,9 @@ class Sff(Policy):
 
 
 class SffInformed(Sff):
-    """The same, every vehicle using the reference's velocity."""
+    """The same, every vehicle using the reference's velocity, with yaw damping."""
 
+    yaw_damping_nms: ClassVar[float] = 600.0
     tuned_as: ClassVar[str] = "sff_informed"
 
 

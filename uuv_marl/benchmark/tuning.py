@@ -19,7 +19,7 @@ _CLEARANCE_COST_S_PER_M = 20.0
 
 
 class Range(NamedTuple):
-    """Where a parameter may lie."""
+    """Where a parameter may lie. The search starts in the middle, which was found by hand to work at all."""
 
     low: float
     high: float
@@ -27,42 +27,44 @@ class Range(NamedTuple):
 
 
 _OBSTACLE = {
-    "repulsion": Range(300.0, 6000.0, log=True),
-    "repulsion_range": Range(5.0, 60.0),
-    "tangential": Range(300.0, 6000.0, log=True),
-    "tangential_range": Range(20.0, 100.0),
-    "drag": Range(0.0, 1.0),
+    "repulsion": Range(500.0, 32000.0, log=True),
+    "repulsion_range": Range(5.0, 45.0),
+    "tangential": Range(300.0, 30000.0, log=True),
+    "tangential_range": Range(50.0, 110.0),
 }
 _BIO = {
-    "zeta_l": Range(20.0, 200.0, log=True),
-    "zeta_n": Range(0.3, 6.0, log=True),
-    "delta_n": Range(30.0, 100.0),
-    "zeta_o": Range(0.5, 40.0, log=True),
-    "delta_o": Range(40.0, 200.0),
+    "zeta_l": Range(20.0, 320.0, log=True),
+    "zeta_n": Range(0.4, 10.0, log=True),
+    "delta_n": Range(40.0, 100.0),
+    "zeta_o": Range(0.8, 80.0, log=True),
+    "delta_o": Range(60.0, 200.0),
 }
 _SFF = {
-    "pull": Range(300.0, 6000.0, log=True),
-    "pull_length": Range(20.0, 150.0),
-    "cluster": Range(100.0, 3000.0, log=True),
-    "cluster_distance": Range(10.0, 30.0),
-    "cluster_width": Range(3.0, 25.0),
-    "cluster_range": Range(20.0, 100.0),
+    "pull": Range(300.0, 7500.0, log=True),
+    "pull_length": Range(20.0, 100.0),
+    "cluster": Range(120.0, 3000.0, log=True),
+    "cluster_distance": Range(10.0, 26.0),
+    "cluster_width": Range(4.0, 20.0),
+    "cluster_range": Range(20.0, 60.0),
     "velocity": Range(30.0, 3000.0, log=True),
-    "blend": Range(0.0, 1.0),
+    "blend": Range(0.0, 0.6),
     **_OBSTACLE,
+    "drag": Range(0.0, 1.0),
 }
+_SFF_INFORMED = {**_SFF, "drag": Range(0.8, 1.1), "reference_velocity": Range(40.0, 4000.0, log=True)}
 _SDC = {
-    "consensus": Range(300.0, 20000.0, log=True),
-    "rho_0": Range(50.0, 300.0),
-    "rho_inf": Range(10.0, 100.0),
-    "kappa": Range(0.003, 0.3, log=True),
-    "reference": Range(0.2, 10.0, log=True),
-    "velocity": Range(30.0, 6000.0, log=True),
-    "short": Range(300.0, 6000.0, log=True),
+    "consensus": Range(500.0, 12500.0, log=True),
+    "rho_0": Range(50.0, 250.0),
+    "rho_inf": Range(10.0, 70.0),
+    "kappa": Range(0.004, 0.1, log=True),
+    "reference": Range(0.1, 10.0, log=True),
+    "velocity": Range(50.0, 5000.0, log=True),
+    "short": Range(300.0, 30000.0, log=True),
     "short_range": Range(6.0, 14.0),
     **_OBSTACLE,
+    "drag": Range(0.8, 1.1),
+    "reference_velocity": Range(40.0, 4000.0, log=True),
 }
-_INFORMED = {"reference_velocity": Range(30.0, 3000.0, log=True)}
 
 SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
     "bio_inspired_plus": (
@@ -70,9 +72,9 @@ SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
         lambda **gains: bio_inspired.Gains(**gains, feed_forward=bio_inspired.FEED_FORWARD),
     ),
     "sff": (_SFF, sff.Gains),
-    "sff_informed": (_SFF | _INFORMED, sff.Gains),
+    "sff_informed": (_SFF_INFORMED, sff.Gains),
     "sdc": (_SDC, sdc.Gains),
-    "sdc_informed": (_SDC | _INFORMED, sdc.Gains),
+    "sdc_informed": (_SDC, sdc.Gains),
 }
 """Free parameters of every tuned policy, and how they become its gains."""
 
@@ -121,7 +123,7 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
     done = len(optuna.create_study(storage=storage, study_name=policy, load_if_exists=True).trials)
     while done < trials:
         # One sampler seed per trial: a resumed search draws what an uninterrupted one draws.
-        sampler = optuna.samplers.TPESampler(seed=done, multivariate=True, n_startup_trials=60)
+        sampler = optuna.samplers.CmaEsSampler(seed=done, n_startup_trials=0, warn_independent_sampling=False)
         study = optuna.load_study(study_name=policy, storage=storage, sampler=sampler)
         study.optimize(objective, n_trials=1)
         done += 1
@@ -132,8 +134,8 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         "objective": "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
         "scenario": SCENARIO,
         "seeds": list(SEEDS),
-        "optimiser": f"Optuna {optuna.__version__} TPESampler(multivariate), seed = trial number",
-        "space": {name: {"low": r.low, "high": r.high, "log": r.log} for name, r in space.items()},
+        "optimiser": f"Optuna {optuna.__version__} CmaEsSampler, seed = trial number",
+        "space": {name: r._asdict() for name, r in space.items()},
         "best": {name: float(f"{value:.4g}") for name, value in study.best_params.items()},
         "best_cost_s": study.best_value,
         "trials": [[round(t.value or 0.0, 2), *(float(f"{v:.4g}") for v in t.params.values())] for t in study.trials],

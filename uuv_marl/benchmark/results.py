@@ -1,0 +1,139 @@
+"""Results on disk: every seed and metric, written whole after each run, so that a stopped benchmark can go on."""
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Iterable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl import __version__
+from uuv_marl.baselines import POLICIES
+from uuv_marl.baselines.registry import policy_class
+from uuv_marl.benchmark.evaluate import Run
+from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import source_hash
+
+SCHEMA = 1
+_LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
+
+
+class ResultsError(RuntimeError):
+    """A folder that can't take these results."""
+
+
+class Row(NamedTuple):
+    """One run as ``results.json`` keeps it."""
+
+    scenario: str
+    policy: str
+    seed: int
+    metrics: Metrics
+
+
+class Results:
+    """``results.json`` in a folder, and ``traces/`` with the time series of every run.
+
+    Args:
+        folder: made if missing. What it holds already is continued, if it comes from the same code and scenarios.
+        scenarios: the scenarios that runs will name.
+        route_seed: the seed whose routes are kept, for pictures.
+    """
+
+    def __init__(self, folder: Path, scenarios: Iterable[Scenario], route_seed: int = 0) -> None:
+        self.folder = folder
+        self.scenarios = {scenario.name: scenario for scenario in scenarios}
+        self._route_seed = route_seed
+        self.rows: list[Row] = []
+        self._path = folder / "results.json"
+        (folder / "traces").mkdir(parents=True, exist_ok=True)
+        if self._path.exists():
+            self._continue()
+
+    def _continue(self) -> None:
+        try:
+            data: dict[str, Any] = json.loads(self._path.read_text(encoding="utf-8"))
+            fingerprint, known = data["fingerprint"], data["scenarios"]
+            rows = [Row(**row) for row in data["runs"]]
+        except (ValueError, KeyError, TypeError) as error:
+            raise ResultsError(f"{self._path} can't be read ({error}); move it away or give another --output") from None
+        if fingerprint != source_hash():
+            raise ResultsError(
+                f"{self._path} comes from other code of uuv_marl; move it away or give another --output, "
+                "so that no table mixes the two"
+            )
+        for name, scenario in self.scenarios.items():
+            if name in known and known[name] != scenario.model_dump(mode="json"):
+                raise ResultsError(
+                    f"{self._path} holds runs of another {name!r} (different --set or file); "
+                    "move it away or give another --output"
+                )
+        self.rows = rows
+
+    def has(self, scenario: str, policy: str, seed: int) -> bool:
+        """Whether this run is done."""
+        return any((row.scenario, row.policy, row.seed) == (scenario, policy, seed) for row in self.rows)
+
+    def add(self, scenario: str, policy: str, run: Run) -> None:
+        """Keep a run, on disk at once."""
+        arrays = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
+        if run.seed == self._route_seed:
+            arrays["routes"] = run.routes
+        trace = self.trace_path(scenario, policy, run.seed)
+        partial = trace.with_suffix(".partial.npz")
+        np.savez_compressed(partial, allow_pickle=False, **arrays)
+        os.replace(partial, trace)
+        self.rows.append(Row(scenario, policy, run.seed, run.metrics))
+        self._write()
+
+    def select(self, scenario: str, policy: str, seeds: Iterable[int]) -> list[Row]:
+        """The runs of a policy on a scenario, by seed."""
+        wanted = set(seeds)
+        rows = [row for row in self.rows if (row.scenario, row.policy) == (scenario, policy) and row.seed in wanted]
+        return sorted(rows, key=lambda row: row.seed)
+
+    def trace_path(self, scenario: str, policy: str, seed: int) -> Path:
+        """Where a run's time series are."""
+        return self.folder / "traces" / f"{scenario}.{policy}.{seed}.npz"
+
+    def trace(self, scenario: str, policy: str, seed: int) -> dict[str, NDArray[np.float32]]:
+        """A run's time series: the fields of ``metrics.Sample``, ``obstacle_distance_m``, ``obstacles``, ``waypoints``,
+        and ``routes`` for the first seed."""
+        with np.load(self.trace_path(scenario, policy, seed)) as file:
+            return {name: file[name] for name in file.files}
+
+    def _write(self) -> None:
+        policies = sorted({row.policy for row in self.rows}, key=list(POLICIES).index)
+        data = {
+            "schema": SCHEMA,
+            "fingerprint": source_hash(),
+            "versions": {
+                "uuv_marl": __version__,
+                "python": platform.python_version(),
+                **{library: version(library) for library in _LIBRARIES},
+            },
+            "machine": {"platform": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
+            "scenarios": {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()},
+            "policies": {name: knowledge(name) for name in policies},
+            "runs": [row._asdict() for row in self.rows],
+        }
+        partial = self._path.with_suffix(".partial")
+        partial.write_text(json.dumps(data, allow_nan=False) + "\n", encoding="utf-8")
+        os.replace(partial, self._path)
+
+
+def knowledge(policy: str) -> dict[str, Any]:
+    """What a policy has beyond the percept, as tables and results show it."""
+    made = policy_class(policy)
+    return {"channels": list(made.channels), "yaw_damping_nms": made.yaw_damping_nms}
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """Short name of a configuration, for captions."""
+    return hashlib.sha256(json.dumps(scenario.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()[:8]

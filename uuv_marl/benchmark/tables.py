@@ -1,0 +1,126 @@
+"""The benchmark's table: interquartile means over seeds with bootstrap intervals, worst seeds, the paper's figures."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.table import Table as RichTable
+from scipy.stats import bootstrap, trim_mean
+
+from uuv_marl.benchmark.paper import PAPER, PaperFigure
+from uuv_marl.benchmark.results import Results, Row, knowledge
+
+_CONFIDENCE = 0.95
+_RESAMPLES = 2000
+
+HEADERS = (
+    "policy", "beyond the percept", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
+    "spacing [m]", "worst", "mean spacing [m]", "collisions", "paper",
+)  # fmt: skip
+CAPTION = (
+    "Interquartile mean over seeds [95 % bootstrap interval]; worst seed; times over the seeds that arrived. "
+    "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles, and its time mean. "
+    "SFF and SDC are reconstructions: the paper only names them. Figures of the paper are single runs."
+)
+
+
+class Estimate(NamedTuple):
+    """An interquartile mean with its interval."""
+
+    iqm: float
+    low: float
+    high: float
+
+
+def estimate(values: Sequence[float]) -> Estimate:
+    """Interquartile mean over seeds and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable."""
+    data = np.asarray(values, np.float64)
+    if len(data) < 2 or np.ptp(data) == 0.0:
+        return Estimate(_iqm(data), float(data.min()), float(data.max()))
+    interval = bootstrap(
+        (data,), _iqm, confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES, method="percentile", axis=0,
+        vectorized=False, rng=np.random.default_rng(0),
+    ).confidence_interval  # fmt: skip
+    return Estimate(_iqm(data), float(interval.low), float(interval.high))
+
+
+def _iqm(data: NDArray[np.float64], axis: int = 0) -> float:
+    return float(trim_mean(data, 0.25, axis=axis))
+
+
+def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, ...]]:
+    """The table's cells, a row for each policy that has runs."""
+    rows: list[tuple[str, ...]] = []
+    for policy in policies:
+        runs = results.select(scenario, policy, seeds)
+        if runs:
+            rows.append(_cells(policy, runs, PAPER.get((scenario, policy))))
+    return rows
+
+
+def _cells(policy: str, runs: Sequence[Row], paper: PaperFigure | None) -> tuple[str, ...]:
+    times = _values(runs, "task_time_s")
+    collisions = _values(runs, "collisions")
+    collided = sum(1 for count in collisions if count)
+    return (
+        policy,
+        _knows(policy),
+        f"{len(times)}/{len(runs)}",
+        *_pair(times, max, 1),
+        *_pair(_values(runs, "min_obstacle_distance_m"), min, 2),
+        *_pair(_values(runs, "min_spacing_m"), min, 2),
+        _pair(_values(runs, "mean_min_spacing_m"), min, 2)[0],
+        f"{sum(collisions):.0f} in {collided} seeds" if collided else "0",
+        _paper_cell(paper),
+    )
+
+
+def _values(runs: Sequence[Row], name: str) -> list[float]:
+    values = [run.metrics[name] for run in runs]
+    return [float(value) for value in values if isinstance(value, (int, float))]
+
+
+def _pair(values: Sequence[float], worst: Callable[[Sequence[float]], float], digits: int) -> tuple[str, str]:
+    if not values:
+        return "–", "–"
+    e = estimate(values)
+    return f"{e.iqm:.{digits}f} [{e.low:.{digits}f}, {e.high:.{digits}f}]", f"{worst(values):.{digits}f}"
+
+
+def _knows(policy: str) -> str:
+    known = knowledge(policy)
+    parts = list(known["channels"])
+    if known["yaw_damping_nms"]:
+        parts.append(f"yaw damping {known['yaw_damping_nms']:g} N m s")
+    return ", ".join(parts) or "–"
+
+
+def _paper_cell(paper: PaperFigure | None) -> str:
+    if paper is None:
+        return "–"
+    parts: list[str] = []
+    if paper.task_time_s is not None:
+        parts.append(f"{paper.task_time_s:g} s")
+    if paper.min_obstacle_distance_m is not None:
+        parts.append("-".join(f"{distance:g}" for distance in paper.min_obstacle_distance_m) + " m")
+    if paper.min_spacing_m is not None:
+        parts.append(f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m")
+    return ", ".join(parts)
+
+
+def rich_table(title: str, rows: Sequence[Sequence[str]]) -> RichTable:
+    """For the terminal."""
+    table = RichTable(title=title, title_justify="left", caption=CAPTION, caption_justify="left")
+    for k, header in enumerate(HEADERS):
+        table.add_column(header, justify="left" if k in (0, 1, len(HEADERS) - 1) else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def markdown_table(title: str, rows: Sequence[Sequence[str]]) -> str:
+    """For ``table.md``."""
+    lines = [f"## {title}", "", "| " + " | ".join(HEADERS) + " |", "|" + " --- |" * len(HEADERS)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,1 @@
+"""Environments: one contract (observation, reward, endings), many APIs."""

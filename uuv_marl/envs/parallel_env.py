@@ -1,0 +1,190 @@
+"""The PettingZoo environments: ``parallel_env`` (all agents at once) and ``env`` (AEC, one after the other)."""
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+from pettingzoo import AECEnv, ParallelEnv
+from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
+
+from uuv_marl.envs.state import global_state, state_bounds
+from uuv_marl.envs.task import Outcome, Reward, Task
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+from uuv_marl.sim.swarm import Swarm
+
+Float32 = NDArray[np.float32]
+Infos = dict[str, dict[str, Any]]
+
+
+class SwarmParallelEnv(ParallelEnv[str, Float32, Float32]):
+    """A swarm of UUVs that follows a trajectory around obstacles. See ``parallel_env`` for the arguments.
+
+    Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
+    and yaw torque as shares of full force, projected onto the unit disc.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form
+        "name": "uuv_swarm_v0",
+        "render_modes": ["human", "rgb_array"],
+        "is_parallelizable": True,
+        "render_fps": 10,
+    }
+
+    def __init__(self, task: Task, render_mode: str | None = None, info_terms: bool = False) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']} or None, got {render_mode!r}")
+        self._task = task
+        self.render_mode = render_mode
+        self._info_terms = info_terms
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.scenario.timing.decision_period_s) or 1}
+        self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
+        self.agents: list[str] = []
+        layout = task.swarm.layout
+        self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
+        self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
+        low, high = state_bounds(self.scenario)
+        self.state_space = Box(low, high)
+        self._canvas: Any = None
+        self._was_reset = False
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is simulated."""
+        return self._task.swarm.scenario
+
+    @property
+    def swarm(self) -> Swarm:
+        """The simulation below, one world: truth that agents don't observe, for evaluation and custom rewards."""
+        return self._task.swarm
+
+    @property
+    def max_cycles(self) -> int | None:
+        """Decisions after which an episode is truncated, None for the scenario's time limit."""
+        return self._task.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, value: int | None) -> None:
+        self._task.max_cycles = value
+
+    def observation_space(self, agent: str) -> Box:
+        """The same object for every call."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Box:
+        """The same object for every call."""
+        return self.action_spaces[agent]
+
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Float32], Infos]:
+        """Start an episode. Without a seed the environment's own random stream goes on. ``options`` are ignored."""
+        observation = self._task.reset(seed)[0]
+        self._was_reset = True
+        self.agents = list(self.possible_agents)
+        if self.render_mode == "human":
+            self.render()
+        return {agent: observation[i] for i, agent in enumerate(self.agents)}, {agent: {} for agent in self.agents}
+
+    def step(
+        self, actions: Mapping[str, ArrayLike]
+    ) -> tuple[dict[str, Float32], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """One decision of every agent.
+
+        Raises:
+            ValueError: an agent's action is missing, misshapen or not finite, or an agent is unknown.
+            RuntimeError: before ``reset``, or after the episode's end.
+        """
+        if not self.agents:
+            when = "the episode is over" if self._was_reset else "step came before reset"
+            raise RuntimeError(f"{when}; call reset() to start an episode")
+        outcome = self._task.step(self._action_array(actions))
+        acted = self.agents
+        index = {agent: int(agent.removeprefix("uuv_")) for agent in acted}
+        ended = outcome.terminated[0] | outcome.truncated[0]
+        self.agents = [agent for agent in acted if not ended[index[agent]]]
+        if self.render_mode == "human":
+            self.render()
+        rewards, terminated, truncated = (
+            values[0].tolist() for values in (outcome.reward, outcome.terminated, outcome.truncated)
+        )
+        return (
+            {agent: outcome.observation[0, i] for agent, i in index.items()},
+            {agent: rewards[i] for agent, i in index.items()},
+            {agent: terminated[i] for agent, i in index.items()},
+            {agent: truncated[i] for agent, i in index.items()},
+            {agent: self._info(outcome, i) for agent, i in index.items()},
+        )
+
+    def _info(self, outcome: Outcome, i: int) -> dict[str, Any]:
+        if not self._info_terms:
+            return {}
+        return {"reward_terms": {name: float(term[0, i]) for name, term in outcome.terms.items()}}
+
+    def _action_array(self, actions: Mapping[str, ArrayLike]) -> Float32:
+        unknown = set(actions) - set(self.possible_agents)
+        if unknown:
+            raise ValueError(f"there is no agent {min(unknown)!r}; agents are uuv_0 to {self.possible_agents[-1]}")
+        array = np.zeros((1, len(self.possible_agents), 2), np.float32)
+        for agent in self.agents:
+            if agent not in actions:
+                raise ValueError(f"the action of {agent} is missing; give one for each of env.agents")
+            action = np.asarray(actions[agent], np.float32)
+            if action.shape != (2,):
+                raise ValueError(f"the action of {agent} must have shape (2,), got {action.shape}")
+            array[0, int(agent.removeprefix("uuv_"))] = action
+        if not np.isfinite(array).all():
+            i = int(np.argwhere(~np.isfinite(array))[0, 1])
+            raise ValueError(f"the action of {self.possible_agents[i]} must be finite, got {array[0, i].tolist()}")
+        return array
+
+    def state(self) -> Float32:
+        """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""
+        return global_state(self.swarm)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
+        if self.render_mode is None:
+            raise RuntimeError("render() needs a render_mode: make the environment with render_mode='rgb_array'")
+        if self._canvas is None:
+            from uuv_marl.envs.rendering import Canvas  # noqa: PLC0415 - pygame is an extra
+
+            self._canvas = Canvas(window=self.render_mode == "human", fps=self.metadata["render_fps"])
+        return self._canvas.draw(self.swarm)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._canvas is not None:
+            self._canvas.close()
+            self._canvas = None
+
+
+def parallel_env(
+    scenario: str | os.PathLike[str] | Scenario = "single_obstacle",
+    num_vehicles: int | None = None,
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+    *,
+    reward: Reward = "individual",
+    info_terms: bool = False,
+    overrides: Mapping[str, object] | None = None,
+) -> SwarmParallelEnv:
+    """A PettingZoo parallel environment.
+
+    Args:
+        scenario: a name (``uuv_marl.scenario_names()``), a TOML file or a ``Scenario``.
+        num_vehicles: replaces the scenario's.
+        max_cycles: truncates after so many decisions; None for the scenario's time limit.
+        render_mode: ``human``, ``rgb_array`` or None.
+        reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
+        info_terms: put the reward's terms into every agent's info.
+        overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
+    """
+    loaded = load_scenario(scenario, num_vehicles=num_vehicles, overrides=overrides)
+    return SwarmParallelEnv(Task(loaded, 1, reward, max_cycles), render_mode, info_terms)
+
+
+def env(**kwargs: Any) -> AECEnv[str, Float32, Float32]:
+    """The same as an AEC environment; arguments as for ``parallel_env``."""
+    return OrderEnforcingWrapper(parallel_to_aec(parallel_env(**kwargs)))

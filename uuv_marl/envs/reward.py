@@ -1,0 +1,43 @@
+"""The reward: named terms of every vehicle, weighted by the scenario, and their sum.
+
+Sound by construction: terms per second are bounded and at most zero, arrival pays once and ends the episode, so that
+arriving earlier never pays less; a lost vehicle is charged the worst that the rest of the episode could have cost it,
+so that dying never pays; no term depends on the number of vehicles.
+"""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.swarm import Swarm
+
+Float64 = NDArray[np.float64]
+
+RewardFunction = Callable[[Swarm], Float64]
+"""A user's own reward: from the swarm after a step to an array (world, vehicle)."""
+
+
+def reward_terms(swarm: Swarm) -> Mapping[str, Float64]:
+    """The weighted terms of the latest step, shape (world, vehicle) each; zero for vehicles that were lost before.
+
+    ``tracking``: beyond the tube s_l around l(t). ``obstacle``: surface nearer than s_o. ``spacing``: another vehicle
+    nearer than s_u. ``effort``: squared action. ``collision``: contact episodes that began. ``loss``: the vehicle was
+    lost. ``arrival``: the swarm arrived.
+    """
+    scenario, facts, state = swarm.scenario, swarm.facts, swarm.state
+    weight, limit, period = scenario.reward, scenario.constraints, scenario.timing.decision_period_s
+    present = state.alive | facts.lost
+    away = np.hypot(*np.moveaxis(state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
+    left_s = np.maximum(swarm.time_limit_s - facts.time_s, 0.0)[:, None]
+    worst_rate = weight.tracking + weight.obstacle + weight.spacing + weight.effort
+    terms = {
+        "tracking": -weight.tracking * period * np.clip(away / limit.s_l_m - 1.0, 0.0, 1.0),
+        "obstacle": -weight.obstacle * period * np.clip(1.0 - facts.clearance / limit.s_o_m, 0.0, 1.0),
+        "spacing": -weight.spacing * period * np.clip(1.0 - facts.spacing / limit.s_u_m, 0.0, 1.0),
+        "effort": -weight.effort * period * facts.effort,
+        "collision": -weight.collision * facts.contacts.astype(np.float64),
+        "loss": -(weight.collision + weight.arrival + worst_rate * left_s) * facts.lost,
+        "arrival": weight.arrival * (state.alive & swarm.arrived[:, None]),
+    }
+    return {name: np.where(present, term, 0.0) for name, term in terms.items()}

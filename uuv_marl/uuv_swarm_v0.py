@@ -1,0 +1,6 @@
+"""PettingZoo's module form of the environment: ``from uuv_marl import uuv_swarm_v0``."""
+
+from uuv_marl.envs.parallel_env import SwarmParallelEnv as raw_env
+from uuv_marl.envs.parallel_env import env, parallel_env
+
+__all__ = ["env", "parallel_env", "raw_env"]
