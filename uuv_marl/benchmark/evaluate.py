@@ -33,10 +33,10 @@ class Run(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a batch is: simulated seconds done, and at most to do, summed over its seeds."""
+    """How far an evaluation is."""
 
-    done_s: float
-    total_s: float
+    share: float
+    """Of the simulated time that all its seeds need at most."""
 
 
 def evaluate(
@@ -48,7 +48,12 @@ def evaluate(
     alone, not on the seeds beside it. ``parameters`` go to the policy.
     """
     for first in range(0, len(seeds), BATCH):
-        yield from _batch(scenario, policy, seeds[first : first + BATCH], parameters)
+        batch = seeds[first : first + BATCH]
+        for event in _batch(scenario, policy, batch, parameters):
+            if isinstance(event, Progress):
+                yield Progress((first + event.share * len(batch)) / len(seeds))
+            else:
+                yield event
 
 
 def _batch(
@@ -82,7 +87,7 @@ def _batch(
         active &= ~ended
         if len(routes) % report_every == 0:
             done = np.where(active, swarm.facts.time_s, limits)
-            yield Progress(float(done.sum()), float(limits.sum()))
+            yield Progress(float(done.sum() / limits.sum()))
 
 
 def _positions(swarm: Swarm) -> Float32:

@@ -13,6 +13,7 @@ from uuv_marl.benchmark.results import Results, Row, knowledge
 
 _CONFIDENCE = 0.95
 _RESAMPLES = 2000
+_NOTHING = "–"
 
 HEADERS = (
     "policy", "beyond the percept", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
@@ -83,7 +84,7 @@ def _values(runs: Sequence[Row], name: str) -> list[float]:
 
 def _pair(values: Sequence[float], worst: Callable[[Sequence[float]], float], digits: int) -> tuple[str, str]:
     if not values:
-        return "–", "–"
+        return _NOTHING, _NOTHING
     e = estimate(values)
     return f"{e.iqm:.{digits}f} [{e.low:.{digits}f}, {e.high:.{digits}f}]", f"{worst(values):.{digits}f}"
 
@@ -93,12 +94,12 @@ def _knows(policy: str) -> str:
     parts = list(known["channels"])
     if known["yaw_damping_nms"]:
         parts.append(f"yaw damping {known['yaw_damping_nms']:g} N m s")
-    return ", ".join(parts) or "–"
+    return ", ".join(parts) or _NOTHING
 
 
 def _paper_cell(paper: PaperFigure | None) -> str:
     if paper is None:
-        return "–"
+        return _NOTHING
     parts: list[str] = []
     if paper.task_time_s is not None:
         parts.append(f"{paper.task_time_s:g} s")
@@ -110,12 +111,23 @@ def _paper_cell(paper: PaperFigure | None) -> str:
 
 
 def rich_table(title: str, rows: Sequence[Sequence[str]]) -> RichTable:
-    """For the terminal."""
-    table = RichTable(title=title, title_justify="left", caption=CAPTION, caption_justify="left")
-    for k, header in enumerate(HEADERS):
-        table.add_column(header, justify="left" if k in (0, 1, len(HEADERS) - 1) else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
+    """For the terminal: the same cells, stacked so that they fit."""
+    table = RichTable(title=title, title_justify="left", caption=CAPTION, caption_justify="left", show_lines=True)
+    table.add_column("policy\n(beyond the percept)")
+    for header in ("arrived", "task time [s]", "obstacle distance [m]", "spacing [m]"):
+        table.add_column(header, justify="right")
+    table.add_column("collisions")
+    table.add_column("paper")
+    for policy, knows, arrived, time, slowest, distance, nearest, spacing, closest, mean, collisions, paper in rows:
+        table.add_row(
+            policy if knows == _NOTHING else f"{policy}\n({knows})",
+            arrived,
+            f"{time}\nworst {slowest}",
+            f"{distance}\nworst {nearest}",
+            f"{spacing}\nworst {closest}\ntime mean {mean}",
+            collisions,
+            paper,
+        )
     return table
 
 

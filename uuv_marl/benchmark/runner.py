@@ -1,0 +1,58 @@
+"""The benchmark as a job: which runs are missing, run them, and write table and pictures."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
+from uuv_marl.benchmark.figures import draw_all
+from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.tables import CAPTION, markdown_table, rows_of
+from uuv_marl.scenario import Scenario
+
+DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed")
+"""The paper's Table 2, then the stronger variants."""
+MAX_SEED = 10_000
+"""Benchmark seeds are 0 to 9,999; tuning and training use others."""
+
+Report = Callable[[str, str, float], None]
+"""Called with scenario, policy and the share of that pair's work that is done."""
+
+
+def run_missing(
+    results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int], report: Report
+) -> None:
+    """Run what ``results`` lacks; every finished seed is kept at once."""
+    for scenario in scenarios:
+        for policy in policies:
+            missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
+            done, fresh = len(seeds) - len(missing), 0
+            for event in evaluate(granted(policy, scenario), policy, missing):
+                if isinstance(event, Run):
+                    results.add(scenario.name, policy, event)
+                    fresh += 1
+                share = event.share if isinstance(event, Progress) else fresh / len(missing)
+                report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
+            report(scenario.name, policy, 1.0)
+
+
+def title(scenario: Scenario, seeds: Sequence[int]) -> str:
+    """Heading of a scenario's table."""
+    return (
+        f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
+        f"{len(seeds)} seeds, echoes report the {scenario.sonar.echo_reports}"
+    )
+
+
+def write_report(
+    results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]
+) -> list[Path]:
+    """``table.md`` and the pictures; the paths, the table first."""
+    tables = [
+        markdown_table(title(scenario, seeds), rows_of(results, scenario.name, policies, seeds))
+        for scenario in scenarios
+    ]
+    path = results.folder / "table.md"
+    path.write_text("\n".join([*tables, CAPTION + "\n"]), encoding="utf-8")
+    figures = [figure for scenario in scenarios for figure in draw_all(results, scenario.name, policies, seeds)]
+    return [path, *figures]

@@ -1,0 +1,203 @@
+"""The command line: ``uuv-marl --help``."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.syntax import Syntax
+from rich.table import Table
+
+from uuv_marl import __version__
+
+app = typer.Typer(
+    help="Swarms of unmanned underwater vehicles: scenarios, controllers and their benchmark.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_show_locals=False,
+    rich_markup_mode="markdown",
+)
+# Piped output keeps a width at which tables are legible.
+console = Console(width=None if sys.stdout.isatty() else 130)
+errors = Console(stderr=True)
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
+    """Turn what a user can mend into one message, without a traceback."""
+    from uuv_marl.baselines import PolicyError
+    from uuv_marl.benchmark.results import ResultsError
+    from uuv_marl.scenario_files import ScenarioError
+
+    try:
+        yield
+    except (ScenarioError, PolicyError, ResultsError) as error:
+        errors.print(f"[bold red]Error:[/] {escape(str(error))}", highlight=False)
+        raise typer.Exit(2) from None
+
+
+def _show_version(value: bool) -> None:
+    if value:
+        console.print(f"uuv_marl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def benchmark(
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Name or TOML file; repeat for several. Default: single_obstacle.")
+    ] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(help="Name; repeat for several. Default: the paper's three and their stronger variants."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1.")] = 20,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as sonar.echo_reports=surface."),
+    ] = None,
+    output: Annotated[Path, typer.Option(help="Folder of results, table and pictures.")] = Path("results/benchmark"),
+) -> None:
+    """Compare policies on scenarios over seeds.
+
+    Prints a table beside the paper's figures and writes results.json (every seed and metric), table.md and
+    figures/*.png. Ctrl-C keeps the finished seeds; the same command goes on.
+
+    Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
+    """
+    with _explained():
+        from uuv_marl.baselines.registry import policy_class
+        from uuv_marl.benchmark.results import Results
+        from uuv_marl.benchmark.runner import DEFAULT_POLICIES, run_missing, title, write_report
+        from uuv_marl.benchmark.tables import rich_table, rows_of
+        from uuv_marl.scenario_files import load_scenario, parse_override
+        from uuv_marl.sim.compiled import is_first_compilation
+
+        changes = dict(parse_override(text) for text in overrides or [])
+        scenarios = [load_scenario(name, overrides=changes) for name in scenario or ["single_obstacle"]]
+        policies = list(dict.fromkeys(policy or DEFAULT_POLICIES))
+        for name in policies:
+            policy_class(name)
+        results = Results(output, scenarios)
+        if is_first_compilation():
+            console.print("First run of this version: compiling takes about a minute, once.")
+        wanted = list(range(seeds))
+        try:
+            with _progress() as progress:
+                tasks: dict[tuple[str, str], int] = {}
+
+                def report(name: str, policy_name: str, share: float) -> None:
+                    key = (name, policy_name)
+                    if key not in tasks:
+                        tasks[key] = progress.add_task(f"{name}: {policy_name}", total=1.0)
+                    progress.update(tasks[key], completed=share)
+
+                run_missing(results, scenarios, policies, wanted, report)
+        except KeyboardInterrupt:
+            console.print(f"Stopped. {len(results.rows)} finished runs are in {output}/results.json; "
+                          "the same command goes on.")
+            raise typer.Exit(130) from None
+        written = write_report(results, scenarios, policies, wanted)
+        for loaded in scenarios:
+            console.print(rich_table(title(loaded, wanted), rows_of(results, loaded.name, policies, wanted)))
+        console.print(f"Every seed: {output}/results.json   table: {written[0]}   pictures:")
+        for path in written[1:]:
+            console.print(f"  {path}", highlight=False)
+
+
+@app.command()
+def scenarios(
+    show: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Print one, complete, with the source of every number.")
+    ] = None,
+) -> None:
+    """List the scenarios, or show one."""
+    with _explained():
+        from uuv_marl.scenario_files import load_scenario, scenario_names
+        from uuv_marl.scenario_files import show as show_scenario
+
+        if show is not None:
+            text = show_scenario(show)
+            console.print(Syntax(text, "toml", background_color="default") if console.is_terminal else text,
+                          markup=False, highlight=False, soft_wrap=True)
+            return
+        table = Table("name", "version", "what", "source")
+        for name in scenario_names():
+            loaded = load_scenario(name)
+            table.add_row(name, str(loaded.version), loaded.title, loaded.source)
+        console.print(table)
+
+
+@app.command()
+def policies() -> None:
+    """List the policies and what they need beyond the percept."""
+    from uuv_marl.baselines import POLICIES
+
+    table = Table("name", "channels", "yaw damping [N m s]", "what")
+    for name, made in POLICIES.items():
+        what = (made.__doc__ or "").strip().splitlines()[0]
+        table.add_row(name, ", ".join(made.channels) or "–", f"{made.yaw_damping_nms:g}", what)
+    console.print(table)
+
+
+@app.command()
+def tune(
+    policy: Annotated[list[str] | None, typer.Option(help="Name; repeat for several. Default: all.")] = None,
+    trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
+    output: Annotated[Path, typer.Option(help="Folder of the trials.")] = Path("results/tune"),
+) -> None:
+    """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
+
+    Needs the extra "tune". Takes about twenty minutes per policy. Ctrl-C keeps the finished trials; the same command
+    goes on. The shipped results are in uuv_marl/baselines/tuned.
+    """
+    with _explained():
+        from uuv_marl.baselines import PolicyError
+        from uuv_marl.benchmark.tuning import SPACES
+        from uuv_marl.benchmark.tuning import tune as search
+
+        for name in policy or SPACES:
+            if name not in SPACES:
+                raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
+        try:
+            with _progress() as progress:
+                for name in policy or SPACES:
+                    task = progress.add_task(name, total=trials)
+                    path = search(
+                        name, output, trials,
+                        lambda done, best, task=task, name=name: progress.update(
+                            task, completed=done, description=f"{name}: best {best:.1f} s"
+                        ),
+                    )  # fmt: skip
+                    progress.console.print(f"{path}", highlight=False)
+        except ModuleNotFoundError as error:
+            raise PolicyError(f"tuning needs {error.name}: pip install 'uuv_marl[tune]'") from None
+        except KeyboardInterrupt:
+            console.print(f"Stopped. The finished trials are in {output}; the same command goes on.")
+            raise typer.Exit(130) from None
+
+
+def _progress() -> Progress:
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
+        console=console,
+    )  # fmt: skip
+
+
+def main() -> None:
+    """Entry point of ``uuv-marl``."""
+    app()
