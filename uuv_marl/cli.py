@@ -9,7 +9,15 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.syntax import Syntax
 from rich.table import Table
 
@@ -98,7 +106,7 @@ def benchmark(
         wanted = list(range(seeds))
         try:
             with _progress() as progress:
-                tasks: dict[tuple[str, str], int] = {}
+                tasks: dict[tuple[str, str], TaskID] = {}
 
                 def report(name: str, policy_name: str, share: float) -> None:
                     key = (name, policy_name)
@@ -108,8 +116,9 @@ def benchmark(
 
                 run_missing(results, scenarios, policies, wanted, report)
         except KeyboardInterrupt:
-            console.print(f"Stopped. {len(results.rows)} finished runs are in {output}/results.json; "
-                          "the same command goes on.")
+            console.print(
+                f"Stopped. {len(results.rows)} finished runs are in {output}/results.json; the same command goes on."
+            )
             raise typer.Exit(130) from None
         written = write_report(results, scenarios, policies, wanted)
         for loaded in scenarios:
@@ -132,8 +141,12 @@ def scenarios(
 
         if show is not None:
             text = show_scenario(show)
-            console.print(Syntax(text, "toml", background_color="default") if console.is_terminal else text,
-                          markup=False, highlight=False, soft_wrap=True)
+            console.print(
+                Syntax(text, "toml", background_color="default") if console.is_terminal else text,
+                markup=False,
+                highlight=False,
+                soft_wrap=True,
+            )
             return
         table = Table("name", "version", "what", "source")
         for name in scenario_names():

@@ -64,10 +64,10 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
     table = [
         PerceptField("velocity", (2,), *speed, "own surge and sway velocity"),
         PerceptField("yaw_rate", (1,), "rad/s", 1.0, -_MAX_SPEED, _MAX_SPEED, "own yaw rate"),
-        PerceptField("reference", (2,), *position, "reference point l(t) minus own position; saturates, direction kept"),
+        PerceptField("reference", (2,), *position, "from the vehicle to l(t); saturates, direction kept"),
         PerceptField("reference_velocity", (2,), *speed, "velocity of the reference point"),
         PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard"),
-        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: position of the nearest vehicle, else 0"),
+        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: nearest vehicle's position, else 0"),
         PerceptField("echo", (num_active,), *flag, "per active sub-sector: 1 if an obstacle echoes"),
         PerceptField(
             "echo_range", (num_active,), "m", _POSITION_SCALE_M, 0.0, MAX_RANGE_M,

@@ -5,6 +5,7 @@ Symbols of the vehicle are Fossen's; resistances (X_u, Y_v, ...) are positive, a
 """
 
 import math
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -78,7 +79,7 @@ class Trajectory(Section):
     def duration_s(self) -> float:
         """Time to the end of the fixed polyline; the bound on any task time."""
         points = self.waypoints_m or ()
-        return sum(math.dist(a, b) for a, b in zip(points, points[1:], strict=False)) / self.speed_mps
+        return sum(math.dist(a, b) for a, b in pairwise(points)) / self.speed_mps
 
 
 class Obstacle(Section):

@@ -4,6 +4,7 @@ Every message names the field, its value and the remedy.
 """
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,7 +52,7 @@ def check_course(scenario: "Scenario") -> None:
         if scenario.obstacles:
             raise ValueError("obstacles must be empty where random_field draws them")
         return
-    for k, (a, b) in enumerate(zip(points, points[1:], strict=False)):
+    for k, (a, b) in enumerate(pairwise(points)):
         if math.dist(a, b) < 1e-6:
             raise ValueError(f"trajectory.waypoints_m must differ from one to the next, got {list(a)} twice at {k}")
     for k, obstacle in enumerate(scenario.obstacles):
@@ -128,7 +129,7 @@ def check_vehicle(scenario: "Scenario") -> None:
 
 
 def _check_dissipation(scenario: "Scenario") -> None:
-    """nu . D(nu) nu >= 0 for every nu, linear and non-linear part each."""
+    """Nu . D(nu) nu >= 0 for every nu, linear and non-linear part each."""
     p = scenario.vehicle
     if (p.Y_r + p.N_v) ** 2 > 4 * p.Y_v * p.N_r:
         raise ValueError(

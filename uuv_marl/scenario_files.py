@@ -10,7 +10,7 @@ from typing import Any, cast
 import tomlkit
 from pydantic import ValidationError
 from tomlkit.container import Container
-from tomlkit.items import Item, Table
+from tomlkit.items import Array, Item, Table
 
 from uuv_marl.scenario import Scenario
 
@@ -106,7 +106,7 @@ def show(name: str | os.PathLike[str]) -> str:
 
 def _overlay(document: Container, changes: Container, title: Any) -> None:
     for key, item in changes.items():
-        if not isinstance(item, (Table, list)) or isinstance(item, tomlkit.items.Array):
+        if not isinstance(item, (Table, list)) or isinstance(item, Array):
             title[key] = item
         elif isinstance(item, Table) and key in document:
             for field, value in cast(dict[str, Item], item).items():
@@ -119,15 +119,18 @@ def _find(name: str | os.PathLike[str]) -> Path:
     text = os.fspath(name)
     if text.endswith(".toml"):
         if not Path(text).is_file():
-            raise ScenarioError(f"scenario file {text} does not exist; give the path of a TOML file, or a name: "
-                                f"{', '.join(scenario_names())}")
+            raise ScenarioError(
+                f"scenario file {text} does not exist; give the path of a TOML file, or a name: "
+                f"{', '.join(scenario_names())}"
+            )
         return Path(text)
     if text in scenario_names():
         return _FOLDER / f"{text}.toml"
     near = difflib.get_close_matches(text, scenario_names(), n=1, cutoff=0.4)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    raise ScenarioError(f"scenario {text!r} is unknown; {hint}There are {', '.join(scenario_names())}, "
-                        "and any path ending in .toml")
+    raise ScenarioError(
+        f"scenario {text!r} is unknown; {hint}There are {', '.join(scenario_names())}, and any path ending in .toml"
+    )
 
 
 def _parse(path: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A comparator in the style of single-informed distributed consensus (SDC), which the paper only names: a reconstruction.
+"""A comparator in the style of single-informed distributed consensus (SDC), a reconstruction: the paper only names it.
 
 Every vehicle holds a slot of a hexagonal lattice relative to its predecessors: the neighbours it hears whose slots are
 nearer to the informed vehicle's. So what the one informed vehicle reads of l(t) spreads outwards along a directed
@@ -130,8 +130,8 @@ class SdcInformed(Sdc):
 def hexagonal_slots(n: int) -> Float64:
     """The n points of a hexagonal lattice nearest to its centre, their mean at zero [m], shape (vehicle, 2)."""
     reach = math.ceil(math.sqrt(n)) + 2
-    row, column = (axis.ravel() for axis in np.mgrid[-reach : reach + 1, -reach : reach + 1])
-    points = SLOT_PITCH_M * np.stack([row * math.sqrt(3) / 2, column + 0.5 * (row % 2)], axis=1)
+    row, column = (axis.ravel() - reach for axis in np.indices((2 * reach + 1, 2 * reach + 1)))
+    points: Float64 = SLOT_PITCH_M * np.stack([row * math.sqrt(3) / 2, column + 0.5 * (row % 2)], axis=1)
     # Rounded, so that points at equal distances keep their order on every machine.
     nearest = points[np.argsort(np.round((points**2).sum(axis=1), 6), kind="stable")[:n]]
     return nearest - nearest.mean(axis=0)

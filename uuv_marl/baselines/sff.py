@@ -1,4 +1,4 @@
-"""A comparator in the style of self-organised fission and fusion (SFF), which the paper only names: a reconstruction.
+"""A comparator in the style of self-organised fission and fusion (SFF), a reconstruction: the paper only names it.
 
 Neighbours' positions are predicted from their history; a clustering term acts on the predictions, a hybrid velocity
 term follows the neighbours' mean or, once an obstacle echoes, the one whose motion changed most; a splitting term
@@ -118,9 +118,7 @@ def _recall(identity: float, known: Float32) -> int:
 
 
 @compiled
-def _act(
-    flat: Float32, at: Offsets, g: Gains, limits: Limits, period: float, memory: Memory, action: Float32
-) -> None:
+def _act(flat: Float32, at: Offsets, g: Gains, limits: Limits, period: float, memory: Memory, action: Float32) -> None:
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
             f_x, f_y = _force(

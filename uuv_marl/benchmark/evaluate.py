@@ -39,9 +39,7 @@ class Progress(NamedTuple):
     """Of the simulated time that all its seeds need at most."""
 
 
-def evaluate(
-    scenario: Scenario, policy: str, seeds: Sequence[int], **parameters: object
-) -> Iterator[Run | Progress]:
+def evaluate(scenario: Scenario, policy: str, seeds: Sequence[int], **parameters: object) -> Iterator[Run | Progress]:
     """Episodes of a policy on a scenario, each as soon as it ends, with progress in between.
 
     The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed

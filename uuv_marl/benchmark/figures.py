@@ -1,5 +1,8 @@
 """The benchmark's pictures: routes with obstacles, distance to obstacles and spacing over time."""
 
+# pyright: reportUnknownMemberType=false
+# Matplotlib leaves the types of its keyword arguments open.
+
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -65,9 +68,7 @@ def _routes(results: Results, scenario: str, policies: Sequence[str], folder: Pa
     return _save(figure, folder / f"{scenario}_routes.png")
 
 
-def _distance(
-    results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int], folder: Path
-) -> Path:
+def _distance(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int], folder: Path) -> Path:
     def nearest(trace: dict[str, Float32]) -> Float32:
         distance = trace["obstacle_distance_m"]
         return distance.min(axis=1) if distance.shape[1] else np.full(len(distance), np.nan, np.float32)
@@ -112,9 +113,7 @@ def _bands(
         traces = [results.trace(scenario, policy, row.seed) for row in results.select(scenario, policy, seeds)]
         end = max(float(trace["time_s"][-1]) for trace in traces)
         grid = np.arange(0.0, end, _GRID_S)
-        curves = np.array([
-            np.interp(grid, trace["time_s"], value(trace), right=np.nan) for trace in traces
-        ])
+        curves = np.array([np.interp(grid, trace["time_s"], value(trace), right=np.nan) for trace in traces])
         kept = np.isfinite(curves).sum(axis=0) > len(traces) / 2
         curves, grid = curves[:, kept], grid[kept]
         if not grid.size:

@@ -9,7 +9,7 @@ from uuv_marl.sim.swarm import ARRIVAL_RADII_M, Swarm
 
 Float64 = NDArray[np.float64]
 Bool = NDArray[np.bool_]
-Metrics = dict[str, float | int | None | dict[str, float]]
+Metrics = dict[str, float | int | dict[str, float] | None]
 
 
 class Sample(NamedTuple):

@@ -88,7 +88,7 @@ class Results:
         trace = self.trace_path(scenario, policy, run.seed)
         partial = trace.with_suffix(".partial.npz")
         np.savez_compressed(partial, allow_pickle=False, **arrays)
-        os.replace(partial, trace)
+        partial.replace(trace)
         self.rows.append(Row(scenario, policy, run.seed, run.metrics))
         self._write()
 
@@ -103,8 +103,10 @@ class Results:
         return self.folder / "traces" / f"{scenario}.{policy}.{seed}.npz"
 
     def trace(self, scenario: str, policy: str, seed: int) -> dict[str, NDArray[np.float32]]:
-        """A run's time series: the fields of ``metrics.Sample``, ``obstacle_distance_m``, ``obstacles``, ``waypoints``,
-        and ``routes`` for the first seed."""
+        """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
+
+        Beside them ``obstacles``, ``waypoints``, and ``routes`` for the first seed.
+        """
         with np.load(self.trace_path(scenario, policy, seed)) as file:
             return {name: file[name] for name in file.files}
 
@@ -125,7 +127,7 @@ class Results:
         }
         partial = self._path.with_suffix(".partial")
         partial.write_text(json.dumps(data, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(partial, self._path)
+        partial.replace(self._path)
 
 
 def knowledge(policy: str) -> dict[str, Any]:

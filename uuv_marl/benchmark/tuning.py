@@ -2,11 +2,11 @@
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from uuv_marl.baselines import granted
-from uuv_marl.baselines import bio_inspired, sdc, sff
+from uuv_marl.baselines import bio_inspired, granted, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.scenario import Scenario
 
@@ -69,7 +69,7 @@ _SDC = {
 SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
     "bio_inspired_plus": (
         _BIO,
-        lambda **gains: bio_inspired.Gains(**gains, feed_forward=bio_inspired.FEED_FORWARD),
+        partial(bio_inspired.Gains, feed_forward=bio_inspired.FEED_FORWARD),
     ),
     "sff": (_SFF, sff.Gains),
     "sff_informed": (_SFF_INFORMED, sff.Gains),

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Space
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
@@ -20,7 +20,7 @@ Float32 = NDArray[np.float32]
 Infos = dict[str, dict[str, Any]]
 
 
-class SwarmParallelEnv(ParallelEnv[str, Float32, Float32]):
+class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
     """A swarm of UUVs that follows a trajectory around obstacles. See ``parallel_env`` for the arguments.
 
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
@@ -70,15 +70,19 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32]):
     def max_cycles(self, value: int | None) -> None:
         self._task.max_cycles = value
 
-    def observation_space(self, agent: str) -> Box:
+    def observation_space(self, agent: str) -> Space[Any]:
         """The same object for every call."""
         return self.observation_spaces[agent]
 
-    def action_space(self, agent: str) -> Box:
+    def action_space(self, agent: str) -> Space[Any]:
         """The same object for every call."""
         return self.action_spaces[agent]
 
-    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Float32], Infos]:
+    def reset(
+        self,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,  # noqa: ARG002 - PettingZoo's signature
+    ) -> tuple[dict[str, Float32], Infos]:
         """Start an episode. Without a seed the environment's own random stream goes on. ``options`` are ignored."""
         observation = self._task.reset(seed)[0]
         self._was_reset = True
@@ -88,7 +92,7 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32]):
         return {agent: observation[i] for i, agent in enumerate(self.agents)}, {agent: {} for agent in self.agents}
 
     def step(
-        self, actions: Mapping[str, ArrayLike]
+        self, actions: Mapping[str, ArrayLike | None]
     ) -> tuple[dict[str, Float32], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """One decision of every agent.
 
@@ -122,7 +126,7 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32]):
             return {}
         return {"reward_terms": {name: float(term[0, i]) for name, term in outcome.terms.items()}}
 
-    def _action_array(self, actions: Mapping[str, ArrayLike]) -> Float32:
+    def _action_array(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
         unknown = set(actions) - set(self.possible_agents)
         if unknown:
             raise ValueError(f"there is no agent {min(unknown)!r}; agents are uuv_0 to {self.possible_agents[-1]}")
@@ -185,6 +189,6 @@ def parallel_env(
     return SwarmParallelEnv(Task(loaded, 1, reward, max_cycles), render_mode, info_terms)
 
 
-def env(**kwargs: Any) -> AECEnv[str, Float32, Float32]:
+def env(**kwargs: Any) -> AECEnv[str, Float32, Float32 | None]:
     """The same as an AEC environment; arguments as for ``parallel_env``."""
     return OrderEnforcingWrapper(parallel_to_aec(parallel_env(**kwargs)))

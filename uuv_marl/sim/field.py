@@ -40,8 +40,11 @@ def _polyline(field: RandomField, rng: np.random.Generator) -> Float64:
 
 
 def _obstacles(scenario: Scenario, field: RandomField, waypoints: Float64, rng: np.random.Generator) -> Float64:
-    """Discs whose gaps are all at least 2 (s_o + s_u): grown by half of that they stay disjoint, so that the free
-    water around them is connected and some path keeps s_o + s_u from every surface."""
+    """Discs whose gaps are all at least 2 (s_o + s_u).
+
+    Grown by half of that they stay disjoint, so that the free water around them is connected, and some path keeps
+    s_o + s_u from every surface.
+    """
     gap = 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
     end_clear = max(field.end_clear_m * growth(scenario.swarm.num_vehicles), gap)
     wanted = int(rng.integers(field.obstacles[0], field.obstacles[1] + 1))

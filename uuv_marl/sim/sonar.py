@@ -185,6 +185,24 @@ def echo(
 
 
 @compiled
+def survey_obstacles(
+    i: int, x: float, y: float, before: Float64, obstacles: Float64, num_obstacles: int, hull: float, found: Survey
+) -> float:
+    """Clearances of vehicle i at (x, y); how many contact episodes with obstacles began."""
+    began = 0.0
+    for k in range(num_obstacles):
+        gap = math.hypot(obstacles[k, 0] - x, obstacles[k, 1] - y) - obstacles[k, 2]
+        found.clearance[i] = min(found.clearance[i], gap)
+        found.obstacle_clearance[k] = min(found.obstacle_clearance[k], gap)
+        if gap < hull:
+            was = math.hypot(obstacles[k, 0] - before[i, 0], obstacles[k, 1] - before[i, 1]) - obstacles[k, 2]
+            if was >= hull:
+                found.contacts[i] += 1
+                began += 1.0
+    return began
+
+
+@compiled
 def survey_world(
     eta: Float64,
     before: Float64,
@@ -240,15 +258,7 @@ def survey_world(
                     j, i, -c_j * dx - s_j * dy, s_j * dx - c_j * dy, squared,
                     suite.lower, suite.upper, suite.fan_first, suite.fan_range, found.nearest, found.heard,
                 )  # fmt: skip
-        for k in range(num_obstacles):
-            gap = math.hypot(obstacles[k, 0] - x, obstacles[k, 1] - y) - obstacles[k, 2]
-            found.clearance[i] = min(found.clearance[i], gap)
-            found.obstacle_clearance[k] = min(found.obstacle_clearance[k], gap)
-            if gap < hull:
-                was = math.hypot(obstacles[k, 0] - before[i, 0], obstacles[k, 1] - before[i, 1]) - obstacles[k, 2]
-                if was >= hull:
-                    found.contacts[i] += 1
-                    began += 1.0
+        began += survey_obstacles(i, x, y, before, obstacles, num_obstacles, hull, found)
     for i in range(n):
         found.spacing[i] = math.sqrt(found.spacing[i])
         least = min(least, found.spacing[i])

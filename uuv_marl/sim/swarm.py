@@ -3,8 +3,8 @@
 import os
 from collections.abc import Sequence
 
-import numba
 import numpy as np
+from numba.np.ufunc.parallel import threading_layer
 from numpy.typing import NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
@@ -27,7 +27,7 @@ _threads_of_parent = False
 def _note_fork() -> None:
     global _threads_of_parent  # noqa: PLW0603 - set once, in a forked child
     try:
-        numba.threading_layer()
+        threading_layer()
     except ValueError:
         return
     _threads_of_parent = True
@@ -176,9 +176,19 @@ class Swarm:
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
         self._ready[w] = True
+        self._observe(w)
+
+    def observe(self) -> Percept:
+        """Facts and percepts anew, as after a reset, where ``state`` or ``course`` was changed by hand."""
+        for w in range(self.num_worlds):
+            self._observe(w)
+        return self.percept
+
+    def _observe(self, w: int) -> None:
         observe_world(
-            w, state, course, self.facts, self._rules, self._suite, self._found, self.layout.offsets, self._flat
-        )
+            w, self.state, self.course, self.facts, self._rules, self._suite, self._found, self.layout.offsets,
+            self._flat,
+        )  # fmt: skip
 
     def step(self, action: Float32, active: NDArray[np.bool_] | None = None) -> Percept:
         """Advance by one decision period.

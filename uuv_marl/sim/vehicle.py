@@ -96,7 +96,7 @@ def damping(u: float, v: float, r: float, p: Plant) -> Vector3:
 
 @compiled
 def acceleration(u: float, v: float, r: float, tau_u: float, tau_r: float, p: Plant) -> Vector3:
-    """nu' = M^-1 (tau - C(nu) nu - D(nu) nu) [m/s2, m/s2, rad/s2]. Eq. 2."""
+    """Nu' = M^-1 (tau - C(nu) nu - D(nu) nu) [m/s2, m/s2, rad/s2]. Eq. 2."""
     c_u, c_v, c_r = coriolis(u, v, r, p)
     d_u, d_v, d_r = damping(u, v, r, p)
     f_u, f_v, f_r = tau_u - c_u - d_u, -c_v - d_v, tau_r - c_r - d_r

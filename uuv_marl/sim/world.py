@@ -106,7 +106,7 @@ class Rules(NamedTuple):
 
 
 @compiled
-def move(w: int, action: Float32, forces: Float64, state: State, facts: Facts, plant: Plant, rules: Rules) -> None:
+def move(w: int, forces: Float64, state: State, facts: Facts, plant: Plant, rules: Rules) -> None:
     """One control hold: actions become forces, forces become motion. Eq. 1-4, 22-24.
 
     ``forces`` (vehicle, 3) keeps each vehicle's projected action and the heading at which it was decided.
@@ -273,7 +273,7 @@ def step_world(
         forces[w, i, 0], forces[w, i, 1], forces[w, i, 2] = a_x, a_y, state.eta[w, i, 2]
         num_alive += int(state.alive[w, i])
     for hold in range(rules.holds):
-        move(w, action, forces[w], state, facts, plant, rules)
+        move(w, forces[w], state, facts, plant, rules)
         state.tick[w] += 1
         lose(w, state, course, facts, rules)
         listens = hold == rules.holds - 1

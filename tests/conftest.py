@@ -1,0 +1,51 @@
+"""Fixtures that several test files share."""
+
+import os
+
+os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from uuv_marl import load_scenario
+from uuv_marl.sim.swarm import Swarm
+
+settings.register_profile("laws", deadline=None, derandomize=True, max_examples=60)
+settings.load_profile("laws")
+
+SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
+
+
+@pytest.fixture(params=SCENARIOS)
+def scenario_name(request):
+    return request.param
+
+
+@pytest.fixture
+def still_water():
+    """A scenario whose obstacle is out of the way, for placing vehicles by hand."""
+    return load_scenario("tracking")
+
+
+@pytest.fixture
+def place():
+    """A swarm of one world with vehicles and obstacles where a test wants them."""
+
+    def placed(scenario, eta, nu=None, obstacles=()):
+        eta = np.asarray(eta, float).reshape(-1, 3)
+        discs = [
+            {"centre_m": list(o[:2]), "radius_m": o[2]}
+            for o in [(5000.0 + 100 * k, 5000.0, 1.0) for k in range(len(obstacles))]
+        ]
+        swarm = Swarm(load_scenario(scenario, num_vehicles=len(eta), overrides={"obstacles": discs}))
+        swarm.reset(0)
+        swarm.state.eta[0] = eta
+        swarm.state.before[0] = eta[:, :2]
+        swarm.state.nu[0] = 0.0 if nu is None else nu
+        if len(obstacles):
+            swarm.course.obstacles[0] = obstacles
+        swarm.observe()
+        return swarm
+
+    return placed

@@ -1,0 +1,235 @@
+"""Laws of the policies, and what they demand."""
+
+import json
+import math
+from importlib import resources
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uuv_marl import load_scenario, parallel_env
+from uuv_marl.baselines import POLICIES, PolicyError, bio_inspired, granted, make, sdc, sff
+from uuv_marl.benchmark.tuning import SPACES, TRIALS
+from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.sim.swarm import Swarm
+
+GAINS = bio_inspired.Gains()
+
+
+def test_the_default_gains_are_table_1():
+    assert GAINS[:5] == (30.0, 0.8, 60.0, 8.0, 80.0)
+    assert GAINS.feed_forward == 0.0
+
+
+def test_neighbours_at_60_m_neither_attract_nor_repel():
+    f_x, f_y, _ = bio_inspired.neighbour_force(36.0, 48.0, GAINS)
+    assert math.hypot(f_x, f_y) < 1e-9
+    assert bio_inspired.neighbour_force(59.0, 0.0, GAINS)[0] < 0 < bio_inspired.neighbour_force(61.0, 0.0, GAINS)[0]
+
+
+@given(st.floats(-400, 400), st.floats(-400, 400))
+def test_pair_forces_are_central_and_opposite(x, y):
+    a = bio_inspired.neighbour_force(x, y, GAINS)
+    b = bio_inspired.neighbour_force(-x, -y, GAINS)
+    assert a[:2] == pytest.approx((-b[0], -b[1]))
+    assert a[0] * y == pytest.approx(a[1] * x, rel=1e-9, abs=1e-6)
+
+
+def test_clamps_bind_only_where_equation_20_overflows_and_are_counted():
+    assert bio_inspired.bounded_exp(60.0, 2.0) == (math.exp(30.0), 0)
+    assert bio_inspired.bounded_exp(60.0, 0.1) == (math.exp(50.0), 1)
+    assert bio_inspired.bounded_exp(10.0, 0.1) == (math.exp(20.0), 1)
+
+
+def written_as_in_the_paper(percept, gains, limits):
+    """Eq. 18-22 with NumPy, for one vehicle."""
+    force = gains.zeta_l * percept["reference"].astype(float)
+    for heard, p in zip(percept["heard"], percept["neighbour"].astype(float), strict=True):
+        if heard:
+            d = np.hypot(*p)
+            force += gains.zeta_n * -p * (np.exp(gains.delta_n / d) - np.e)
+    for echo, p in zip(percept["echo"], percept["echo_position"].astype(float), strict=True):
+        if echo:
+            force += gains.zeta_o * np.exp(gains.delta_o / np.hypot(*p)) * -p
+    action = force / [limits.max_force, limits.max_torque]
+    return action / max(1.0, np.hypot(*action))
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 1000))
+def test_the_controller_is_equations_18_to_22(seed):
+    scenario = load_scenario("single_obstacle")
+    swarm, policy = Swarm(scenario), make("bio_inspired", scenario)
+    swarm.reset(seed)
+    swarm.state.eta[0, :, :2] += 110.0  # beside the obstacle
+    percept = swarm.observe()
+    action = policy.act(percept)
+    assert action.dtype == np.float32
+    assert percept["echo"].any()
+    for i in range(54):
+        mine = Percept(percept.flat[0, i], percept.layout)
+        np.testing.assert_allclose(action[0, i], written_as_in_the_paper(mine, GAINS, policy.limits), atol=1e-5)
+
+
+def test_a_lone_vehicle_lags_by_drag_over_zeta_l():
+    scenario = load_scenario(
+        "tracking", num_vehicles=1, overrides={"trajectory.waypoints_m": [[0.0, 0.0], [4000.0, 0.0]]}
+    )
+    swarm, policy = Swarm(scenario), make("bio_inspired", scenario)
+    percept = swarm.reset(0)
+    for _ in range(6000):
+        percept = swarm.step(policy.act(percept))
+    drag = (70.0 + 100.0 * 4.0) * 4.0
+    lag = swarm.facts.reference[0, 0] - swarm.state.eta[0, 0, 0]
+    assert lag == pytest.approx(drag / 30.0, abs=0.05)  # 62.7 m
+    assert swarm.state.nu[0, 0, 0] == pytest.approx(4.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", [name for name in POLICIES if name != "random"])
+def test_forces_turn_with_the_world(name):
+    """Body-frame actions don't change, up to float32, when the world is rotated and moved."""
+    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=20))
+    turn, (x, y) = 0.7, (50.0, -80.0)
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    actions = []
+    for moved in (False, True):
+        swarm, policy = Swarm(scenario), make(name, scenario)
+        swarm.reset(3)
+        swarm.state.eta[0, :, :2] += 90.0
+        if moved:
+            swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
+            swarm.state.eta[0, :, 2] += turn
+            swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (x, y)
+            swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (x, y)
+        percept = swarm.observe()
+        if name.startswith("sdc"):  # its lattice lies north-east, so only the move is a symmetry
+            policy.act(percept)
+            if moved:
+                policy._slots = policy._slots @ rotation.T
+        actions.append(policy.act(percept))
+    if not name.startswith("sdc"):
+        np.testing.assert_allclose(actions[0], actions[1], atol=2e-4)
+
+
+def test_echoes_of_one_obstacle_count_once_where_asked():
+    layout = PerceptLayout.of(load_scenario("single_obstacle"))
+    flat = np.zeros((1, 1, layout.size), np.float32)
+    percept = Percept(flat, layout)
+    percept["echo"][0, 0] = [0, 1, 1, 1, 0, 1, 0]
+    percept["echo_range"][0, 0] = [0, 40, 30, 35, 0, 20, 0]
+    percept["echo_position"][0, 0, 1:4] = (55.0, -5.0)
+    percept["echo_position"][0, 0, 5] = (30.0, 30.0)
+    each = make("bio_inspired", load_scenario("single_obstacle"), gains=GAINS._replace(zeta_o=0.1))
+    once = make(
+        "bio_inspired", load_scenario("single_obstacle"), gains=GAINS._replace(zeta_o=0.1), obstacle_term="per_obstacle"
+    )
+    first, second = ((0.1 * np.exp(80 / np.hypot(*p)) * -np.array(p)) for p in ((55.0, -5.0), (30.0, 30.0)))
+    np.testing.assert_allclose(each.act(percept)[0, 0], (3 * first + second) / 3000, rtol=1e-5)
+    np.testing.assert_allclose(once.act(percept)[0, 0], (first + second) / 3000, rtol=1e-5)
+
+
+@given(st.floats(10.0, 26.0), st.floats(4.0, 20.0))
+def test_clustering_repels_within_its_distance_and_attracts_beyond(distance, width):
+    gains = sff.Gains(1, 1, 100.0, distance, width, 60.0, 0, 0, 0, 1, 0, 1, 0)
+    assert sff.clustering(distance, gains) == 0.0
+    assert sff.clustering(distance - 5.0, gains) < 0 < sff.clustering(distance + 5.0, gains)
+    assert sff.clustering(60.0, gains) == 0.0
+
+
+def test_sff_predicts_where_a_neighbour_will_be():
+    """A neighbour that closes in is pushed away earlier than one that stands, in whatever frame the vehicle turns."""
+    gains = sff.Gains(0.001, 60, 600.0, 18.0, 12.0, 40.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0)
+    scenario = granted("sff", load_scenario("tracking", num_vehicles=2))
+    layout = PerceptLayout.of(scenario)
+
+    def second_action(before, now, yaw_rate=0.0):
+        policy = make("sff", scenario, gains=gains)
+        for place in (before, now):
+            flat = np.zeros((1, 2, layout.size), np.float32)
+            percept = Percept(flat, layout)
+            percept["heard"][0, 0, 3] = 1
+            percept["neighbour"][0, 0, 3] = place
+            percept["link_identity"][0, 0, 3] = 2
+            percept["yaw_rate"][0, 0] = yaw_rate
+            action = policy.act(percept)
+        return action[0, 0]
+
+    standing = second_action((20.0, 0.0), (20.0, 0.0))
+    closing = second_action((20.4, 0.0), (20.0, 0.0))
+    np.testing.assert_allclose(standing, [sff.clustering(20.0, gains) / 3000, 0.0], atol=1e-7)
+    np.testing.assert_allclose(closing, [sff.clustering(16.0, gains) / 3000, 0.0], atol=1e-5)
+    turned = 20.0 * math.cos(0.05), -20.0 * math.sin(0.05)
+    turning = second_action((20.0, 0.0), turned, yaw_rate=0.5)
+    assert np.hypot(*turning) == pytest.approx(np.hypot(*standing), rel=1e-3)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 54, 200])
+def test_slots_are_a_lattice_around_zero(n):
+    slots = sdc.hexagonal_slots(n)
+    assert slots.shape == (n, 2)
+    np.testing.assert_allclose(slots.mean(axis=0), 0.0, atol=1e-9)
+    if n > 1:
+        away = np.hypot(*(slots[:, None] - slots[None]).transpose(2, 0, 1)) + 1e9 * np.eye(n)
+        np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
+
+
+def test_slots_are_assigned_so_that_ways_are_short():
+    scenario = granted("sdc", load_scenario("tracking", num_vehicles=7))
+    swarm, policy = Swarm(scenario), make("sdc", scenario)
+    swarm.reset(0)
+    slots = sdc.hexagonal_slots(7)[[3, 1, 4, 0, 6, 5, 2]]
+    swarm.state.eta[0, :, :2] = slots * 1.1 + (500.0, 300.0)
+    policy.act(swarm.observe())
+    np.testing.assert_allclose(policy._slots[0], slots, atol=1e-9)
+
+
+def test_policies_that_remember_forget_on_reset():
+    for name in ("sff", "sdc", "random"):
+        scenario = granted(name, load_scenario("single_obstacle", num_vehicles=9))
+        swarm, policy = Swarm(scenario), make(name, scenario)
+        runs = []
+        for _ in range(2):
+            percept = swarm.reset(4)
+            policy.reset(4)
+            for _ in range(30):
+                percept = swarm.step(policy.act(percept))
+            runs.append(swarm.state.eta.tobytes())
+        assert runs[0] == runs[1], name
+
+
+@pytest.mark.parametrize(("name", "channel"), [("sff", "link"), ("sdc", "compass and link")])
+def test_a_policy_without_its_channels_names_the_remedy(name, channel):
+    with pytest.raises(PolicyError, match=f"{channel}.*override sonar.channels"):
+        make(name, load_scenario("tracking"))
+    with pytest.raises(PolicyError, match="override sonar.channels"):
+        make(name, parallel_env("tracking"))
+
+
+def test_a_policy_refuses_another_inner_loop():
+    with pytest.raises(PolicyError, match="yaw damping of 600 .* override actuators.yaw_damping_nms"):
+        make("bio_inspired_plus", load_scenario("tracking"))
+    with pytest.raises(PolicyError, match="yaw damping of 0"):
+        make("bio_inspired", granted("bio_inspired_plus", load_scenario("tracking")))
+
+
+def test_unknown_names_and_parameters_suggest():
+    with pytest.raises(PolicyError, match="did you mean 'bio_inspired'"):
+        make("bio_inspred", load_scenario("tracking"))
+    with pytest.raises(PolicyError, match="no parameter 'gain'; it has gains, obstacle_term"):
+        make("bio_inspired", load_scenario("tracking"), gain=3)
+
+
+@pytest.mark.parametrize("name", SPACES)
+def test_tuned_gains_come_from_shipped_trials(name):
+    data = json.loads((resources.files("uuv_marl.baselines") / "tuned" / f"{name}.json").read_text())
+    assert len(data["trials"]) == TRIALS
+    assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
+    best = min(data["trials"], key=lambda trial: trial[0])
+    assert best[0] == pytest.approx(data["best_cost_s"], abs=0.01)
+    assert best[1:] == list(data["best"].values())
+    assert list(data["best"]) == list(SPACES[name][0])
+    scenario = granted(name, load_scenario("tracking"))
+    gains = make(name, scenario).gains._asdict()
+    assert {key: gains[key] for key in data["best"]} == data["best"]

@@ -1,0 +1,199 @@
+"""Metrics, resumable results, tables, pictures and the command line."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark import runner
+from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
+from uuv_marl.benchmark.results import Results, ResultsError
+from uuv_marl.benchmark.tables import CAPTION, HEADERS, estimate, markdown_table, rows_of
+from uuv_marl.cli import app
+
+QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
+SETS = [f"--set={field}={value}" for field, value in QUICK.items()]
+
+
+def quick(name="single_obstacle"):
+    return load_scenario(name, overrides=QUICK)
+
+
+def runs_of(scenario, policy, seeds):
+    return {run.seed: run for run in evaluate(granted(policy, scenario), policy, seeds) if isinstance(run, Run)}
+
+
+def test_metrics_are_those_of_the_series():
+    run = runs_of(load_scenario("single_obstacle"), "bio_inspired", [4])[4]
+    series, metrics = run.series, run.metrics
+    assert metrics["min_spacing_m"] == pytest.approx(series["min_spacing_m"].min())
+    assert metrics["mean_min_spacing_m"] == pytest.approx(series["min_spacing_m"].mean(), rel=1e-5)
+    assert metrics["max_spacing_m"] == pytest.approx(series["max_spacing_m"].max())
+    assert metrics["min_obstacle_distance_m"] == pytest.approx(series["obstacle_distance_m"].min())
+    # Independently, from the routes alone.
+    away = np.hypot(*(run.routes - 350.0).transpose(2, 0, 1)) - 25.0
+    assert metrics["min_obstacle_distance_m"] == pytest.approx(away.min(), abs=1e-3)
+    pairs = np.hypot(*(run.routes[:, :, None] - run.routes[:, None]).transpose(3, 0, 1, 2))
+    pairs[:, np.arange(54), np.arange(54)] = np.inf
+    np.testing.assert_allclose(series["min_spacing_m"], pairs.min(axis=(1, 2)), atol=1e-3)
+    centre = run.routes.mean(axis=1)
+    arrived = np.hypot(*(centre[-51:] - 600.0).T)
+    assert (arrived <= 2.0 + 1e-3).all()
+    assert series["time_s"][-1] == pytest.approx(metrics["task_time_s"] + 5.0, abs=1e-3)
+    assert set(metrics["constraint_share"]) == {"all", "s_l", "s_o", "s_u"}
+    assert metrics["vehicles_lost"] == 0
+
+
+def test_a_run_does_not_depend_on_the_seeds_beside_it():
+    scenario = quick("random_field")
+    alone, together = runs_of(scenario, "bio_inspired", [3]), runs_of(scenario, "bio_inspired", list(range(40)))
+    assert alone[3].metrics == together[3].metrics
+    assert sorted(together) == list(range(40))
+
+
+def test_never_arriving_and_no_obstacles_are_null():
+    metrics = runs_of(quick("tracking"), "idle", [0])[0].metrics
+    assert metrics["task_time_s"] is None
+    assert metrics["min_obstacle_distance_m"] is None
+    json.dumps(metrics, allow_nan=False)
+
+
+def test_progress_rises_to_the_end():
+    shares = [e.share for e in evaluate(quick(), "idle", list(range(40))) if isinstance(e, Progress)]
+    assert shares == sorted(shares)
+    assert 0 < shares[0] < shares[-1] <= 1
+
+
+def test_the_estimate_is_the_interquartile_mean_with_its_interval():
+    e = estimate([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 1000.0])
+    assert e.iqm == 4.5
+    assert e.low < e.iqm < e.high
+    assert estimate([3.0, 3.0, 3.0]) == (3.0, 3.0, 3.0)
+    assert estimate([2.0]) == (2.0, 2.0, 2.0)
+    assert estimate([1.0, 2.0, 3.0, 4.0]) == estimate([1.0, 2.0, 3.0, 4.0])
+
+
+def test_results_go_on_where_they_stopped(tmp_path):
+    scenario = quick()
+    results = Results(tmp_path, [scenario])
+    seen = []
+
+    def stop_after_three(name, policy, share):
+        seen.append(len(results.rows))
+        if len(results.rows) >= 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        runner.run_missing(results, [scenario], ["idle", "bio_inspired"], [0, 1], stop_after_three)
+    data = json.loads((tmp_path / "results.json").read_text())
+    assert len(data["runs"]) == 3
+    again = Results(tmp_path, [scenario])
+    ran = []
+    runner.run_missing(again, [scenario], ["idle", "bio_inspired"], [0, 1], lambda *a: ran.append(a))
+    assert len(again.rows) == 4
+    whole = Results(tmp_path / "whole", [scenario])
+    runner.run_missing(whole, [scenario], ["idle", "bio_inspired"], [0, 1], lambda *a: None)
+    assert sorted(map(str, whole.rows)) == sorted(map(str, again.rows))
+    assert set(data) == {"schema", "fingerprint", "versions", "machine", "scenarios", "policies", "runs"}
+    assert set(data["runs"][0]) == {"scenario", "policy", "seed", "metrics"}
+
+
+def test_results_of_something_else_are_refused(tmp_path):
+    results = Results(tmp_path, [quick()])
+    runner.run_missing(results, [quick()], ["idle"], [0], lambda *a: None)
+    other = load_scenario(quick(), overrides={"constraints.s_o_m": 6.0})
+    with pytest.raises(ResultsError, match=r"another 'single_obstacle'.*--output"):
+        Results(tmp_path, [other])
+    path = tmp_path / "results.json"
+    path.write_text(path.read_text().replace('"fingerprint": "', '"fingerprint": "0'))
+    with pytest.raises(ResultsError, match="other code"):
+        Results(tmp_path, [quick()])
+    path.write_text("{")
+    with pytest.raises(ResultsError, match="can't be read"):
+        Results(tmp_path, [quick()])
+
+
+def test_the_table_shows_the_paper_and_what_each_policy_knows(tmp_path):
+    scenario = load_scenario("single_obstacle", overrides={"time_limit.factor": 0.02, "time_limit.extra_s": 5.0})
+    results = Results(tmp_path, [scenario])
+    policies = ["bio_inspired", "sdc", "idle"]
+    runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
+    rows = rows_of(results, scenario.name, policies, [0, 1])
+    text = markdown_table("x", rows)
+    assert [len(row) for row in rows] == [len(HEADERS)] * 3
+    assert "205 s, 10.48-12.63 m" in text
+    assert "206 s, 4.2 m" in text
+    assert "compass, link, yaw damping 600 N m s" in text
+    assert "0/2" in text
+    assert "reconstructions" in CAPTION
+
+
+def test_the_command_line_from_end_to_end(tmp_path):
+    arguments = ["benchmark", "--scenario=lossy", "--scenario=tracking", "--policy=bio_inspired", "--policy=random"]
+    arguments += ["--seeds=3", f"--output={tmp_path}", *SETS, "--set=disturbance.loss_times_s=[1.0, 2.0]"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    assert "bio_inspired" in done.output
+    data = json.loads((tmp_path / "results.json").read_text())
+    assert {(r["scenario"], r["policy"], r["seed"]) for r in data["runs"]} == {
+        (s, p, k) for s in ("lossy", "tracking") for p in ("bio_inspired", "random") for k in range(3)
+    }
+    names = {path.name for path in (tmp_path / "figures").iterdir()}
+    assert names == {
+        "lossy_routes.png", "lossy_obstacle_distance.png", "lossy_spacing.png", "tracking_routes.png",
+        "tracking_spacing.png",
+    }  # fmt: skip
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in (tmp_path / "figures").iterdir())
+    assert "| policy |" in (tmp_path / "table.md").read_text()
+    before = (tmp_path / "results.json").read_bytes()
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert (tmp_path / "results.json").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["benchmark", "--scenario=singel_obstacle"], "did you mean"),
+        (["benchmark", "--policy=bio"], "did you mean"),
+        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must be positive"),
+        (["benchmark", "--set=vehicle"], "must look like field=value"),
+        (["scenarios", "--show=trackin"], "did you mean"),
+        (["tune", "--policy=idle"], "no free gains"),
+    ],
+)
+def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path):
+    done = CliRunner().invoke(app, [*arguments, *([f"--output={tmp_path}"] if arguments[0] == "benchmark" else [])])
+    assert done.exit_code == 2
+    assert message in " ".join(done.output.split())
+    assert "Traceback" not in done.output
+
+
+def test_lists_and_help():
+    for arguments in (
+        ["--help"],
+        ["benchmark", "--help"],
+        ["scenarios"],
+        ["policies"],
+        ["--version"],
+        ["tune", "--help"],
+    ):
+        assert CliRunner().invoke(app, arguments).exit_code == 0
+    shown = CliRunner().invoke(app, ["scenarios", "--show", "random_field"]).output
+    assert "Repoulias" in shown
+    assert "[random_field]" in shown
+
+
+def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
+    pytest.importorskip("optuna")
+    from uuv_marl.benchmark import tuning
+
+    monkeypatch.setattr(tuning, "SEEDS", (10_000,))
+    monkeypatch.setattr("uuv_marl.scenario_files.load_scenario", lambda *a, **k: quick())
+    whole = json.loads(tuning.tune("bio_inspired_plus", tmp_path / "a", 5, lambda *a: None).read_text())
+    tuning.tune("bio_inspired_plus", tmp_path / "b", 2, lambda *a: None)
+    parts = json.loads(tuning.tune("bio_inspired_plus", tmp_path / "b", 5, lambda *a: None).read_text())
+    assert whole == parts
+    assert len(whole["trials"]) == 5

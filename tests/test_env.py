@@ -1,0 +1,314 @@
+"""The PettingZoo environments: conformance, contract, determinism, errors, pictures."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+
+import uuv_marl
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.envs.state import state_table
+from uuv_marl.percept import Percept, PerceptLayout, percept_table
+from uuv_marl.sim.swarm import Swarm
+
+with warnings.catch_warnings():
+    # PettingZoo 1.27's own tests import its own environments in a way that it deprecates.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, render_test
+    from pettingzoo.test.state_test import state_test
+
+pytest.importorskip("pygame")
+
+
+def module(scenario):
+    """PettingZoo's tests take a module with these two functions."""
+
+    class Module:
+        @staticmethod
+        def parallel_env(**kwargs):
+            return uuv_marl.parallel_env(scenario, **kwargs)
+
+        @staticmethod
+        def env(**kwargs):
+            return uuv_marl.env(scenario=scenario, **kwargs)
+
+    return Module
+
+
+def test_parallel_api(scenario_name):
+    parallel_api_test(uuv_marl.parallel_env(scenario_name), num_cycles=60)
+
+
+def test_parallel_api_to_the_end_with_losses():
+    overrides = {"disturbance.loss_times_s": [1.0, 2.0], "time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
+    parallel_api_test(uuv_marl.parallel_env("lossy", num_vehicles=8, overrides=overrides), num_cycles=100)
+
+
+def test_aec_api(scenario_name):
+    api_test(uuv_marl.env(scenario=scenario_name, num_vehicles=6), num_cycles=30)
+
+
+def test_parallel_seed(scenario_name):
+    parallel_seed_test(lambda: uuv_marl.parallel_env(scenario_name))
+
+
+def test_max_cycles(scenario_name):
+    max_cycles_test(module(scenario_name))
+
+
+def test_state(scenario_name):
+    state_test(uuv_marl.env(scenario=scenario_name), uuv_marl.parallel_env(scenario_name))
+
+
+def test_render(scenario_name):
+    render_test(lambda **kwargs: uuv_marl.env(scenario=scenario_name, num_vehicles=4, **kwargs))
+
+
+def test_the_module_form():
+    from uuv_marl import uuv_swarm_v0
+
+    env = uuv_swarm_v0.parallel_env()
+    assert env.metadata["name"] == "uuv_swarm_v0"
+    assert env.possible_agents == [f"uuv_{i}" for i in range(54)]
+    assert isinstance(env, uuv_swarm_v0.raw_env)
+    assert str(uuv_swarm_v0.env().unwrapped) == "uuv_swarm_v0"
+
+
+def episode(env, policy=None, seed=3, limit=None, action_seed=0):
+    """Everything that a whole episode returns, as bytes; ``policy`` or random actions."""
+    rng = np.random.default_rng(action_seed)
+    observations, _ = env.reset(seed=seed)
+    if policy is not None:
+        policy.reset(seed)
+    record = [b"".join(o.tobytes() for o in observations.values())]
+    steps = 0
+    while env.agents and (limit is None or steps < limit):
+        if policy is None:
+            actions = {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in env.agents}
+        else:
+            actions = policy(observations)
+        observations, rewards, terminated, truncated, _ = env.step(actions)
+        record.append(b"".join(o.tobytes() for o in observations.values()))
+        record.append(repr((rewards, terminated, truncated, env.agents)).encode())
+        steps += 1
+    return record
+
+
+SHORT = {"time_limit.factor": 0.05, "time_limit.extra_s": 20.0}
+
+
+def test_a_whole_episode_is_repeated_bit_for_bit(scenario_name):
+    first = episode(uuv_marl.parallel_env(scenario_name, overrides=SHORT))
+    assert len(first) > 300
+    assert first == episode(uuv_marl.parallel_env(scenario_name, overrides=SHORT))
+    assert first[0] != episode(uuv_marl.parallel_env(scenario_name, overrides=SHORT), seed=4, limit=1)[0]
+
+
+@pytest.mark.parametrize("name", ["bio_inspired", "bio_inspired_plus", "sff", "sdc", "random"])
+@pytest.mark.parametrize("scenario", ["lossy", "random_field"])
+def test_a_policy_drives_the_environment_as_it_drives_the_swarm(name, scenario):
+    """From observations alone, a whole episode, bit for bit the batched run."""
+    losses = {"disturbance.loss_times_s": [2.0, 4.0, 9.0]} if scenario == "lossy" else {}
+    granting = granted(name, load_scenario(scenario, overrides={**SHORT, **losses}))
+    env = uuv_marl.parallel_env(granting)
+    through_env = make(name, env)
+    seeds = [11, 12]
+    swarm, batched = Swarm(granting, 2), make(name, granting, 2)
+    percept = swarm.reset(seeds)
+    batched.reset(seeds)
+    observations, _ = env.reset(seed=12)
+    through_env.reset(12)
+    while env.agents:
+        percept = swarm.step(batched.act(percept))
+        observations, *_ = env.step(through_env(observations))
+        assert env.swarm.state.eta[0].tobytes() == swarm.state.eta[1].tobytes()
+        assert env.swarm.facts.arrival_s.tobytes() == swarm.facts.arrival_s[1:].tobytes()
+
+
+def test_to_arrival_all_agents_terminate_together():
+    env = uuv_marl.parallel_env("single_obstacle")
+    policy = make("bio_inspired", env)
+    observations, _ = env.reset(seed=0)
+    policy.reset(0)
+    steps, total = 0, 0.0
+    while env.agents:
+        observations, rewards, terminated, truncated, _ = env.step(policy(observations))
+        total += sum(rewards.values())
+        steps += 1
+    assert all(terminated.values())
+    assert not any(truncated.values())
+    assert 1980 <= steps <= 2200
+    assert env.swarm.arrived[0]
+
+
+def test_the_time_limit_truncates_and_a_loss_terminates_alone():
+    overrides = {**SHORT, "disturbance.loss_times_s": [1.0]}
+    env = uuv_marl.parallel_env("lossy", overrides=overrides)
+    env.reset(seed=0)
+    lost = []
+    while env.agents:
+        acting = list(env.agents)
+        _, _, terminated, truncated, _ = env.step({agent: np.zeros(2, np.float32) for agent in acting})
+        if env.agents and len(env.agents) < len(acting):
+            lost += [agent for agent in acting if terminated[agent]]
+            assert not any(truncated.values())
+    assert len(lost) == 1
+    assert all(truncated.values())
+    assert not any(terminated.values())
+    assert len(truncated) == 53
+
+
+def test_unseeded_resets_go_on_with_the_stream():
+    a, b = uuv_marl.parallel_env(num_vehicles=3), uuv_marl.parallel_env(num_vehicles=3)
+    first = a.reset(seed=9)[0]["uuv_0"]
+    second = a.reset()[0]["uuv_0"]
+    assert not np.array_equal(first, second)
+    b.reset(seed=9)
+    np.testing.assert_array_equal(b.reset()[0]["uuv_0"], second)
+
+
+def test_observations_are_within_finite_bounds_and_lose_nothing():
+    env = uuv_marl.parallel_env("random_field", num_vehicles=20)
+    space = env.observation_space("uuv_0")
+    assert space.shape == (98,)
+    assert space.dtype == np.float32
+    assert np.isfinite(space.low).all()
+    assert np.isfinite(space.high).all()
+    observations, _ = env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        assert all(space.contains(o) for o in observations.values())
+        rows = np.stack(list(observations.values()))[None]
+        back = Percept.from_observation(rows, env.swarm.layout)
+        assert back.flat.tobytes() == env.swarm.percept.flat.tobytes()
+        observations, *_ = env.step({a: rng.uniform(-1, 1, 2).astype(np.float32) for a in env.agents})
+
+
+def test_scales_are_powers_of_two_and_sizes_add_up():
+    for channels, size in (((), 98), (("compass",), 100), (("link",), 161), (("compass", "link"), 163)):
+        layout = PerceptLayout(percept_table(21, 7, channels))
+        assert layout.size == size
+        assert (np.log2(layout.scale) % 1 == 0).all()
+    env = uuv_marl.parallel_env()
+    table = state_table(env.scenario)
+    env.reset(seed=0)
+    assert env.state().shape == (sum(field.size for field in table),) == env.state_space.shape
+
+
+def test_rotated_worlds_look_the_same():
+    """The percept has no compass: an agent can't tell a scenario from the same one turned."""
+    turned = {"trajectory.waypoints_m": [[150.0, -150.0], [600.0, -600.0]], "obstacles.0.centre_m": [350.0, -350.0]}
+    for agent, first in uuv_marl.parallel_env().reset(seed=1)[0].items():
+        second = uuv_marl.parallel_env(overrides=turned).reset(seed=1)[0][agent]
+        assert first.shape == second.shape
+        break
+
+
+def test_reward_terms_add_up_and_team_reward_is_their_mean():
+    overrides = {"constraints.s_l_m": 20.0, "constraints.s_u_m": 20.0}
+    alone = uuv_marl.parallel_env(num_vehicles=10, info_terms=True, overrides=overrides)
+    team = uuv_marl.parallel_env(num_vehicles=10, reward="team", overrides=overrides)
+    own = uuv_marl.parallel_env(num_vehicles=10, reward=lambda swarm: -swarm.facts.spacing)
+    for env in (alone, team, own):
+        env.reset(seed=2)
+    actions = {agent: np.full(2, 0.4, np.float32) for agent in alone.agents}
+    for _ in range(50):
+        _, rewards, _, _, infos = alone.step(actions)
+        _, shared, _, _, _ = team.step(actions)
+        _, spacing, _, _, _ = own.step(actions)
+    for agent, reward in rewards.items():
+        assert sum(infos[agent]["reward_terms"].values()) == pytest.approx(reward)
+        assert shared[agent] == pytest.approx(np.mean(list(rewards.values())))
+    assert min(rewards.values()) < 0
+    np.testing.assert_allclose(list(spacing.values()), -own.swarm.facts.spacing[0])
+
+
+def test_bad_input_names_the_agent_and_the_remedy():
+    env = uuv_marl.parallel_env(num_vehicles=3)
+    good = {agent: np.zeros(2, np.float32) for agent in env.possible_agents}
+    with pytest.raises(RuntimeError, match="step came before reset; call reset"):
+        env.step(good)
+    env.reset(seed=0)
+    cases = [
+        ({**good, "uuv_1": np.zeros(3)}, r"uuv_1 must have shape \(2,\), got \(3,\)"),
+        ({**good, "uuv_2": [np.nan, 0.0]}, r"uuv_2 must be finite, got \[nan, 0.0\]"),
+        ({"uuv_0": good["uuv_0"]}, "the action of uuv_1 is missing"),
+        ({**good, "uuv_9": np.zeros(2)}, "there is no agent 'uuv_9'"),
+    ]
+    for actions, message in cases:
+        with pytest.raises(ValueError, match=message):
+            env.step(actions)
+    with pytest.raises(ValueError, match="render_mode must be one of"):
+        uuv_marl.parallel_env(render_mode="ascii")
+    with pytest.raises(ValueError, match="max_cycles must be at least 1"):
+        uuv_marl.parallel_env(max_cycles=0)
+    with pytest.raises(ValueError, match="reward must be 'individual', 'team'"):
+        uuv_marl.parallel_env(reward="sparse")
+    with pytest.raises(RuntimeError, match="needs a render_mode"):
+        env.render()
+    short = uuv_marl.parallel_env(num_vehicles=3, max_cycles=1)
+    short.reset(seed=0)
+    short.step(good)
+    with pytest.raises(RuntimeError, match="the episode is over; call reset"):
+        short.step(good)
+
+
+def test_actions_are_projected_onto_the_disc():
+    a, b = uuv_marl.parallel_env(num_vehicles=1), uuv_marl.parallel_env(num_vehicles=1)
+    a.reset(seed=0)
+    b.reset(seed=0)
+    a.step({"uuv_0": np.array([1.0, 1.0])})
+    b.step({"uuv_0": np.array([0.5, 0.5]) * 1e3})
+    np.testing.assert_allclose(a.swarm.state.nu, b.swarm.state.nu, rtol=1e-6)
+    assert a.swarm.facts.effort[0, 0] == pytest.approx(1.0)
+
+
+def test_a_picture_shows_what_is_there():
+    env = uuv_marl.parallel_env("multi_obstacle", render_mode="rgb_array")
+    env.reset(seed=0)
+    picture = env.render()
+    assert picture.shape == (800, 800, 3)
+    colours = {tuple(int(v) for v in c) for c in np.unique(picture.reshape(-1, 3), axis=0)}
+    assert (213, 94, 0) in colours  # obstacles
+    assert (240, 228, 66) in colours  # vehicles
+    env.step({agent: np.ones(2, np.float32) for agent in env.agents})
+    assert not np.array_equal(env.render(), picture)
+    env.close()
+
+
+class OneWorld(gymnasium.Env):
+    """A single-agent face of one world, for Gymnasium's forked workers."""
+
+    observation_space = gymnasium.spaces.Box(-1e4, 1e4, (98,))
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
+
+    def __init__(self):
+        self.env = uuv_marl.parallel_env(num_vehicles=5)
+
+    def reset(self, *, seed=None, options=None):
+        return self.env.reset(seed=seed)[0]["uuv_0"], {}
+
+    def step(self, action):
+        observations, rewards, *_ = self.env.step(dict.fromkeys(self.env.agents, action))
+        return observations["uuv_0"], rewards["uuv_0"], False, False, {}
+
+
+@pytest.mark.parametrize("context", ["fork", "spawn"])
+def test_gymnasium_workers_give_the_same_run(context):
+    batch = Swarm(load_scenario("single_obstacle", num_vehicles=5), 2)  # threads are running before the fork
+    batch.reset(0)
+    batch.step(np.zeros((2, 5, 2), np.float32))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # Python's own word on forking with threads
+        workers = gymnasium.vector.AsyncVectorEnv([OneWorld, OneWorld], context=context)
+    here = gymnasium.vector.SyncVectorEnv([OneWorld, OneWorld])
+    actions = np.random.default_rng(0).uniform(-1, 1, (20, 2, 2)).astype(np.float32)
+    runs = []
+    for envs in (workers, here):
+        record = [envs.reset(seed=5)[0].tobytes()]
+        record += [envs.step(action)[0].tobytes() for action in actions]
+        runs.append(record)
+        envs.close()
+    assert runs[0] == runs[1]

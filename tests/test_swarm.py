@@ -1,0 +1,313 @@
+"""Swarm: seeds, batches, endings, losses, contacts, and the random fields."""
+
+import math
+import multiprocessing
+import subprocess
+import sys
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import label
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.scenario_checks import start_distance
+from uuv_marl.sim.field import draw_field
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.vehicle import advance, plant
+
+
+def play(scenario, seeds, steps, policy="bio_inspired"):
+    """Final states and percepts, world by world, of a few steps in one batch."""
+    scenario = granted(policy, scenario)
+    swarm, actor = Swarm(scenario, len(seeds)), make(policy, scenario, len(seeds))
+    percept = swarm.reset(list(seeds))
+    actor.reset(list(seeds))
+    for _ in range(steps):
+        percept = swarm.step(actor.act(percept))
+    return swarm.state.eta.copy(), swarm.state.nu.copy(), percept.flat.copy()
+
+
+@pytest.mark.parametrize("policy", ["bio_inspired", "sff", "sdc", "random"])
+@pytest.mark.parametrize("name", ["lossy", "random_field"])
+def test_a_world_is_the_same_alone_and_in_a_batch(name, policy):
+    scenario = load_scenario(name, overrides={"disturbance.loss_times_s": [5.0, 9.0]})
+    batch = play(scenario, (3, 1, 7, 5, 2), 150, policy)
+    for w, seed in enumerate((3, 1, 7, 5, 2)):
+        alone = play(scenario, (seed,), 150, policy)
+        for one, many in zip(alone, batch, strict=True):
+            assert one[0].tobytes() == many[w].tobytes()
+
+
+def test_threads_do_not_change_a_run():
+    scenario = load_scenario("single_obstacle")
+    before = numba.get_num_threads()
+    try:
+        numba.set_num_threads(1)
+        one = play(scenario, range(6), 80)
+    finally:
+        numba.set_num_threads(before)
+    many = play(scenario, range(6), 80)
+    assert all(a.tobytes() == b.tobytes() for a, b in zip(one, many, strict=True))
+
+
+def test_another_process_gives_the_same_run():
+    scenario = load_scenario("single_obstacle")
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        theirs = pool.apply(play, (scenario, range(2), 50))
+    ours = play(scenario, range(2), 50)
+    assert all(a.tobytes() == b.tobytes() for a, b in zip(theirs, ours, strict=True))
+
+
+FORKED = """
+import os, numpy as np
+from uuv_marl import load_scenario
+from uuv_marl.sim.swarm import Swarm
+scenario = load_scenario("single_obstacle")
+action = np.zeros((2, 54, 2), np.float32)
+batch = Swarm(scenario, 2); batch.reset(0); batch.step(action)
+pid = os.fork()
+if pid == 0:
+    one = Swarm(scenario, 1); one.reset(0); one.step(action[:1])
+    try:
+        batch.step(action)
+    except RuntimeError as error:
+        os._exit(7 if "spawn" in str(error) else 8)
+    os._exit(9)
+print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+"""
+
+
+def test_after_a_fork_one_world_runs_and_a_batch_names_spawn():
+    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "7", done.stderr
+
+
+def test_worlds_are_reset_one_by_one_and_their_streams_go_on():
+    scenario = load_scenario("single_obstacle", num_vehicles=6)
+    swarm = Swarm(scenario, 3)
+    swarm.reset(10)
+    first = swarm.state.eta.copy()
+    swarm.reset(None, worlds=[1])
+    assert np.array_equal(swarm.state.eta[[0, 2]], first[[0, 2]])
+    assert not np.array_equal(swarm.state.eta[1], first[1])
+    second = swarm.state.eta[1].copy()
+    alone = Swarm(scenario)
+    alone.reset(11)
+    alone.reset()
+    assert np.array_equal(alone.state.eta[0], second)
+    swarm.reset([11], worlds=[2])
+    assert np.array_equal(swarm.state.eta[2], first[1])
+
+
+def test_inactive_worlds_stand_still():
+    swarm = Swarm(load_scenario("tracking", num_vehicles=4), 2)
+    swarm.reset(0)
+    before = swarm.state.eta.copy()
+    swarm.step(np.ones((2, 4, 2), np.float32), np.array([True, False]))
+    assert not np.array_equal(swarm.state.eta[0], before[0])
+    assert np.array_equal(swarm.state.eta[1], before[1])
+    assert swarm.facts.time_s.tolist() == [0.1, 0.0]
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 54, 55, 200])
+def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n):
+    scenario = load_scenario("single_obstacle", num_vehicles=n)
+    swarm = Swarm(scenario, 3)
+    swarm.reset(0)
+    length, width = scenario.start.sides(n)
+    for eta, nu in zip(swarm.state.eta, swarm.state.nu, strict=True):
+        offset = eta[:, :2] - 150.0
+        along, across = (offset[:, 0] + offset[:, 1]) / math.sqrt(2), (offset[:, 1] - offset[:, 0]) / math.sqrt(2)
+        assert (along <= 1e-6).all()
+        assert (along >= -length - 1e-6).all()
+        assert (np.abs(across) >= 10 - 1e-6).all()
+        assert (np.abs(across) <= 10 + width + 1e-6).all()
+        assert (across < 0).sum() == (n + 1) // 2
+        assert (nu[:, 0] >= 0).all()
+        assert (nu[:, 0] <= 4).all()
+        assert not nu[:, 1:].any()
+    if n > 1:
+        assert swarm.facts.min_spacing.min() >= 13.0
+
+
+def test_placement_ends_where_random_placement_jams():
+    scenario = load_scenario("single_obstacle", overrides={"start.spacing_m": 17.0})
+    swarm = Swarm(scenario, 4)
+    swarm.reset(0)
+    assert swarm.facts.min_spacing.min() >= 17.0
+    assert not np.array_equal(swarm.state.eta[0], swarm.state.eta[1])
+
+
+def test_a_force_held_over_a_decision_keeps_its_direction_in_the_world():
+    scenario = load_scenario("tracking", num_vehicles=1, overrides={"timing.decision_period_s": 0.5})
+    swarm = Swarm(scenario)
+    swarm.reset(0)
+    state, p = (*swarm.state.eta[0, 0], *swarm.state.nu[0, 0]), plant(scenario)
+    action = np.array([[[0.3, 0.6]]], np.float32)
+    swarm.step(action)
+    a, heading = action[0, 0].astype(float), state[2]
+    world = (
+        math.cos(heading) * a[0] - math.sin(heading) * a[1],
+        math.sin(heading) * a[0] + math.cos(heading) * a[1],
+    )
+    for _ in range(5):
+        c, s = math.cos(state[2]), math.sin(state[2])
+        tau = 3000 * (c * world[0] + s * world[1]), 3000 * (c * world[1] - s * world[0])
+        state = advance(*state, *tau, 0.1, p)
+    np.testing.assert_allclose(swarm.state.eta[0, 0, :2], state[:2], atol=1e-9)
+    np.testing.assert_allclose(swarm.state.nu[0, 0], state[3:], atol=1e-9)
+
+
+def test_control_hold_and_integration_step_are_two_numbers():
+    coarse = load_scenario("tracking", num_vehicles=3)
+    fine = load_scenario(coarse, overrides={"timing.integration_step_s": 0.01})
+    ends = []
+    for scenario in (coarse, fine):
+        swarm = Swarm(scenario)
+        swarm.reset(0)
+        for _ in range(20):
+            swarm.step(np.full((1, 3, 2), 0.2, np.float32))
+        assert swarm.facts.time_s[0] == pytest.approx(2.0)
+        ends.append(swarm.state.eta[0].copy())
+    assert 0 < np.abs(ends[0] - ends[1]).max() < 1e-3
+
+
+def test_arrival_needs_rest_nearness_spread_and_dwell(place):
+    scenario = load_scenario("single_obstacle", num_vehicles=2)
+    swarm = Swarm(scenario)
+    swarm.reset(0)
+    idle = np.zeros((1, 2, 2), np.float32)
+
+    def stay(offsets, seconds, ticks_from):
+        swarm.state.tick[0] = ticks_from
+        for _ in range(round(seconds * 10)):
+            swarm.state.eta[0, :, :2] = 600.0 + np.array(offsets)
+            swarm.state.nu[0] = 0.0
+            swarm.step(idle)
+
+    late = 1700
+    stay([[1.0, 0.0], [-1.0, 0.0]], 20.0, 1000)  # l(t) still on its way
+    assert not swarm.arrived[0]
+    stay([[90.0, 0.0], [-90.0, 0.0]], 6.0, late)  # too wide
+    assert not swarm.arrived[0]
+    stay([[5.0, 0.0], [-0.9, 0.0]], 6.0, late)  # centre 2.05 m off
+    assert not swarm.arrived[0]
+    stay([[5.0, 0.0], [-1.1, 0.0]], 5.0, late)  # not long enough
+    assert not swarm.arrived[0]
+    stay([[5.0, 0.0], [-1.1, 0.0]], 0.1, late + 50)
+    assert swarm.arrived[0]
+    assert swarm.facts.arrival_s[0, 0] == pytest.approx((late + 1) / 10)
+    assert math.isnan(swarm.facts.arrival_s[0, 1])  # never within 1 m
+    assert swarm.facts.arrival_s[0, 2] <= swarm.facts.arrival_s[0, 0]  # within 5 m
+
+
+def test_lost_vehicles_fall_silent_and_leave_the_centre():
+    scenario = load_scenario("lossy", overrides={"disturbance.loss_times_s": [0.25, 1.0]})
+    swarm = Swarm(scenario)
+    swarm.reset(5)
+    action = np.zeros((1, 54, 2), np.float32)
+    lost_at = {}
+    for step in range(1, 13):
+        percept = swarm.step(action)
+        for i in np.flatnonzero(swarm.facts.lost[0]):
+            lost_at[int(i)] = step
+    assert sorted(lost_at.values()) == [3, 10]
+    assert list(lost_at) == swarm.course.losses[0].tolist()
+    gone = list(lost_at)
+    assert not np.isin(swarm.heard[0], gone).any()
+    assert not percept.flat[0, gone].any()
+    living = swarm.state.alive[0]
+    np.testing.assert_allclose(swarm.facts.centre[0], swarm.state.eta[0, living, :2].mean(axis=0))
+    assert np.isinf(swarm.facts.spacing[0, gone]).all()
+    still = swarm.state.eta[0, gone].copy()
+    swarm.step(np.ones((1, 54, 2), np.float32))
+    np.testing.assert_array_equal(swarm.state.eta[0, gone], still)
+
+
+def test_a_contact_counts_once_while_it_lasts(place):
+    swarm = place(load_scenario("tracking"), [[0, 0, 0], [10, 0, math.pi]], nu=[[3, 0, 0], [3, 0, 0]])
+    action = np.zeros((1, 2, 2), np.float32)
+    counts = []
+    for _ in range(60):
+        swarm.step(action)
+        counts.append(int(swarm.facts.collisions[0]))
+    assert sum(counts) == 1
+    assert counts.index(1) > 5
+    swarm.state.eta[0, :, 0] = [0, 30]
+    swarm.step(action)
+    swarm.state.eta[0, :, 0] = [0, 1.5]
+    swarm.step(action)
+    assert swarm.facts.collisions[0] == 1
+    assert swarm.facts.contacts[0].tolist() == [1, 1]
+
+
+def test_touching_an_obstacle_is_a_collision_of_one_vehicle(place):
+    swarm = place(load_scenario("tracking"), [[0, 0, 0], [-60, 40, 0]], nu=[[4, 0, 0]] * 2, obstacles=[(32, 0, 30.0)])
+    action = np.zeros((1, 2, 2), np.float32)
+    total = np.zeros(2)
+    for _ in range(10):
+        swarm.step(action)
+        total += swarm.facts.contacts[0]
+    assert total.tolist() == [1, 0]
+    assert swarm.facts.obstacle_clearance[0, 0] < 1.0
+
+
+def test_contact_ends_the_vehicles_only_where_the_scenario_says_so(place):
+    scenario = load_scenario("tracking", overrides={"contact.ends_vehicle": True})
+    swarm = place(scenario, [[0, 0, 0], [4, 0, math.pi], [30, 20, 0]], nu=[[3, 0, 0], [3, 0, 0], [0, 0, 0]])
+    for _ in range(10):
+        swarm.step(np.zeros((1, 3, 2), np.float32))
+    assert swarm.state.alive[0].tolist() == [False, False, True]
+    assert not np.isin(swarm.heard[0, 2], [0, 1]).any()
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (np.zeros((1, 3, 2)), "float32"),
+        (np.zeros((1, 2, 2), np.float32), r"\(1, 3, 2\)"),
+        (np.full((1, 3, 2), np.nan, np.float32), "finite, got nan for vehicle 0 of world 0"),
+    ],
+)
+def test_bad_actions_are_named(action, message):
+    swarm = Swarm(load_scenario("tracking", num_vehicles=3))
+    swarm.reset(0)
+    with pytest.raises(ValueError, match=message):
+        swarm.step(action)
+
+
+def test_step_before_reset_is_named():
+    swarm = Swarm(load_scenario("tracking", num_vehicles=3))
+    with pytest.raises(RuntimeError, match="before reset"):
+        swarm.step(np.zeros((1, 3, 2), np.float32))
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10**6), st.sampled_from([1, 54, 200]))
+def test_random_fields_are_feasible(seed, n):
+    """Independent of the construction: on a grid, water with s_o + s_u to spare joins the start with the end."""
+    scenario = load_scenario("random_field", num_vehicles=n)
+    waypoints, obstacles = draw_field(scenario, np.random.default_rng(seed))
+    again = draw_field(scenario, np.random.default_rng(seed))
+    np.testing.assert_array_equal(waypoints, again.waypoints)
+    np.testing.assert_array_equal(obstacles, again.obstacles)
+    assert len(obstacles) <= scenario.random_field.obstacles[1]
+    gap = 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
+    for k, (x, y, radius) in enumerate(obstacles):
+        assert start_distance(scenario, tuple(waypoints[0]), tuple(waypoints[1]), (x, y)) >= radius + gap
+        assert math.hypot(x - waypoints[-1, 0], y - waypoints[-1, 1]) >= radius + gap
+        for a, b, other in obstacles[:k]:
+            assert math.hypot(x - a, y - b) >= radius + other + gap
+    low, high = waypoints.min(axis=0) - 150, waypoints.max(axis=0) + 150
+    # A cell counts as free where its centre is; the grid is much finer than the channels left between grown discs.
+    x, y = np.meshgrid(*(np.arange(a, b, 2.5) for a, b in zip(low, high, strict=True)), indexing="ij")
+    free = np.ones(x.shape, bool)
+    for a, b, radius in obstacles:
+        free &= np.hypot(x - a, y - b) >= radius + gap / 2 - 2.5
+    regions, _ = label(free)
+    cells = [tuple(((point - low) / 2.5).round().astype(int)) for point in (waypoints[0], waypoints[-1])]
+    assert regions[cells[0]] == regions[cells[1]] != 0

@@ -1,0 +1,171 @@
+"""Laws of the vehicle's dynamics (Eq. 1-4, 22-24)."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from uuv_marl import load_scenario
+from uuv_marl.scenario_files import ScenarioError
+from uuv_marl.sim import vehicle
+from uuv_marl.sim.vehicle import plant
+
+speed = st.floats(-6.0, 6.0)
+COUPLED = {
+    "vehicle.x_G_m": 0.05,
+    "vehicle.Y_rdot_kgm": -4.0,
+    "vehicle.Y_r": 12.0,
+    "vehicle.N_v": -20.0,
+    "vehicle.Y_rr": 15.0,
+    "vehicle.N_rv": -40.0,
+}
+PLAIN = plant(load_scenario("tracking"))
+FULL = plant(load_scenario("tracking", overrides=COUPLED))
+
+
+@st.composite
+def plants(draw):
+    """Any vehicle that the scenario's own checks let pass."""
+    overrides = {
+        "vehicle.x_G_m": draw(st.floats(-0.2, 0.2)),
+        "vehicle.Y_rdot_kgm": draw(st.floats(-30.0, 30.0)),
+        "vehicle.Y_r": draw(st.floats(-60.0, 60.0)),
+        "vehicle.N_v": draw(st.floats(-60.0, 60.0)),
+        "vehicle.Y_rr": draw(st.floats(-200.0, 200.0)),
+        "vehicle.N_rv": draw(st.floats(-200.0, 200.0)),
+    }
+    try:
+        return plant(load_scenario("tracking", overrides=overrides))
+    except ScenarioError:
+        assume(False)
+
+
+def matrices(scenario, nu):
+    """M, C and D of Eq. 3-4, written as the paper prints them."""
+    p, (u, v, r) = scenario.vehicle, nu
+    m, x_g = p.m_kg, p.x_G_m
+    m_rb = np.array([[m, 0, 0], [0, m, m * x_g], [0, m * x_g, p.I_z_kgm2]])
+    m_a = -np.array([[p.X_udot_kg, 0, 0], [0, p.Y_vdot_kg, p.Y_rdot_kgm], [0, p.Y_rdot_kgm, p.N_rdot_kgm2]])
+    a, b = m * (x_g * r + v), m * u
+    c_rb = np.array([[0, 0, -a], [0, 0, b], [a, -b, 0]])
+    a, b = p.Y_vdot_kg * v + p.Y_rdot_kgm * r, p.X_udot_kg * u
+    c_a = np.array([[0, 0, a], [0, 0, -b], [-a, b, 0]])
+    d_l = np.array([[p.X_u, 0, 0], [0, p.Y_v, -p.Y_r], [0, -p.N_v, p.N_r]])
+    d_nl = np.array(
+        [
+            [p.X_uu * abs(u), 0, 0],
+            [0, p.Y_vv * abs(v), -p.Y_rr * abs(r)],
+            [0, -p.N_rv * abs(r), p.N_rr * abs(r)],
+        ]
+    )
+    return m_rb + m_a, c_rb + c_a, d_l + d_nl
+
+
+@given(speed, speed, speed, st.floats(-3000, 3000), st.floats(-3000, 3000))
+def test_acceleration_is_equation_2_with_all_its_terms(u, v, r, tau_u, tau_r):
+    scenario = load_scenario("tracking", overrides=COUPLED)
+    nu = np.array([u, v, r])
+    m, c, d = matrices(scenario, nu)
+    expected = np.linalg.solve(m, np.array([tau_u, 0.0, tau_r]) - c @ nu - d @ nu)
+    np.testing.assert_allclose(vehicle.acceleration(u, v, r, tau_u, tau_r, FULL), expected, rtol=1e-9, atol=1e-9)
+
+
+@given(speed, speed, speed, plants())
+def test_coriolis_forces_do_no_work(u, v, r, p):
+    c = vehicle.coriolis(u, v, r, p)
+    scale = sum(abs(a * b) for a, b in zip((u, v, r), c, strict=True))
+    assert abs(u * c[0] + v * c[1] + r * c[2]) <= 1e-12 * scale + 1e-12
+
+
+@given(speed, speed, speed, plants())
+def test_damping_never_adds_energy(u, v, r, p):
+    d = vehicle.damping(u, v, r, p)
+    scale = sum(abs(a * b) for a, b in zip((u, v, r), d, strict=True))
+    assert u * d[0] + v * d[1] + r * d[2] >= -1e-12 * scale
+
+
+@given(speed, speed, speed)
+def test_energy_falls_by_what_damping_takes(u, v, r):
+    scenario = load_scenario("tracking", overrides=COUPLED)
+    nu = np.array([u, v, r])
+    m, _, d = matrices(scenario, nu)
+    power = nu @ m @ np.array(vehicle.acceleration(u, v, r, 0.0, 0.0, FULL))
+    assert power == pytest.approx(-nu @ d @ nu, rel=1e-9, abs=1e-6)
+
+
+def test_runge_kutta_converges_at_order_4():
+    start, tau, time = (0.0, 0.0, 0.3, 1.0, 0.5, 0.2), (900.0, 150.0), 1.6
+
+    def end(steps):
+        state = start
+        for _ in range(steps):
+            state = vehicle.advance(*state, *tau, time / steps, FULL)
+        return np.array(state)
+
+    exact = end(4096)
+    errors = [np.abs(end(steps) - exact).max() for steps in (16, 32, 64, 128)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (orders > 3.7).all(), orders
+    assert (orders < 4.5).all(), orders
+
+
+@given(speed, speed, speed, st.floats(-3, 3), st.floats(-3, 3), st.floats(-500, 500), st.floats(-500, 500))
+def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
+    tau = (700.0, -300.0)
+    a = np.array(vehicle.advance(0.0, 0.0, psi, u, v, r, *tau, 0.1, FULL))
+    b = np.array(vehicle.advance(x, y, psi + turn, u, v, r, *tau, 0.1, FULL))
+    c, s = math.cos(turn), math.sin(turn)
+    moved = np.array([x + c * a[0] - s * a[1], y + s * a[0] + c * a[1], a[2] + turn])
+    np.testing.assert_allclose(b[:3], moved, atol=1e-9)
+    np.testing.assert_allclose(b[3:], a[3:], atol=1e-9)
+
+
+def test_mirrored_vehicle_moves_as_the_mirror_image():
+    a = vehicle.advance(0.0, 0.0, 0.4, 2.0, 0.6, 0.9, 500.0, 200.0, 0.1, PLAIN)
+    b = vehicle.advance(0.0, 0.0, -0.4, 2.0, -0.6, -0.9, 500.0, -200.0, 0.1, PLAIN)
+    np.testing.assert_allclose(b, np.array(a) * [1, -1, -1, 1, -1, -1], atol=1e-12)
+
+
+def test_full_thrust_reaches_the_speed_whose_drag_equals_it():
+    state = (0.0,) * 6
+    for _ in range(2000):
+        state = vehicle.advance(*state, 3000.0, 0.0, 0.1, PLAIN)
+    u = state[3]
+    assert (PLAIN.X_u + PLAIN.X_uu * u) * u == pytest.approx(3000.0, rel=1e-9)
+
+
+@given(st.floats(-50, 50), st.floats(-50, 50))
+def test_projection_keeps_direction_and_the_unit_disc(x, y):
+    p_x, p_y = vehicle.project(x, y)
+    assert math.hypot(p_x, p_y) <= 1.0 + 1e-12
+    assert p_x * y == pytest.approx(p_y * x, abs=1e-9)
+    if math.hypot(x, y) <= 1.0:
+        assert (p_x, p_y) == (x, y)
+
+
+@given(st.floats(-1, 1), st.floats(-8, 8))
+def test_yaw_damping_opposes_the_turn_within_the_torque_limit(a_y, r):
+    p = PLAIN._replace(yaw_damping=600.0)
+    torque = vehicle.actuators(0.3, a_y, r, p)[1]
+    assert abs(torque) <= p.max_torque
+    assert torque == pytest.approx(max(-3000.0, min(3000.0, 3000.0 * a_y - 600.0 * r)))
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-7, 7))
+def test_a_held_force_keeps_its_direction_in_the_world(a_x, a_y, turn):
+    p = PLAIN._replace(max_force=2000.0, max_torque=900.0, lever_arm=0.5)
+    b_x, b_y = vehicle.turned(a_x, a_y, turn, p)
+    before = np.array([a_x * p.max_force, a_y * p.max_torque / p.lever_arm])
+    after = np.array([b_x * p.max_force, b_y * p.max_torque / p.lever_arm])
+    c, s = math.cos(turn), math.sin(turn)
+    np.testing.assert_allclose([c * after[0] - s * after[1], s * after[0] + c * after[1]], before, atol=1e-9)
+
+
+@given(st.floats(-100, 100))
+def test_wrap_gives_the_same_direction_in_one_turn(angle):
+    wrapped = vehicle.wrap(angle)
+    assert -math.pi <= wrapped < math.pi
+    assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-12)
+    assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-12)

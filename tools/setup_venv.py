@@ -1,0 +1,69 @@
+"""Make .venv and install uuv_marl into it: setup_venv.py base|dev. Explains what is missing.
+
+Written for any Python 3, so that one that is too old hears why.
+"""
+
+import os
+import re
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+VENV = os.path.join(ROOT, ".venv")
+PYTHON = os.path.join(VENV, "bin", "python")
+
+
+def stop(message):
+    """End with a message and no traceback."""
+    sys.stderr.write(message + "\n")
+    raise SystemExit(1)
+
+
+def supported():
+    """Lowest version and the first one too new, from pyproject.toml."""
+    with open(os.path.join(ROOT, "pyproject.toml")) as file:
+        low, high = re.search(r'requires-python = ">=(\d+\.\d+),<(\d+\.\d+)"', file.read()).groups()
+    return tuple(map(int, low.split("."))), tuple(map(int, high.split(".")))
+
+
+def check_python():
+    """Stop where this interpreter can't carry uuv_marl."""
+    low, high = supported()
+    if not low <= sys.version_info[:2] < high:
+        stop(
+            "uuv_marl needs Python %d.%d or later, before %d.%d (Numba and PettingZoo end there); this is %s at %s.\n"
+            "Install a fitting one, or name it: make benchmark PYTHON=python3.12"
+            % (low + high + (sys.version.split()[0], sys.executable))
+        )
+    try:
+        import ensurepip  # noqa: F401
+        import venv  # noqa: F401
+    except ImportError:
+        stop(
+            "%s can't make virtual environments: its modules ensurepip and venv are missing.\n"
+            "On Debian and Ubuntu: apt-get install python%d.%d-venv. Elsewhere install a complete Python, or name one: "
+            "make benchmark PYTHON=/path/to/python3" % ((sys.executable,) + sys.version_info[:2])
+        )
+
+
+def run(*command):
+    """Run a command, or stop with what it was."""
+    if subprocess.call(command, cwd=ROOT) != 0:
+        stop("This failed: %s\nRead the lines above; 'make clean' removes a half-made .venv." % " ".join(command))
+
+
+def main(extra):
+    """Make the environment for ``base`` or ``dev``."""
+    check_python()
+    if not os.path.exists(PYTHON):
+        print("Making .venv with Python %s" % sys.version.split()[0])
+        run(sys.executable, "-m", "venv", VENV)
+    target = "." if extra == "base" else ".[%s]" % extra
+    print("Installing uuv_marl%s; the first time takes a minute or two" % target[1:])
+    run(PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", "constraints.txt", "-e", target)
+    with open(os.path.join(VENV, extra + ".stamp"), "w"):
+        pass
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
