@@ -1,5 +1,6 @@
 """Laws of the policies, and what they demand."""
 
+import csv
 import json
 import math
 from importlib import resources
@@ -224,11 +225,12 @@ def test_unknown_names_and_parameters_suggest():
 @pytest.mark.parametrize("name", SPACES)
 def test_tuned_gains_come_from_shipped_trials(name):
     data = json.loads((resources.files("uuv_marl.baselines") / "tuned" / f"{name}.json").read_text())
-    assert len(data["trials"]) == TRIALS
+    with (resources.files("uuv_marl.baselines") / "tuned" / f"{name}.csv").open() as file:
+        trials = list(csv.DictReader(file))
+    assert len(trials) == TRIALS
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
-    best = min(data["trials"], key=lambda trial: trial[0])
-    assert best[0] == pytest.approx(data["best_cost_s"], abs=0.01)
-    assert best[1:] == list(data["best"].values())
+    best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
+    assert best == {"cost_s": data["best_cost_s"], **data["best"]}
     assert list(data["best"]) == list(SPACES[name][0])
     scenario = granted(name, load_scenario("tracking"))
     gains = make(name, scenario).gains._asdict()

@@ -192,8 +192,9 @@ def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
 
     monkeypatch.setattr(tuning, "SEEDS", (10_000,))
     monkeypatch.setattr("uuv_marl.scenario_files.load_scenario", lambda *a, **k: quick())
-    whole = json.loads(tuning.tune("bio_inspired_plus", tmp_path / "a", 5, lambda *a: None).read_text())
-    tuning.tune("bio_inspired_plus", tmp_path / "b", 2, lambda *a: None)
-    parts = json.loads(tuning.tune("bio_inspired_plus", tmp_path / "b", 5, lambda *a: None).read_text())
-    assert whole == parts
-    assert len(whole["trials"]) == 5
+    for folder, stops in (("whole", [5]), ("parts", [2, 5])):
+        for trials in stops:
+            tuning.tune("bio_inspired_plus", tmp_path / folder, trials, lambda *a: None)
+    for name in ("bio_inspired_plus.json", "bio_inspired_plus.csv"):
+        assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
+    assert len((tmp_path / "whole" / "bio_inspired_plus.csv").read_text().splitlines()) == 6

@@ -26,7 +26,12 @@ print(swarm.state.nu[0, 0, 0].hex())
 def run(folder, cache):
     environment = {**os.environ, "PYTHONPATH": str(folder), "UUV_MARL_CACHE_DIR": str(cache)}
     return subprocess.run(
-        [sys.executable, "-c", STEP, str(folder)], capture_output=True, text=True, check=True, env=environment
+        [sys.executable, "-c", STEP, str(folder)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+        cwd=folder,
     )
 
 

@@ -47,7 +47,7 @@ def test_parallel_api_to_the_end_with_losses():
 
 
 def test_aec_api(scenario_name):
-    api_test(uuv_marl.env(scenario=scenario_name, num_vehicles=6), num_cycles=30)
+    api_test(uuv_marl.env(scenario=scenario_name, num_vehicles=8), num_cycles=30)
 
 
 def test_parallel_seed(scenario_name):
@@ -63,7 +63,7 @@ def test_state(scenario_name):
 
 
 def test_render(scenario_name):
-    render_test(lambda **kwargs: uuv_marl.env(scenario=scenario_name, num_vehicles=4, **kwargs))
+    render_test(lambda **kwargs: uuv_marl.env(scenario=scenario_name, num_vehicles=8, **kwargs))
 
 
 def test_the_module_form():

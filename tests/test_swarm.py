@@ -229,7 +229,7 @@ def test_lost_vehicles_fall_silent_and_leave_the_centre():
 
 
 def test_a_contact_counts_once_while_it_lasts(place):
-    swarm = place(load_scenario("tracking"), [[0, 0, 0], [10, 0, math.pi]], nu=[[3, 0, 0], [3, 0, 0]])
+    swarm = place(load_scenario("tracking"), [[0, 0, 0], [8, 0, math.pi]], nu=[[3, 0, 0], [3, 0, 0]])
     action = np.zeros((1, 2, 2), np.float32)
     counts = []
     for _ in range(60):
@@ -239,7 +239,9 @@ def test_a_contact_counts_once_while_it_lasts(place):
     assert counts.index(1) > 5
     swarm.state.eta[0, :, 0] = [0, 30]
     swarm.step(action)
-    swarm.state.eta[0, :, 0] = [0, 1.5]
+    assert swarm.facts.collisions[0] == 0
+    swarm.state.eta[0, :, 0] = [0, 2.3]
+    swarm.state.nu[0, :, 0] = 3.0
     swarm.step(action)
     assert swarm.facts.collisions[0] == 1
     assert swarm.facts.contacts[0].tolist() == [1, 1]

@@ -1,5 +1,6 @@
 """Fair tuning: the same optimiser, evaluations, seeds and objective for every hand-made policy with free gains."""
 
+import csv
 import json
 from collections.abc import Callable
 from functools import partial
@@ -101,8 +102,8 @@ def cost(run: Run, scenario: Scenario) -> float:
 def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], None]) -> Path:
     """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
 
-    Writes ``output/POLICY.json`` with the best parameters and every trial, and keeps Optuna's journal beside it.
-    ``report`` is called with the number of trials done and the best cost [s].
+    Writes ``output/POLICY.json`` with the best parameters and ``POLICY.csv`` with every trial, and keeps Optuna's
+    journal beside them. ``report`` is called with the number of trials done and the best cost [s].
     """
     import optuna  # noqa: PLC0415 - an extra
     from optuna.storages.journal import JournalFileBackend  # noqa: PLC0415
@@ -120,26 +121,29 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         runs = [run for run in evaluate(scenario, policy, SEEDS, gains=gains(**drawn)) if isinstance(run, Run)]
         return sum(cost(run, scenario) for run in runs) / len(runs)
 
-    done = len(optuna.create_study(storage=storage, study_name=policy, load_if_exists=True).trials)
-    while done < trials:
+    study = optuna.create_study(storage=storage, study_name=policy, load_if_exists=True)
+    complete = (optuna.trial.TrialState.COMPLETE,)
+    while (done := len(study.get_trials(states=complete))) < trials:
         # One sampler seed per trial: a resumed search draws what an uninterrupted one draws.
         sampler = optuna.samplers.CmaEsSampler(seed=done, n_startup_trials=0, warn_independent_sampling=False)
         study = optuna.load_study(study_name=policy, storage=storage, sampler=sampler)
         study.optimize(objective, n_trials=1)
-        done += 1
-        report(done, study.best_value)
-    study = optuna.load_study(study_name=policy, storage=storage)
+        report(done + 1, study.best_value)
     result = {
         "policy": policy,
         "objective": "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
         "scenario": SCENARIO,
         "seeds": list(SEEDS),
-        "optimiser": f"Optuna {optuna.__version__} CmaEsSampler, seed = trial number",
+        "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
         "space": {name: r._asdict() for name, r in space.items()},
         "best": {name: float(f"{value:.4g}") for name, value in study.best_params.items()},
-        "best_cost_s": study.best_value,
-        "trials": [[round(t.value or 0.0, 2), *(float(f"{v:.4g}") for v in t.params.values())] for t in study.trials],
+        "best_cost_s": round(study.best_value, 3),
     }
-    path = output / f"{policy}.json"
+    trials_path, path = output / f"{policy}.csv", output / f"{policy}.json"
+    with trials_path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["cost_s", *space])
+        for trial in study.get_trials(states=complete):
+            writer.writerow([f"{trial.value:.3f}", *(f"{trial.params[name]:.4g}" for name in space)])
     path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     return path
