@@ -90,8 +90,8 @@ def benchmark(
     with _explained():
         from uuv_marl.baselines.registry import policy_class
         from uuv_marl.benchmark.results import Results
-        from uuv_marl.benchmark.runner import DEFAULT_POLICIES, run_missing, title, write_report
-        from uuv_marl.benchmark.tables import rich_table, rows_of
+        from uuv_marl.benchmark.runner import DEFAULT_POLICIES, make_tables, run_missing, write_report
+        from uuv_marl.benchmark.tables import rich_table
         from uuv_marl.scenario_files import load_scenario, parse_override
         from uuv_marl.sim.compiled import is_first_compilation
 
@@ -120,9 +120,10 @@ def benchmark(
                 f"Stopped. {len(results.rows)} finished runs are in {output}/results.json; the same command goes on."
             )
             raise typer.Exit(130) from None
-        written = write_report(results, scenarios, policies, wanted)
-        for loaded in scenarios:
-            console.print(rich_table(title(loaded, wanted), rows_of(results, loaded.name, policies, wanted)))
+        tables = make_tables(results, scenarios, policies, wanted)
+        written = write_report(results, tables, scenarios, policies, wanted)
+        for table in tables:
+            console.print(rich_table(table.title, table.rows))
         console.print(f"Every seed: {output}/results.json   table: {written[0]}   pictures:")
         for path in written[1:]:
             console.print(f"  {path}", highlight=False)

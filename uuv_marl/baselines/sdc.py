@@ -133,7 +133,8 @@ def hexagonal_slots(n: int) -> Float64:
     row, column = (axis.ravel() - reach for axis in np.indices((2 * reach + 1, 2 * reach + 1)))
     points: Float64 = SLOT_PITCH_M * np.stack([row * math.sqrt(3) / 2, column + 0.5 * (row % 2)], axis=1)
     # Rounded, so that points at equal distances keep their order on every machine.
-    nearest = points[np.argsort(np.round((points**2).sum(axis=1), 6), kind="stable")[:n]]
+    squared: Float64 = np.round((points[:, 0] ** 2 + points[:, 1] ** 2), 6)
+    nearest = points[np.argsort(squared, kind="stable")[:n]]
     return nearest - nearest.mean(axis=0)
 
 

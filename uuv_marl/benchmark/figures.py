@@ -81,6 +81,7 @@ def _distance(results: Results, scenario: str, policies: Sequence[str], seeds: S
     ax.axhline(0.0, color="0.35", linewidth=1.0)
     ax.set_ylabel("distance to obstacle [m]")
     ax.set_yscale("symlog", linthresh=10.0)
+    ax.set_ylim(bottom=min(-1.0, float(ax.dataLim.ymin) - 1.0))
     ax.set_yticks([0, 5, 10, 20, 50, 100, 200], labels=["0", "5", "10", "20", "50", "100", "200"])
     return _save(figure, folder / f"{scenario}_obstacle_distance.png")
 
@@ -99,7 +100,7 @@ def _spacing(results: Results, scenario: str, policies: Sequence[str], seeds: Se
 def _time_axes(results: Results, scenario: str, what: str) -> tuple[Figure, Axes]:
     figure = Figure(figsize=(9.0, 4.8), layout="constrained")
     ax = figure.subplots()
-    ax.set_title(f"{_name(results, scenario)}: {what}; median over seeds, band from lowest to highest", fontsize=10)
+    ax.set_title(f"{_name(results, scenario)}: {what}\nmedian over seeds, band from lowest to highest", fontsize=10)
     ax.set_xlabel("time [s]")
     ax.grid(alpha=0.25)
     return figure, ax

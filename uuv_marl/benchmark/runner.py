@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
@@ -44,15 +45,30 @@ def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     )
 
 
-def write_report(
+class Table(NamedTuple):
+    """A scenario's table."""
+
+    title: str
+    rows: list[tuple[str, ...]]
+
+
+def make_tables(
     results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]
+) -> list[Table]:
+    """A table for each scenario."""
+    return [Table(title(s, seeds), rows_of(results, s.name, policies, seeds)) for s in scenarios]
+
+
+def write_report(
+    results: Results,
+    tables: Sequence[Table],
+    scenarios: Sequence[Scenario],
+    policies: Sequence[str],
+    seeds: Sequence[int],
 ) -> list[Path]:
     """``table.md`` and the pictures; the paths, the table first."""
-    tables = [
-        markdown_table(title(scenario, seeds), rows_of(results, scenario.name, policies, seeds))
-        for scenario in scenarios
-    ]
     path = results.folder / "table.md"
-    path.write_text("\n".join([*tables, CAPTION + "\n"]), encoding="utf-8")
+    texts = [markdown_table(table.title, table.rows) for table in tables]
+    path.write_text("\n".join([*texts, CAPTION + "\n"]), encoding="utf-8")
     figures = [figure for scenario in scenarios for figure in draw_all(results, scenario.name, policies, seeds)]
     return [path, *figures]

@@ -11,6 +11,7 @@ from scipy.stats import bootstrap, trim_mean
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import Results, Row, knowledge
 
+Float64 = NDArray[np.float64]
 _CONFIDENCE = 0.95
 _RESAMPLES = 2000
 _NOTHING = "–"
@@ -38,16 +39,21 @@ def estimate(values: Sequence[float]) -> Estimate:
     """Interquartile mean over seeds and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable."""
     data = np.asarray(values, np.float64)
     if len(data) < 2 or np.ptp(data) == 0.0:
-        return Estimate(_iqm(data), float(data.min()), float(data.max()))
+        return Estimate(float(_iqm(data)), float(data.min()), float(data.max()))
     interval = bootstrap(
-        (data,), _iqm, confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES, method="percentile", axis=0,
-        vectorized=False, rng=np.random.default_rng(0),
-    ).confidence_interval  # fmt: skip
-    return Estimate(_iqm(data), float(interval.low), float(interval.high))
+        (data,),
+        _iqm,
+        confidence_level=_CONFIDENCE,
+        n_resamples=_RESAMPLES,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return Estimate(float(_iqm(data)), float(interval.low), float(interval.high))
 
 
-def _iqm(data: NDArray[np.float64], axis: int = 0) -> float:
-    return float(trim_mean(data, 0.25, axis=axis))
+def _iqm(data: Float64, axis: int = -1) -> Float64:
+    return np.asarray(trim_mean(data, 0.25, axis=axis), np.float64)
 
 
 def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, ...]]:

@@ -1,0 +1,66 @@
+"""What the documents say is executed, or compared with the code."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from uuv_marl.cli import app
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(language):
+    return [
+        pytest.param(block, id=f"{page.name}-{k}")
+        for page in PAGES
+        for k, block in enumerate(re.findall(rf"```{language}\n(.*?)```", page.read_text(), flags=re.S))
+    ]
+
+
+@pytest.mark.parametrize("block", blocks("python"))
+def test_python_blocks_run(block, capsys):
+    exec(compile(block, "README.md", "exec"), {"__name__": "example"})
+
+
+@pytest.mark.parametrize(
+    "line",
+    sorted(
+        {
+            line.split("#")[0].strip()
+            for param in blocks("console")
+            for line in param.values[0].splitlines()
+            if "uuv-marl" in line
+        }
+    ),
+)
+def test_commands_are_understood(line, monkeypatch):
+    """Parsed as written, options and names checked, then stopped before the long work."""
+    monkeypatch.setattr("uuv_marl.benchmark.runner.run_missing", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr("uuv_marl.benchmark.tuning.tune", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
+    with CliRunner().isolated_filesystem():
+        done = CliRunner().invoke(app, line.split()[1:])
+    assert done.exit_code in (0, 130), done.output
+
+
+def test_make_targets_named_in_the_readme_exist():
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"^make (\w+)", (ROOT / "README.md").read_text(), flags=re.M):
+        assert re.search(rf"^{target}:", makefile, flags=re.M), target
+
+
+def test_generated_tables_are_those_of_the_code():
+    spec = importlib.util.spec_from_file_location("write_tables", ROOT / "tools" / "write_tables.py")
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    assert tool.PAGE.read_text() == tool.text()
+    assert tool.README.read_text() == tool.readme()
+
+
+def test_links_to_files_lead_somewhere():
+    for page in PAGES:
+        for link in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text()):
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
