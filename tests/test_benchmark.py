@@ -137,6 +137,7 @@ def test_the_command_line_from_end_to_end(tmp_path):
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
     assert "bio_inspired" in done.output
+    assert "task time [s]" in done.output  # brackets are not markup
     data = json.loads((tmp_path / "results.json").read_text())
     assert {(r["scenario"], r["policy"], r["seed"]) for r in data["runs"]} == {
         (s, p, k) for s in ("lossy", "tracking") for p in ("bio_inspired", "random") for k in range(3)

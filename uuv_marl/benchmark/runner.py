@@ -28,6 +28,7 @@ def run_missing(
         for policy in policies:
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
             done, fresh = len(seeds) - len(missing), 0
+            report(scenario.name, policy, done / len(seeds))
             for event in evaluate(granted(policy, scenario), policy, missing):
                 if isinstance(event, Run):
                     results.add(scenario.name, policy, event)

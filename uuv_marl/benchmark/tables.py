@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.markup import escape
 from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
@@ -121,11 +122,11 @@ def rich_table(title: str, rows: Sequence[Sequence[str]]) -> RichTable:
     table = RichTable(title=title, title_justify="left", caption=CAPTION, caption_justify="left", show_lines=True)
     table.add_column("policy\n(beyond the percept)")
     for header in ("arrived", "task time [s]", "obstacle distance [m]", "spacing [m]"):
-        table.add_column(header, justify="right")
+        table.add_column(escape(header), justify="right")
     table.add_column("collisions")
     table.add_column("paper")
     for policy, knows, arrived, time, slowest, distance, nearest, spacing, closest, mean, collisions, paper in rows:
-        table.add_row(
+        cells = (
             policy if knows == _NOTHING else f"{policy}\n({knows})",
             arrived,
             f"{time}\nworst {slowest}",
@@ -134,6 +135,7 @@ def rich_table(title: str, rows: Sequence[Sequence[str]]) -> RichTable:
             collisions,
             paper,
         )
+        table.add_row(*map(escape, cells))
     return table
 
 
