@@ -37,12 +37,12 @@ def test_python_blocks_run(block, capsys):
         }
     ),
 )
-def test_commands_are_understood(line, monkeypatch):
+def test_commands_are_understood(line, monkeypatch, tmp_path):
     """Parsed as written, options and names checked, then stopped before the long work."""
     monkeypatch.setattr("uuv_marl.benchmark.runner.run_missing", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
     monkeypatch.setattr("uuv_marl.benchmark.tuning.tune", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
-    with CliRunner().isolated_filesystem():
-        done = CliRunner().invoke(app, line.split()[1:])
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, line.split()[1:])
     assert done.exit_code in (0, 130), done.output
 
 

@@ -51,9 +51,10 @@ def returns(scenario, arrival_tick=None, die_at=None, bump_at=None, ticks=60):
         swarm.state.tick[0] = 2000 + k
         swarm.state.eta[0, :, :2] = 600.0 + 10.0 * np.arange(swarm_size)[:, None] - (0 if near else 300.0)
         swarm.state.eta[0, :, :2] -= swarm.state.eta[0, :, :2].mean(axis=0) - (600.0 if near else 300.0)
-        if k == bump_at:
-            swarm.state.eta[0, 0, :2] = swarm.state.eta[0, 1, :2] + 0.5
         swarm.state.nu[0] = 0.0
+        if k == bump_at:  # vehicle 0 runs into vehicle 1
+            swarm.state.eta[0, 0] = (*(swarm.state.eta[0, 1, :2] + (2.1, 0.0)), np.pi)
+            swarm.state.nu[0, 0, 0] = 3.0
         if k == die_at:
             swarm.state.alive[0, 0] = False
         task_alive = swarm.state.alive[0].copy()
