@@ -24,7 +24,12 @@ check: .venv/dev.stamp
 	$(BIN)/lint-imports
 	$(BIN)/pyright
 
-.venv/%.stamp: pyproject.toml constraints.txt tools/setup_venv.py
+# A stamp without its environment is worth nothing.
+ifeq ($(wildcard $(BIN)/uuv-marl),)
+.PHONY: .venv/base.stamp .venv/dev.stamp
+endif
+
+.venv/base.stamp .venv/dev.stamp: .venv/%.stamp: pyproject.toml constraints.txt tools/setup_venv.py
 	@command -v "$(PYTHON)" >/dev/null || { echo "There is no '$(PYTHON)' here. Install Python 3.11 or later, or name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }
 	@"$(PYTHON)" tools/setup_venv.py $*
 

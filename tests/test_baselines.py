@@ -204,14 +204,14 @@ def test_policies_that_remember_forget_on_reset():
 
 @pytest.mark.parametrize(("name", "channel"), [("sff", "link"), ("sdc", "compass and link")])
 def test_a_policy_without_its_channels_names_the_remedy(name, channel):
-    with pytest.raises(PolicyError, match=f"{channel}.*override sonar.channels"):
+    with pytest.raises(PolicyError, match=f"{channel} .sonar.channels.*use uuv_marl.baselines.granted"):
         make(name, load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="override sonar.channels"):
+    with pytest.raises(PolicyError, match="granted"):
         make(name, parallel_env("tracking"))
 
 
 def test_a_policy_refuses_another_inner_loop():
-    with pytest.raises(PolicyError, match="yaw damping of 600 .* override actuators.yaw_damping_nms"):
+    with pytest.raises(PolicyError, match="yaw damping of 600 .*actuators.yaw_damping_nms.*granted"):
         make("bio_inspired_plus", load_scenario("tracking"))
     with pytest.raises(PolicyError, match="yaw damping of 0"):
         make("bio_inspired", granted("bio_inspired_plus", load_scenario("tracking")))
@@ -220,6 +220,10 @@ def test_a_policy_refuses_another_inner_loop():
 def test_unknown_names_and_parameters_suggest():
     with pytest.raises(PolicyError, match="did you mean 'bio_inspired'"):
         make("bio_inspred", load_scenario("tracking"))
+    with pytest.raises(PolicyError, match="made for a Scenario"):
+        make("bio_inspired", "tracking")
+    with pytest.raises(PolicyError, match="num_worlds must be at least 1"):
+        make("bio_inspired", load_scenario("tracking"), 0)
     with pytest.raises(PolicyError, match="no parameter 'gain'; it has gains, obstacle_term"):
         make("bio_inspired", load_scenario("tracking"), gain=3)
 

@@ -107,6 +107,12 @@ def test_results_of_something_else_are_refused(tmp_path):
     other = load_scenario(quick(), overrides={"constraints.s_o_m": 6.0})
     with pytest.raises(ResultsError, match=r"another 'single_obstacle'.*--output"):
         Results(tmp_path, [other])
+    between = Results(tmp_path, [quick("tracking")])  # another scenario in the same folder forgets nothing
+    runner.run_missing(between, [quick("tracking")], ["idle"], [0], lambda *a: None)
+    with pytest.raises(ResultsError, match="another 'single_obstacle'"):
+        Results(tmp_path, [other])
+    with pytest.raises(ResultsError, match="can't be written"):
+        Results(tmp_path / "results.json" / "below", [quick()])
     path = tmp_path / "results.json"
     path.write_text(path.read_text().replace('"fingerprint": "', '"fingerprint": "0'))
     with pytest.raises(ResultsError, match="other code"):
@@ -116,8 +122,38 @@ def test_results_of_something_else_are_refused(tmp_path):
         Results(tmp_path, [quick()])
 
 
-def test_the_table_shows_the_paper_and_what_each_policy_knows(tmp_path):
+OWN_POLICY = """
+import numpy as np
+from uuv_marl.baselines import Policy
+
+class Ahead(Policy):
+    def act(self, percept):
+        reference = percept["reference"]
+        return (reference / np.maximum(np.hypot(*np.moveaxis(reference, -1, 0)), 1e-6)[..., None]).astype(np.float32)
+"""
+
+
+def test_your_own_policy_stands_in_the_table(tmp_path, monkeypatch):
+    (tmp_path / "my_policies.py").write_text(OWN_POLICY)
+    monkeypatch.chdir(tmp_path)
+    arguments = ["benchmark", "--policy=my_policies:Ahead", "--seeds=2", "--output=out", *SETS]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    assert "my_policies:Ahead" in (tmp_path / "out" / "table.md").read_text()
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+
+
+def test_the_table_says_what_was_changed_and_then_leaves_the_paper_out():
+    assert "CHANGED" not in runner.title(load_scenario("single_obstacle"), [0])
+    changed = load_scenario("single_obstacle", overrides={"obstacles": [], "vehicle.m_kg": 190.0})
+    text = runner.title(changed, [0])
+    assert "vehicle.m_kg=190.0" in text
+    assert "obstacles=[]" in text
+
+
+def test_the_table_shows_the_paper_and_what_each_policy_knows(tmp_path, monkeypatch):
     scenario = load_scenario("single_obstacle", overrides={"time_limit.factor": 0.02, "time_limit.extra_s": 5.0})
+    monkeypatch.setattr("uuv_marl.benchmark.tables.differences", lambda scenario: [])
     results = Results(tmp_path, [scenario])
     policies = ["bio_inspired", "sdc", "idle"]
     runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
@@ -162,6 +198,11 @@ def test_the_command_line_from_end_to_end(tmp_path):
         (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must be positive"),
         (["benchmark", "--set=vehicle"], "must look like field=value"),
         (["scenarios", "--show=trackin"], "did you mean"),
+        (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy brings its own"),
+        (["benchmark", "--scenario=tracking", "--scenario=tracking"], "different names"),
+        (["benchmark", "--policy=nowhere:Thing"], "can't be imported"),
+        (["benchmark", "--policy=math:pi"], "must be a subclass"),
+        (["benchmark", "--set=name=../up"], "name must hold letters"),
         (["tune", "--policy=idle"], "no free gains"),
     ],
 )

@@ -1,5 +1,6 @@
 """The PettingZoo environments: conformance, contract, determinism, errors, pictures."""
 
+import pickle
 import warnings
 
 import gymnasium
@@ -242,12 +243,20 @@ def test_bad_input_names_the_agent_and_the_remedy():
             env.step(actions)
     with pytest.raises(ValueError, match="render_mode must be one of"):
         uuv_marl.parallel_env(render_mode="ascii")
-    with pytest.raises(ValueError, match="max_cycles must be at least 1"):
+    with pytest.raises(ValueError, match="max_cycles must be a whole number from 1"):
         uuv_marl.parallel_env(max_cycles=0)
     with pytest.raises(ValueError, match="reward must be 'individual', 'team'"):
         uuv_marl.parallel_env(reward="sparse")
     with pytest.raises(RuntimeError, match="needs a render_mode"):
         env.render()
+    fresh = uuv_marl.parallel_env(num_vehicles=3, render_mode="rgb_array")
+    for call in (fresh.render, fresh.state):
+        with pytest.raises(RuntimeError, match="came before reset"):
+            call()
+    lone = uuv_marl.parallel_env(num_vehicles=1, reward=lambda swarm: -swarm.facts.spacing)
+    lone.reset(seed=0)
+    with pytest.raises(ValueError, match="must give finite numbers"):
+        lone.step({"uuv_0": np.zeros(2)})
     short = uuv_marl.parallel_env(num_vehicles=3, max_cycles=1)
     short.reset(seed=0)
     short.step(good)
@@ -275,6 +284,8 @@ def test_a_picture_shows_what_is_there():
     assert (240, 228, 66) in colours  # vehicles
     env.step({agent: np.ones(2, np.float32) for agent in env.agents})
     assert not np.array_equal(env.render(), picture)
+    twin = pickle.loads(pickle.dumps(env))
+    np.testing.assert_array_equal(twin.render(), env.render())
     env.close()
 
 

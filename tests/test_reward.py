@@ -95,8 +95,8 @@ def test_a_collision_always_lowers_the_return():
 
 
 def test_a_lost_vehicle_is_charged_more_than_staying_could_cost():
-    overrides = {"disturbance.loss_times_s": [1.0], "time_limit.factor": 0.05, "time_limit.extra_s": 5.0}
-    lossy = load_scenario("single_obstacle", num_vehicles=6, overrides=overrides)
+    """Idle vehicles are left behind by l(t) for minutes: dying at once must cost more than that."""
+    lossy = load_scenario("single_obstacle", num_vehicles=6, overrides={"disturbance.loss_times_s": [1.0]})
     calm = load_scenario(lossy, overrides={"disturbance.loss_times_s": []})
     idle = np.zeros((1, 6, 2), np.float32)
     total = {}

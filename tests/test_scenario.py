@@ -145,6 +145,22 @@ def test_unknown_names_suggest_the_nearest():
         parse_override("swarm.num_vehicles")
 
 
+def test_a_file_extends_one_beside_it(tmp_path):
+    (tmp_path / "a.toml").write_text('extends = "single_obstacle"\n[swarm]\nnum_vehicles = 12\n')
+    (tmp_path / "b.toml").write_text('extends = "a.toml"\n[arrival]\nradius_m = 3.0\n')
+    scenario = load_scenario(tmp_path / "b.toml")
+    assert (scenario.name, scenario.swarm.num_vehicles, scenario.arrival.radius_m) == ("b", 12, 3.0)
+    (tmp_path / "a.toml").write_text('extends = "b.toml"\n')
+    with pytest.raises(ScenarioError, match="must not lead back"):
+        load_scenario(tmp_path / "b.toml")
+    (tmp_path / "a.toml").write_text("extends = 3\n")
+    with pytest.raises(ScenarioError, match="extends must be a scenario's name or file, got 3"):
+        load_scenario(tmp_path / "a.toml")
+    (tmp_path / "a.toml").write_bytes(b"\xff")
+    with pytest.raises(ScenarioError, match="not valid TOML"):
+        load_scenario(tmp_path / "a.toml")
+
+
 def test_broken_files_are_named(tmp_path):
     path = tmp_path / "broken.toml"
     path.write_text("[swarm\n")

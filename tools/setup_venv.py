@@ -58,6 +58,13 @@ def main(extra):
     if not os.path.exists(PYTHON):
         print("Making .venv with Python %s" % sys.version.split()[0])
         run(sys.executable, "-m", "venv", VENV)
+    made_with = (
+        subprocess.check_output([PYTHON, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]).decode().strip()
+    )
+    if made_with != "%d.%d" % sys.version_info[:2]:
+        stop(
+            "The .venv here is of Python %s, not of this %s; 'make clean' first." % (made_with, sys.version.split()[0])
+        )
     target = "." if extra == "base" else ".[%s]" % extra
     print("Installing uuv_marl%s; the first time takes a minute or two" % target[1:])
     run(PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", "constraints.txt", "-e", target)

@@ -71,7 +71,9 @@ def benchmark(
     ] = None,
     policy: Annotated[
         list[str] | None,
-        typer.Option(help="Name; repeat for several. Default: the paper's three and their stronger variants."),
+        typer.Option(
+            help="Name, or module:Class; repeat for several. Default: the paper's three and stronger variants."
+        ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1.")] = 20,
     overrides: Annotated[
@@ -88,16 +90,23 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with _explained():
+        from uuv_marl.baselines import PolicyError
         from uuv_marl.baselines.registry import policy_class
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.runner import DEFAULT_POLICIES, make_tables, run_missing, write_report
         from uuv_marl.benchmark.tables import rich_table
-        from uuv_marl.scenario_files import load_scenario, parse_override
+        from uuv_marl.scenario_files import ScenarioError, load_scenario, parse_override
         from uuv_marl.sim.compiled import is_first_compilation
 
         changes = dict(parse_override(text) for text in overrides or [])
+        for field in sorted({"sonar.channels", "actuators.yaw_damping_nms"} & set(changes)):
+            raise PolicyError(f"{field} can't be set here: every policy brings its own, see 'uuv-marl policies'")
         scenarios = [load_scenario(name, overrides=changes) for name in scenario or ["single_obstacle"]]
+        names = [loaded.name for loaded in scenarios]
+        if len(set(names)) < len(names):
+            raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
         policies = list(dict.fromkeys(policy or DEFAULT_POLICIES))
+        sys.path.insert(0, "")  # --policy module:Class finds modules of this folder
         for name in policies:
             policy_class(name)
         results = Results(output, scenarios)
@@ -199,7 +208,9 @@ def tune(
                     )  # fmt: skip
                     progress.console.print(f"{path}", highlight=False)
         except ModuleNotFoundError as error:
-            raise PolicyError(f"tuning needs {error.name}: pip install 'uuv_marl[tune]'") from None
+            raise PolicyError(
+                f"tuning needs {error.name}: install the extra, in the checkout: pip install -e '.[tune]'"
+            ) from None
         except KeyboardInterrupt:
             console.print(f"Stopped. The finished trials are in {output}; the same command goes on.")
             raise typer.Exit(130) from None

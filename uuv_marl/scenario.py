@@ -306,8 +306,8 @@ class Reward(Section):
 class Scenario(Section):
     """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
 
-    name: str
-    """Set by the loader: the file's name."""
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    """Set by the loader: the file's name; names results and pictures."""
     title: str
     """One line."""
     source: str

@@ -28,6 +28,7 @@ _EXPLANATIONS = {
     "string_type": "must be a text",
     "tuple_type": "must be a list",
     "literal_error": "must be {expected}",
+    "string_pattern_mismatch": "must hold letters, digits, _ and - only",
     "model_type": "must be a table of fields",
     "too_short": "must have at least {min_length} entries",
     "too_long": "must have at most {max_length} entries",
@@ -94,8 +95,28 @@ def to_toml(scenario: Scenario) -> str:
     return tomlkit.dumps(data)  # pyright: ignore[reportUnknownMemberType]
 
 
+def differences(scenario: Scenario) -> list[str]:
+    """``field=value`` wherever a scenario differs from the shipped one of its name; everything where there is none."""
+    shipped = load_scenario(scenario.name) if scenario.name in scenario_names() else None
+    before = _leaves(shipped.model_dump(mode="json")) if shipped else {}
+    now = _leaves(scenario.model_dump(mode="json"))
+    changed = [f"{field}={value}" for field, value in now.items() if before.get(field) != value]
+    return changed + [f"{field} removed" for field in before if field not in now]
+
+
+def _leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
+    leaves: dict[str, object] = {}
+    for key, value in data.items():
+        if isinstance(value, dict):
+            leaves |= _leaves(cast(dict[str, Any], value), f"{prefix}{key}.")
+        else:
+            leaves[prefix + key] = value
+    return leaves
+
+
 def show(name: str | os.PathLike[str]) -> str:
     """A scenario's complete TOML with the source of every number, its own values over those that all share."""
+    load_scenario(name)  # says what is wrong, where something is
     document = tomlkit.parse((_FOLDER / f"{_BASE}.toml").read_text(encoding="utf-8"))
     title = tomlkit.document()
     for path in reversed(_chain(_find(name))):
@@ -115,15 +136,16 @@ def _overlay(document: Container, changes: Container, title: Any) -> None:
             document[key] = cast(Item, item)
 
 
-def _find(name: str | os.PathLike[str]) -> Path:
+def _find(name: str | os.PathLike[str], beside: Path | None = None) -> Path:
     text = os.fspath(name)
     if text.endswith(".toml"):
-        if not Path(text).is_file():
+        path = (beside or Path()) / text
+        if not path.is_file():
             raise ScenarioError(
                 f"scenario file {text} does not exist; give the path of a TOML file, or a name: "
                 f"{', '.join(scenario_names())}"
             )
-        return Path(text)
+        return path
     if text in scenario_names():
         return _FOLDER / f"{text}.toml"
     near = difflib.get_close_matches(text, scenario_names(), n=1, cutoff=0.4)
@@ -136,15 +158,18 @@ def _find(name: str | os.PathLike[str]) -> Path:
 def _parse(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path} is not valid TOML: {error}") from None
 
 
 def _chain(path: Path) -> list[Path]:
     """The file and all that it extends, down to the base."""
     chain = [path]
-    while chain[-1].name != f"{_BASE}.toml":
-        parent = _find(_parse(chain[-1])["extends"]) if "extends" in _parse(chain[-1]) else _FOLDER / f"{_BASE}.toml"
+    while chain[-1] != _FOLDER / f"{_BASE}.toml":
+        name = _parse(chain[-1]).get("extends")
+        if not isinstance(name, str | None):
+            raise ScenarioError(f"{chain[-1]}: extends must be a scenario's name or file, got {name!r}")
+        parent = _FOLDER / f"{_BASE}.toml" if name is None else _find(name, chain[-1].parent)
         if parent in chain:
             raise ScenarioError(f"{path}: extends must not lead back to {parent}; name another scenario")
         chain.append(parent)

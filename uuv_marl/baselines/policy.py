@@ -52,17 +52,18 @@ class Policy(abc.ABC):
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         name = type(self).__name__
         missing = [channel for channel in self.channels if channel not in scenario.sonar.channels]
+        needs: list[str] = []
         if missing:
-            raise PolicyError(
-                f"{name} needs the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)}, which scenario "
-                f"{scenario.name!r} does not grant; override sonar.channels with {list(self.channels)}"
-            )
+            needs.append(f"the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)} (sonar.channels)")
         if scenario.actuators.yaw_damping_nms != self.yaw_damping_nms:
+            needs.append(f"a yaw damping of {self.yaw_damping_nms:g} N m s (actuators.yaw_damping_nms)")
+        if needs:
             raise PolicyError(
-                f"{name} is designed for a yaw damping of {self.yaw_damping_nms:g} N m s, scenario {scenario.name!r} "
-                f"has {scenario.actuators.yaw_damping_nms:g}; override actuators.yaw_damping_nms with "
-                f"{self.yaw_damping_nms:g}"
+                f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
+                "use uuv_marl.baselines.granted(policy, scenario), or override these fields"
             )
+        if num_worlds < 1:
+            raise PolicyError(f"num_worlds must be at least 1, got {num_worlds}")
         actuators = scenario.actuators
         self.scenario = scenario
         self.num_worlds = num_worlds

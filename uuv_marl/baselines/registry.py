@@ -1,6 +1,7 @@
 """Policies by name, for a swarm or for an environment."""
 
 import difflib
+import importlib
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, overload
@@ -67,11 +68,22 @@ class EnvPolicy:
 
 
 def policy_class(name: str) -> type[Policy]:
-    """A policy's class by its name. Raises PolicyError with the nearest name."""
+    """A policy's class by its name, or by ``module:Class``. Raises PolicyError with the nearest name."""
+    if ":" in name:
+        module, _, attribute = name.partition(":")
+        try:
+            made: object = getattr(importlib.import_module(module), attribute)
+        except (ImportError, AttributeError) as error:
+            raise PolicyError(f"policy {name!r} can't be imported: {error}") from None
+        if not (isinstance(made, type) and issubclass(made, Policy)):
+            raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {made!r}")
+        return made
     if name not in POLICIES:
         near = difflib.get_close_matches(name, POLICIES, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise PolicyError(f"policy {name!r} is unknown; {hint}There are {', '.join(POLICIES)}")
+        raise PolicyError(
+            f"policy {name!r} is unknown; {hint}There are {', '.join(POLICIES)}, and module:Class for your own"
+        )
     return POLICIES[name]
 
 
@@ -111,5 +123,7 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
         raise PolicyError(f"policy {name!r} has no parameter {unknown[0]!r}; it has {', '.join(known) or 'none'}")
     if isinstance(target, Scenario):
         return constructor(target, num_worlds, **parameters)
-    env = target.unwrapped
+    env: Any = getattr(target, "unwrapped", None)
+    if not isinstance(getattr(env, "scenario", None), Scenario):
+        raise PolicyError(f"a policy is made for a Scenario (see load_scenario) or our parallel_env, got {target!r}")
     return EnvPolicy(constructor(env.scenario, 1, **parameters), env.possible_agents)

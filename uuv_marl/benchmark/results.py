@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl import __version__
-from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
@@ -49,10 +48,14 @@ class Results:
     def __init__(self, folder: Path, scenarios: Iterable[Scenario], route_seed: int = 0) -> None:
         self.folder = folder
         self.scenarios = {scenario.name: scenario for scenario in scenarios}
+        self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
         self._route_seed = route_seed
         self.rows: list[Row] = []
         self._path = folder / "results.json"
-        (folder / "traces").mkdir(parents=True, exist_ok=True)
+        try:
+            (folder / "traces").mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ResultsError(f"{folder} can't be written ({error.strerror}); give another --output") from None
         if self._path.exists():
             self._continue()
 
@@ -68,12 +71,13 @@ class Results:
                 f"{self._path} comes from other code of uuv_marl; move it away or give another --output, "
                 "so that no table mixes the two"
             )
-        for name, scenario in self.scenarios.items():
-            if name in known and known[name] != scenario.model_dump(mode="json"):
+        for name, dump in self._dumps.items():
+            if name in known and known[name] != dump:
                 raise ResultsError(
                     f"{self._path} holds runs of another {name!r} (different --set or file); "
                     "move it away or give another --output"
                 )
+        self._dumps = {**known, **self._dumps}
         self.rows = rows
 
     def has(self, scenario: str, policy: str, seed: int) -> bool:
@@ -100,7 +104,7 @@ class Results:
 
     def trace_path(self, scenario: str, policy: str, seed: int) -> Path:
         """Where a run's time series are."""
-        return self.folder / "traces" / f"{scenario}.{policy}.{seed}.npz"
+        return self.folder / "traces" / f"{scenario}.{policy.replace(':', '-')}.{seed}.npz"
 
     def trace(self, scenario: str, policy: str, seed: int) -> dict[str, NDArray[np.float32]]:
         """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
@@ -111,7 +115,7 @@ class Results:
             return {name: file[name] for name in file.files}
 
     def _write(self) -> None:
-        policies = sorted({row.policy for row in self.rows}, key=list(POLICIES).index)
+        policies = dict.fromkeys(row.policy for row in self.rows)
         data = {
             "schema": SCHEMA,
             "fingerprint": source_hash(),
@@ -121,7 +125,7 @@ class Results:
                 **{library: version(library) for library in _LIBRARIES},
             },
             "machine": {"platform": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
-            "scenarios": {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()},
+            "scenarios": self._dumps,
             "policies": {name: knowledge(name) for name in policies},
             "runs": [row._asdict() for row in self.rows],
         }

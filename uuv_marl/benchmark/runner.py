@@ -10,6 +10,7 @@ from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.tables import CAPTION, markdown_table, rows_of
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import differences, scenario_names
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed")
 """The paper's Table 2, then the stronger variants."""
@@ -40,9 +41,11 @@ def run_missing(
 
 def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     """Heading of a scenario's table."""
+    changed = differences(scenario) if scenario.name in scenario_names() else []
+    note = f"; CHANGED: {', '.join(changed)}" if changed else ""
     return (
         f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
-        f"{len(seeds)} seeds, echoes report the {scenario.sonar.echo_reports}"
+        f"{len(seeds)} seeds, echoes report the {scenario.sonar.echo_reports}{note}"
     )
 
 

@@ -11,6 +11,7 @@ from scipy.stats import bootstrap, trim_mean
 
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import Results, Row, knowledge
+from uuv_marl.scenario_files import differences
 
 Float64 = NDArray[np.float64]
 _CONFIDENCE = 0.95
@@ -19,11 +20,13 @@ _NOTHING = "–"
 
 HEADERS = (
     "policy", "beyond the percept", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
-    "spacing [m]", "worst", "mean spacing [m]", "collisions", "paper",
+    "spacing [m]", "worst", "mean spacing [m]", "within Eq. 7", "collisions", "paper",
 )  # fmt: skip
 CAPTION = (
     "Interquartile mean over seeds [95 % bootstrap interval]; worst seed; times over the seeds that arrived. "
     "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles, and its time mean. "
+    "Within Eq. 7: mean share of the time in which all vehicles are within s_l of l(t), keep s_o from obstacles, "
+    "and s_u from each other. "
     "SFF and SDC are reconstructions: the paper only names them. Figures of the paper are single runs."
 )
 
@@ -60,10 +63,11 @@ def _iqm(data: Float64, axis: int = -1) -> Float64:
 def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, ...]]:
     """The table's cells, a row for each policy that has runs."""
     rows: list[tuple[str, ...]] = []
+    as_in_paper = not differences(results.scenarios[scenario])
     for policy in policies:
         runs = results.select(scenario, policy, seeds)
         if runs:
-            rows.append(_cells(policy, runs, PAPER.get((scenario, policy))))
+            rows.append(_cells(policy, runs, PAPER.get((scenario, policy)) if as_in_paper else None))
     return rows
 
 
@@ -79,6 +83,7 @@ def _cells(policy: str, runs: Sequence[Row], paper: PaperFigure | None) -> tuple
         *_pair(_values(runs, "min_obstacle_distance_m"), min, 2),
         *_pair(_values(runs, "min_spacing_m"), min, 2),
         _pair(_values(runs, "mean_min_spacing_m"), min, 2)[0],
+        _shares(runs),
         f"{sum(collisions):.0f} in {collided} seeds" if collided else "0",
         _paper_cell(paper),
     )
@@ -87,6 +92,15 @@ def _cells(policy: str, runs: Sequence[Row], paper: PaperFigure | None) -> tuple
 def _values(runs: Sequence[Row], name: str) -> list[float]:
     values = [run.metrics[name] for run in runs]
     return [float(value) for value in values if isinstance(value, (int, float))]
+
+
+def _shares(runs: Sequence[Row]) -> str:
+    shares = [run.metrics["constraint_share"] for run in runs]
+    means = {
+        name: float(np.mean([share[name] for share in shares if isinstance(share, dict)]))
+        for name in ("s_l", "s_o", "s_u")
+    }
+    return ", ".join(f"{name} {mean:.0%}" for name, mean in means.items())
 
 
 def _pair(values: Sequence[float], worst: Callable[[Sequence[float]], float], digits: int) -> tuple[str, str]:
@@ -123,16 +137,30 @@ def rich_table(title: str, rows: Sequence[Sequence[str]]) -> RichTable:
     table.add_column("policy\n(beyond the percept)")
     for header in ("arrived", "task time [s]", "obstacle distance [m]", "spacing [m]"):
         table.add_column(escape(header), justify="right")
-    table.add_column("collisions")
+    table.add_column("within Eq. 7, collisions")
     table.add_column("paper")
-    for policy, knows, arrived, time, slowest, distance, nearest, spacing, closest, mean, collisions, paper in rows:
+    for (
+        policy,
+        knows,
+        arrived,
+        time,
+        slowest,
+        distance,
+        nearest,
+        spacing,
+        closest,
+        mean,
+        within,
+        collisions,
+        paper,
+    ) in rows:
         cells = (
             policy if knows == _NOTHING else f"{policy}\n({knows})",
             arrived,
             f"{time}\nworst {slowest}",
             f"{distance}\nworst {nearest}",
             f"{spacing}\nworst {closest}\ntime mean {mean}",
-            collisions,
+            f"{within}\ncollisions: {collisions}",
             paper,
         )
         table.add_row(*map(escape, cells))

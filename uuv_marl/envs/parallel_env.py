@@ -145,17 +145,27 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
 
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""
+        self._need_reset("state()")
         return global_state(self.swarm)
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
         if self.render_mode is None:
             raise RuntimeError("render() needs a render_mode: make the environment with render_mode='rgb_array'")
+        self._need_reset("render()")
         if self._canvas is None:
             from uuv_marl.envs.rendering import Canvas  # noqa: PLC0415 - pygame is an extra
 
             self._canvas = Canvas(window=self.render_mode == "human", fps=self.metadata["render_fps"])
         return self._canvas.draw(self.swarm)
+
+    def _need_reset(self, what: str) -> None:
+        if not self._was_reset:
+            raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For pickle and deepcopy: everything but the window."""
+        return {**self.__dict__, "_canvas": None}
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -189,6 +199,6 @@ def parallel_env(
     return SwarmParallelEnv(Task(loaded, 1, reward, max_cycles), render_mode, info_terms)
 
 
-def env(**kwargs: Any) -> AECEnv[str, Float32, Float32 | None]:
+def env(*args: Any, **kwargs: Any) -> AECEnv[str, Float32, Float32 | None]:
     """The same as an AEC environment; arguments as for ``parallel_env``."""
-    return OrderEnforcingWrapper(parallel_to_aec(parallel_env(**kwargs)))
+    return OrderEnforcingWrapper(parallel_to_aec(parallel_env(*args, **kwargs)))

@@ -9,7 +9,8 @@ from uuv_marl.sim.swarm import Swarm
 try:
     import pygame
 except ModuleNotFoundError as error:
-    raise ModuleNotFoundError("rendering needs pygame: pip install 'uuv_marl[render]'") from error
+    message = "rendering needs pygame: install the extra, in the checkout: pip install -e '.[render]'"
+    raise ModuleNotFoundError(message) from error
 
 SIZE_PX = 800
 _MARGIN_M = 130.0
@@ -44,7 +45,9 @@ class Canvas:
         if self._window is None:
             return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))
         self._window.blit(self._surface, (0, 0))
-        pygame.event.pump()
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+            self.close()
+            raise SystemExit("the window was closed")
         pygame.display.flip()
         self._clock.tick(self._fps)
         return None

@@ -43,13 +43,22 @@ class Task:
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, reward: Reward = "individual", max_cycles: int | None = None
     ) -> None:
-        if isinstance(reward, str) and reward not in ("individual", "team"):
+        if not callable(reward) and reward not in ("individual", "team"):
             raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
-        if max_cycles is not None and max_cycles < 1:
-            raise ValueError(f"max_cycles must be at least 1, got {max_cycles}; leave it out for the time limit")
         self.swarm = Swarm(scenario, num_worlds)
         self.max_cycles = max_cycles
-        self._reward = reward
+        self._reward: Reward = reward
+
+    @property
+    def max_cycles(self) -> int | None:
+        """Decisions after which an episode is truncated."""
+        return self._max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, value: int | None) -> None:
+        if value is not None and (not isinstance(value, int) or value < 1):
+            raise ValueError(f"max_cycles must be a whole number from 1, or None for the time limit, got {value!r}")
+        self._max_cycles = value
 
     def reset(self, seed: int | Sequence[int] | None = None, worlds: Sequence[int] | None = None) -> Float32:
         """Start worlds anew, as ``Swarm.reset``; the observations (world, vehicle, entry)."""
@@ -66,6 +75,11 @@ class Task:
             reward = np.asarray(self._reward(swarm), np.float64)
             if reward.shape != alive.shape:
                 raise ValueError(f"the reward function must give an array {alive.shape}, got {reward.shape}")
+            if not np.isfinite(reward[before]).all():
+                raise ValueError(
+                    "the reward function must give finite numbers; distances are infinite where nobody is near "
+                    "(facts.spacing of a lone vehicle) or nothing is there (facts.clearance without obstacles)"
+                )
         else:
             terms = reward_terms(swarm)
             reward = np.sum(list(terms.values()), axis=0)

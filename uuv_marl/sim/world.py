@@ -125,10 +125,7 @@ def move(w: int, forces: Float64, state: State, facts: Facts, plant: Plant, rule
         tau_u, tau_r = actuators(a_x, a_y, r, plant)
         for _ in range(rules.steps):
             x, y, psi, u, v, r = advance(x, y, psi, u, v, r, tau_u, tau_r, rules.step_s, plant)
-        # The held action's heading turns with the wrap, so that their difference stays the turn since the decision.
-        wrapped = wrap(psi)
-        forces[i, 2] += wrapped - psi
-        eta[i, 0], eta[i, 1], eta[i, 2] = x, y, wrapped
+        eta[i, 0], eta[i, 1], eta[i, 2] = x, y, wrap(psi)
         nu[i, 0], nu[i, 1], nu[i, 2] = u, v, r
         squared = a_x * a_x + a_y * a_y
         facts.effort[w, i] += squared / rules.holds
