@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from uuv_marl import load_scenario
 from uuv_marl.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -44,6 +45,12 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, line.split()[1:])
     assert done.exit_code in (0, 130), done.output
+
+
+@pytest.mark.parametrize("block", blocks("toml"))
+def test_toml_blocks_are_scenarios(block, tmp_path):
+    (tmp_path / "mine.toml").write_text(block)
+    assert load_scenario(tmp_path / "mine.toml").title
 
 
 def test_make_targets_named_in_the_readme_exist():
