@@ -61,6 +61,15 @@ def test_never_arriving_and_no_obstacles_are_null():
     json.dumps(metrics, allow_nan=False)
 
 
+def test_a_swarm_that_is_lost_keeps_no_constraint():
+    close = {"contact.ends_vehicle": True, "contact.hull_radius_m": 6.0, "constraints.s_l_m": 5000.0}
+    scenario = load_scenario("tracking", overrides={**QUICK, **close, "swarm.num_vehicles": 40})
+    for metrics in (run.metrics for run in runs_of(scenario, "random", [0, 1, 2]).values()):
+        json.dumps(metrics, allow_nan=False)
+        if metrics["vehicles_lost"] == 40:
+            assert metrics["constraint_share"]["s_l"] < 1.0
+
+
 def test_progress_rises_to_the_end():
     shares = [e.share for e in evaluate(quick(), "idle", list(range(40))) if isinstance(e, Progress)]
     assert shares == sorted(shares)
@@ -141,6 +150,13 @@ def test_your_own_policy_stands_in_the_table(tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     assert "my_policies:Ahead" in (tmp_path / "out" / "table.md").read_text()
     assert CliRunner().invoke(app, arguments).exit_code == 0
+    for trace in (tmp_path / "out" / "traces").glob("*.1.npz"):
+        trace.unlink()
+    assert CliRunner().invoke(app, arguments).exit_code == 0  # a run without its trace is run again
+    (tmp_path / "my_policies.py").write_text(OWN_POLICY + "\n# changed\n")
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 2
+    assert "before its file changed" in " ".join(done.output.split())
 
 
 def test_the_table_says_what_was_changed_and_then_leaves_the_paper_out():

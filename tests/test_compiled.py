@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import uuv_marl
+from uuv_marl.sim.compiled import source_hash
 
 PACKAGE = Path(uuv_marl.__file__).parent
 STEP = """
@@ -46,6 +47,17 @@ def test_editing_a_callee_in_another_file_changes_the_run(tmp_path):
     callee.write_text(text.replace("(p.X_u + p.X_uu * abs(u)) * u", "(p.X_u + p.X_uu * abs(u)) * u * 2.0"))
     assert run(tmp_path / "code", cache).stdout != first
     assert len(list(cache.iterdir())) == 2
+
+
+def test_the_cache_is_keyed_by_all_that_compiled_code_freezes(tmp_path):
+    copy = tmp_path / "uuv_marl"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    hashes = {source_hash(copy)}
+    for file in ("scenario.py", "percept.py", "sim/sonar.py", "baselines/sff.py"):
+        with (copy / file).open("a") as handle:
+            handle.write("\n")
+        hashes.add(source_hash(copy))
+    assert len(hashes) == 5
 
 
 def test_an_unwritable_cache_is_explained_and_the_run_goes_on(tmp_path):

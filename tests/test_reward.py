@@ -113,6 +113,25 @@ def test_a_lost_vehicle_is_charged_more_than_staying_could_cost():
     assert total[lossy].mean() < total[calm].mean()
 
 
+@pytest.mark.parametrize("reward", ["individual", "team"])
+def test_dying_never_pays_the_one_who_dies(reward):
+    base = load_scenario("single_obstacle", num_vehicles=12, overrides={"time_limit.factor": 0.5})
+    totals, lost = [], []
+    for losses in ([], [30.0]):
+        task = Task(load_scenario(base, overrides={"disturbance.loss_times_s": losses}), reward=reward)
+        task.reset(3)
+        lost += task.swarm.course.losses[0].tolist()
+        total = np.zeros(12)
+        while not task.swarm.timed_out[0]:
+            outcome = task.step(np.zeros((1, 12, 2), np.float32))
+            total += outcome.reward[0] * (outcome.terminated[0] | task.swarm.state.alive[0])
+        totals.append(total)
+    whole, dead = totals
+    assert dead[lost] < whole[lost]
+    if reward == "team":
+        assert (dead <= whole).all()
+
+
 def test_the_mean_does_not_depend_on_the_number_of_vehicles():
     """Vehicles that all see the same have the same reward, however many they are."""
     means = []

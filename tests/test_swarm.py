@@ -103,6 +103,25 @@ def test_worlds_are_reset_one_by_one_and_their_streams_go_on():
     assert np.array_equal(swarm.state.eta[2], first[1])
 
 
+def test_seeds_come_as_numbers_lists_or_arrays():
+    swarm = Swarm(load_scenario("tracking", num_vehicles=3), 2)
+    starts = []
+    for seed in (5, [5, 6], np.array([5, 6]), np.int64(5)):
+        swarm.reset(seed)
+        starts.append(swarm.state.eta.tobytes())
+        make("random", swarm.scenario, 2).reset(seed)
+    assert len(set(starts)) == 1
+    with pytest.raises(ValueError, match="one seed for each of 2 worlds, got 3"):
+        swarm.reset([1, 2, 3])
+
+
+def test_a_loss_at_the_start_happens_in_the_first_step():
+    swarm = Swarm(load_scenario("tracking", num_vehicles=3, overrides={"disturbance.loss_times_s": [0.0]}))
+    swarm.reset(0)
+    swarm.step(np.zeros((1, 3, 2), np.float32))
+    assert swarm.state.alive.sum() == 2
+
+
 def test_inactive_worlds_stand_still():
     swarm = Swarm(load_scenario("tracking", num_vehicles=4), 2)
     swarm.reset(0)

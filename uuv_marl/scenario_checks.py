@@ -31,6 +31,11 @@ def check_start(scenario: "Scenario") -> None:
             f"start.spacing_m must be at least two hull radii = {2 * scenario.contact.hull_radius_m:g}, "
             f"got {start.spacing_m:g}; raise it or lower contact.hull_radius_m"
         )
+    if start.gap_m < start.spacing_m and n > 1:
+        raise ValueError(
+            f"start.gap_m must be at least start.spacing_m = {start.spacing_m:g}, so that the two groups keep it from "
+            f"each other, got {start.gap_m:g}"
+        )
     columns, rows, _ = start.lattice(n)
     needed = math.ceil(n / 2)
     if columns * rows < needed:
@@ -104,6 +109,9 @@ def check_vehicle(scenario: "Scenario") -> None:
     # Damping rates are largest at the largest speeds that full force and torque can hold.
     u = max(_terminal(p.X_u, p.X_uu, limits.max_force_n), scenario.start.speed_max_mps)
     r = _terminal(p.N_r, p.N_rr, limits.max_torque_nm)
+    if not (math.isfinite(u) and math.isfinite(r)):
+        pair = "X_u and vehicle.X_uu" if not math.isfinite(u) else "N_r and vehicle.N_rr"
+        raise ValueError(f"vehicle.{pair} must not both be 0: nothing would bound the speed; raise one")
     slope = np.array(
         [
             [p.Y_v + 2 * p.Y_vv * u, -p.Y_r - 2 * p.Y_rr * r],

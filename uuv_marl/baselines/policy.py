@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.swarm import world_seeds
 from uuv_marl.sim.vehicle import project
 
 Float32 = NDArray[np.float32]
@@ -78,10 +79,10 @@ class Policy(abc.ABC):
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)
         """How often a numerical clamp bound since the reset, shape (world,)."""
 
-    def reset(self, seed: int | Sequence[int] = 0, worlds: Sequence[int] | None = None) -> None:
+    def reset(self, seed: int | Sequence[int] | NDArray[np.integer] = 0, worlds: Sequence[int] | None = None) -> None:
         """Forget the past of these worlds (default all); seeds as in ``Swarm.reset``."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
-        seeds = [seed + w for w in chosen] if isinstance(seed, int) else list(seed)
+        seeds = world_seeds(seed, chosen)
         self.clamps[chosen] = 0
         self.forget(chosen, seeds)
 

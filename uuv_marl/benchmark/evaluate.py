@@ -71,7 +71,7 @@ def _batch(
         percept = swarm.step(actor.act(percept), active)
         meter.update(active)
         routes.append(_positions(swarm))
-        ended = active & (swarm.arrived | swarm.timed_out)
+        ended = active & (swarm.arrived | swarm.timed_out | ~swarm.state.alive.any(axis=1))
         for w in (int(index) for index in np.flatnonzero(ended)):
             course, num = swarm.course, int(swarm.course.num_obstacles[w])
             yield Run(

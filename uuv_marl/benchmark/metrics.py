@@ -43,16 +43,17 @@ def measure(swarm: Swarm) -> Sample:
     living = np.maximum(alive.sum(axis=1), 1)
     psi = state.eta[:, :, 2]
     order = np.hypot((np.cos(psi) * alive).sum(axis=1), (np.sin(psi) * alive).sum(axis=1)) / living
+    anybody = alive.any(axis=1)
     away = np.hypot(*np.moveaxis(state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
     return Sample(
         time_s=facts.time_s.copy(),
         min_spacing_m=facts.min_spacing.copy(),
         max_spacing_m=facts.max_spacing.copy(),
         centre_error_m=np.hypot(*(facts.centre - facts.reference[:, :2]).T),
-        order_parameter=order,
-        within_s_l=(np.where(alive, away, 0.0).max(axis=1) <= constraints.s_l_m).astype(np.float64),
-        within_s_o=(facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m).astype(np.float64),
-        within_s_u=(facts.min_spacing >= constraints.s_u_m).astype(np.float64),
+        order_parameter=np.where(anybody, order, np.nan),
+        within_s_l=(anybody & (np.where(alive, away, 0.0).max(axis=1) <= constraints.s_l_m)).astype(np.float64),
+        within_s_o=(anybody & (facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m)).astype(np.float64),
+        within_s_u=(anybody & (facts.min_spacing >= constraints.s_u_m)).astype(np.float64),
         effort=(facts.effort * alive).sum(axis=1) / living,
         saturation=facts.saturated.copy(),
     )
@@ -99,10 +100,12 @@ class Meter:
             "duration_s": float(self._swarm.duration_s[world]),
             "min_obstacle_distance_m": _number(clearance),
             "min_spacing_m": _number(table["min_spacing_m"].min()),
-            "mean_min_spacing_m": _number(table["min_spacing_m"].mean()),
-            "max_spacing_m": _number(table["max_spacing_m"].max()),
-            "centre_error_m": _number(table["centre_error_m"].mean()),
-            "order_parameter": _number(table["order_parameter"].mean()),
+            "mean_min_spacing_m": _mean(table["min_spacing_m"]),
+            "max_spacing_m": _number(
+                np.max(table["max_spacing_m"], where=np.isfinite(table["max_spacing_m"]), initial=-np.inf)
+            ),
+            "centre_error_m": _mean(table["centre_error_m"]),
+            "order_parameter": _mean(table["order_parameter"]),
             "collisions": int(self._collisions[world]),
             "constraint_share": {
                 "all": float(all_three.mean()),
@@ -115,6 +118,12 @@ class Meter:
             "saturation_share": float(table["saturation"][1:].mean()),
             "vehicles_lost": int((~self._swarm.state.alive[world]).sum()),
         }
+
+
+def _mean(values: Float64) -> float | None:
+    """Over the samples at which there was something to measure."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else None
 
 
 def _number(value: float) -> float | None:

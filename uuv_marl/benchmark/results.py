@@ -1,6 +1,7 @@
 """Results on disk: every seed and metric, written whole after each run, so that a stopped benchmark can go on."""
 
 import hashlib
+import inspect
 import json
 import os
 import platform
@@ -17,9 +18,9 @@ from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.compiled import source_hash
 
 SCHEMA = 1
+_PACKAGE = Path(__file__).resolve().parent.parent
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
 
 
@@ -66,7 +67,7 @@ class Results:
             rows = [Row(**row) for row in data["runs"]]
         except (ValueError, KeyError, TypeError) as error:
             raise ResultsError(f"{self._path} can't be read ({error}); move it away or give another --output") from None
-        if fingerprint != source_hash():
+        if fingerprint != source_fingerprint():
             raise ResultsError(
                 f"{self._path} comes from other code of uuv_marl; move it away or give another --output, "
                 "so that no table mixes the two"
@@ -77,8 +78,14 @@ class Results:
                     f"{self._path} holds runs of another {name!r} (different --set or file); "
                     "move it away or give another --output"
                 )
+        for policy, before in data["policies"].items():
+            if before.get("source") != knowledge(policy)["source"]:
+                raise ResultsError(
+                    f"{self._path} holds runs of {policy!r} as it was before its file changed; "
+                    "move it away or give another --output"
+                )
         self._dumps = {**known, **self._dumps}
-        self.rows = rows
+        self.rows = [row for row in rows if self.trace_path(row.scenario, row.policy, row.seed).exists()]
 
     def has(self, scenario: str, policy: str, seed: int) -> bool:
         """Whether this run is done."""
@@ -118,7 +125,7 @@ class Results:
         policies = dict.fromkeys(row.policy for row in self.rows)
         data = {
             "schema": SCHEMA,
-            "fingerprint": source_hash(),
+            "fingerprint": source_fingerprint(),
             "versions": {
                 "uuv_marl": __version__,
                 "python": platform.python_version(),
@@ -135,9 +142,19 @@ class Results:
 
 
 def knowledge(policy: str) -> dict[str, Any]:
-    """What a policy has beyond the percept, as tables and results show it."""
+    """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
     made = policy_class(policy)
-    return {"channels": list(made.channels), "yaw_damping_nms": made.yaw_damping_nms}
+    file = inspect.getsourcefile(made) if ":" in policy else None
+    source = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16] if file else None
+    return {"channels": list(made.channels), "yaw_damping_nms": made.yaw_damping_nms, "source": source}
+
+
+def source_fingerprint() -> str:
+    """Hash of all that a run's numbers come from: the package's code and tuned gains."""
+    digest = hashlib.sha256()
+    for path in sorted([*_PACKAGE.rglob("*.py"), *_PACKAGE.glob("baselines/tuned/*.json")]):
+        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
 
 
 def scenario_hash(scenario: Scenario) -> str:

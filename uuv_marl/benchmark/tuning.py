@@ -83,7 +83,7 @@ SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
 def cost(run: Run, scenario: Scenario) -> float:
     """What tuning minimises for one seed [s]: the task's time; the time limit and more where it fails.
 
-    A collision, and each metre of clearance below s_o, cost more than any time they could save.
+    A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too.
     """
     metrics = run.metrics
     time = metrics["task_time_s"]

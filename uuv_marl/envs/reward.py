@@ -1,8 +1,10 @@
 """The reward: named terms of every vehicle, weighted by the scenario, and their sum.
 
 Sound by construction: terms per second are bounded and at most zero, arrival pays once and ends the episode, so that
-arriving earlier never pays less; a lost vehicle is charged the worst that the rest of the episode could have cost it,
-so that dying never pays; no term depends on the number of vehicles.
+arriving earlier never pays less; a lost vehicle is charged the worst that those terms could have cost it in the rest of
+the episode, the arrival it misses, and a collision, so that dying never pays the one who dies (unless it would have
+collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps the
+swarm from arriving, the others gain from its loss.
 """
 
 from collections.abc import Callable, Mapping

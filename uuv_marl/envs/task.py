@@ -35,7 +35,8 @@ class Task:
     Args:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
-        reward: ``individual`` (the sum of a vehicle's terms), ``team`` (their mean over all vehicles, for each), or a
+        reward: ``individual`` (the sum of a vehicle's terms), ``team`` (their mean over all vehicles, for each;
+            a lost vehicle is also charged its own loss whole), or a
             function from the swarm to an array (world, vehicle).
         max_cycles: truncates after so many decisions, if the scenario's time limit does not come first.
     """
@@ -84,7 +85,8 @@ class Task:
             terms = reward_terms(swarm)
             reward = np.sum(list(terms.values()), axis=0)
             if self._reward == "team":
-                reward = np.broadcast_to(reward.mean(axis=1, keepdims=True), reward.shape)
+                # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
+                reward = reward.mean(axis=1, keepdims=True) + terms["loss"]
         late = swarm.timed_out | (swarm.state.tick >= self._last_tick)
         return Outcome(
             observation=observation,

@@ -1,7 +1,7 @@
 """Numba behind one decorator: compiled code is cached on disk, and the cache never serves old physics.
 
 Numba recompiles a function when its own file changes, but not when a function that it *calls* lives in another
-file that has changed. So the cache lives in a folder named by a hash of every file that holds compiled code.
+file that has changed. So the cache lives in a folder named by a hash of every file that compiled code comes from.
 """
 
 import functools
@@ -19,12 +19,12 @@ from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 _PACKAGE = Path(__file__).resolve().parent.parent
-_COMPILED_PARTS = ("sim", "baselines")
+_COMPILED_PARTS = (".", "sim", "baselines")
 _log = logging.getLogger("uuv_marl")
 
 
 def source_hash(package: Path = _PACKAGE) -> str:
-    """Hash of every source file that may hold compiled code."""
+    """Hash of every source file that holds compiled code, or constants and layouts that compiled code freezes."""
     digest = hashlib.sha256()
     for part in _COMPILED_PARTS:
         for path in sorted((package / part).glob("*.py")):

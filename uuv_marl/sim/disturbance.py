@@ -14,4 +14,4 @@ def draw_losses(scenario: Scenario, rng: np.random.Generator) -> NDArray[np.int6
 def loss_ticks(scenario: Scenario) -> NDArray[np.int64]:
     """The control hold at whose end each loss happens, shape (loss,)."""
     times = np.array(scenario.disturbance.loss_times_s, np.float64)
-    return np.ceil(times / scenario.timing.control_hold_s - 1e-9).astype(np.int64)
+    return np.maximum(np.ceil(times / scenario.timing.control_hold_s - 1e-9), 1).astype(np.int64)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from numba.np.ufunc.parallel import threading_layer
@@ -19,7 +20,8 @@ from uuv_marl.sim.world import Course, Facts, Rules, State, observe_world, step_
 
 Float32 = NDArray[np.float32]
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
-"""Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``)."""
+"""Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
+ends on the scenario's own, so that the time within a smaller radius is often missing."""
 
 _threads_of_parent = False
 
@@ -143,7 +145,9 @@ class Swarm:
         """Worlds at or past their time limit, shape (world,)."""
         return self.facts.time_s >= self.time_limit_s - 1e-9
 
-    def reset(self, seed: int | Sequence[int] | None = None, worlds: Sequence[int] | None = None) -> Percept:
+    def reset(
+        self, seed: int | Sequence[int] | NDArray[np.integer] | None = None, worlds: Sequence[int] | None = None
+    ) -> Percept:
         """Start worlds anew.
 
         Args:
@@ -152,11 +156,10 @@ class Swarm:
             worlds: which ones, default all.
         """
         chosen = range(self.num_worlds) if worlds is None else worlds
-        if isinstance(seed, Sequence) and len(seed) != len(chosen):
-            raise ValueError(f"seed must hold one seed for each of {len(chosen)} worlds, got {len(seed)}")
+        seeds = [] if seed is None else world_seeds(seed, chosen)
         for k, w in enumerate(chosen):
             if seed is not None:
-                self._rngs[w] = np.random.default_rng(seed[k] if isinstance(seed, Sequence) else seed + w)
+                self._rngs[w] = np.random.default_rng(seeds[k])
             self._reset_world(w, self._rngs[w] or np.random.default_rng())
         return self.percept
 
@@ -222,6 +225,16 @@ class Swarm:
                 )
             step_worlds(running, *arrays)
         return self.percept
+
+
+def world_seeds(seed: int | Sequence[int] | NDArray[np.integer], worlds: Sequence[int]) -> list[int]:
+    """A seed for each of these worlds: ``seed + w``, or the given ones."""
+    if np.ndim(seed) == 0:
+        return [int(cast(int, seed)) + w for w in worlds]
+    seeds = [int(value) for value in cast(Sequence[int], seed)]
+    if len(seeds) != len(worlds):
+        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
+    return seeds
 
 
 def _rules(scenario: Scenario) -> Rules:
