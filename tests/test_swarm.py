@@ -215,6 +215,11 @@ def test_arrival_needs_rest_nearness_spread_and_dwell(place):
     assert not swarm.arrived[0]
     stay([[5.0, 0.0], [-0.9, 0.0]], 6.0, late)  # centre 2.05 m off
     assert not swarm.arrived[0]
+    stay([[5.0, 0.0], [-1.1, 0.0]], 4.0, late)  # interrupted
+    stay([[9.0, 0.0], [-1.1, 0.0]], 0.1, late + 40)
+    stay([[5.0, 0.0], [-1.1, 0.0]], 4.0, late + 41)
+    assert not swarm.arrived[0]
+    stay([[9.0, 0.0], [-1.1, 0.0]], 0.1, late)
     stay([[5.0, 0.0], [-1.1, 0.0]], 5.0, late)  # not long enough
     assert not swarm.arrived[0]
     stay([[5.0, 0.0], [-1.1, 0.0]], 0.1, late + 50)
