@@ -23,12 +23,6 @@ def scenario_name(request):
 
 
 @pytest.fixture
-def still_water():
-    """A scenario whose obstacle is out of the way, for placing vehicles by hand."""
-    return load_scenario("tracking")
-
-
-@pytest.fixture
 def place():
     """A swarm of one world with vehicles and obstacles where a test wants them."""
 
