@@ -75,7 +75,9 @@ def benchmark(
             help="Name, or module:Class; repeat for several. Default: the paper's three and stronger variants."
         ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1.")] = 20,
+    seeds: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1; tuning and training use those above 9,999.")
+    ] = 20,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as sonar.echo_reports=surface."),
@@ -185,7 +187,7 @@ def tune(
 ) -> None:
     """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
 
-    Needs the extra "tune". Takes about twenty minutes per policy. Ctrl-C keeps the finished trials; the same command
+    Needs the extra "tune". Takes ten to fifteen minutes per policy. Ctrl-C keeps the finished trials; the same command
     goes on. The shipped results are in uuv_marl/baselines/tuned.
     """
     with _explained():

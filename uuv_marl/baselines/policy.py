@@ -102,7 +102,7 @@ def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
 
 
 def tuned(name: str) -> Mapping[str, float]:
-    """The best parameters that tuning found for a policy; all its trials are in the same shipped file."""
+    """The best parameters that tuning found for a policy; all its trials are in the CSV file beside it."""
     text = resources.files("uuv_marl.baselines").joinpath("tuned", f"{name}.json").read_text(encoding="utf-8")
     data: dict[str, Any] = json.loads(text)
     return data["best"]

@@ -76,10 +76,7 @@ class Meter:
 
     def series(self, world: int) -> dict[str, NDArray[np.float32]]:
         """A world's samples over time: every field of ``Sample``, and ``obstacle_distance_m`` (time, obstacle)."""
-        columns = {
-            name: np.array([getattr(sample, name)[world] for sample in self._samples], np.float32)
-            for name in Sample._fields
-        }
+        columns = {name: values.astype(np.float32) for name, values in self._table(world).items()}
         num = int(self._swarm.course.num_obstacles[world])
         distances = np.array([clearance[world, :num] for clearance in self._clearances], np.float32)
         return {**columns, "obstacle_distance_m": distances.reshape(len(self._samples), num)}
@@ -87,7 +84,7 @@ class Meter:
     def metrics(self, world: int, clamps: int) -> Metrics:
         """A world's metrics, as ``results.json`` keeps them; null where there is nothing to measure."""
         facts = self._swarm.facts
-        table = {name: np.array([getattr(s, name)[world] for s in self._samples]) for name in Sample._fields}
+        table = self._table(world)
         clearance = min(float(clearance[world].min()) for clearance in self._clearances)
         all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
         later = {
@@ -118,6 +115,10 @@ class Meter:
             "saturation_share": float(table["saturation"][1:].mean()),
             "vehicles_lost": int((~self._swarm.state.alive[world]).sum()),
         }
+
+    def _table(self, world: int) -> dict[str, Float64]:
+        """A world's samples over time, shape (time,) each."""
+        return {name: np.array([getattr(s, name)[world] for s in self._samples]) for name in Sample._fields}
 
 
 def _mean(values: Float64) -> float | None:

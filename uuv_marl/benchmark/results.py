@@ -51,6 +51,7 @@ class Results:
         self.scenarios = {scenario.name: scenario for scenario in scenarios}
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
         self._route_seed = route_seed
+        self._fingerprint = source_fingerprint()
         self.rows: list[Row] = []
         self._path = folder / "results.json"
         try:
@@ -67,7 +68,7 @@ class Results:
             rows = [Row(**row) for row in data["runs"]]
         except (ValueError, KeyError, TypeError) as error:
             raise ResultsError(f"{self._path} can't be read ({error}); move it away or give another --output") from None
-        if fingerprint != source_fingerprint():
+        if fingerprint != self._fingerprint:
             raise ResultsError(
                 f"{self._path} comes from other code of uuv_marl; move it away or give another --output, "
                 "so that no table mixes the two"
@@ -125,7 +126,7 @@ class Results:
         policies = dict.fromkeys(row.policy for row in self.rows)
         data = {
             "schema": SCHEMA,
-            "fingerprint": source_fingerprint(),
+            "fingerprint": self._fingerprint,
             "versions": {
                 "uuv_marl": __version__,
                 "python": platform.python_version(),

@@ -14,8 +14,6 @@ from uuv_marl.scenario_files import differences, scenario_names
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed")
 """The paper's Table 2, then the stronger variants."""
-MAX_SEED = 10_000
-"""Benchmark seeds are 0 to 9,999; tuning and training use others."""
 
 Report = Callable[[str, str, float], None]
 """Called with scenario, policy and the share of that pair's work that is done."""

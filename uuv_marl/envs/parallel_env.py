@@ -42,6 +42,7 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
         self._info_terms = info_terms
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.scenario.timing.decision_period_s) or 1}
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
+        self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         layout = task.swarm.layout
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
@@ -105,7 +106,7 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
             raise RuntimeError(f"{when}; call reset() to start an episode")
         outcome = self._task.step(self._action_array(actions))
         acted = self.agents
-        index = {agent: int(agent.removeprefix("uuv_")) for agent in acted}
+        index = {agent: self._index[agent] for agent in acted}
         ended = outcome.terminated[0] | outcome.truncated[0]
         self.agents = [agent for agent in acted if not ended[index[agent]]]
         if self.render_mode == "human":
@@ -127,7 +128,7 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
         return {"reward_terms": {name: float(term[0, i]) for name, term in outcome.terms.items()}}
 
     def _action_array(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
-        unknown = set(actions) - set(self.possible_agents)
+        unknown = set(actions) - self._index.keys()
         if unknown:
             raise ValueError(f"there is no agent {min(unknown)!r}; agents are uuv_0 to {self.possible_agents[-1]}")
         array = np.zeros((1, len(self.possible_agents), 2), np.float32)
@@ -137,7 +138,7 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
             action = np.asarray(actions[agent], np.float32)
             if action.shape != (2,):
                 raise ValueError(f"the action of {agent} must have shape (2,), got {action.shape}")
-            array[0, int(agent.removeprefix("uuv_"))] = action
+            array[0, self._index[agent]] = action
         if not np.isfinite(array).all():
             i = int(np.argwhere(~np.isfinite(array))[0, 1])
             raise ValueError(f"the action of {self.possible_agents[i]} must be finite, got {array[0, i].tolist()}")

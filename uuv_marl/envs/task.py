@@ -35,9 +35,8 @@ class Task:
     Args:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
-        reward: ``individual`` (the sum of a vehicle's terms), ``team`` (their mean over all vehicles, for each;
-            a lost vehicle is also charged its own loss whole), or a
-            function from the swarm to an array (world, vehicle).
+        reward: ``individual`` (the sum of a vehicle's terms), ``team`` (their mean over all vehicles, for each; a lost
+            vehicle is also charged its own loss whole), or a function from the swarm to an array (world, vehicle).
         max_cycles: truncates after so many decisions, if the scenario's time limit does not come first.
     """
 
