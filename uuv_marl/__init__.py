@@ -1,24 +1,38 @@
 """Swarms of unmanned underwater vehicles: a PettingZoo environment, reference controllers and a benchmark.
 
-``parallel_env()`` and ``env()`` make environments, ``load_scenario(name)`` a configuration,
-``baselines.make(name, env)`` a controller. ``uuv-marl --help`` shows the command line.
+``parallel_env()``, ``env()`` and ``vector_env(num_envs)`` make environments, ``load_scenario(name)`` a configuration,
+``baselines.make(name, env)`` a controller. ``uuv-marl --help`` shows the command line. Importing registers
+``uuv_marl/Swarm-v0`` and ``uuv_marl/Solo-v0`` with Gymnasium, and ``uuv_marl/uuv_swarm_v0`` with PettingZoo.
 """
 
 import importlib
 from typing import TYPE_CHECKING, Any
+
+from uuv_marl.envs import registration
 
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from uuv_marl import baselines, uuv_swarm_v0
     from uuv_marl.envs.parallel_env import env, parallel_env
+    from uuv_marl.envs.vector_env import vector_env
     from uuv_marl.scenario_files import load_scenario, scenario_names
 
-__all__ = ["__version__", "baselines", "env", "load_scenario", "parallel_env", "scenario_names", "uuv_swarm_v0"]
+__all__ = [
+    "__version__",
+    "baselines",
+    "env",
+    "load_scenario",
+    "parallel_env",
+    "scenario_names",
+    "uuv_swarm_v0",
+    "vector_env",
+]
 
 _HOMES = {
     "env": "uuv_marl.envs.parallel_env",
     "parallel_env": "uuv_marl.envs.parallel_env",
+    "vector_env": "uuv_marl.envs.vector_env",
     "load_scenario": "uuv_marl.scenario_files",
     "scenario_names": "uuv_marl.scenario_files",
 }
@@ -31,3 +45,6 @@ def __getattr__(name: str) -> Any:
     if name in ("baselines", "uuv_swarm_v0"):
         return importlib.import_module(f"uuv_marl.{name}")
     raise AttributeError(f"module 'uuv_marl' has no attribute {name!r}")
+
+
+registration.register()

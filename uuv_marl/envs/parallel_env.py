@@ -1,6 +1,5 @@
 """The PettingZoo environments: ``parallel_env`` (all agents at once) and ``env`` (AEC, one after the other)."""
 
-import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,10 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
-from uuv_marl.envs.state import global_state, state_bounds
-from uuv_marl.envs.task import Outcome, Reward, Task
+from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, make_task
+from uuv_marl.envs.view import View
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
 from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
@@ -35,21 +33,18 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
     }
 
     def __init__(self, task: Task, render_mode: str | None = None, info_terms: bool = False) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']} or None, got {render_mode!r}")
         self._task = task
+        self._view = View(render_mode, self.metadata["render_modes"], self.scenario)
         self.render_mode = render_mode
         self._info_terms = info_terms
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.scenario.timing.decision_period_s) or 1}
+        self.metadata = {**self.metadata, "render_fps": self._view.fps}
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         layout = task.swarm.layout
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
-        low, high = state_bounds(self.scenario)
-        self.state_space = Box(low, high)
-        self._canvas: Any = None
+        self.state_space = Box(task.state_layout.low, task.state_layout.high)
         self._was_reset = False
 
     @property
@@ -88,8 +83,7 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
         observation = self._task.reset(seed)[0]
         self._was_reset = True
         self.agents = list(self.possible_agents)
-        if self.render_mode == "human":
-            self.render()
+        self._view.update(self.swarm)
         return {agent: observation[i] for i, agent in enumerate(self.agents)}, {agent: {} for agent in self.agents}
 
     def step(
@@ -107,10 +101,8 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
         outcome = self._task.step(self._action_array(actions))
         acted = self.agents
         index = {agent: self._index[agent] for agent in acted}
-        ended = outcome.terminated[0] | outcome.truncated[0]
-        self.agents = [agent for agent in acted if not ended[index[agent]]]
-        if self.render_mode == "human":
-            self.render()
+        self.agents = [agent for agent in acted if outcome.acting[0, index[agent]]]
+        self._view.update(self.swarm)
         rewards, terminated, truncated = (
             values[0].tolist() for values in (outcome.reward, outcome.terminated, outcome.truncated)
         )
@@ -147,42 +139,31 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""
         self._need_reset("state()")
-        return global_state(self.swarm)
+        return self._task.state()[0]
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
-        if self.render_mode is None:
-            raise RuntimeError("render() needs a render_mode: make the environment with render_mode='rgb_array'")
         self._need_reset("render()")
-        if self._canvas is None:
-            from uuv_marl.envs.rendering import Canvas  # noqa: PLC0415 - pygame is an extra
-
-            self._canvas = Canvas(window=self.render_mode == "human", fps=self.metadata["render_fps"])
-        return self._canvas.draw(self.swarm)
+        return self._view.draw(self.swarm)
 
     def _need_reset(self, what: str) -> None:
         if not self._was_reset:
             raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
 
-    def __getstate__(self) -> dict[str, Any]:
-        """For pickle and deepcopy: everything but the window."""
-        return {**self.__dict__, "_canvas": None}
-
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._canvas is not None:
-            self._canvas.close()
-            self._canvas = None
+        self._view.close()
 
 
 def parallel_env(
-    scenario: str | os.PathLike[str] | Scenario = "single_obstacle",
+    scenario: ScenarioLike = "single_obstacle",
     num_vehicles: int | None = None,
     max_cycles: int | None = None,
     render_mode: str | None = None,
     *,
     reward: Reward = "individual",
     info_terms: bool = False,
+    decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> SwarmParallelEnv:
     """A PettingZoo parallel environment.
@@ -194,10 +175,14 @@ def parallel_env(
         render_mode: ``human``, ``rgb_array`` or None.
         reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
+        decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
+            ``timing.decision_period_s``. Meanwhile the force is held in the world frame and projected anew.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
     """
-    loaded = load_scenario(scenario, num_vehicles=num_vehicles, overrides=overrides)
-    return SwarmParallelEnv(Task(loaded, 1, reward, max_cycles), render_mode, info_terms)
+    task = make_task(
+        scenario, 1, num_vehicles, max_cycles, reward=reward, decision_period=decision_period, overrides=overrides
+    )
+    return SwarmParallelEnv(task, render_mode, info_terms)
 
 
 def env(*args: Any, **kwargs: Any) -> AECEnv[str, Float32, Float32 | None]:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.percept import PerceptField
+from uuv_marl.percept import PerceptField, PerceptLayout
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.swarm import Swarm
 
@@ -31,38 +31,31 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     )
 
 
-def state_bounds(scenario: Scenario) -> tuple[Float32, Float32]:
-    """Lowest and highest value of every entry of the scaled vector."""
-    table = state_table(scenario)
-    sizes = [field.size for field in table]
-    low = np.repeat(np.array([field.low / field.scale for field in table], np.float32), sizes)
-    high = np.repeat(np.array([field.high / field.scale for field in table], np.float32), sizes)
-    return low, high
+def state_layout(scenario: Scenario) -> PerceptLayout:
+    """The table with its bounds, scales and positions in the flat vector."""
+    return PerceptLayout(state_table(scenario))
 
 
-def global_state(swarm: Swarm, world: int = 0) -> Float32:
-    """A world's state, scaled by ``state_table``, shape (entry,), float32; lost vehicles are zero."""
+def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
+    """The state of every world, scaled by its layout, shape (world, entry), float32; lost vehicles are zero."""
     state, course, facts = swarm.state, swarm.course, swarm.facts
-    alive, eta, nu = state.alive[world], state.eta[world], state.nu[world]
-    origin = facts.reference[world, :2]
-    num, m = int(course.num_obstacles[world]), swarm.scenario.max_obstacles
-    obstacles, present = course.obstacles[world, :m], (np.arange(m) < num).astype(np.float64)
-    fields = [
+    worlds, m = np.arange(swarm.num_worlds), swarm.scenario.max_obstacles
+    alive, origin = state.alive[:, :, None], facts.reference[:, None, :2]
+    obstacles = course.obstacles[:, :m]
+    present = (np.arange(m) < course.num_obstacles[:, None])[:, :, None]
+    psi = state.eta[:, :, 2]
+    fields = (
         alive,
-        (eta[:, :2] - origin) * alive[:, None],
-        np.stack([np.cos(eta[:, 2]), np.sin(eta[:, 2])], axis=-1) * alive[:, None],
-        nu[:, :2] * alive[:, None],
-        nu[:, 2] * alive,
-        facts.reference[world, 2:],
-        course.waypoints[world, course.last[world]] - origin,
-        facts.time_s[world] / swarm.time_limit_s[world],
+        (state.eta[:, :, :2] - origin) * alive,
+        np.stack([np.cos(psi), np.sin(psi)], axis=-1) * alive,
+        state.nu[:, :, :2] * alive,
+        state.nu[:, :, 2:] * alive,
+        facts.reference[:, 2:],
+        course.waypoints[worlds, course.last] - origin[:, 0],
+        facts.time_s / swarm.time_limit_s,
         present,
-        (obstacles[:, :2] - origin) * present[:, None],
-        obstacles[:, 2] * present,
-    ]
-    table = state_table(swarm.scenario)
-    scaled = [
-        np.clip(np.ravel(values), field.low, field.high) / field.scale
-        for field, values in zip(table, fields, strict=True)
-    ]
-    return np.concatenate(scaled).astype(np.float32)
+        (obstacles[:, :, :2] - origin) * present,
+        obstacles[:, :, 2:] * present,
+    )
+    flat = np.concatenate([np.reshape(field, (swarm.num_worlds, -1)) for field in fields], axis=1)
+    return np.clip(flat / layout.scale, layout.low, layout.high).astype(np.float32)

@@ -1,32 +1,52 @@
 """What every environment API shares: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
 
+import math
+import os
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.envs.reward import RewardFunction, reward_terms
+from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import ScenarioError, load_scenario
+from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Bool = NDArray[np.bool_]
+ScenarioLike = str | os.PathLike[str] | Scenario
 Reward = Literal["individual", "team"] | RewardFunction
 
 
 class Outcome(NamedTuple):
-    """One step of every world. Arrays of shape (world, vehicle, ...)."""
+    """One step of every world. Arrays of shape (world, vehicle, ...), or (world,) where that is said."""
 
     observation: Float32
     reward: Float64
+    """0 for vehicles that were lost before."""
     terminated: Bool
     """The swarm arrived, or the vehicle was lost in this step."""
     truncated: Bool
     """The time limit, for vehicles that are not lost."""
+    acting: Bool
+    """Vehicles that act in the next step: neither lost nor at their world's end."""
+    world_reward: Float64
+    """Shape (world,): the mean over all vehicles, before ``team`` adds anybody's own loss."""
+    world_terminated: Bool
+    """Shape (world,): the swarm arrived, or all its vehicles are lost."""
+    world_truncated: Bool
+    """Shape (world,): the time limit."""
     terms: Mapping[str, Float64]
     """The reward's terms; empty for a user's own reward."""
+
+    @property
+    def over(self) -> Bool:
+        """Worlds whose episode ended, shape (world,)."""
+        return self.world_terminated | self.world_truncated
 
 
 class Task:
@@ -46,6 +66,7 @@ class Task:
         if not callable(reward) and reward not in ("individual", "team"):
             raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
         self.swarm = Swarm(scenario, num_worlds)
+        self.state_layout = state_layout(scenario)
         self.max_cycles = max_cycles
         self._reward: Reward = reward
 
@@ -60,41 +81,96 @@ class Task:
             raise ValueError(f"max_cycles must be a whole number from 1, or None for the time limit, got {value!r}")
         self._max_cycles = value
 
+    @property
+    def longest_episode(self) -> int:
+        """Decisions after which any episode of the scenario is over."""
+        scenario = self.swarm.scenario
+        limit = scenario.time_limit
+        seconds = limit.factor * longest_duration(scenario) + limit.extra_s
+        cycles = math.ceil(seconds / scenario.timing.decision_period_s)
+        return min(cycles, self.max_cycles or cycles)
+
     def reset(self, seed: int | Sequence[int] | None = None, worlds: Sequence[int] | None = None) -> Float32:
         """Start worlds anew, as ``Swarm.reset``; the observations (world, vehicle, entry)."""
         return self.swarm.reset(seed, worlds).to_observation()
 
-    def step(self, action: Float32) -> Outcome:
+    def step(self, action: ArrayLike) -> Outcome:
         """One decision of every world; ``action`` has shape (world, vehicle, 2)."""
         swarm = self.swarm
         before = swarm.state.alive.copy()
-        observation = swarm.step(action).to_observation()
-        alive, ended = swarm.state.alive, swarm.arrived[:, None]
-        terms: Mapping[str, Float64] = {}
-        if callable(self._reward):
-            reward = np.asarray(self._reward(swarm), np.float64)
-            if reward.shape != alive.shape:
-                raise ValueError(f"the reward function must give an array {alive.shape}, got {reward.shape}")
-            if not np.isfinite(reward[before]).all():
-                raise ValueError(
-                    "the reward function must give finite numbers; distances are infinite where nobody is near "
-                    "(facts.spacing of a lone vehicle) or nothing is there (facts.clearance without obstacles)"
-                )
-        else:
-            terms = reward_terms(swarm)
-            reward = np.sum(list(terms.values()), axis=0)
-            if self._reward == "team":
-                # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
-                reward = reward.mean(axis=1, keepdims=True) + terms["loss"]
+        observation = swarm.step(np.asarray(action, np.float32)).to_observation()
+        alive, arrived = swarm.state.alive, swarm.arrived
+        reward, world_reward, terms = self._rewards(before)
         late = swarm.timed_out | (swarm.state.tick >= self._last_tick)
+        world_terminated = arrived | ~alive.any(axis=1)
+        world_truncated = late & ~world_terminated
         return Outcome(
             observation=observation,
             reward=reward,
-            terminated=before & (ended | ~alive),
-            truncated=alive & ~ended & late[:, None],
+            terminated=before & (arrived[:, None] | ~alive),
+            truncated=alive & world_truncated[:, None],
+            acting=alive & ~(world_terminated | world_truncated)[:, None],
+            world_reward=world_reward,
+            world_terminated=world_terminated,
+            world_truncated=world_truncated,
             terms=terms,
         )
+
+    def state(self) -> Float32:
+        """The global state of every world, shape (world, entry), see ``uuv_marl.envs.state.state_table``."""
+        return global_state(self.swarm, self.state_layout)
+
+    def _rewards(self, before: Bool) -> tuple[Float64, Float64, Mapping[str, Float64]]:
+        """Reward per vehicle, per world, and the terms, for those that were there ``before`` the step."""
+        if callable(self._reward):
+            own = np.where(before, self._own_reward(self._reward, before), 0.0)
+            return own, own.mean(axis=1), {}
+        terms = reward_terms(self.swarm)
+        reward = sum(terms.values(), np.zeros(before.shape))
+        mean = reward.mean(axis=1)
+        if self._reward == "team":
+            # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
+            reward = np.where(before, mean[:, None] + terms["loss"], 0.0)
+        return reward, mean, terms
+
+    def _own_reward(self, function: RewardFunction, before: Bool) -> Float64:
+        reward = np.asarray(function(self.swarm), np.float64)
+        if reward.shape != before.shape:
+            raise ValueError(f"the reward function must give an array {before.shape}, got {reward.shape}")
+        if not np.isfinite(reward[before]).all():
+            raise ValueError(
+                "the reward function must give finite numbers; distances are infinite where nobody is near "
+                "(facts.spacing of a lone vehicle) or nothing is there (facts.clearance without obstacles)"
+            )
+        return reward
 
     @property
     def _last_tick(self) -> float:
         return np.inf if self.max_cycles is None else self.max_cycles * self.swarm.scenario.timing.holds_per_decision
+
+
+def make_task(
+    scenario: ScenarioLike = "single_obstacle",
+    num_worlds: int = 1,
+    num_vehicles: int | None = None,
+    max_cycles: int | None = None,
+    *,
+    reward: Reward = "individual",
+    decision_period: float | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> Task:
+    """A task from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
+    changes = dict(overrides or {})
+    if decision_period is not None:
+        changes["timing.decision_period_s"] = decision_period
+    return Task(load_scenario(scenario, num_vehicles=num_vehicles, overrides=changes), num_worlds, reward, max_cycles)
+
+
+def refuse_losses(scenario: Scenario, api: str) -> None:
+    """Raise ScenarioError where vehicles can be lost, for an API whose rows must all live to the episode's end."""
+    if scenario.disturbance.loss_times_s or scenario.contact.ends_vehicle:
+        raise ScenarioError(
+            f"{api} can't show that a vehicle is lost before the others, which scenario {scenario.name!r} allows; use "
+            "uuv_marl.parallel_env, vector_env or the TorchRL or RLlib environment, or override "
+            "disturbance.loss_times_s=[] and contact.ends_vehicle=false"
+        )

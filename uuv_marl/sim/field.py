@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.scenario import RandomField, Scenario, growth
 from uuv_marl.scenario_checks import start_distance
+from uuv_marl.sim.trajectory import arrival_times
 
 Float64 = NDArray[np.float64]
 _TRIES_PER_OBSTACLE = 32
@@ -27,6 +28,14 @@ def draw_field(scenario: Scenario, rng: np.random.Generator) -> Field:
         return Field(np.array(scenario.trajectory.waypoints_m), np.array(obstacles, np.float64).reshape(-1, 3))
     waypoints = _polyline(scenario.random_field, rng)
     return Field(waypoints, _obstacles(scenario, scenario.random_field, waypoints, rng))
+
+
+def longest_duration(scenario: Scenario) -> float:
+    """Time [s] that l(t) takes at most to the end of a trajectory of this scenario."""
+    speed, field = scenario.trajectory.speed_mps, scenario.random_field
+    if field is not None:
+        return field.legs[1] * field.leg_length_m[1] / speed
+    return float(arrival_times(np.array(scenario.trajectory.waypoints_m), speed)[-1])
 
 
 def _polyline(field: RandomField, rng: np.random.Generator) -> Float64:

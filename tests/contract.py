@@ -1,0 +1,240 @@
+"""The contract every API must keep: the same seeds and actions give the same run. Each player drives one API."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+import uuv_marl
+
+WORLDS, VEHICLES, SEED = 3, 4, 20
+ARRIVES = {
+    "trajectory.speed_mps": 40.0,
+    "arrival.radius_m": 5000.0,
+    "arrival.spread_m": 20000.0,
+    "arrival.dwell_s": 0.2,
+}
+LOSES = {"disturbance.loss_times_s": [1.0, 2.0]}
+TIMES_OUT = {"time_limit.factor": 0.02, "time_limit.extra_s": 8.0}
+SINKS = {
+    **LOSES,
+    "time_limit.extra_s": 40.0,
+    "contact.ends_vehicle": True,
+    "contact.hull_radius_m": 22.0,
+    "start.spacing_m": 45.0,
+    "start.gap_m": 45.0,
+}
+BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
+
+
+class Case(NamedTuple):
+    """An environment and actions for WORLDS worlds, with at least one ending in each."""
+
+    name: str
+    scenario: str
+    overrides: dict
+    period: float = 0.5
+    steps: int = 110
+
+    @property
+    def kwargs(self):
+        return {
+            "scenario": self.scenario,
+            "num_vehicles": VEHICLES,
+            "decision_period": self.period,
+            "overrides": {**(LOSES if self.scenario == "lossy" else {}), **self.overrides},
+        }
+
+    def actions(self):
+        """Shape (step, world, vehicle, 2)."""
+        return np.random.default_rng(7).uniform(-1, 1, (self.steps, WORLDS, VEHICLES, 2)).astype(np.float32)
+
+
+class Run(NamedTuple):
+    """What an API gave. Rows of vehicles that were lost before are zero."""
+
+    observation: np.ndarray
+    """(step + 1, world, vehicle, entry), as the next decision sees it: the new episode's where one ended."""
+    last: np.ndarray
+    """(step, world, vehicle, entry): the observation that ends an episode, else zero."""
+    reward: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+    """(step, world, vehicle)"""
+    over: np.ndarray
+    """(step, world): the world was reset after this step."""
+
+    def equals(self, other):
+        """Bit for bit, rewards as precise as the coarser of the two."""
+        coarser = min(self.reward.dtype, other.reward.dtype)
+        for name, mine, theirs in zip(self._fields, self, other, strict=True):
+            if name == "reward":
+                mine, theirs = mine.astype(coarser), theirs.astype(coarser)  # noqa: PLW2901
+            assert mine.tobytes() == theirs.tobytes(), f"{name} differs first at {np.argwhere(mine != theirs)[:1]}"
+
+
+def empty(steps, size, reward=np.float64):
+    shape = (steps, WORLDS, VEHICLES)
+    return Run(
+        np.zeros((steps + 1, *shape[1:], size), np.float32),
+        np.zeros((*shape, size), np.float32),
+        np.zeros(shape, reward),
+        np.zeros(shape, bool),
+        np.zeros(shape, bool),
+        np.zeros(shape[:2], bool),
+    )
+
+
+def cases():
+    scenarios = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
+    return [
+        *(Case(f"{name}-times_out", name, TIMES_OUT) for name in scenarios),
+        *(Case(f"{name}-arrives", name, ARRIVES) for name in scenarios),
+        Case("sinks", "single_obstacle", SINKS, 1.0, 350),
+        Case("own_period", "random_field", BRIEF, 0.1),
+    ]
+
+
+def parallel(case):
+    """PettingZoo's parallel API, a world after the other: the reference."""
+    actions = case.actions()
+    run = None
+    for w in range(WORLDS):
+        env = uuv_marl.parallel_env(**case.kwargs)
+        run = run or empty(len(actions), env.observation_space("uuv_0").shape[0])
+        play_dictionaries(env, run, w, actions[:, w])
+    return run
+
+
+def play_dictionaries(env, run, w, actions):
+    """One world through any environment that speaks dictionaries of agents."""
+    index = {agent: i for i, agent in enumerate(env.possible_agents)}
+
+    def write(out, values):
+        for agent, value in values.items():
+            if agent in index:
+                out[index[agent]] = value
+
+    observations, _ = env.reset(seed=SEED + w)
+    write(run.observation[0, w], observations)
+    for t, action in enumerate(actions):
+        observations, rewards, terminated, truncated, _ = env.step({a: action[index[a]] for a in env.agents})
+        write(run.reward[t, w], rewards)
+        write(run.terminated[t, w], terminated)
+        write(run.truncated[t, w], truncated)
+        if env.agents:
+            write(run.observation[t + 1, w], observations)
+        else:
+            run.over[t, w] = True
+            write(run.last[t, w], observations)
+            write(run.observation[t + 1, w], env.reset()[0])
+
+
+def aec(case):
+    """PettingZoo's turn-based API: what an agent reads by ``last`` at its turn is the outcome of the round before."""
+    actions = case.actions()
+    run = None
+    for w in range(WORLDS):
+        env = uuv_marl.env(**case.kwargs)
+        run = run or empty(len(actions), env.observation_space("uuv_0").shape[0])
+        t, seed = 0, SEED + w
+        while t <= len(actions):
+            env.reset(seed=seed)
+            run.over[t - 1, w] |= t > 0
+            t, seed = play_turns(env, run, w, actions[:, w], t), None
+    return run
+
+
+def play_turns(env, run, w, actions, start):
+    """An episode from round ``start`` on; the round in which the next one starts, or one past the last."""
+    rounds = dict.fromkeys(env.possible_agents, start)
+    for agent in env.agent_iter():
+        i, t = env.possible_agents.index(agent), rounds[agent]
+        observation, reward, terminated, truncated, _ = env.last()
+        over = all(env.terminations[other] or env.truncations[other] for other in env.agents)
+        (run.last[t - 1, w] if over else run.observation[t, w])[i] = observation
+        if t > start:
+            at = (t - 1, w, i)
+            run.reward[at], run.terminated[at], run.truncated[at] = reward, terminated, truncated
+        if terminated or truncated:
+            env.step(None)
+        else:
+            env.step(actions[t, i] if t < len(actions) else np.zeros(2))
+            rounds[agent] = t + 1
+            if min(rounds[other] for other in env.agents) > len(actions):
+                return len(actions) + 1
+    return max(rounds.values())
+
+
+def vector(case):
+    """Gymnasium's vector API."""
+    env = uuv_marl.vector_env(WORLDS, **case.kwargs)
+    actions = case.actions()
+    run = empty(len(actions), env.single_observation_space.shape[1])
+    run.observation[0], _ = env.reset(seed=SEED)
+    for t, action in enumerate(actions):
+        observation, reward, terminated, truncated, infos = env.step(action)
+        run.observation[t + 1] = observation
+        run.reward[t], run.terminated[t], run.truncated[t] = (
+            infos[f"agent_{name}"] for name in ("reward", "terminated", "truncated")
+        )
+        np.testing.assert_array_equal(reward, run.reward[t].mean(axis=1))
+        run.over[t] = over = terminated | truncated
+        assert not (terminated & truncated).any()
+        np.testing.assert_array_equal(infos.get("_final_obs", np.zeros(WORLDS, bool)), over)
+        for w in np.flatnonzero(over):
+            run.last[t, w] = infos["final_obs"][w]
+    return run
+
+
+def sb3(case):
+    """Stable-Baselines3's VecEnv: rows are vehicles."""
+    from uuv_marl.envs.sb3 import SwarmVecEnv
+
+    env = SwarmVecEnv(WORLDS, **case.kwargs)
+    actions = case.actions()
+    run = empty(len(actions), env.observation_space.shape[0], np.float32)
+    split = (WORLDS, VEHICLES, -1)
+    env.seed(SEED)
+    run.observation[0] = env.reset().reshape(split)
+    for t, action in enumerate(actions):
+        observation, reward, done, infos = env.step(action.reshape(-1, 2))
+        run.over[t] = done.reshape(split[:2]).all(axis=1)
+        run.observation[t + 1], run.reward[t] = observation.reshape(split), reward.reshape(split[:2])
+        for row in range(env.num_envs):
+            at = (t, *divmod(row, VEHICLES))
+            assert done[row] == ("terminal_observation" in infos[row])
+            if done[row]:
+                run.last[at] = infos[row]["terminal_observation"]
+                run.truncated[at] = infos[row]["TimeLimit.truncated"]
+                run.terminated[at] = not infos[row]["TimeLimit.truncated"]
+                assert infos[row]["is_success"] == run.terminated[at]
+    return run
+
+
+def torchrl(case):
+    """TorchRL's EnvBase, reset as its collectors do."""
+    import torch
+
+    from uuv_marl.envs.torchrl import SwarmEnv
+
+    env = SwarmEnv(WORLDS, **case.kwargs, seed=SEED)
+    actions = case.actions()
+    run = empty(len(actions), env.observation_spec["uuv", "observation"].shape[-1], np.float32)
+    data = env.reset()
+    run.observation[0] = data["uuv", "observation"]
+    for t, action in enumerate(actions):
+        data["uuv", "action"] = torch.from_numpy(action)
+        acting = data["uuv", "mask"].numpy()
+        stepped, data = env.step_and_maybe_reset(data)
+        after = stepped["next"]
+        run.over[t] = over = after["done"].squeeze(-1).numpy()
+        run.observation[t + 1] = data["uuv", "observation"]
+        run.reward[t] = after["uuv", "reward"].squeeze(-1)
+        run.terminated[t] = after["uuv", "terminated"].squeeze(-1).numpy() & acting
+        run.truncated[t] = after["uuv", "truncated"].squeeze(-1)
+        run.last[t, over] = after["uuv", "observation"][over]
+        # A world's own flags say what ends it; a lost vehicle's do not.
+        truncated = after["truncated"].squeeze(-1).numpy()
+        np.testing.assert_array_equal(truncated, run.truncated[t].any(axis=1))
+        np.testing.assert_array_equal(after["terminated"].squeeze(-1).numpy(), over & ~truncated)
+    return run

@@ -1,0 +1,140 @@
+"""Stable-Baselines3 itself: its PPO and SAC, its wrappers, its checks, on our environments."""
+
+import gymnasium
+import numpy as np
+import pytest
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
+
+from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.scenario_files import ScenarioError
+
+SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
+QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
+
+
+def swarm(num_worlds=2, scenario="random_field", overrides=SHORT, **kwargs):
+    return SwarmVecEnv(num_worlds, scenario, num_vehicles=4, decision_period=0.5, overrides=overrides, **kwargs)
+
+
+def weights(model):
+    return np.concatenate([p.detach().numpy().ravel() for p in model.policy.parameters()])
+
+
+def learn(env, seed=3):
+    model = PPO("MlpPolicy", env, n_steps=32, batch_size=64, n_epochs=2, seed=seed, device="cpu")
+    before = weights(model)
+    model.learn(3 * 32 * env.num_envs)
+    assert np.isfinite(weights(model)).all()
+    assert not np.array_equal(before, weights(model))
+    return model
+
+
+def test_ppo_learns_and_a_seed_fixes_it():
+    first, second = learn(VecMonitor(swarm())), learn(VecMonitor(swarm()))
+    assert weights(first).tobytes() == weights(second).tobytes()
+    assert weights(first).tobytes() != weights(learn(VecMonitor(swarm()), seed=4)).tobytes()
+    assert first.num_timesteps == 3 * 32 * 8
+    mean, _ = evaluate_policy(first, VecMonitor(swarm()), n_eval_episodes=8)
+    assert np.isfinite(mean)
+
+
+def test_ppo_knows_episodes_without_any_wrapper():
+    env = swarm(overrides=QUICK, scenario="single_obstacle")
+    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, n_epochs=1, seed=0, device="cpu")
+    model.learn(64 * env.num_envs)
+    assert model.ep_info_buffer
+    assert {info["l"] for info in model.ep_info_buffer} == {33}
+    assert set(model.ep_success_buffer) == {True}
+
+
+def test_normalising_and_stacking_wrappers():
+    learn(VecNormalize(VecMonitor(VecCheckNan(swarm(), raise_exception=True))))
+    learn(VecFrameStack(swarm(), 2))
+
+
+def test_episode_statistics_agree_with_vecmonitor():
+    ours, theirs = swarm(), VecMonitor(swarm())
+    for env in (ours, theirs):
+        env.seed(5)
+        env.reset()
+    rng, ended = np.random.default_rng(0), 0
+    for _ in range(60):
+        actions = rng.uniform(-1, 1, (8, 2)).astype(np.float32)
+        _, _, done, mine = ours.step(actions)
+        *_, monitored = theirs.step(actions)
+        for row in np.flatnonzero(done):
+            assert mine[row]["episode"]["r"] == pytest.approx(monitored[row]["episode"]["r"], abs=1e-5)
+            assert mine[row]["episode"]["l"] == monitored[row]["episode"]["l"]
+            ended += 1
+    assert ended >= 24
+
+
+def test_time_limits_are_bootstrapped_and_arrivals_are_not(monkeypatch):
+    """What SB3 puts into its buffer: at a time limit the value of ``terminal_observation`` is added, at arrival not."""
+    for overrides, scenario, truncated in ((SHORT, "random_field", True), (QUICK, "single_obstacle", False)):
+        env = swarm(scenario=scenario, overrides=overrides)
+        model = PPO("MlpPolicy", env, n_steps=40, batch_size=64, n_epochs=1, seed=0, device="cpu")
+        asked = []
+        predict = model.policy.predict_values
+        monkeypatch.setattr(model.policy, "predict_values", lambda o, p=predict, a=asked: (a.append(o.shape), p(o))[1])
+        model.learn(40 * env.num_envs)
+        single = [shape for shape in asked if tuple(shape) == (1, 98)]
+        assert bool(single) == truncated
+
+
+def test_unseeded_resets_go_on_and_seeding_returns_every_row():
+    env = swarm()
+    assert list(env.seed(5)) == [5] * 4 + [6] * 4
+    first, second = env.reset(), env.reset()
+    assert not np.array_equal(first, second)
+    env.seed(5)
+    np.testing.assert_array_equal(env.reset(), first)
+    np.testing.assert_array_equal(env.reset(), second)
+    assert len(env.seed()) == 8
+
+
+def test_scenarios_that_lose_vehicles_are_refused_with_the_remedy():
+    with pytest.raises(ScenarioError, match=r"'lossy' allows; use .* or override disturbance.loss_times_s=\[\]"):
+        SwarmVecEnv(1, "lossy")
+    with pytest.raises(ScenarioError, match="contact.ends_vehicle=false"):
+        SwarmVecEnv(1, overrides={"contact.ends_vehicle": True})
+    SwarmVecEnv(1, "lossy", overrides={"disturbance.loss_times_s": []})
+
+
+def test_attributes_of_rows():
+    env = swarm()
+    assert env.get_attr("render_mode") == [None] * 8
+    assert env.get_attr("scenario", [0, 3]) == [env.scenario] * 2
+    assert env.has_attr("swarm")
+    assert not env.has_attr("nonsense")
+    assert env.env_is_wrapped(gymnasium.Wrapper) == [False] * 8
+    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
+        env.set_attr("reward", 1)
+    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
+        env.env_method("reset")
+
+
+def test_a_picture_tiles_the_worlds():
+    pytest.importorskip("pygame")
+    env = swarm(render_mode="rgb_array")
+    env.reset()
+    assert env.render().shape == (1600, 800, 3)
+    env.close()
+
+
+@pytest.mark.parametrize("others", ["bio_inspired", "sdc"])
+def test_solo_passes_sb3s_check(scenario_name, others):
+    check_env(gymnasium.make("uuv_marl/Solo-v0", scenario=scenario_name, num_vehicles=8, others=others))
+
+
+def test_sac_learns_on_solo():
+    env = gymnasium.make("uuv_marl/Solo-v0", num_vehicles=4, decision_period=0.5, overrides=SHORT)
+    model = SAC("MlpPolicy", env, learning_starts=40, batch_size=32, seed=1, device="cpu")
+    before = weights(model)
+    model.learn(120)
+    assert np.isfinite(weights(model)).all()
+    assert not np.array_equal(before, weights(model))
+    assert model.ep_info_buffer

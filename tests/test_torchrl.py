@@ -1,0 +1,113 @@
+"""TorchRL itself: its checks, its collector, its PPO loss, on our environment."""
+
+import warnings
+
+import numpy as np
+import pytest
+import torch
+from tensordict.nn import TensorDictModule
+from tensordict.nn.distributions import NormalParamExtractor
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # TorchRL 0.14 deprecates parts of itself as it is imported.
+    from torchrl.collectors import Collector
+    from torchrl.envs import Compose, InitTracker, RewardSum, TransformedEnv
+    from torchrl.envs.utils import check_env_specs
+    from torchrl.modules import MultiAgentMLP, ProbabilisticActor, TanhNormal
+    from torchrl.objectives import ClipPPOLoss, ValueEstimators
+
+from uuv_marl.envs.torchrl import SwarmEnv
+
+SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
+LOSSES = {**SHORT, "disturbance.loss_times_s": [1.0, 2.0]}
+GROUP_DONE = {"reward": ("uuv", "reward"), "done": ("uuv", "done"), "terminated": ("uuv", "terminated")}
+
+
+def swarm(num_worlds=3, scenario="random_field", overrides=SHORT, **kwargs):
+    return SwarmEnv(num_worlds, scenario, num_vehicles=4, decision_period=0.5, overrides=overrides, **kwargs)
+
+
+def network(outputs, centralised):
+    return MultiAgentMLP(
+        n_agent_inputs=98, n_agent_outputs=outputs, n_agents=4, centralized=centralised, share_params=True, depth=1,
+        num_cells=16,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def actor():
+    torch.manual_seed(0)
+    net = torch.nn.Sequential(network(4, centralised=False), NormalParamExtractor())
+    keys = {"in_keys": [("uuv", "observation")], "out_keys": [("uuv", "loc"), ("uuv", "scale")]}
+    return ProbabilisticActor(
+        TensorDictModule(net, **keys), in_keys=keys["out_keys"], out_keys=[("uuv", "action")],
+        distribution_class=TanhNormal, return_log_prob=True, log_prob_key=("uuv", "sample_log_prob"),
+    )  # fmt: skip
+
+
+def test_specs_hold(scenario_name):
+    check_env_specs(SwarmEnv(2, scenario_name, num_vehicles=8, decision_period=0.5))
+
+
+def test_specs_are_those_of_the_other_apis():
+    env = swarm()
+    spec = env.observation_spec["uuv", "observation"]
+    assert spec.shape == (3, 4, 98)
+    np.testing.assert_array_equal(spec.space.high[0, 0], env.swarm.layout.high)
+    assert env.group_map == {"uuv": ["uuv_0", "uuv_1", "uuv_2", "uuv_3"]}
+    assert env.full_action_spec["uuv", "action"].shape == (3, 4, 2)
+
+
+def test_rollouts_reset_worlds_at_their_end_alone():
+    env = swarm(overrides=LOSSES, scenario="lossy", seed=1)
+    data = env.rollout(60, break_when_any_done=False)
+    mask, over = data["uuv", "mask"], data["next", "done"].squeeze(-1)
+    assert over.sum() >= 6
+    lost = ~data["next", "uuv", "mask"]
+    assert (lost.any(-1) & ~over).any()
+    assert data["next", "uuv", "terminated"].squeeze(-1)[lost].all()
+    assert mask[:, 1:][over[:, :-1]].all(), "a new episode begins with everybody"
+    assert (mask[:, 1:] == data["next", "uuv", "mask"][:, :-1])[~over[:, :-1]].all()
+    np.testing.assert_array_equal(data["next", "uuv", "observation"][lost], 0.0)
+    np.testing.assert_array_equal(data["next", "uuv", "reward"].squeeze(-1)[~mask], 0.0)
+
+
+def test_seeds():
+    a, b = swarm(seed=4), swarm()
+    first = a.reset()["uuv", "observation"]
+    b.set_seed(4)
+    torch.testing.assert_close(b.reset()["uuv", "observation"], first, rtol=0, atol=0)
+    assert not torch.equal(a.reset()["uuv", "observation"], first)
+    torch.testing.assert_close(swarm(1, seed=5).reset()["uuv", "observation"][0], first[1], rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("scenario", ["random_field", "lossy"])
+def test_ppo_loss_trains_with_the_collector(actor, scenario):
+    env = TransformedEnv(
+        swarm(scenario=scenario, overrides=LOSSES if scenario == "lossy" else SHORT),
+        Compose(InitTracker(), RewardSum(in_keys=[("uuv", "reward")], reset_keys=["_reset"])),
+    )
+    critic = TensorDictModule(network(1, centralised=True), [("uuv", "observation")], [("uuv", "state_value")])
+    loss = ClipPPOLoss(actor, critic)
+    loss.set_keys(
+        **GROUP_DONE, action=("uuv", "action"), value=("uuv", "state_value"),
+        sample_log_prob=("uuv", "sample_log_prob"),
+    )  # fmt: skip
+    loss.make_value_estimator(ValueEstimators.GAE, gamma=0.98, lmbda=0.95)
+    optimiser = torch.optim.Adam(loss.parameters(), 1e-3)
+    before = torch.nn.utils.parameters_to_vector(actor.parameters()).detach().clone()
+    collector = Collector(env, actor, frames_per_batch=90, total_frames=270)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # TorchRL's own, on torch 2.13
+        for batch in collector:
+            assert torch.isfinite(batch["next", "uuv", "episode_reward"]).all()
+            with torch.no_grad():
+                loss.value_estimator(batch, params=loss.critic_network_params)
+            total = sum(value for key, value in loss(batch[batch["uuv", "mask"].all(-1)]).items() if "loss_" in key)
+            optimiser.zero_grad()
+            total.backward()
+            optimiser.step()
+    collector.shutdown()
+    after = torch.nn.utils.parameters_to_vector(actor.parameters())
+    assert torch.isfinite(after).all()
+    assert not torch.equal(before, after)

@@ -1,0 +1,249 @@
+"""Gymnasium's APIs: many worlds, one learner among others, the registries."""
+
+import copy
+import pickle
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pettingzoo
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import vector as wrappers
+
+import uuv_marl
+from uuv_marl import baselines
+from uuv_marl.envs.solo import SoloEnv
+
+pytest.importorskip("pygame")
+SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
+
+
+def short(num_envs=3, **kwargs):
+    return uuv_marl.vector_env(num_envs, "random_field", num_vehicles=5, decision_period=0.5, overrides=SHORT, **kwargs)
+
+
+def random_actions(env, steps=40):
+    return np.random.default_rng(1).uniform(-1, 1, (steps, *env.action_space.shape)).astype(np.float32)
+
+
+def test_spaces_and_metadata():
+    env = short()
+    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert env.metadata["render_fps"] == 2
+    assert env.single_observation_space.shape == (5, 98)
+    assert env.observation_space.shape == (3, 5, 98)
+    assert env.action_space.shape == (3, 5, 2)
+    observation, infos = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+    assert infos["agent_mask"].all()
+    for action in random_actions(env):
+        observation, reward, terminated, truncated, infos = env.step(action)
+        assert env.observation_space.contains(observation)
+        assert reward.shape == terminated.shape == truncated.shape == (3,)
+        assert (reward.dtype, terminated.dtype) == (np.float64, np.bool_)
+
+
+def test_a_world_is_the_same_in_any_batch():
+    small, large = short(1), short(7)
+    a, b = small.reset(seed=14)[0], large.reset(seed=10)[0]
+    np.testing.assert_array_equal(a[0], b[4])
+    for action in random_actions(large):
+        a, b = small.step(action[4:5])[0], large.step(action)[0]
+        assert a[0].tobytes() == b[4].tobytes()
+
+
+def test_seeds_per_world_and_masks():
+    env = short()
+    first = env.reset(seed=[4, None, 5])[0]
+    np.testing.assert_array_equal(env.reset(seed=4)[0][0], first[0])
+    again = env.reset(seed=[5, 6, 7], options={"reset_mask": np.array([True, False, False])})[0]
+    np.testing.assert_array_equal(again[0], first[2])
+    np.testing.assert_array_equal(again[1], short(1).reset(seed=5)[0][0])  # as reset(seed=4) left it
+    for mask in (np.zeros(3, bool), np.ones(2, bool), np.ones(3, int)):
+        with pytest.raises(ValueError, match=r"reset_mask'\] must be a bool array of shape \(3,\)"):
+            env.reset(options={"reset_mask": mask})
+    with pytest.raises(ValueError, match="one seed for each of 3 worlds, got 2"):
+        env.reset(seed=[1, 2])
+    with pytest.raises(ValueError, match="seed must not be negative"):
+        env.reset(seed=[1, -2, 3])
+
+
+def test_observations_handed_out_stay_as_they_are():
+    env = short()
+    first, _ = env.reset(seed=0)
+    kept = first.copy()
+    actions = random_actions(env)
+    second, reward, *_, infos = env.step(actions[0])
+    kept_second, kept_reward, kept_mask = second.copy(), reward.copy(), infos["agent_mask"].copy()
+    for action in actions[1:]:
+        env.step(action)
+    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(second, kept_second)
+    np.testing.assert_array_equal(reward, kept_reward)
+    np.testing.assert_array_equal(infos["agent_mask"], kept_mask)
+
+
+def test_gymnasium_wrappers_work():
+    env = wrappers.DictInfoToList(
+        wrappers.NormalizeReward(wrappers.RecordEpisodeStatistics(short(info_terms=True)))
+    )
+    env.reset(seed=0)
+    plain = short()
+    plain.reset(seed=0)
+    returns, seen = np.zeros(3), 0
+    for action in random_actions(env):
+        _, _, terminated, truncated, infos = env.step(action)
+        returns += plain.step(action)[1]
+        for w in np.flatnonzero(terminated | truncated):
+            assert infos[w]["episode"]["r"] == pytest.approx(returns[w])
+            assert infos[w]["final_obs"].shape == (5, 98)
+            assert infos[w]["final_info"]["time_s"] > 5.0
+            returns[w], seen = 0.0, seen + 1
+        assert infos[0]["agent_reward"].shape == (5,)
+        assert infos[0]["reward_terms"]["effort"].shape == (5,)
+    assert seen >= 6
+
+
+def test_final_info_tells_how_a_world_ended():
+    quick = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
+    env = uuv_marl.vector_env(2, "single_obstacle", num_vehicles=4, decision_period=0.5, overrides=quick)
+    env.reset(seed=0)
+    while True:
+        _, _, terminated, truncated, infos = env.step(np.zeros((2, 4, 2), np.float32))
+        if terminated.any():
+            break
+    assert terminated.all()
+    assert not truncated.any()
+    assert infos["final_info"]["arrived"].all()
+    assert infos["final_info"]["state"].shape == (2, *env.state_space.shape)
+    assert (infos["final_info"]["state"] != env.state()).any()
+
+
+def test_the_held_force_keeps_its_direction_in_the_world():
+    """One decision of 0.5 s equals five of 0.1 s in which the same world-frame force is projected anew (Eq. 22)."""
+    long = uuv_marl.vector_env(1, "single_obstacle", num_vehicles=3, decision_period=0.5)
+    fine = uuv_marl.vector_env(1, "single_obstacle", num_vehicles=3)
+    long.reset(seed=0)
+    fine.reset(seed=0)
+    action = np.array([[[0.5, 0.4], [0.1, -0.6], [-0.3, 0.2]]], np.float32)
+    psi_0 = fine.swarm.state.eta[0, :, 2].copy()
+    long.step(action)
+    for _ in range(5):
+        turned = fine.swarm.state.eta[0, :, 2] - psi_0
+        x, y = action[0, :, 0], action[0, :, 1]
+        held = np.stack([x * np.cos(turned) + y * np.sin(turned), y * np.cos(turned) - x * np.sin(turned)], axis=-1)
+        fine.step(held[None].astype(np.float32))
+    np.testing.assert_allclose(long.swarm.state.eta, fine.swarm.state.eta, rtol=0, atol=1e-4)
+    assert np.abs(turned).max() > 0.05, "else the test shows nothing"
+
+
+def test_pictures_of_every_world():
+    env = short(2, render_mode="rgb_array")
+    env.reset(seed=0)
+    first, second = env.render()
+    assert first.shape == (800, 800, 3)
+    assert not np.array_equal(first, second)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(env)).render()[1], second)
+    env.close()
+    with pytest.raises(ValueError, match=r"render_mode must be one of \['rgb_array'\] or None, got 'human'"):
+        short(render_mode="human")
+    with pytest.raises(RuntimeError, match="needs a render_mode"):
+        short().render()
+
+
+def test_bad_actions_and_order():
+    env = short()
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.step(np.zeros((3, 5, 2)))
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"shape \(3, 5, 2\)"):
+        env.step(np.zeros((3, 4, 2)))
+    with pytest.raises(ValueError, match="vehicle 2 of world 1"):
+        bad = np.zeros((3, 5, 2))
+        bad[1, 2] = np.nan
+        env.step(bad)
+
+
+def test_registries():
+    made = gymnasium.make_vec("uuv_marl/Swarm-v0", num_envs=2, scenario="tracking", num_vehicles=3)
+    assert made.observation_space.shape == (2, 3, 98)
+    assert made.spec.id == "uuv_marl/Swarm-v0"
+    solo = gymnasium.make("uuv_marl/Solo-v0", num_vehicles=3)
+    assert solo.observation_space.shape == (98,)
+    parallel = pettingzoo.make("parallel", "uuv_marl/uuv_swarm_v0", num_vehicles=3, max_cycles=7)
+    assert parallel.max_cycles == 7
+    assert pettingzoo.make("aec", "uuv_marl/uuv_swarm_v0", num_vehicles=3).max_num_agents == 3
+
+
+def test_importing_twice_registers_once():
+    code = "import warnings; warnings.simplefilter('error'); import uuv_marl, importlib; import uuv_marl.envs.vector_env"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def solo(others="bio_inspired", **kwargs):
+    return gymnasium.make("uuv_marl/Solo-v0", others=others, **{"num_vehicles": 6, **kwargs})
+
+
+@pytest.mark.parametrize("others", ["bio_inspired", "sdc", "random"])
+def test_solo_passes_gymnasiums_check(scenario_name, others):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(solo(others, scenario=scenario_name, num_vehicles=8, render_mode="rgb_array").unwrapped)
+
+
+@pytest.mark.parametrize("others", ["bio_inspired", "sff_informed", "sdc", "random"])
+def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
+    """The learner's action and the policy's for all others give the run of ``parallel_env``, bit for bit."""
+    losses = {"disturbance.loss_times_s": [2.0, 3.0]} if scenario_name == "lossy" else {}
+    scenario = uuv_marl.load_scenario(scenario_name, num_vehicles=6, overrides={**SHORT, **losses})
+    env = solo(others, scenario=scenario, num_vehicles=None, info_terms=True)
+    whole = uuv_marl.parallel_env(baselines.granted(others, scenario), info_terms=True)
+    policy = baselines.make(others, whole)
+    rng = np.random.default_rng(0)
+    observation, _ = env.reset(seed=8)
+    observations, _ = whole.reset(seed=8)
+    policy.reset(8)
+    steps = 0
+    while "uuv_0" in whole.agents:
+        assert observation.tobytes() == observations["uuv_0"].tobytes()
+        own = rng.uniform(-1, 1, 2).astype(np.float32)
+        observation, *outcome = env.step(own)
+        observations, *theirs = whole.step({**policy(observations), "uuv_0": own})
+        assert outcome == [values["uuv_0"] for values in theirs]
+        steps += 1
+    assert steps > 15
+    assert outcome[1] != outcome[2]  # terminated where the learner was lost, else truncated
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.unwrapped.step(own)
+
+
+def test_solo_repeats_itself_with_policies_that_draw():
+    runs = []
+    for _ in range(2):
+        env = solo("random", overrides=SHORT)
+        record = [env.reset(seed=3)[0]]
+        for _ in range(2):
+            over = False
+            while not over:
+                observation, reward, terminated, truncated, _ = env.step(np.zeros(2, np.float32))
+                record += [observation, reward]
+                over = terminated or truncated
+            record.append(env.reset()[0])
+        runs.append(b"".join(np.asarray(item).tobytes() for item in record))
+    assert runs[0] == runs[1]
+
+
+def test_solo_says_what_is_wrong():
+    env = solo()
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"must be finite and of shape \(2,\), got \[nan, 0.0\]"):
+        env.unwrapped.step([np.nan, 0.0])
+    with pytest.raises(baselines.PolicyError, match="did you mean 'bio_inspired'"):
+        solo("bio_inspird")
+    with pytest.raises(ValueError, match="render_mode must be one of"):
+        SoloEnv(render_mode="ascii")
+    copy.deepcopy(env)

@@ -1,0 +1,139 @@
+"""``SwarmEnv``: worlds as a batched TorchRL environment with one group of agents, ``uuv``."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Bounded, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+from uuv_marl.envs.task import Bool, Reward, ScenarioLike, make_task
+from uuv_marl.percept import PerceptLayout
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.swarm import Swarm
+
+GROUP = "uuv"
+
+
+class SwarmEnv(EnvBase):
+    """Worlds with batch size (num_worlds,), float32 and bool, on the CPU unless ``device`` says otherwise.
+
+    Under ``uuv``: ``observation`` (vehicle, entry), ``mask`` (vehicle,), ``action`` (vehicle, 2), ``reward``
+    (vehicle, 1), and ``done``, ``terminated``, ``truncated`` (vehicle, 1). At the root: ``state`` (entry,) for
+    centralised critics, and ``done``, ``terminated``, ``truncated`` (1,) of the world, by which TorchRL resets:
+    collectors and ``rollout`` reset a world when its episode ends, and no world otherwise. A lost vehicle stays
+    ``terminated``, its ``mask`` False, its observation and reward 0, until its world ends; mask it out of the loss.
+
+    Args:
+        num_worlds: worlds stepped together.
+        seed: of the first reset, world w from ``seed + w``; as ``set_seed``.
+        device: where the tensors go; the water stays on the CPU.
+        scenario, num_vehicles, max_cycles, reward, decision_period, overrides: as for ``uuv_marl.parallel_env``.
+    """
+
+    def __init__(
+        self,
+        num_worlds: int = 1,
+        scenario: ScenarioLike = "single_obstacle",
+        num_vehicles: int | None = None,
+        max_cycles: int | None = None,
+        *,
+        seed: int | None = None,
+        device: torch.device | str = "cpu",
+        reward: Reward = "individual",
+        decision_period: float | None = None,
+        overrides: Mapping[str, object] | None = None,
+    ) -> None:
+        super().__init__(device=device, batch_size=torch.Size([num_worlds]))
+        self._task = make_task(
+            scenario, num_worlds, num_vehicles, max_cycles, reward=reward, decision_period=decision_period,
+            overrides=overrides,
+        )  # fmt: skip
+        self._next_seed: int | None = seed
+        self.group_map = {GROUP: [f"uuv_{i}" for i in range(self.swarm.num_vehicles)]}
+        self._make_specs()
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is simulated."""
+        return self._task.swarm.scenario
+
+    @property
+    def swarm(self) -> Swarm:
+        """The simulation below."""
+        return self._task.swarm
+
+    def _make_specs(self) -> None:
+        worlds, group = (self.swarm.num_worlds,), (self.swarm.num_worlds, self.swarm.num_vehicles)
+
+        def boxed(layout: PerceptLayout, shape: tuple[int, ...]) -> Bounded:
+            low, high = (torch.from_numpy(bound).expand(*shape, layout.size) for bound in (layout.low, layout.high))
+            return Bounded(low, high, device=self.device, dtype=torch.float32)
+
+        def flags(*shape: int) -> Categorical:
+            return Categorical(2, torch.Size(shape), self.device, torch.bool)
+
+        def endings(*shape: int) -> dict[str, Categorical]:
+            return {name: flags(*shape, 1) for name in ("done", "terminated", "truncated")}
+
+        def nested(entries: Mapping[str, Any], root: Mapping[str, Any] | None = None) -> Composite:
+            return Composite({GROUP: Composite(entries, shape=group), **(root or {})}, shape=worlds, device=self.device)
+
+        observation = {"observation": boxed(self.swarm.layout, group), "mask": flags(*group)}
+        self.observation_spec = nested(observation, {"state": boxed(self._task.state_layout, worlds)})
+        self.action_spec = nested({"action": Bounded(-1.0, 1.0, torch.Size((*group, 2)), self.device, torch.float32)})
+        self.reward_spec = nested({"reward": Unbounded(torch.Size((*group, 1)), self.device, torch.float32)})
+        self.done_spec = nested(endings(*group), endings(*worlds))
+
+    def _set_seed(self, seed: int | None) -> None:
+        self._next_seed = seed
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **_kwargs: Any) -> TensorDictBase:
+        """Start the worlds that ``_reset`` marks, default all; TorchRL takes only these from what is returned."""
+        marked = None if tensordict is None else tensordict.get("_reset", None)
+        every = range(self.swarm.num_worlds)
+        worlds = list(every) if marked is None else torch.where(marked.reshape(-1))[0].tolist()
+        seed, self._next_seed = self._next_seed, None
+        observation = self._task.reset(None if seed is None else [seed + world for world in worlds], worlds)
+        alive = self.swarm.state.alive
+        none = np.zeros(len(every), np.bool_)
+        return self._tensordict({"observation": observation, "mask": alive.copy()}, ~alive, alive & False, none, none)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """One decision of every vehicle of every world."""
+        outcome = self._task.step(tensordict.get((GROUP, "action")).detach().cpu().numpy())
+        alive = self.swarm.state.alive
+        group = {
+            "observation": outcome.observation,
+            "mask": alive.copy(),
+            "reward": outcome.reward.astype(np.float32)[:, :, None],
+        }
+        return self._tensordict(
+            group, outcome.terminated | ~alive, outcome.truncated, outcome.world_terminated, outcome.world_truncated
+        )
+
+    def _tensordict(
+        self,
+        group: dict[str, NDArray[Any]],
+        terminated: Bool,
+        truncated: Bool,
+        world_terminated: Bool,
+        world_truncated: Bool,
+    ) -> TensorDictBase:
+        """Arrays as a tensordict, with the endings of vehicles and worlds."""
+        group |= _endings(terminated, truncated)
+        root = {"state": self._task.state(), **_endings(world_terminated, world_truncated)}
+        batch = self.batch_size
+        made = TensorDict({key: torch.from_numpy(array) for key, array in root.items()}, batch)
+        inner = {key: torch.from_numpy(array) for key, array in group.items()}
+        made.set(GROUP, TensorDict(inner, (*batch, self.swarm.num_vehicles)))
+        return made.to(self.device)
+
+
+def _endings(terminated: Bool, truncated: Bool) -> dict[str, Bool]:
+    """TorchRL's three flags, with a trailing axis of one."""
+    flags = {"done": terminated | truncated, "terminated": terminated, "truncated": truncated}
+    return {name: flag[..., None] for name, flag in flags.items()}
