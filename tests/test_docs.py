@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import warnings
 from pathlib import Path
 
 import pytest
@@ -12,19 +13,35 @@ from uuv_marl.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+ELSEWHERE = {"benchmarl.md", "rllib.md"}
+"""Pages whose Python runs in tests/adapters, where their libraries are."""
 
 
-def blocks(language):
+def blocks(language, pages=PAGES):
     return [
         pytest.param(block, id=f"{page.name}-{k}")
-        for page in PAGES
+        for page in pages
         for k, block in enumerate(re.findall(rf"```{language}\n(.*?)```", page.read_text(), flags=re.S))
     ]
 
 
-@pytest.mark.parametrize("block", blocks("python"))
-def test_python_blocks_run(block, capsys):
-    exec(compile(block, "README.md", "exec"), {"__name__": "example"})
+@pytest.mark.parametrize("block", blocks("python", [page for page in PAGES if page.name not in ELSEWHERE]))
+def test_python_blocks_run(block, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="torchrl|tensordict")
+        exec(compile(block, "README.md", "exec"), {"__name__": "example"})
+
+
+def test_examples_are_short():
+    for param in blocks("python"):
+        assert len(param.values[0].splitlines()) < 30, param.id
+
+
+@pytest.mark.parametrize("page", sorted(ELSEWHERE))
+def test_pages_of_other_environments_are_run_there(page):
+    test = ROOT / "tests" / "adapters" / f"test_{page.removesuffix('.md')}.py"
+    assert f'"{page}"' in test.read_text()
 
 
 @pytest.mark.parametrize(

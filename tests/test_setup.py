@@ -3,6 +3,7 @@
 import importlib.util
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -42,7 +43,8 @@ def test_a_missing_ensurepip_is_explained(setup, monkeypatch, capsys):
 
 
 def test_a_missing_interpreter_is_explained(tmp_path):
-    for name in ("Makefile", "pyproject.toml", "constraints.txt", "tools/setup_venv.py"):
+    pins = [path.name for path in ROOT.glob("constraints*.txt")]
+    for name in ("Makefile", "pyproject.toml", "tools/setup_venv.py", *pins):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text((ROOT / name).read_text())
     done = subprocess.run(
@@ -50,3 +52,10 @@ def test_a_missing_interpreter_is_explained(tmp_path):
     )
     assert done.returncode != 0
     assert "There is no 'python3.nowhere' here" in done.stdout
+
+
+def test_every_environment_has_its_extras_and_pins(setup):
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for _, wanted, constraints in setup.ENVIRONMENTS.values():
+        assert set(wanted.strip("[]").split(",")) - {""} <= set(extras)
+        assert "torch==2.13.0" in (ROOT / constraints).read_text().splitlines()

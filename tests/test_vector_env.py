@@ -88,9 +88,7 @@ def test_observations_handed_out_stay_as_they_are():
 
 
 def test_gymnasium_wrappers_work():
-    env = wrappers.DictInfoToList(
-        wrappers.NormalizeReward(wrappers.RecordEpisodeStatistics(short(info_terms=True)))
-    )
+    env = wrappers.DictInfoToList(wrappers.NormalizeReward(wrappers.RecordEpisodeStatistics(short(info_terms=True))))
     env.reset(seed=0)
     plain = short()
     plain.reset(seed=0)
@@ -162,9 +160,9 @@ def test_bad_actions_and_order():
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"shape \(3, 5, 2\)"):
         env.step(np.zeros((3, 4, 2)))
+    bad = np.zeros((3, 5, 2))
+    bad[1, 2] = np.nan
     with pytest.raises(ValueError, match="vehicle 2 of world 1"):
-        bad = np.zeros((3, 5, 2))
-        bad[1, 2] = np.nan
         env.step(bad)
 
 
@@ -180,7 +178,7 @@ def test_registries():
 
 
 def test_importing_twice_registers_once():
-    code = "import warnings; warnings.simplefilter('error'); import uuv_marl, importlib; import uuv_marl.envs.vector_env"
+    code = "import warnings; warnings.simplefilter('error'); import uuv_marl; import uuv_marl.envs.vector_env"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

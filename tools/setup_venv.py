@@ -1,4 +1,4 @@
-"""Make .venv and install uuv_marl into it: setup_venv.py base|dev. Explains what is missing.
+"""Make a virtual environment and install uuv_marl into it: setup_venv.py NAME. Explains what is missing.
 
 Written for any Python 3, so that one that is too old hears why.
 """
@@ -9,8 +9,13 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-VENV = os.path.join(ROOT, ".venv")
-PYTHON = os.path.join(VENV, "bin", "python")
+# Name: folder, extras, constraints. BenchMARL and RLlib pin what the others have newer, so they live apart.
+ENVIRONMENTS = {
+    "base": (".venv", "", "constraints.txt"),
+    "dev": (".venv", "[dev]", "constraints.txt"),
+    "benchmarl": (".venv-benchmarl", "[benchmarl,test]", "constraints-benchmarl.txt"),
+    "rllib": (".venv-rllib", "[distributed,render,test]", "constraints-rllib.txt"),
+}
 
 
 def stop(message):
@@ -49,26 +54,29 @@ def check_python():
 def run(*command):
     """Run a command, or stop with what it was."""
     if subprocess.call(command, cwd=ROOT) != 0:
-        stop("This failed: %s\nRead the lines above; 'make clean' removes a half-made .venv." % " ".join(command))
+        stop("This failed: %s\nRead the lines above; 'make clean' removes half-made environments." % " ".join(command))
 
 
-def main(extra):
-    """Make the environment for ``base`` or ``dev``."""
+def main(name):
+    """Make the environment of this name."""
     check_python()
-    if not os.path.exists(PYTHON):
-        print("Making .venv with Python %s" % sys.version.split()[0])
-        run(sys.executable, "-m", "venv", VENV)
+    folder, extras, constraints = ENVIRONMENTS[name]
+    venv = os.path.join(ROOT, folder)
+    python = os.path.join(venv, "bin", "python")
+    if not os.path.exists(python):
+        print("Making %s with Python %s" % (folder, sys.version.split()[0]))
+        run(sys.executable, "-m", "venv", venv)
     made_with = (
-        subprocess.check_output([PYTHON, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]).decode().strip()
+        subprocess.check_output([python, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]).decode().strip()
     )
     if made_with != "%d.%d" % sys.version_info[:2]:
         stop(
-            "The .venv here is of Python %s, not of this %s; 'make clean' first." % (made_with, sys.version.split()[0])
+            "The %s here is of Python %s, not of this %s; 'make clean' first."
+            % (folder, made_with, sys.version.split()[0])
         )
-    target = "." if extra == "base" else ".[%s]" % extra
-    print("Installing uuv_marl%s; the first time takes a minute or two" % target[1:])
-    run(PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", "constraints.txt", "-e", target)
-    with open(os.path.join(VENV, extra + ".stamp"), "w"):
+    print("Installing uuv_marl%s into %s; the first time takes a few minutes" % (extras, folder))
+    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", constraints, "-e", "." + extras)
+    with open(os.path.join(venv, name + ".stamp"), "w"):
         pass
 
 

@@ -3,4 +3,7 @@
 from uuv_marl.envs.parallel_env import SwarmParallelEnv as raw_env
 from uuv_marl.envs.parallel_env import env, parallel_env
 
-__all__ = ["env", "parallel_env", "raw_env"]
+__all__ = ["HISTORY", "env", "parallel_env", "raw_env"]
+
+HISTORY = {"v0": "first version"}
+"""What changed in physics, observation, action or reward, by version of the environment."""

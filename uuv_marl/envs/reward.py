@@ -20,13 +20,20 @@ RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""
 
 
-def reward_terms(swarm: Swarm) -> Mapping[str, Float64]:
-    """The weighted terms of the latest step, shape (world, vehicle) each; zero for vehicles that were lost before.
+TERMS: Mapping[str, str] = {
+    "tracking": "- w x period x (distance to l(t) / s_l - 1), the bracket within 0 and 1",
+    "obstacle": "- w x period x (1 - distance to the nearest obstacle's surface / s_o), likewise",
+    "spacing": "- w x period x (1 - distance to the nearest vehicle / s_u), likewise",
+    "effort": "- w x period x squared length of the action",
+    "collision": "- w for every contact episode that begins",
+    "loss": "for a vehicle that is lost: minus collision's w, arrival's w and what the four rates can cost to the limit",
+    "arrival": "+ w for every vehicle when the swarm arrives",
+}
+"""What each term is; w is its weight in the scenario's ``reward``, the period that between decisions [s]."""
 
-    ``tracking``: beyond the tube s_l around l(t). ``obstacle``: surface nearer than s_o. ``spacing``: another vehicle
-    nearer than s_u. ``effort``: squared action. ``collision``: contact episodes that began. ``loss``: the vehicle was
-    lost. ``arrival``: the swarm arrived.
-    """
+
+def reward_terms(swarm: Swarm) -> Mapping[str, Float64]:
+    """The weighted ``TERMS`` of the latest step, shape (world, vehicle) each; zero for vehicles lost before."""
     scenario, facts, state = swarm.scenario, swarm.facts, swarm.state
     weight, limit, period = scenario.reward, scenario.constraints, scenario.timing.decision_period_s
     present = state.alive | facts.lost

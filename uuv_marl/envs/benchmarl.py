@@ -1,0 +1,100 @@
+"""``SwarmTask``: our scenarios as BenchMARL tasks, so that every BenchMARL algorithm runs on them."""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from benchmarl.environments import Task, TaskClass  # pyright: ignore[reportMissingImports]
+from torchrl.data import Composite
+from torchrl.envs import EnvBase
+
+from uuv_marl.envs.task import make_task, refuse_losses
+from uuv_marl.envs.torchrl import GROUP, SwarmEnv
+
+
+class SwarmTaskClass(TaskClass):
+    """Makes ``uuv_marl.envs.torchrl.SwarmEnv``; ``config`` holds its arguments but for the number of worlds and seed.
+
+    BenchMARL trains on the rows of all vehicles alike, so that scenarios in which one can be lost are refused.
+    """
+
+    def get_env_fun(
+        self,
+        num_envs: int,
+        continuous_actions: bool,  # noqa: ARG002 - BenchMARL's signature
+        seed: int | None,
+        device: Any,
+    ) -> Callable[[], EnvBase]:
+        """A function that makes ``num_envs`` worlds."""
+        refuse_losses(make_task(**self._arguments).swarm.scenario, "BenchMARL")
+        return lambda: SwarmEnv(num_envs, seed=seed, device=device, **self._arguments)
+
+    @property
+    def _arguments(self) -> dict[str, Any]:
+        return {"scenario": self.name.lower(), **self.config}
+
+    def supports_continuous_actions(self) -> bool:
+        """Forces are continuous."""
+        return True
+
+    def supports_discrete_actions(self) -> bool:
+        """Forces are continuous."""
+        return False
+
+    def max_steps(self, env: EnvBase) -> int:  # noqa: ARG002
+        """Decisions after which every episode is over."""
+        return make_task(**self._arguments).longest_episode
+
+    def has_render(self, env: EnvBase) -> bool:  # noqa: ARG002
+        """TorchRL's environment draws nothing; ``uuv_marl.parallel_env`` does."""
+        return False
+
+    def group_map(self, env: EnvBase) -> dict[str, list[str]]:
+        """One group, ``uuv``."""
+        return cast(dict[str, list[str]], env.group_map)
+
+    def observation_spec(self, env: EnvBase) -> Composite:
+        """``uuv``: ``observation``."""
+        group = env.full_observation_spec_unbatched[GROUP]
+        return Composite({GROUP: Composite({"observation": group["observation"].clone()}, shape=group.shape)})
+
+    def info_spec(self, env: EnvBase) -> Composite | None:  # noqa: ARG002
+        """Nothing is logged beyond rewards and endings."""
+        return None
+
+    def state_spec(self, env: EnvBase) -> Composite:
+        """``state``, for centralised critics."""
+        return Composite({"state": env.full_observation_spec_unbatched["state"].clone()})
+
+    def action_spec(self, env: EnvBase) -> Composite:
+        """``uuv``: ``action``."""
+        return env.full_action_spec_unbatched
+
+    def action_mask_spec(self, env: EnvBase) -> Composite | None:  # noqa: ARG002
+        """Every force is allowed."""
+        return None
+
+    @staticmethod
+    def env_name() -> str:
+        """Name of the environment in BenchMARL's reports."""
+        return "uuv_marl"
+
+
+class SwarmTask(Task):
+    """The shipped scenarios in which no vehicle is lost: ``SwarmTask.RANDOM_FIELD.get_task()``.
+
+    ``get_task(config={"num_vehicles": 10, "decision_period": 0.5})`` takes the arguments of ``parallel_env``.
+    """
+
+    TRACKING = None
+    SINGLE_OBSTACLE = None
+    MULTI_OBSTACLE = None
+    RANDOM_FIELD = None
+
+    @staticmethod
+    def associated_class() -> type[TaskClass]:
+        """Ours."""
+        return SwarmTaskClass
+
+    def get_from_yaml(self, path: str | None = None) -> TaskClass:
+        """The task with the arguments in a YAML file, by default none: BenchMARL has no file for us."""
+        return self.get_task({}) if path is None else super().get_from_yaml(path)
