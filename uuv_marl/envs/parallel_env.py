@@ -9,16 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
-from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, make_task
+from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, TaskBased, make_task
 from uuv_marl.envs.view import View
-from uuv_marl.scenario import Scenario
-from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
 Infos = dict[str, dict[str, Any]]
 
 
-class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
+class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
     """A swarm of UUVs that follows a trajectory around obstacles. See ``parallel_env`` for the arguments.
 
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
@@ -46,16 +44,6 @@ class SwarmParallelEnv(ParallelEnv[str, Float32, Float32 | None]):
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
         self.state_space = Box(task.state_layout.low, task.state_layout.high)
         self._was_reset = False
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation below, one world: truth that agents don't observe, for evaluation and custom rewards."""
-        return self._task.swarm
 
     @property
     def max_cycles(self) -> int | None:

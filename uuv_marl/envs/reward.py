@@ -26,7 +26,7 @@ TERMS: Mapping[str, str] = {
     "spacing": "- w x period x (1 - distance to the nearest vehicle / s_u), likewise",
     "effort": "- w x period x squared length of the action",
     "collision": "- w for every contact episode that begins",
-    "loss": "for a vehicle that is lost: minus collision's w, arrival's w and what the four rates can cost to the limit",
+    "loss": "lost vehicle: minus collision's w, arrival's w, and the most that the four rates cost until the limit",
     "arrival": "+ w for every vehicle when the swarm arrives",
 }
 """What each term is; w is its weight in the scenario's ``reward``, the period that between decisions [s]."""

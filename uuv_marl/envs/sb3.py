@@ -9,15 +9,13 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
-from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, make_task, refuse_losses
+from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, TaskBased, make_task, refuse_losses
 from uuv_marl.envs.view import View
-from uuv_marl.scenario import Scenario
-from uuv_marl.sim.swarm import Swarm
 
 Indices = None | int | Iterable[int]
 
 
-class SwarmVecEnv(VecEnv):
+class SwarmVecEnv(TaskBased, VecEnv):
     """``num_worlds`` x vehicles rows; row ``world * vehicles + i`` is vehicle i of a world.
 
     Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
@@ -59,16 +57,6 @@ class SwarmVecEnv(VecEnv):
         self._returns = np.zeros(self._shape)
         self._lengths = np.zeros(num_worlds, np.int64)
         self._starts = np.full(num_worlds, time.perf_counter())
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation below."""
-        return self._task.swarm
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """For the next reset: world w starts from ``seed + w``. Returns the seed of every row's world."""

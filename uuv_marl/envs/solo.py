@@ -9,14 +9,12 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.baselines import granted, make
-from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, make_task
+from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, TaskBased, make_task
 from uuv_marl.envs.view import View
-from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
-from uuv_marl.sim.swarm import Swarm
 
 
-class SoloEnv(gymnasium.Env[Float32, Float32]):
+class SoloEnv(TaskBased, gymnasium.Env[Float32, Float32]):
     """The learner is vehicle 0 and acts by ``step``; all others run the policy ``others``.
 
     Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the swarm
@@ -56,16 +54,6 @@ class SoloEnv(gymnasium.Env[Float32, Float32]):
         self.observation_space = Box(layout.low, layout.high)
         self.action_space = Box(-1.0, 1.0, (2,))
         self._running = False
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation below, one world."""
-        return self._task.swarm
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -149,6 +149,22 @@ class Task:
         return np.inf if self.max_cycles is None else self.max_cycles * self.swarm.scenario.timing.holds_per_decision
 
 
+class TaskBased:
+    """What every API's object shows of the task below it."""
+
+    _task: Task
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is simulated."""
+        return self._task.swarm.scenario
+
+    @property
+    def swarm(self) -> Swarm:
+        """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
+        return self._task.swarm
+
+
 def make_task(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,

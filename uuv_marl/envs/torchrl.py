@@ -10,15 +10,13 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from uuv_marl.envs.task import Bool, Reward, ScenarioLike, make_task
+from uuv_marl.envs.task import Bool, Reward, ScenarioLike, TaskBased, make_task
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.scenario import Scenario
-from uuv_marl.sim.swarm import Swarm
 
 GROUP = "uuv"
 
 
-class SwarmEnv(EnvBase):
+class SwarmEnv(TaskBased, EnvBase):
     """Worlds with batch size (num_worlds,), float32 and bool, on the CPU unless ``device`` says otherwise.
 
     Under ``uuv``: ``observation`` (vehicle, entry), ``mask`` (vehicle,), ``action`` (vehicle, 2), ``reward``
@@ -55,16 +53,6 @@ class SwarmEnv(EnvBase):
         self._next_seed: int | None = seed
         self.group_map = {GROUP: [f"uuv_{i}" for i in range(self.swarm.num_vehicles)]}
         self._make_specs()
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation below."""
-        return self._task.swarm
 
     def _make_specs(self) -> None:
         worlds, group = (self.swarm.num_worlds,), (self.swarm.num_worlds, self.swarm.num_vehicles)

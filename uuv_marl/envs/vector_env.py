@@ -9,15 +9,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, Reward, ScenarioLike, Task, make_task
+from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, Reward, ScenarioLike, Task, TaskBased, make_task
 from uuv_marl.envs.view import View
-from uuv_marl.scenario import Scenario
-from uuv_marl.sim.swarm import Swarm
 
 Infos = dict[str, Any]
 
 
-class SwarmVectorEnv(VectorEnv[Float32, Float32, NDArray[Any]]):
+class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
     """Worlds stepped together. See ``vector_env`` for the arguments.
 
     Observation of shape (num_envs, vehicle, entry), action of shape (num_envs, vehicle, 2), reward the mean over a
@@ -48,16 +46,6 @@ class SwarmVectorEnv(VectorEnv[Float32, Float32, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.state_space = Box(task.state_layout.low, task.state_layout.high)
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation below: truth that agents don't observe, for evaluation and custom rewards."""
-        return self._task.swarm
 
     def reset(
         self,
