@@ -34,6 +34,7 @@ class Case(NamedTuple):
     overrides: dict
     period: float = 0.5
     steps: int = 110
+    options: dict = {}  # noqa: RUF012 - read only
 
     @property
     def kwargs(self):
@@ -42,6 +43,7 @@ class Case(NamedTuple):
             "num_vehicles": VEHICLES,
             "decision_period": self.period,
             "overrides": {**(LOSES if self.scenario == "lossy" else {}), **self.overrides},
+            **self.options,
         }
 
     def actions(self):
@@ -62,17 +64,29 @@ class Run(NamedTuple):
     """(step, world, vehicle)"""
     over: np.ndarray
     """(step, world): the world was reset after this step."""
+    mask: np.ndarray
+    """(step + 1, world, vehicle): who makes the next decision."""
+    state: np.ndarray
+    """(step + 1, world, entry), likewise; no entries from an API that has none."""
 
     def equals(self, other):
         """Bit for bit, rewards as precise as the coarser of the two."""
         coarser = min(self.reward.dtype, other.reward.dtype)
         for name, mine, theirs in zip(self._fields, self, other, strict=True):
+            if name == "state" and 0 in (mine.size, theirs.size):
+                continue
             if name == "reward":
                 mine, theirs = mine.astype(coarser), theirs.astype(coarser)  # noqa: PLW2901
             assert mine.tobytes() == theirs.tobytes(), f"{name} differs first at {np.argwhere(mine != theirs)[:1]}"
 
 
-def empty(steps, size, reward=np.float64):
+def own_reward(swarm):
+    """A user's: minus the distance to l(t) in units of 10 m."""
+    away = swarm.state.eta[:, :, :2] - swarm.facts.reference[:, None, :2]
+    return -np.hypot(away[..., 0], away[..., 1]) / 10.0
+
+
+def empty(steps, size, reward=np.float64, state=0):
     shape = (steps, WORLDS, VEHICLES)
     return Run(
         np.zeros((steps + 1, *shape[1:], size), np.float32),
@@ -81,6 +95,8 @@ def empty(steps, size, reward=np.float64):
         np.zeros(shape, bool),
         np.zeros(shape, bool),
         np.zeros(shape[:2], bool),
+        np.zeros((steps + 1, *shape[1:]), bool),
+        np.zeros((steps + 1, WORLDS, state), np.float32),
     )
 
 
@@ -91,6 +107,9 @@ def cases():
         *(Case(f"{name}-arrives", name, ARRIVES) for name in scenarios),
         Case("sinks", "single_obstacle", SINKS, 1.0, 350),
         Case("own_period", "random_field", BRIEF, 0.1),
+        Case("team_reward", "lossy", TIMES_OUT, options={"reward": "team"}),
+        Case("own_reward", "random_field", ARRIVES, options={"reward": own_reward}),
+        Case("max_cycles", "single_obstacle", TIMES_OUT, options={"max_cycles": 9}),
     ]
 
 
@@ -100,7 +119,7 @@ def parallel(case):
     run = None
     for w in range(WORLDS):
         env = uuv_marl.parallel_env(**case.kwargs)
-        run = run or empty(len(actions), env.observation_space("uuv_0").shape[0])
+        run = run or empty(len(actions), env.observation_space("uuv_0").shape[0], state=env.state_space.shape[0])
         play_dictionaries(env, run, w, actions[:, w])
     return run
 
@@ -114,19 +133,23 @@ def play_dictionaries(env, run, w, actions):
             if agent in index:
                 out[index[agent]] = value
 
-    observations, _ = env.reset(seed=SEED + w)
-    write(run.observation[0, w], observations)
+    def begin(t, observations):
+        write(run.observation[t, w], observations)
+        run.mask[t, w] = [agent in env.agents for agent in env.possible_agents]
+        if run.state.size:
+            run.state[t, w] = env.state()
+
+    begin(0, env.reset(seed=SEED + w)[0])
     for t, action in enumerate(actions):
         observations, rewards, terminated, truncated, _ = env.step({a: action[index[a]] for a in env.agents})
         write(run.reward[t, w], rewards)
         write(run.terminated[t, w], terminated)
         write(run.truncated[t, w], truncated)
-        if env.agents:
-            write(run.observation[t + 1, w], observations)
-        else:
+        if not env.agents:
             run.over[t, w] = True
             write(run.last[t, w], observations)
-            write(run.observation[t + 1, w], env.reset()[0])
+            observations = env.reset()[0]
+        begin(t + 1, observations)
 
 
 def aec(case):
@@ -135,7 +158,8 @@ def aec(case):
     run = None
     for w in range(WORLDS):
         env = uuv_marl.env(**case.kwargs)
-        run = run or empty(len(actions), env.observation_space("uuv_0").shape[0])
+        size = env.unwrapped.state_space.shape[0]
+        run = run or empty(len(actions), env.observation_space("uuv_0").shape[0], state=size)
         t, seed = 0, SEED + w
         while t <= len(actions):
             env.reset(seed=seed)
@@ -155,9 +179,12 @@ def play_turns(env, run, w, actions, start):
         if t > start:
             at = (t - 1, w, i)
             run.reward[at], run.terminated[at], run.truncated[at] = reward, terminated, truncated
+        if not over:
+            run.state[t, w] = env.state()
         if terminated or truncated:
             env.step(None)
         else:
+            run.mask[t, w, i] = True
             env.step(actions[t, i] if t < len(actions) else np.zeros(2))
             rounds[agent] = t + 1
             if min(rounds[other] for other in env.agents) > len(actions):
@@ -169,15 +196,17 @@ def vector(case):
     """Gymnasium's vector API."""
     env = uuv_marl.vector_env(WORLDS, **case.kwargs)
     actions = case.actions()
-    run = empty(len(actions), env.single_observation_space.shape[1])
-    run.observation[0], _ = env.reset(seed=SEED)
+    run = empty(len(actions), env.single_observation_space.shape[1], state=env.state_space.shape[0])
+    run.observation[0], infos = env.reset(seed=SEED)
+    run.mask[0], run.state[0] = infos["agent_mask"], env.state()
     for t, action in enumerate(actions):
         observation, reward, terminated, truncated, infos = env.step(action)
-        run.observation[t + 1] = observation
+        run.observation[t + 1], run.mask[t + 1], run.state[t + 1] = observation, infos["agent_mask"], env.state()
         run.reward[t], run.terminated[t], run.truncated[t] = (
             infos[f"agent_{name}"] for name in ("reward", "terminated", "truncated")
         )
-        np.testing.assert_array_equal(reward, run.reward[t].mean(axis=1))
+        if "reward" not in case.options:
+            np.testing.assert_array_equal(reward, run.reward[t].mean(axis=1))
         run.over[t] = over = terminated | truncated
         assert not (terminated & truncated).any()
         np.testing.assert_array_equal(infos.get("_final_obs", np.zeros(WORLDS, bool)), over)
@@ -194,6 +223,7 @@ def sb3(case):
     actions = case.actions()
     run = empty(len(actions), env.observation_space.shape[0], np.float32)
     split = (WORLDS, VEHICLES, -1)
+    run.mask[:] = True
     env.seed(SEED)
     run.observation[0] = env.reset().reshape(split)
     for t, action in enumerate(actions):
@@ -219,18 +249,23 @@ def torchrl(case):
 
     env = SwarmEnv(WORLDS, **case.kwargs, seed=SEED)
     actions = case.actions()
-    run = empty(len(actions), env.observation_spec["uuv", "observation"].shape[-1], np.float32)
+    sizes = (env.observation_spec[key].shape[-1] for key in (("uuv", "observation"), "state"))
+    run = empty(len(actions), next(sizes), np.float32, next(sizes))
+
+    def begin(t, data):
+        run.observation[t], run.mask[t] = data["uuv", "observation"], data["uuv", "mask"]
+        run.state[t] = data["state"]
+
     data = env.reset()
-    run.observation[0] = data["uuv", "observation"]
+    begin(0, data)
     for t, action in enumerate(actions):
         data["uuv", "action"] = torch.from_numpy(action)
-        acting = data["uuv", "mask"].numpy()
         stepped, data = env.step_and_maybe_reset(data)
         after = stepped["next"]
         run.over[t] = over = after["done"].squeeze(-1).numpy()
-        run.observation[t + 1] = data["uuv", "observation"]
+        begin(t + 1, data)
         run.reward[t] = after["uuv", "reward"].squeeze(-1)
-        run.terminated[t] = after["uuv", "terminated"].squeeze(-1).numpy() & acting
+        run.terminated[t] = after["uuv", "terminated"].squeeze(-1).numpy() & run.mask[t]
         run.truncated[t] = after["uuv", "truncated"].squeeze(-1)
         run.last[t, over] = after["uuv", "observation"][over]
         # A world's own flags say what ends it; a lost vehicle's do not.

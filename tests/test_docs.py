@@ -61,7 +61,8 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     monkeypatch.setattr("uuv_marl.benchmark.tuning.tune", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, line.split()[1:])
-    assert done.exit_code in (0, 130), done.output
+    # Ray has an environment of its own; without it a command says so once its options are understood.
+    assert done.exit_code in (0, 130) or "needs ray" in done.output, done.output
 
 
 @pytest.mark.parametrize("block", blocks("toml"))

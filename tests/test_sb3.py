@@ -117,9 +117,25 @@ def test_attributes_of_rows():
         env.env_method("reset")
 
 
+def test_options_reach_the_rows():
+    env = swarm(reward=lambda s: np.full(s.state.alive.shape, 2.5), max_cycles=3)
+    env.reset()
+    actions = np.zeros((8, 2), np.float32)
+    outcomes = [env.step(actions) for _ in range(3)]
+    assert all((reward == 2.5).all() for _, reward, _, _ in outcomes)
+    assert [done.all() for _, _, done, _ in outcomes] == [False, False, True]
+    assert all(0.0 <= info["episode"]["t"] < 60.0 for info in outcomes[-1][3])
+    assert outcomes[-1][3][0]["episode"]["r"] == 7.5
+    with pytest.raises(ValueError, match=r"must have shape \(8, 2\), a row per vehicle, got \(2, 8\)"):
+        env.step(actions.T)
+
+
 def test_a_picture_tiles_the_worlds():
     pytest.importorskip("pygame")
     env = swarm(render_mode="rgb_array")
+    assert env.metadata["render_fps"] == 2
+    with pytest.raises(RuntimeError, match="came before reset"):
+        env.render()
     env.reset()
     assert env.render().shape == (1600, 800, 3)
     env.close()

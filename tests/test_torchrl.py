@@ -11,7 +11,7 @@ from tensordict.nn.distributions import NormalParamExtractor
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # TorchRL 0.14 deprecates parts of itself as it is imported.
     from torchrl.collectors import Collector
-    from torchrl.envs import Compose, InitTracker, RewardSum, TransformedEnv
+    from torchrl.envs import Compose, FrameSkipTransform, InitTracker, RewardSum, TransformedEnv
     from torchrl.envs.utils import check_env_specs
     from torchrl.modules import MultiAgentMLP, ProbabilisticActor, TanhNormal
     from torchrl.objectives import ClipPPOLoss, ValueEstimators
@@ -78,7 +78,43 @@ def test_seeds():
     b.set_seed(4)
     torch.testing.assert_close(b.reset()["uuv", "observation"], first, rtol=0, atol=0)
     assert not torch.equal(a.reset()["uuv", "observation"], first)
+    torch.testing.assert_close(b.reset(seed=4)["uuv", "observation"], first, rtol=0, atol=0)
     torch.testing.assert_close(swarm(1, seed=5).reset()["uuv", "observation"][0], first[1], rtol=0, atol=0)
+
+
+def test_a_seed_waits_for_each_worlds_next_reset():
+    env = swarm()
+    data = env.reset()
+    env.set_seed(4)
+    data["_reset"] = torch.tensor([[True], [False], [False]])
+    seeded = swarm(seed=4).reset()["uuv", "observation"]
+    part = env.reset(data.clone())["uuv", "observation"]
+    torch.testing.assert_close(part[0], seeded[0], rtol=0, atol=0)
+    torch.testing.assert_close(part[1:], data["uuv", "observation"][1:], rtol=0, atol=0)
+    whole = env.reset()["uuv", "observation"]
+    torch.testing.assert_close(whole[1:], seeded[1:], rtol=0, atol=0)
+    assert not torch.equal(whole[0], seeded[0])
+
+
+def test_the_arrival_is_paid_once_however_often_an_ended_world_is_stepped():
+    quick = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
+    returns = []
+    for skip in (1, 4):
+        env = TransformedEnv(swarm(1, "single_obstacle", quick, seed=0), FrameSkipTransform(skip))
+        idle = TensorDictModule(lambda o: torch.zeros(*o.shape[:-1], 2), [("uuv", "observation")], [("uuv", "action")])
+        data = env.rollout(40, idle)
+        assert data["next", "terminated"][0, -1]
+        assert data["next", "uuv", "terminated"][0, -1].all()
+        returns.append(data["next", "uuv", "reward"].sum())
+    assert returns[0] > 50.0
+    torch.testing.assert_close(returns[0], returns[1])
+
+
+def test_resets_hand_out_flags_of_their_own():
+    data = swarm().reset()
+    data["terminated"].fill_(True)
+    assert not data["truncated"].any()
+    assert not data["uuv", "truncated"].any()
 
 
 @pytest.mark.parametrize("scenario", ["random_field", "lossy"])

@@ -68,8 +68,41 @@ def test_seeds_per_world_and_masks():
             env.reset(options={"reset_mask": mask})
     with pytest.raises(ValueError, match="one seed for each of 3 worlds, got 2"):
         env.reset(seed=[1, 2])
-    with pytest.raises(ValueError, match="seed must not be negative"):
-        env.reset(seed=[1, -2, 3])
+    for bad in (-5, -1, [1, -2, 3]):
+        with pytest.raises(ValueError, match="seed must not be negative"):
+            env.reset(seed=bad)
+    with pytest.raises(TypeError):
+        env.reset(seed=[1.5, 2, 3])
+    for large in (2**63 - 1, 2**64):
+        assert env.reset(seed=large)[0].tobytes() == env.reset(seed=large)[0].tobytes()
+    assert env.reset(seed=np.int64(4))[0].tobytes() == env.reset(seed=np.array([4, 5, 6]))[0].tobytes()
+    env.reset(seed=9)
+    assert env.np_random_seed == 9
+
+
+def test_without_autoreset_an_ended_world_waits_unpaid():
+    env, resetting = short(autoreset_mode="Disabled", max_cycles=9), short(max_cycles=9)
+    assert env.metadata["autoreset_mode"] is AutoresetMode.DISABLED
+    shaped = wrappers.FlattenObservation(env)
+    shaped.reset(seed=0)
+    resetting.reset(seed=0)
+    for action in random_actions(env, 9):
+        shaped.step(action.reshape(shaped.action_space.shape))
+        *_, infos = resetting.step(action)
+    observation, reward, _, truncated, infos_after = env.step(random_actions(env, 1)[0])
+    assert truncated.all()
+    assert not reward.any()
+    assert not infos_after["agent_mask"].any()
+    for world in range(3):
+        np.testing.assert_array_equal(observation[world], infos["final_obs"][world])
+    mask = np.array([False, True, False])
+    again, _ = env.reset(options={"reset_mask": mask})
+    np.testing.assert_array_equal(again[1], resetting.swarm.percept.to_observation()[1])
+    np.testing.assert_array_equal(again[0], observation[0])
+    *_, truncated, _ = env.step(random_actions(env, 1)[0])
+    np.testing.assert_array_equal(truncated, ~mask)
+    with pytest.raises(ValueError, match="must be SAME_STEP or DISABLED"):
+        short(autoreset_mode=AutoresetMode.NEXT_STEP)
 
 
 def test_observations_handed_out_stay_as_they_are():
@@ -79,8 +112,16 @@ def test_observations_handed_out_stay_as_they_are():
     actions = random_actions(env)
     second, reward, *_, infos = env.step(actions[0])
     kept_second, kept_reward, kept_mask = second.copy(), reward.copy(), infos["agent_mask"].copy()
+    endings = []
     for action in actions[1:]:
-        env.step(action)
+        *_, later = env.step(action)
+        if "final_obs" in later:
+            endings.append((later, pickle.dumps(later)))
+    assert all(pickle.dumps(later) == as_it_was for later, as_it_was in endings)
+    mask = np.array([True, False, False])
+    _, begun = env.reset(options={"reset_mask": mask})
+    mask[:] = False
+    assert begun["_agent_mask"].tolist() == [True, False, False]
     np.testing.assert_array_equal(first, kept)
     np.testing.assert_array_equal(second, kept_second)
     np.testing.assert_array_equal(reward, kept_reward)
@@ -99,7 +140,7 @@ def test_gymnasium_wrappers_work():
         for w in np.flatnonzero(terminated | truncated):
             assert infos[w]["episode"]["r"] == pytest.approx(returns[w])
             assert infos[w]["final_obs"].shape == (5, 98)
-            assert infos[w]["final_info"]["time_s"] > 5.0
+            assert infos[w]["final_info"]["time_s"] == pytest.approx(0.5 * infos[w]["episode"]["l"])
             returns[w], seen = 0.0, seen + 1
         assert infos[0]["agent_reward"].shape == (5,)
         assert infos[0]["reward_terms"]["effort"].shape == (5,)
@@ -117,8 +158,11 @@ def test_final_info_tells_how_a_world_ended():
     assert terminated.all()
     assert not truncated.any()
     assert infos["final_info"]["arrived"].all()
-    assert infos["final_info"]["state"].shape == (2, *env.state_space.shape)
-    assert (infos["final_info"]["state"] != env.state()).any()
+    alone = uuv_marl.parallel_env("single_obstacle", num_vehicles=4, decision_period=0.5, overrides=quick)
+    alone.reset(seed=1)
+    while alone.agents:
+        alone.step({agent: np.zeros(2) for agent in alone.agents})
+    np.testing.assert_array_equal(infos["final_info"]["state"][1], alone.state())
 
 
 def test_the_held_force_keeps_its_direction_in_the_world():
@@ -149,8 +193,14 @@ def test_pictures_of_every_world():
     env.close()
     with pytest.raises(ValueError, match=r"render_mode must be one of \['rgb_array'\] or None, got 'human'"):
         short(render_mode="human")
+    unseen = short(render_mode="rgb_array")
+    for early in (unseen.render, unseen.state, SoloEnv(render_mode="rgb_array").render):
+        with pytest.raises(RuntimeError, match="came before reset"):
+            early()
+    silent = short()
+    silent.reset()
     with pytest.raises(RuntimeError, match="needs a render_mode"):
-        short().render()
+        silent.render()
 
 
 def test_bad_actions_and_order():
@@ -233,6 +283,14 @@ def test_solo_repeats_itself_with_policies_that_draw():
             record.append(env.reset()[0])
         runs.append(b"".join(np.asarray(item).tobytes() for item in record))
     assert runs[0] == runs[1]
+
+
+def test_solo_takes_the_options_of_the_parallel_environment():
+    options = {"decision_period": 0.5, "overrides": {"timing.control_hold_s": 0.5}, "max_cycles": np.int64(3)}
+    env = solo("idle", reward=lambda swarm: np.full(swarm.state.alive.shape, 2.5), **options)
+    env.reset(seed=0)
+    steps = [env.step(np.zeros(2, np.float32))[1:4] for _ in range(3)]
+    assert steps == [(2.5, False, False), (2.5, False, False), (2.5, False, True)]
 
 
 def test_solo_says_what_is_wrong():

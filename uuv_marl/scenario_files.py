@@ -4,6 +4,7 @@ import difflib
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any, cast
 
@@ -70,7 +71,7 @@ def load_scenario(
     for field, value in (overrides or {}).items():
         _assign(data, field, value)
     if num_vehicles is not None:
-        _assign(data, "swarm.num_vehicles", num_vehicles)
+        _assign(data, "swarm.num_vehicles", int(num_vehicles) if isinstance(num_vehicles, Integral) else num_vehicles)
     try:
         return Scenario.model_validate(_frozen(data))
     except ValidationError as error:

@@ -43,7 +43,6 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
         self.state_space = Box(task.state_layout.low, task.state_layout.high)
-        self._was_reset = False
 
     @property
     def max_cycles(self) -> int | None:
@@ -69,7 +68,6 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
     ) -> tuple[dict[str, Float32], Infos]:
         """Start an episode. Without a seed the environment's own random stream goes on. ``options`` are ignored."""
         observation = self._task.reset(seed)[0]
-        self._was_reset = True
         self.agents = list(self.possible_agents)
         self._view.update(self.swarm)
         return {agent: observation[i] for i, agent in enumerate(self.agents)}, {agent: {} for agent in self.agents}
@@ -84,8 +82,8 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
             RuntimeError: before ``reset``, or after the episode's end.
         """
         if not self.agents:
-            when = "the episode is over" if self._was_reset else "step came before reset"
-            raise RuntimeError(f"{when}; call reset() to start an episode")
+            self._task.need_reset("step")
+            raise RuntimeError("the episode is over; call reset() to start an episode")
         outcome = self._task.step(self._action_array(actions))
         acted = self.agents
         index = {agent: self._index[agent] for agent in acted}
@@ -126,17 +124,12 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
 
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""
-        self._need_reset("state()")
         return self._task.state()[0]
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
-        self._need_reset("render()")
+        self._task.need_reset("render()")
         return self._view.draw(self.swarm)
-
-    def _need_reset(self, what: str) -> None:
-        if not self._was_reset:
-            raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -20,8 +20,8 @@ class SwarmVecEnv(TaskBased, VecEnv):
 
     Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
     reset in the same step, all its rows at once: ``infos[row]`` then holds ``terminal_observation``,
-    ``TimeLimit.truncated``, ``is_success`` (the swarm arrived) and ``episode`` (return ``r``, length ``l``, seconds
-    ``t``). Scenarios in which a vehicle can be lost are refused: SB3 has no row that ends and waits for the others.
+    ``TimeLimit.truncated``, ``is_success`` (the swarm arrived) and ``episode`` (return ``r``, length ``l``, its own
+    seconds ``t``). Scenarios in which a vehicle can be lost are refused: SB3 has no row that ends and waits.
 
     Args:
         num_worlds: worlds stepped together.
@@ -53,6 +53,7 @@ class SwarmVecEnv(TaskBased, VecEnv):
         super().__init__(
             num_worlds * self.swarm.num_vehicles, Box(layout.low, layout.high), Box(-1.0, 1.0, (2,), np.float32)
         )
+        self.metadata: dict[str, Any] = {**self.metadata, "render_fps": self._view.fps}
         self._seed: int | None = None
         self._returns = np.zeros(self._shape)
         self._lengths = np.zeros(num_worlds, np.int64)
@@ -74,7 +75,10 @@ class SwarmVecEnv(TaskBased, VecEnv):
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions, shape (row, 2), for ``step_wait``."""
-        self._actions = np.asarray(actions, np.float32).reshape(*self._shape, 2)
+        rows = np.asarray(actions, np.float32)
+        if rows.shape != (self.num_envs, 2):
+            raise ValueError(f"actions must have shape {(self.num_envs, 2)}, a row per vehicle, got {rows.shape}")
+        self._actions = rows.reshape(*self._shape, 2)
 
     def step_wait(self) -> tuple[Float32, Float32, NDArray[np.bool_], list[dict[str, Any]]]:
         """Observations, rewards, dones and infos of every row."""
@@ -112,6 +116,7 @@ class SwarmVecEnv(TaskBased, VecEnv):
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of every world."""
+        self._task.need_reset("render()")
         return [self._view.draw(self.swarm, world) for world in range(self._shape[0])]
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.baselines import granted, make
-from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, TaskBased, make_task
+from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, TaskBased, make_task, with_period
 from uuv_marl.envs.view import View
 from uuv_marl.scenario_files import load_scenario
 
@@ -43,8 +43,9 @@ class SoloEnv(TaskBased, gymnasium.Env[Float32, Float32]):
         decision_period: float | None = None,
         overrides: Mapping[str, object] | None = None,
     ) -> None:
-        suited = granted(others, load_scenario(scenario, num_vehicles=num_vehicles, overrides=overrides))
-        self._task = make_task(suited, max_cycles=max_cycles, reward=reward, decision_period=decision_period)
+        changes = with_period(overrides, decision_period)
+        suited = granted(others, load_scenario(scenario, num_vehicles=num_vehicles, overrides=changes))
+        self._task = make_task(suited, max_cycles=max_cycles, reward=reward)
         self._others = make(others, self.scenario)
         self._view = View(render_mode, self.metadata["render_modes"], self.scenario)
         self._info_terms = info_terms
@@ -94,6 +95,7 @@ class SoloEnv(TaskBased, gymnasium.Env[Float32, Float32]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
+        self._task.need_reset("render()")
         return self._view.draw(self.swarm)
 
     def close(self) -> None:

@@ -1,6 +1,7 @@
 """What every environment API shares: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
 
 import math
+import operator
 import os
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
@@ -67,6 +68,8 @@ class Task:
             raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
         self.swarm = Swarm(scenario, num_worlds)
         self.state_layout = state_layout(scenario)
+        self._ready = np.zeros(num_worlds, np.bool_)
+        self._over = np.zeros(num_worlds, np.bool_)
         self.max_cycles = max_cycles
         self._reward: Reward = reward
 
@@ -77,7 +80,7 @@ class Task:
 
     @max_cycles.setter
     def max_cycles(self, value: int | None) -> None:
-        if value is not None and (not isinstance(value, int) or value < 1):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1):
             raise ValueError(f"max_cycles must be a whole number from 1, or None for the time limit, got {value!r}")
         self._max_cycles = value
 
@@ -90,26 +93,50 @@ class Task:
         cycles = math.ceil(seconds / scenario.timing.decision_period_s)
         return min(cycles, self.max_cycles or cycles)
 
-    def reset(self, seed: int | Sequence[int] | None = None, worlds: Sequence[int] | None = None) -> Float32:
-        """Start worlds anew, as ``Swarm.reset``; the observations (world, vehicle, entry)."""
-        return self.swarm.reset(seed, worlds).to_observation()
+    def reset(self, seed: int | Sequence[int | None] | None = None, worlds: Sequence[int] | None = None) -> Float32:
+        """Start worlds anew; the observations of all, shape (world, vehicle, entry).
+
+        Args:
+            seed: world w starts from ``seed + w``; or a seed, or None, for each of ``worlds``; without a seed a world's
+                own random stream goes on.
+            worlds: which ones, default all.
+        """
+        chosen = list(range(self.swarm.num_worlds)) if worlds is None else list(worlds)
+        seeds = _seeds(seed, chosen)
+        seeded = {world: value for world, value in zip(chosen, seeds, strict=True) if value is not None}
+        if seeded:
+            self.swarm.reset(list(seeded.values()), list(seeded))
+        if len(seeded) < len(chosen):
+            self.swarm.reset(None, [world for world in chosen if world not in seeded])
+        self._ready[chosen], self._over[chosen] = True, False
+        return self.swarm.percept.to_observation()
+
+    def need_reset(self, what: str) -> None:
+        """Raise RuntimeError where a world was never reset."""
+        if not self._ready.all():
+            raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
 
     def step(self, action: ArrayLike) -> Outcome:
-        """One decision of every world; ``action`` has shape (world, vehicle, 2)."""
+        """One decision of every world; ``action`` has shape (world, vehicle, 2).
+
+        A world whose episode is over stays as it is, its flags too, and is paid nothing, until it is reset.
+        """
+        self.need_reset("step")
         swarm = self.swarm
         before = swarm.state.alive.copy()
-        observation = swarm.step(np.asarray(action, np.float32)).to_observation()
+        observation = swarm.step(np.asarray(action, np.float32), ~self._over).to_observation()
         alive, arrived = swarm.state.alive, swarm.arrived
-        reward, world_reward, terms = self._rewards(before)
+        reward, world_reward, terms = self._rewards(before & ~self._over[:, None])
         late = swarm.timed_out | (swarm.state.tick >= self._last_tick)
         world_terminated = arrived | ~alive.any(axis=1)
         world_truncated = late & ~world_terminated
+        self._over = world_terminated | world_truncated
         return Outcome(
             observation=observation,
             reward=reward,
             terminated=before & (arrived[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
-            acting=alive & ~(world_terminated | world_truncated)[:, None],
+            acting=alive & ~self._over[:, None],
             world_reward=world_reward,
             world_terminated=world_terminated,
             world_truncated=world_truncated,
@@ -118,6 +145,7 @@ class Task:
 
     def state(self) -> Float32:
         """The global state of every world, shape (world, entry), see ``uuv_marl.envs.state.state_table``."""
+        self.need_reset("state()")
         return global_state(self.swarm, self.state_layout)
 
     def _rewards(self, before: Bool) -> tuple[Float64, Float64, Mapping[str, Float64]]:
@@ -126,6 +154,8 @@ class Task:
             own = np.where(before, self._own_reward(self._reward, before), 0.0)
             return own, own.mean(axis=1), {}
         terms = reward_terms(self.swarm)
+        if self._over.any():
+            terms = {name: np.where(before, term, 0.0) for name, term in terms.items()}
         reward = sum(terms.values(), np.zeros(before.shape))
         mean = reward.mean(axis=1)
         if self._reward == "team":
@@ -165,6 +195,21 @@ class TaskBased:
         return self._task.swarm
 
 
+def _seeds(seed: int | Sequence[int | None] | None, worlds: Sequence[int]) -> list[int | None]:
+    """A seed, or None, for each of these worlds."""
+    if seed is None:
+        return [None] * len(worlds)
+    if isinstance(seed, int | np.integer):
+        seeds: list[int | None] = [int(seed) + world for world in worlds]
+    else:
+        seeds = [None if value is None else operator.index(value) for value in seed]
+    if len(seeds) != len(worlds):
+        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
+    if any(value is not None and value < 0 for value in seeds):
+        raise ValueError(f"seed must not be negative, got {seed}")
+    return seeds
+
+
 def make_task(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
@@ -176,10 +221,14 @@ def make_task(
     overrides: Mapping[str, object] | None = None,
 ) -> Task:
     """A task from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
-    changes = dict(overrides or {})
-    if decision_period is not None:
-        changes["timing.decision_period_s"] = decision_period
+    changes = with_period(overrides, decision_period)
     return Task(load_scenario(scenario, num_vehicles=num_vehicles, overrides=changes), num_worlds, reward, max_cycles)
+
+
+def with_period(overrides: Mapping[str, object] | None, decision_period: float | None) -> Mapping[str, object]:
+    """The overrides with the decision period [s] among them, where one is given."""
+    period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
+    return {**(overrides or {}), **period}
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

@@ -50,7 +50,8 @@ class SwarmEnv(TaskBased, EnvBase):
             scenario, num_worlds, num_vehicles, max_cycles, reward=reward, decision_period=decision_period,
             overrides=overrides,
         )  # fmt: skip
-        self._next_seed: int | None = seed
+        self._pending: list[int | None] = [None] * num_worlds
+        self._set_seed(seed)
         self.group_map = {GROUP: [f"uuv_{i}" for i in range(self.swarm.num_vehicles)]}
         self._make_specs()
 
@@ -77,18 +78,25 @@ class SwarmEnv(TaskBased, EnvBase):
         self.done_spec = nested(endings(*group), endings(*worlds))
 
     def _set_seed(self, seed: int | None) -> None:
-        self._next_seed = seed
+        """Each world starts from its seed when it is reset next."""
+        self._pending = [None if seed is None else seed + world for world in range(self.swarm.num_worlds)]
 
-    def _reset(self, tensordict: TensorDictBase | None = None, **_kwargs: Any) -> TensorDictBase:
+    def _reset(
+        self, tensordict: TensorDictBase | None = None, seed: int | None = None, **_kwargs: Any
+    ) -> TensorDictBase:
         """Start the worlds that ``_reset`` marks, default all; TorchRL takes only these from what is returned."""
+        if seed is not None:
+            self._set_seed(seed)
         marked = None if tensordict is None else tensordict.get("_reset", None)
         every = range(self.swarm.num_worlds)
         worlds = list(every) if marked is None else torch.where(marked.reshape(-1))[0].tolist()
-        seed, self._next_seed = self._next_seed, None
-        observation = self._task.reset(None if seed is None else [seed + world for world in worlds], worlds)
+        observation = self._task.reset([self._pending[world] for world in worlds], worlds)
+        for world in worlds:
+            self._pending[world] = None
         alive = self.swarm.state.alive
         none = np.zeros(len(every), np.bool_)
-        return self._tensordict({"observation": observation, "mask": alive.copy()}, ~alive, alive & False, none, none)
+        group = {"observation": observation, "mask": alive.copy()}
+        return self._tensordict(group, ~alive, np.zeros_like(alive), none, none.copy())
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         """One decision of every vehicle of every world."""

@@ -21,6 +21,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
     Observation of shape (num_envs, vehicle, entry), action of shape (num_envs, vehicle, 2), reward the mean over a
     world's vehicles. A world terminates when its swarm arrived or is lost as a whole, is truncated by the time limit,
     and is reset in the same step (``AutoresetMode.SAME_STEP``): its last observation is ``infos["final_obs"][world]``.
+    With ``AutoresetMode.DISABLED`` it stays as it is until you reset it.
 
     ``infos``, arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated`` of
     this step, and ``agent_mask``, the vehicles that act in the next one. Rows of vehicles lost before are zero.
@@ -33,12 +34,21 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         "render_fps": 10,
     }
 
-    def __init__(self, task: Task, render_mode: str | None = None, info_terms: bool = False) -> None:
+    def __init__(
+        self,
+        task: Task,
+        render_mode: str | None = None,
+        info_terms: bool = False,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+    ) -> None:
+        self._resets = AutoresetMode(autoreset_mode)
+        if self._resets is AutoresetMode.NEXT_STEP:
+            raise ValueError("autoreset_mode must be SAME_STEP or DISABLED, got NEXT_STEP: it would waste a step")
         self._task = task
         self._view = View(render_mode, self.metadata["render_modes"], self.scenario)
         self._info_terms = info_terms
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": self._view.fps}
+        self.metadata = {**self.metadata, "render_fps": self._view.fps, "autoreset_mode": self._resets}
         self.num_envs = task.swarm.num_worlds
         n, layout = task.swarm.num_vehicles, task.swarm.layout
         self.single_observation_space = Box(np.tile(layout.low, (n, 1)), np.tile(layout.high, (n, 1)))
@@ -60,12 +70,15 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
                 random stream goes on.
             options: ``{"reset_mask": bool array of shape (num_envs,)}`` resets these worlds only.
         """
-        seeds, mask = self._seeds(seed), self._mask(options)
-        for chosen, seeded in ((mask & (seeds >= 0), True), (mask & (seeds < 0), False)):
-            worlds = np.flatnonzero(chosen).tolist()
-            if worlds:
-                self._task.reset(seeds[chosen].tolist() if seeded else None, worlds)
-        observation = self.swarm.percept.to_observation()
+        mask = self._mask(options)
+        worlds = np.flatnonzero(mask).tolist()
+        if seed is None or isinstance(seed, int | np.integer):
+            observation = self._task.reset(seed, worlds)
+            super().reset(seed=None if seed is None else int(seed))
+        elif len(seed) != self.num_envs:
+            raise ValueError(f"seed must hold one seed for each of {self.num_envs} worlds, got {len(seed)}")
+        else:
+            observation = self._task.reset([seed[world] for world in worlds], worlds)
         return observation, _masked({"agent_mask": self.swarm.state.alive.copy()}, mask)
 
     def step(self, actions: ArrayLike) -> tuple[Float32, Float64, Bool, Bool, Infos]:
@@ -73,7 +86,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         outcome = self._task.step(actions)
         infos = self._infos(outcome)
         observation = outcome.observation
-        if outcome.over.any():
+        if outcome.over.any() and self._resets is AutoresetMode.SAME_STEP:
             infos |= self._final_infos(outcome)
             observation = self._task.reset(worlds=np.flatnonzero(outcome.over).tolist())
             infos["agent_mask"] = self.swarm.state.alive & (outcome.acting | outcome.over[:, None])
@@ -103,16 +116,6 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         }
         return _masked({"final_obs": final, "final_info": _masked(facts, over)}, over)
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> NDArray[np.int64]:
-        """A seed per world, -1 for none."""
-        if seed is None or isinstance(seed, int | np.integer):
-            return np.full(self.num_envs, -1) if seed is None else int(seed) + np.arange(self.num_envs)
-        if len(seed) != self.num_envs:
-            raise ValueError(f"seed must hold one seed for each of {self.num_envs} worlds, got {len(seed)}")
-        if any(value is not None and value < 0 for value in seed):
-            raise ValueError(f"seed must not be negative, got {list(seed)}")
-        return np.array([-1 if value is None else value for value in seed])
-
     def _mask(self, options: Mapping[str, Any] | None) -> Bool:
         mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, np.bool_)))
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
@@ -128,6 +131,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
 
     def render(self) -> tuple[Any, ...]:
         """A picture (height, width, 3) of every world."""
+        self._task.need_reset("render()")
         return tuple(self._view.draw(self.swarm, world) for world in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
@@ -137,7 +141,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
 
 def _masked(infos: Infos, mask: Bool) -> Infos:
     """Gymnasium's form: every key with a mask of the worlds that have it."""
-    return infos | {f"_{key}": mask for key in infos}
+    return infos | {f"_{key}": mask.copy() for key in infos}
 
 
 def vector_env(
@@ -151,11 +155,13 @@ def vector_env(
     info_terms: bool = False,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
 ) -> SwarmVectorEnv:
     """A Gymnasium vector environment of ``num_envs`` worlds; the other arguments are those of ``parallel_env``.
 
     World w of ``reset(seed=s)`` is ``parallel_env().reset(seed=s + w)``, bit for bit, whatever the number of worlds and
     threads. ``reward`` shapes ``infos["agent_reward"]``; the row's own reward is the mean over all vehicles.
+    ``autoreset_mode`` is ``SAME_STEP``, or ``DISABLED`` for those who reset by ``options={"reset_mask": ...}``.
     """
     task = make_task(
         scenario,
@@ -166,4 +172,4 @@ def vector_env(
         decision_period=decision_period,
         overrides=overrides,
     )
-    return SwarmVectorEnv(task, render_mode, info_terms)
+    return SwarmVectorEnv(task, render_mode, info_terms, autoreset_mode)

@@ -1,5 +1,6 @@
 """Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
 
+import operator
 import os
 from collections.abc import Sequence
 from typing import cast
@@ -51,10 +52,10 @@ class Swarm:
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
+        self.num_worlds = operator.index(num_worlds)
         if num_worlds < 1:
             raise ValueError(f"num_worlds must be at least 1, got {num_worlds}")
         self.scenario = scenario
-        self.num_worlds = num_worlds
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
         self._plant = plant(scenario)
@@ -204,8 +205,8 @@ class Swarm:
         expected = (self.num_worlds, self.num_vehicles, 2)
         if action.shape != expected or action.dtype != np.float32:
             raise ValueError(f"action must be float32 of shape {expected}, got {action.dtype} of shape {action.shape}")
-        if not np.isfinite(action).all():
-            w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action))[0])
+        if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
+            w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
         running = np.ones(self.num_worlds, np.bool_) if active is None else active
         if not self._ready[running].all():
