@@ -1,10 +1,10 @@
 """The command line: ``uuv-marl --help``."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -23,6 +23,9 @@ from rich.table import Table
 
 from uuv_marl import __version__
 
+if TYPE_CHECKING:
+    from uuv_marl.benchmark.runner import Evaluate
+
 app = typer.Typer(
     help="Swarms of unmanned underwater vehicles: scenarios, controllers and their benchmark.",
     no_args_is_help=True,
@@ -30,6 +33,8 @@ app = typer.Typer(
     pretty_exceptions_show_locals=False,
     rich_markup_mode="markdown",
 )
+train_app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
+app.add_typer(train_app, name="train")
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
 errors = Console(stderr=True)
@@ -40,13 +45,27 @@ def _explained() -> Iterator[None]:
     """Turn what a user can mend into one message, without a traceback."""
     from uuv_marl.baselines import PolicyError
     from uuv_marl.benchmark.results import ResultsError
+    from uuv_marl.benchmark.runner import ClusterError
     from uuv_marl.scenario_files import ScenarioError
 
     try:
         yield
-    except (ScenarioError, PolicyError, ResultsError) as error:
+    except (ScenarioError, PolicyError, ResultsError, ClusterError) as error:
         errors.print(f"[bold red]Error:[/] {escape(str(error))}", highlight=False)
         raise typer.Exit(2) from None
+
+
+@contextmanager
+def _extra(name: str, what: str) -> Iterator[None]:
+    """Say which extra to install where a library is missing."""
+    from uuv_marl.baselines import PolicyError
+
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise PolicyError(
+            f"{what} needs {error.name}: install the extra, in the checkout: pip install -e '.[{name}]'"
+        ) from None
 
 
 def _show_version(value: bool) -> None:
@@ -83,6 +102,12 @@ def benchmark(
         typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as sonar.echo_reports=surface."),
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder of results, table and pictures.")] = Path("results/benchmark"),
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Spread the seeds over this Ray cluster (auto: the one here). Needs: distributed."
+        ),
+    ] = None,
 ) -> None:
     """Compare policies on scenarios over seeds.
 
@@ -111,12 +136,13 @@ def benchmark(
         sys.path.insert(0, "")  # --policy module:Class finds modules of this folder
         for name in policies:
             policy_class(name)
+        evaluator, cluster = _where(ray, policies)
         results = Results(output, scenarios)
         if is_first_compilation():
             console.print("First run of this version: compiling takes about a minute, once.")
         wanted = list(range(seeds))
         try:
-            with _progress() as progress:
+            with cluster, _progress() as progress:
                 tasks: dict[tuple[str, str], TaskID] = {}
 
                 def report(name: str, policy_name: str, share: float) -> None:
@@ -125,7 +151,7 @@ def benchmark(
                         tasks[key] = progress.add_task(f"{name}: {policy_name}", total=1.0)
                     progress.update(tasks[key], completed=share)
 
-                run_missing(results, scenarios, policies, wanted, report)
+                run_missing(results, scenarios, policies, wanted, report, evaluator)
         except KeyboardInterrupt:
             console.print(
                 f"Stopped. {len(results.rows)} finished runs are in {output}/results.json; the same command goes on."
@@ -138,6 +164,18 @@ def benchmark(
         console.print(f"Every seed: {output}/results.json   table: {written[0]}   pictures:")
         for path in written[1:]:
             console.print(f"  {path}", highlight=False)
+
+
+def _where(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
+    """What runs the seeds, and the connection that it needs: this machine, or the Ray cluster at an address."""
+    from uuv_marl.benchmark.evaluate import evaluate
+
+    if ray is None:
+        return evaluate, nullcontext()
+    with _extra("distributed", "--ray"):
+        from uuv_marl.benchmark.distributed import connected, evaluate_on_cluster
+    own = any(":" in name for name in policies)
+    return evaluate_on_cluster, connected(ray, working_dir=Path.cwd() if own else None)
 
 
 @app.command()
@@ -199,7 +237,7 @@ def tune(
             if name not in SPACES:
                 raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
         try:
-            with _progress() as progress:
+            with _extra("tune", "tuning"), _progress() as progress:
                 for name in policy or SPACES:
                     task = progress.add_task(name, total=trials)
                     path = search(
@@ -209,13 +247,56 @@ def tune(
                         ),
                     )  # fmt: skip
                     progress.console.print(f"{path}", highlight=False)
-        except ModuleNotFoundError as error:
-            raise PolicyError(
-                f"tuning needs {error.name}: install the extra, in the checkout: pip install -e '.[tune]'"
-            ) from None
         except KeyboardInterrupt:
             console.print(f"Stopped. The finished trials are in {output}; the same command goes on.")
             raise typer.Exit(130) from None
+
+
+@train_app.command("rllib")
+def train_rllib(
+    scenario: Annotated[str, typer.Option(help="Name or TOML file.")] = "single_obstacle",
+    num_vehicles: Annotated[int | None, typer.Option(min=1, help="Replaces the scenario's.")] = None,
+    steps: Annotated[int, typer.Option(min=1, help="Agent-steps in all: decisions times vehicles.")] = 1_000_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first worlds and weights.")] = 0,
+    env_runners: Annotated[int, typer.Option(min=0, help="Processes that sample, a core each.")] = 2,
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster (auto: the one here). Default: this machine.")
+    ] = None,
+    output: Annotated[Path, typer.Option(help="Folder of settings, progress and checkpoint.")] = Path("results/rllib"),
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")] = False,
+) -> None:
+    """Train one policy for all vehicles with RLlib's PPO, on this machine or a Ray cluster.
+
+    Needs the extra "distributed". Writes config.json (settings, seeds, versions), progress.csv (a row per iteration)
+    and checkpoints/. Ctrl-C keeps the last checkpoint; the same command with --resume goes on, to more --steps too.
+
+    Example: uuv-marl train rllib --scenario tracking --num-vehicles 8 --steps 200000
+    """
+    with _explained():
+        with _extra("distributed", "training with RLlib"):
+            from uuv_marl.train.rllib import Settings, train
+
+        from uuv_marl.sim.compiled import is_first_compilation
+
+        settings = Settings(scenario=scenario, num_vehicles=num_vehicles, seed=seed)
+        records = train(output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume)
+        last = "no iteration was needed: --steps are done already"
+        compiling = ", and compiling this version about a minute, once" if is_first_compilation() else ""
+        console.print(f"Starting Ray takes about 15 s{compiling}.")
+        try:
+            with _progress() as progress:
+                task = progress.add_task("sampling", total=steps)
+                shown = "–"
+                for record in records:
+                    if record.episode_return is not None:
+                        shown = f"{record.episode_return:.1f}"
+                    rate = f"{record.agent_steps / record.seconds:,.0f} agent-steps/s"
+                    progress.update(task, completed=record.agent_steps, description=f"{rate}, return {shown}")
+                    last = f"{record.agent_steps:,} agent-steps, {rate}, last return per vehicle {shown}"
+        except KeyboardInterrupt:
+            console.print(f"Stopped. The last checkpoint is in {output}; the same command with --resume goes on.")
+            raise typer.Exit(130) from None
+        console.print(f"Done: {last}. Progress: {output}/progress.csv   checkpoint: {output}/checkpoints")
 
 
 def _progress() -> Progress:

@@ -1,6 +1,6 @@
 """The benchmark as a job: which runs are missing, run them, and write table and pictures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,9 +18,21 @@ DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_info
 Report = Callable[[str, str, float], None]
 """Called with scenario, policy and the share of that pair's work that is done."""
 
+Evaluate = Callable[[Scenario, str, Sequence[int]], Iterator[Run | Progress]]
+"""Runs a policy on a scenario over seeds: here as ``evaluate``, or elsewhere with the same runs."""
+
+
+class ClusterError(RuntimeError):
+    """A cluster that can't do the work; the message says what to do."""
+
 
 def run_missing(
-    results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int], report: Report
+    results: Results,
+    scenarios: Sequence[Scenario],
+    policies: Sequence[str],
+    seeds: Sequence[int],
+    report: Report,
+    evaluator: Evaluate = evaluate,
 ) -> None:
     """Run what ``results`` lacks; every finished seed is kept at once."""
     for scenario in scenarios:
@@ -28,7 +40,7 @@ def run_missing(
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
             done, fresh = len(seeds) - len(missing), 0
             report(scenario.name, policy, done / len(seeds))
-            for event in evaluate(granted(policy, scenario), policy, missing):
+            for event in evaluator(granted(policy, scenario), policy, missing):
                 if isinstance(event, Run):
                     results.add(scenario.name, policy, event)
                     fresh += 1

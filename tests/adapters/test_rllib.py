@@ -1,0 +1,440 @@
+"""RLlib: the same environment bit for bit, training that goes on, and the benchmark's seeds on a cluster."""
+
+import csv
+import json
+import os
+import pickle
+import subprocess
+import sys
+import time
+import warnings
+from functools import partial
+from pathlib import Path
+
+# Both before Ray is imported: it stays on 127.0.0.1, and reports nothing to anybody.
+os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
+os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    ray = pytest.importorskip("ray")
+    from ray.cluster_utils import Cluster
+    from ray.rllib.env.multi_agent_episode import MultiAgentEpisode
+    from ray.rllib.utils.pre_checks.env import check_multiagent_environments
+
+    from uuv_marl.train import rllib
+    from uuv_marl.train.rllib import Settings, ppo_config, train
+
+import uuv_marl
+from tests import contract
+from uuv_marl.baselines import make
+from uuv_marl.benchmark import runner
+from uuv_marl.benchmark.distributed import chunks, connected, evaluate_on_cluster
+from uuv_marl.benchmark.results import Results, ResultsError
+from uuv_marl.cli import app
+from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
+LOSES = {"disturbance.loss_times_s": [1.0, 2.0]}
+SMALL = Settings(scenario="lossy", num_vehicles=5, overrides={**SHORT, **LOSES}, batch=200, minibatch=100)
+FEW = ["--set=swarm.num_vehicles=5", "--set=time_limit.factor=0.02", "--set=time_limit.extra_s=2"]
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::DeprecationWarning:ray"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),  # Ray leaves sockets and processes to the interpreter's end
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A cluster of two nodes, a core each."""
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    cluster.add_node(num_cpus=1)
+    yield cluster.address
+    cluster.shutdown()
+
+
+@pytest.fixture
+def joined(address):
+    with connected(address):
+        yield
+
+
+class Flagged:
+    """Flags of truncation per agent, which the contract compares and RLlib must not get."""
+
+    def __init__(self, env):
+        self.env, self.possible_agents, self.reset = env, env.possible_agents, env.reset
+
+    @property
+    def agents(self):
+        return self.env.agents
+
+    def step(self, actions):
+        observations, rewards, terminateds, truncateds, infos = self.env.step(actions)
+        late = {agent: truncateds["__all__"] and not terminateds[agent] for agent in observations}
+        return observations, rewards, terminateds, late, infos
+
+
+@pytest.mark.parametrize("case", contract.cases(), ids=lambda case: case.name)
+def test_the_run_is_that_of_the_parallel_environment(case):
+    actions = case.actions()
+    expected = contract.parallel(case)
+    run = contract.empty(len(actions), expected.observation.shape[-1])
+    for w in range(contract.WORLDS):
+        contract.play_dictionaries(Flagged(SwarmMultiAgentEnv(case.kwargs)), run, w, actions[:, w])
+    run.equals(expected)
+
+
+def play(env, seed=0):
+    """Outcomes of an episode with random actions."""
+    rng = np.random.default_rng(seed)
+    observations, _ = env.reset(seed=seed)
+    outcomes = []
+    while env.agents:
+        actions = {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in observations if agent in env.agents}
+        outcomes.append((actions, *env.step(actions)))
+        observations = outcomes[-1][1]
+    return outcomes
+
+
+def test_a_lost_vehicle_leaves_alone_and_the_time_limit_truncates_the_others():
+    outcomes = play(SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **LOSES}}))
+    lost = [[agent for agent, flag in outcome[3].items() if flag] for outcome in outcomes]
+    times = [t for t, names in enumerate(lost) for _ in names]
+    assert len(times) == 2
+    for t, (_, observations, rewards, terminateds, truncateds, infos) in enumerate(outcomes):
+        living = 5 - sum(time < t for time in times)
+        assert observations.keys() == rewards.keys() == infos.keys() == terminateds.keys() - {"__all__"}
+        assert len(observations) == living
+        assert set(lost[t]) <= observations.keys()
+        assert terminateds["__all__"] is False
+        assert truncateds == {"__all__": t == len(outcomes) - 1}
+
+
+def test_arrival_terminates_all():
+    overrides = {**contract.ARRIVES, **LOSES}
+    outcomes = play(SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 4, "overrides": overrides}))
+    *_, terminateds, truncateds, _ = outcomes[-1]
+    assert len(terminateds) == 3
+    assert all(terminateds.values())
+    assert truncateds == {"__all__": False}
+    assert not any(outcome[3]["__all__"] for outcome in outcomes[:-1])
+
+
+def test_the_loss_of_everybody_terminates_all():
+    env = SwarmMultiAgentEnv({"num_vehicles": 2, "overrides": {"contact.ends_vehicle": True}})
+    env.reset(seed=0)
+    swarm = env._env.swarm
+    north, east, radius = swarm.course.obstacles[0, 0]
+    swarm.state.eta[0] = north - radius - 1.05, east, 0.0  # about to touch
+    swarm.state.nu[0] = 2.0, 0.0, 0.0
+    _, _, terminateds, truncateds, _ = env.step(dict.fromkeys(env.agents, np.zeros(2)))
+    assert terminateds == {"uuv_0": True, "uuv_1": True, "__all__": True}
+    assert truncateds == {"__all__": False}
+    assert env.agents == []
+
+
+def test_rllib_bootstraps_at_the_time_limit_and_not_after_a_loss():
+    env = SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **LOSES}})
+    episode = MultiAgentEpisode(agent_to_module_mapping_fn=lambda *_: "shared")
+    episode.add_env_reset(observations=env.reset(seed=0)[0])
+    for actions, observations, rewards, terminateds, truncateds, infos in play(env):
+        episode.add_env_step(
+            observations, actions, rewards, infos, terminateds=terminateds, truncateds=truncateds
+        )  # fmt: skip
+    ends = [(one.is_terminated, one.is_truncated) for one in episode.agent_episodes.values()]
+    assert sorted(ends) == [(False, True)] * 3 + [(True, False)] * 2
+    assert (episode.is_terminated, episode.is_truncated) == (False, True)
+
+
+def test_rllib_accepts_the_environment_and_it_renders():
+    env = SwarmMultiAgentEnv({"num_vehicles": 3, "render_mode": "rgb_array"})
+    check_multiagent_environments(env)
+    picture = env.render()
+    assert picture.dtype == np.uint8
+    assert picture.ndim == 3
+    env.close()
+    assert SwarmMultiAgentEnv().possible_agents == uuv_marl.parallel_env().possible_agents
+
+
+def test_a_policy_by_name_drives_it():
+    ours, theirs = uuv_marl.parallel_env(num_vehicles=4), SwarmMultiAgentEnv({"num_vehicles": 4})
+    ends = []
+    for env in (ours, theirs):
+        policy = make("bio_inspired", env)
+        observations, _ = env.reset(seed=3)
+        policy.reset(seed=3)
+        for _ in range(20):
+            observations = env.step(policy(observations))[0]
+        ends.append(np.stack(list(observations.values())))
+    assert ends[0].tobytes() == ends[1].tobytes()
+
+
+def weights(algorithm):
+    return {name: np.array(value) for name, value in algorithm.get_module(rllib.POLICY).get_state().items()}
+
+
+def same(one, other):
+    return all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_ppo_trains_by_the_registered_name_on_remote_runners(joined):
+    config = ppo_config(SMALL, num_env_runners=2).environment(register(), env_config={"num_vehicles": 5})
+    assert config.env == ENV_NAME
+    algorithm = config.build_algo()
+    try:
+        before = weights(algorithm)
+        for _ in range(2):
+            result = algorithm.train()
+        assert not same(weights(algorithm), before)
+        assert sum(result["env_runners"]["num_agent_steps_sampled"].values()) >= SMALL.batch
+        on_runners = algorithm.env_runner_group.foreach_env_runner(
+            lambda it: it.module[rllib.POLICY].get_state(inference_only=True), local_env_runner=False
+        )
+        assert len(on_runners) == 2
+        assert all(same(state, weights(algorithm)) for state in on_runners)
+    finally:
+        algorithm.stop()
+
+
+def test_every_runner_starts_from_its_own_world(joined):
+    settings = Settings(scenario="random_field", num_vehicles=5, batch=100, minibatch=100, epochs=1)
+    algorithm = ppo_config(settings, num_env_runners=2, world_seed=123_000).build_algo()
+    try:
+        algorithm.train()
+        fields = algorithm.env_runner_group.foreach_env_runner(
+            lambda it: it.env.envs[0].unwrapped._env.swarm.course.obstacles.copy(), local_env_runner=False
+        )
+    finally:
+        algorithm.stop()
+    expected = []
+    for seed in (123_001, 123_002):
+        env = uuv_marl.parallel_env(settings.load())
+        env.reset(seed=seed)
+        expected.append(env.swarm.course.obstacles)
+    assert sorted(field.tobytes() for field in fields) == sorted(field.tobytes() for field in expected)
+
+
+def test_training_seeds_keep_their_range_and_differ():
+    seeds = {rllib.world_seed(seed, steps) for seed in range(50) for steps in (0, 100, 200)}
+    assert len(seeds) == 150
+    assert all(100_000 <= seed < 999_000 for seed in seeds)
+
+
+def rows(folder):
+    with (folder / "progress.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_training_is_kept_and_goes_on(tmp_path, joined, monkeypatch):
+    folder = tmp_path / "run"
+    first = list(train(folder, 400, SMALL, num_env_runners=1))
+    assert [record.iteration for record in first] == [1, 2]
+    assert [int(row["agent_steps"]) for row in rows(folder)] == [record.agent_steps for record in first]
+    assert [path.name for path in (folder / "checkpoints").iterdir()] == ["000002"]
+    assert any(record.episode_return is not None and record.episode_return < 0 for record in first)
+
+    # As after a kill between a row and its checkpoint.
+    with (folder / "progress.csv").open("a") as file:
+        file.write("3,99999,,,9.9\n")
+    (folder / "checkpoints" / "000003.partial").mkdir()
+
+    seen = []
+    original = rllib._iterate
+    monkeypatch.setattr(
+        rllib, "_iterate", lambda algorithm, *rest: seen.append(weights(algorithm)) or original(algorithm, *rest)
+    )
+    kept = folder / "checkpoints/000002/learner_group/learner/rl_module/shared/module_state.pkl"
+    with kept.open("rb") as file:
+        before = pickle.load(file)
+    second = list(train(folder, 800, SMALL, num_env_runners=1, resume=True))
+    assert same(seen[0], before)
+    assert [record.iteration for record in second] == [3, 4]
+    assert first[-1].agent_steps + 200 <= second[0].agent_steps < first[-1].agent_steps + 205
+    assert second[0].seconds > first[-1].seconds
+    assert [row["iteration"] for row in rows(folder)] == ["1", "2", "3", "4"]
+    assert list(train(folder, 800, SMALL, num_env_runners=1, resume=True)) == []
+
+    sessions = json.loads((folder / "config.json").read_text())["sessions"]
+    assert [session["agent_steps"] for session in sessions] == [0, first[-1].agent_steps, second[-1].agent_steps]
+    assert len({session["world_seed"] for session in sessions}) == 3
+    assert sessions[0]["versions"]["ray"] == ray.__version__
+
+
+def test_an_interrupt_keeps_the_last_checkpoint(tmp_path, joined):
+    records = train(tmp_path, 10_000, SMALL, num_env_runners=1)
+    assert next(records).iteration == 1
+    records.close()
+    assert [record.iteration for record in train(tmp_path, 400, SMALL, num_env_runners=1, resume=True)] == [2]
+
+
+def test_folders_that_are_used_or_empty_or_of_other_settings_are_refused(tmp_path):
+    (tmp_path / "config.json").write_text('{"settings": {}, "sessions": []}')
+    with pytest.raises(ResultsError, match="is not empty; give --resume"):
+        next(train(tmp_path, 100, SMALL))
+    with pytest.raises(ResultsError, match="another scenario; give the same options"):
+        next(train(tmp_path, 100, SMALL, resume=True))
+    with pytest.raises(ResultsError, match="no training to resume"):
+        next(train(tmp_path / "new", 100, SMALL, resume=True))
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_cluster_that_is_missing_or_too_small_is_explained(tmp_path, joined):
+    with pytest.raises(runner.ClusterError, match="has 2; give --env-runners 2"):
+        next(train(tmp_path / "a", 100, SMALL, num_env_runners=3))
+    assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("nowhere", ["127.0.0.1:9", "nonsense", "127.0.0.1:nine"])
+def test_an_address_where_nobody_is_fails_soon(tmp_path, nowhere, monkeypatch):
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    start = time.perf_counter()
+    done = CliRunner().invoke(app, ["train", "rllib", f"--ray={nowhere}", f"--output={tmp_path / 'out'}"])
+    assert done.exit_code == 2
+    assert "no Ray cluster can be joined" in " ".join(done.output.split())
+    assert time.perf_counter() - start < 10
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_train_command(tmp_path, address, monkeypatch):
+    monkeypatch.setattr(rllib, "Settings", partial(Settings, batch=200, minibatch=100))
+    arguments = ["train", "rllib", "--scenario=tracking", "--num-vehicles=5", "--env-runners=2", f"--ray={address}"]
+    arguments += [f"--output={tmp_path}"]
+    done = CliRunner().invoke(app, [*arguments, "--steps=100"])
+    assert done.exit_code == 0, done.output
+    assert "Done: 20" in done.output
+    again = CliRunner().invoke(app, [*arguments, "--steps=100"])
+    assert again.exit_code == 2
+    assert "give --resume" in " ".join(again.output.split())
+    finished = CliRunner().invoke(app, [*arguments, "--steps=100", "--resume"])
+    assert "done already" in finished.output
+    assert not ray.is_initialized()
+
+
+def benchmark(folder, policies, *more):
+    names = [f"--policy={name}" for name in policies]
+    done = CliRunner().invoke(app, ["benchmark", *names, "--seeds=3", f"--output={folder}", *FEW, *more])
+    assert done.exit_code == 0, done.output
+    return json.loads((folder / "results.json").read_text())
+
+
+def test_the_benchmark_on_a_cluster_is_that_of_one_machine(tmp_path, address):
+    policies = ["bio_inspired", "sdc"]
+    here = benchmark(tmp_path / "here", policies)
+    there = benchmark(tmp_path / "there", policies, f"--ray={address}")
+
+    def key(run):
+        return run["policy"], run["seed"]
+
+    assert len(here["runs"]) == 6
+    assert sorted(there["runs"], key=key) == sorted(here["runs"], key=key)
+    for path in (tmp_path / "here" / "traces").iterdir():
+        with np.load(path) as mine, np.load(tmp_path / "there" / "traces" / path.name) as theirs:
+            assert mine.files == theirs.files
+            assert all(mine[name].tobytes() == theirs[name].tobytes() for name in mine.files), path.name
+
+
+OWN = """
+import os
+
+import numba
+from uuv_marl.baselines.floors import Idle
+from beside import NAME
+
+assert NAME == "found"
+assert os.getpid() == {driver} or numba.config.NUMBA_NUM_THREADS == 1
+assert os.getpid() == {driver} or "runtime_resources" in __file__  # a copy, as on another machine
+
+
+class Own(Idle):
+    pass
+"""
+
+
+def test_your_own_policy_reaches_the_nodes(tmp_path, address, monkeypatch):
+    (tmp_path / "my_cluster_policy.py").write_text(OWN.format(driver=os.getpid()))
+    (tmp_path / "beside.py").write_text("NAME = 'found'\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    runs = benchmark(tmp_path / "out", ["my_cluster_policy:Own", "idle"], f"--ray={address}")["runs"]
+    own = {run["seed"]: run["metrics"] for run in runs if run["policy"] != "idle"}
+    assert own == {run["seed"]: run["metrics"] for run in runs if run["policy"] == "idle"}
+    assert len(own) == 3
+
+
+def test_a_stopped_benchmark_keeps_its_seeds_and_goes_on(tmp_path, joined):
+    scenario = uuv_marl.load_scenario("tracking", num_vehicles=5, overrides=SHORT)
+    results = Results(tmp_path, [scenario])
+    seeds = list(range(12))
+
+    def stop(_, __, share):
+        if share > 0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        runner.run_missing(results, [scenario], ["idle"], seeds, stop, evaluate_on_cluster)
+    again = Results(tmp_path, [scenario])
+    assert len(again.rows) == 1
+    shares = []
+    runner.run_missing(again, [scenario], ["idle"], seeds, lambda *event: shares.append(event[-1]), evaluate_on_cluster)
+    assert [row.seed for row in again.select("tracking", "idle", seeds)] == seeds
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_other_code_on_a_node_is_refused(joined, monkeypatch):
+    monkeypatch.setattr("uuv_marl.benchmark.distributed.source_fingerprint", lambda: "of another version")
+    scenario = uuv_marl.load_scenario("tracking", num_vehicles=5, overrides=SHORT)
+    with pytest.raises(runner.ClusterError, match="other code of uuv_marl"):
+        list(evaluate_on_cluster(scenario, "idle", [0]))
+
+
+def test_chunks_hold_every_seed_once_and_are_enough_for_all_cores():
+    for count, cores in [(1, 2), (20, 2), (100, 3), (10_000, 2), (5, 500)]:
+        parts = chunks(range(count), cores)
+        assert [seed for part in parts for seed in part] == list(range(count))
+        assert len(parts) >= min(count, 4 * cores)
+        assert max(map(len, parts)) <= 32
+
+
+def test_ray_on_one_machine_is_closed_to_others():
+    code = (
+        "from uuv_marl.benchmark.distributed import connected, ray\n"
+        "with connected(None): print(ray.nodes()[0]['NodeManagerAddress'], int(ray.cluster_resources()['CPU']))\n"
+        "print(ray.is_initialized())"
+    )
+    clean = {name: value for name, value in os.environ.items() if name != "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"}
+    done = subprocess.run([sys.executable, "-c", code], env=clean, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["127.0.0.1", "1", "False"]
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("arguments", [["train", "rllib"], ["benchmark", "--ray=auto"]])
+def test_a_missing_ray_is_explained(arguments, tmp_path, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith(("uuv_marl.train.", "uuv_marl.benchmark.distrib"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "ray", None)
+    done = CliRunner().invoke(app, [*arguments, f"--output={tmp_path / 'out'}"])
+    assert done.exit_code == 2
+    assert "needs ray: install the extra, in the checkout: pip install -e '.[distributed]'" in " ".join(
+        done.output.split()
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_example_of_the_page_runs(tmp_path):
+    page = (ROOT / "docs" / "rllib.md").read_text()
+    (block,) = [part.split("```")[0] for part in page.split("```python\n")[1:]]
+    assert len(block.splitlines()) < 30
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", block], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,135 @@
+"""The benchmark's seeds on a Ray cluster, with the very runs of one machine. Needs the extra ``distributed``."""
+
+import logging
+import os
+import socket
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+
+import ray as _ray  # pyright: ignore[reportMissingImports]
+
+from uuv_marl.benchmark.evaluate import BATCH, Run, evaluate
+from uuv_marl.benchmark.results import source_fingerprint
+from uuv_marl.benchmark.runner import ClusterError
+from uuv_marl.scenario import Scenario
+
+ray: Any = _ray
+
+_CHUNKS_PER_CPU = 4
+"""Small chunks let fast nodes take more of them and keep more of a stopped benchmark; large ones start less often."""
+_PATIENCE_S = 10.0
+
+
+@contextmanager
+def connected(address: str | None, num_cpus: int = 1, working_dir: Path | None = None) -> Generator[None]:
+    """A Ray cluster for a ``with`` block: the one that this process is connected to already, else a new connection.
+
+    Whatever was started or connected here is left at the end.
+
+    Args:
+        address: of a running cluster, such as ``auto`` or ``10.0.0.1:6379``; None starts Ray on this machine alone,
+            where no other machine can reach it.
+        num_cpus: tasks and actors at a time, where Ray is started here.
+        working_dir: a folder whose modules the workers must find; every node gets a copy, less what .gitignore names.
+
+    Raises:
+        ClusterError: no cluster answers at the address.
+    """
+    if ray.is_initialized():
+        yield
+        return
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    # Every task has one core, on which Numba's own threads would only contend.
+    environment: dict[str, Any] = {"env_vars": {"NUMBA_NUM_THREADS": "1"}}
+    if working_dir is not None:
+        environment["working_dir"] = str(working_dir)
+    common = {"runtime_env": environment, "log_to_driver": False, "logging_level": logging.ERROR}
+    with _closed_to_others() if address is None else nullcontext():
+        if address is None:
+            ray.init("local", num_cpus=num_cpus, include_dashboard=False, **common)
+        else:
+            _join(address, common)
+        try:
+            yield
+        finally:
+            ray.shutdown()
+
+
+@contextmanager
+def _closed_to_others() -> Generator[None]:
+    """Ray listens on 127.0.0.1, where on Linux it would otherwise take orders from the whole network."""
+    constants = ray._private.ray_constants
+    before, constants.ENABLE_RAY_CLUSTER = constants.ENABLE_RAY_CLUSTER, False
+    try:
+        yield
+    finally:
+        constants.ENABLE_RAY_CLUSTER = before
+
+
+def _join(address: str, arguments: dict[str, Any]) -> None:
+    try:
+        _knock(address)
+        ray.init(address, **arguments)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise ClusterError(
+            f"no Ray cluster can be joined at {address!r} ({error}); start one with 'ray start --head' and give the "
+            "address that it prints, or 'auto' on its own machine"
+        ) from error
+
+
+def _knock(address: str) -> None:
+    """Raise OSError where nobody listens: Ray itself would go on trying for minutes."""
+    host, colon, port = address.rpartition("://")[2].rpartition(":")
+    if colon:
+        socket.create_connection((host, int(port)), _PATIENCE_S).close()
+
+
+def evaluate_on_cluster(scenario: Scenario, policy: str, seeds: Sequence[int], **parameters: object) -> Iterator[Run]:
+    """As ``evaluate``, on the cluster that is ``connected``: chunks of seeds as tasks of one core each.
+
+    A run depends on its seed alone, so neither the chunks nor the nodes change it, as long as all nodes have the same
+    kind of processor. Ending the iteration cancels what is unfinished.
+
+    Raises:
+        ClusterError: a node has other code of uuv_marl, or a worker died repeatedly.
+        PolicyError: a node can't import the policy.
+    """
+    task = ray.remote(num_cpus=1)(_chunk)
+    pending = [
+        task.remote(scenario, policy, chunk, parameters, source_fingerprint())
+        for chunk in chunks(seeds, int(ray.cluster_resources().get("CPU", 1)))
+    ]
+    try:
+        while pending:
+            (ready,), pending = ray.wait(pending)
+            yield from _result(ready)
+    finally:
+        for unfinished in pending:
+            ray.cancel(unfinished, force=True)
+
+
+def chunks(seeds: Sequence[int], num_cpus: int) -> list[Sequence[int]]:
+    """The seeds in runs of equal length, several for each core."""
+    size = max(1, min(BATCH, len(seeds) // (_CHUNKS_PER_CPU * num_cpus)))
+    return [seeds[first : first + size] for first in range(0, len(seeds), size)]
+
+
+def _chunk(
+    scenario: Scenario, policy: str, seeds: Sequence[int], parameters: dict[str, object], fingerprint: str
+) -> list[Run]:
+    if source_fingerprint() != fingerprint:
+        raise ClusterError(
+            f"node {os.uname().nodename} has other code of uuv_marl than this machine; install the same on all"
+        )
+    return [event for event in evaluate(scenario, policy, seeds, **parameters) if isinstance(event, Run)]
+
+
+def _result(ready: Any) -> list[Run]:
+    try:
+        return ray.get(ready)
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause from error
+    except ray.exceptions.RayError as error:
+        raise ClusterError(f"the Ray cluster lost a task: {error}; the same command goes on") from error

@@ -1,0 +1,82 @@
+"""Ray RLlib's form of the environment, for its new API stack. Needs the extra ``distributed``."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from ray.rllib.env.multi_agent_env import MultiAgentEnv  # pyright: ignore[reportMissingImports]
+from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
+
+from uuv_marl.envs.parallel_env import Infos, parallel_env
+from uuv_marl.scenario import Scenario
+
+Float32 = NDArray[np.float32]
+
+ENV_NAME = "uuv_swarm_v0"
+"""The name under which ``register`` makes the environment known."""
+
+
+class SwarmMultiAgentEnv(MultiAgentEnv):
+    """The PettingZoo environment as RLlib wants it: the same observations and rewards, bit for bit.
+
+    A lost vehicle is terminated alone, with its last observation, and never appears again. ``__all__`` is set in
+    ``terminateds`` once the swarm has arrived or nobody is left, in ``truncateds`` at the time limit.
+
+    Args:
+        config: the keyword arguments of ``uuv_marl.parallel_env``; RLlib hands over its ``env_config``.
+    """
+
+    def __init__(self, config: Mapping[str, Any] | None = None) -> None:
+        super().__init__()
+        self._env = parallel_env(**(config or {}))
+        self.render_mode = self._env.render_mode
+        self.metadata = dict(self._env.metadata)  # RLlib writes into it
+        self.possible_agents = list(self._env.possible_agents)
+        self.agents = list(self.possible_agents)
+        self.observation_spaces = self._env.observation_spaces
+        self.action_spaces = self._env.action_spaces
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is simulated; ``uuv_marl.baselines.make(name, env)`` reads it."""
+        return self._env.scenario
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Float32], Infos]:
+        """Start an episode, as ``SwarmParallelEnv.reset``."""
+        observations, infos = self._env.reset(seed, options)
+        self.agents = list(self._env.agents)
+        return observations, infos
+
+    def step(
+        self, action_dict: Mapping[str, ArrayLike]
+    ) -> tuple[dict[str, Float32], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """One decision of every agent, as ``SwarmParallelEnv.step``, errors included.
+
+        ``truncateds`` holds ``__all__`` alone: RLlib takes an episode in which every agent is flagged by itself as
+        terminated, and would learn that nothing follows a time limit.
+        """
+        observations, rewards, terminateds, truncateds, infos = self._env.step(action_dict)
+        self.agents = list(self._env.agents)
+        late = any(truncateds.values())
+        terminateds["__all__"] = not self.agents and not late
+        return observations, rewards, terminateds, {"__all__": late}, infos
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """As ``SwarmParallelEnv.render``."""
+        return self._env.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._env.close()
+
+
+def register() -> str:
+    """Make the environment known to RLlib by ``ENV_NAME``, on every node of the cluster; the name.
+
+    Call it after ``ray.init``, and again after each further one: Ray forgets registrations when it shuts down.
+    """
+    register_env(ENV_NAME, SwarmMultiAgentEnv)
+    return ENV_NAME
