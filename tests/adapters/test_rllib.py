@@ -263,8 +263,8 @@ def test_training_is_kept_and_goes_on(tmp_path, joined, monkeypatch):
     assert list(train(folder, 800, SMALL, num_env_runners=1, resume=True)) == []
 
     sessions = json.loads((folder / "config.json").read_text())["sessions"]
-    assert [session["agent_steps"] for session in sessions] == [0, first[-1].agent_steps, second[-1].agent_steps]
-    assert len({session["world_seed"] for session in sessions}) == 3
+    assert [session["agent_steps"] for session in sessions] == [0, first[-1].agent_steps]
+    assert len({session["world_seed"] for session in sessions}) == 2
     assert sessions[0]["versions"]["ray"] == ray.__version__
 
 

@@ -126,6 +126,11 @@ class Swarm:
         return self._found.heard
 
     @property
+    def heading(self) -> NDArray[np.float64]:
+        """Cosine and sine of every vehicle's heading psi, shape (world, vehicle, 2)."""
+        return self._found.heading
+
+    @property
     def duration_s(self) -> NDArray[np.float64]:
         """Time that l(t) takes to its end, the bound on any task time, shape (world,)."""
         return self.course.times[np.arange(self.num_worlds), self.course.last]

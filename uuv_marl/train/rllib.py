@@ -137,6 +137,8 @@ def train(
     settings = settings or Settings()
     scenario = settings.load()
     folder = TrainingFolder(output, {**asdict(settings), "scenario": scenario.model_dump(mode="json")}, resume)
+    if folder.record.agent_steps >= steps:
+        return
     seed = world_seed(settings.seed, folder.record.agent_steps)
     with connected(address, max(1, num_env_runners)):
         _need_cores(num_env_runners)
