@@ -303,3 +303,8 @@ def test_solo_says_what_is_wrong():
     with pytest.raises(ValueError, match="render_mode must be one of"):
         SoloEnv(render_mode="ascii")
     copy.deepcopy(env)
+
+
+def test_a_controller_for_many_worlds_is_made_for_the_scenario():
+    with pytest.raises(baselines.PolicyError, match=r"SwarmVectorEnv has no agents by name; make the policy with make"):
+        baselines.make("bio_inspired", short())

@@ -256,7 +256,9 @@ def tune(
 def train_rllib(
     scenario: Annotated[str, typer.Option(help="Name or TOML file.")] = "single_obstacle",
     num_vehicles: Annotated[int | None, typer.Option(min=1, help="Replaces the scenario's.")] = None,
-    steps: Annotated[int, typer.Option(min=1, help="Agent-steps in all: decisions times vehicles.")] = 1_000_000,
+    steps: Annotated[
+        int, typer.Option(min=1, help="Agent-steps in all: decisions times vehicles; whole batches.")
+    ] = 1_000_000,
     seed: Annotated[int, typer.Option(min=0, help="Of the first worlds and weights.")] = 0,
     env_runners: Annotated[int, typer.Option(min=0, help="Processes that sample, a core each.")] = 2,
     ray: Annotated[
@@ -267,8 +269,9 @@ def train_rllib(
 ) -> None:
     """Train one policy for all vehicles with RLlib's PPO, on this machine or a Ray cluster.
 
-    Needs the extra "distributed". Writes config.json (settings, seeds, versions), progress.csv (a row per iteration)
-    and checkpoints/. Ctrl-C keeps the last checkpoint; the same command with --resume goes on, to more --steps too.
+    Vehicles decide every 0.5 s, with yaw damping. Needs the extra "distributed". Writes config.json (settings, seeds,
+    versions), progress.csv (a row per iteration) and checkpoints/. Ctrl-C keeps the last checkpoint; the same command
+    with --resume goes on, to more --steps too.
 
     Example: uuv-marl train rllib --scenario tracking --num-vehicles 8 --steps 200000
     """
