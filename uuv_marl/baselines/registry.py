@@ -128,7 +128,7 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
         raise PolicyError(f"a policy is made for a Scenario (see load_scenario) or our parallel_env, got {target!r}")
     if not hasattr(env, "possible_agents"):
         raise PolicyError(
-            f"{type(env).__name__} has no agents by name; make the policy with make(name, env.scenario, num_worlds) and "
-            "call policy.act(env.swarm.percept)"
+            f"{type(env).__name__} has no agents by name; make the policy with make(name, env.scenario, num_worlds) "
+            "and call policy.act(env.swarm.percept)"
         )
     return EnvPolicy(constructor(env.scenario, 1, **parameters), env.possible_agents)
