@@ -16,7 +16,6 @@ MAX_RANGE_M = 4096.0
 """Positions in a percept saturate here, so that observation bounds are finite."""
 NOMINAL_VEHICLES = 54
 """The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
-_MAX_SECTOR_DEG = 120.0
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -164,7 +163,7 @@ class SonarArray(Section):
     """Unique within the suite."""
     kind: Literal["active", "passive"]
     """Only active arrays hear obstacles."""
-    mounting_deg: Finite
+    mounting_deg: Annotated[float, Field(ge=-360, le=360)]
     """Direction of the fan's axis, clockwise from the bow."""
     aperture_deg: Annotated[float, Field(gt=0, le=360)]
     """Width of the fan."""
@@ -204,12 +203,7 @@ class Sonar(Section):
         if len(set(self.channels)) < len(self.channels):
             raise ValueError(f"sonar.channels must name each channel once, got {list(self.channels)}")
         for array in self.arrays:
-            width = array.aperture_deg / array.sub_sectors
-            if width > _MAX_SECTOR_DEG:
-                raise ValueError(
-                    f"sonar.arrays.{array.name}.sub_sectors must leave sub-sectors of at most {_MAX_SECTOR_DEG:g} deg, "
-                    f"got {width:g} deg; use at least {math.ceil(array.aperture_deg / _MAX_SECTOR_DEG)}"
-                )
+            scenario_checks.check_sub_sectors(array)
         return self
 
 

@@ -10,12 +10,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from uuv_marl.scenario import Scenario
+    from uuv_marl.scenario import Scenario, SonarArray
 
+MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0
+"""Widths of sub-sectors that the sonar's table of directions is made for."""
 RK4_LIMIT = 2.78
 """Classical Runge-Kutta is stable on the negative real axis up to this product of rate and step."""
 SAMPLED_LIMIT = 2.0
 """A sampled damping loop overshoots without end above this product of rate and hold."""
+
+
+def check_sub_sectors(array: "SonarArray") -> None:
+    """An array's sub-sectors are neither too wide nor too narrow."""
+    width = array.aperture_deg / array.sub_sectors
+    if width > MAX_SECTOR_DEG:
+        raise ValueError(
+            f"sonar.arrays.{array.name}.sub_sectors must leave sub-sectors of at most {MAX_SECTOR_DEG:g} deg, "
+            f"got {width:g} deg; use at least {math.ceil(array.aperture_deg / MAX_SECTOR_DEG)}"
+        )
+    if width < MIN_SECTOR_DEG:
+        raise ValueError(
+            f"sonar.arrays.{array.name}.sub_sectors must leave sub-sectors of at least {MIN_SECTOR_DEG:g} deg, "
+            f"got {width:g} deg; lower it or raise aperture_deg"
+        )
 
 
 def check_start(scenario: "Scenario") -> None:

@@ -19,7 +19,7 @@ from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 _PACKAGE = Path(__file__).resolve().parent.parent
-_COMPILED_PARTS = (".", "sim", "baselines")
+_COMPILED_PARTS = (".", "sim", "baselines", "envs")
 _log = logging.getLogger("uuv_marl")
 
 
@@ -43,7 +43,7 @@ def cache_dir() -> Path | None:
             pass
     except OSError as error:
         _log.warning(
-            "The compile cache %s can't be written (%s), so every start compiles anew, for about a minute. "
+            "The compile cache %s can't be written (%s), so every start compiles anew, for half a minute. "
             "Set UUV_MARL_CACHE_DIR to a writable folder.",
             folder,
             error.strerror,
@@ -52,10 +52,15 @@ def cache_dir() -> Path | None:
     return folder
 
 
-def is_first_compilation() -> bool:
-    """Whether nothing of this version has been compiled and kept yet, so that the first step takes long."""
+@functools.cache
+def announce_compilation() -> None:
+    """Log, once per process, that the first step takes long where nothing of this version has been compiled yet."""
     folder = cache_dir()
-    return folder is None or not any(folder.rglob("*.nbi"))
+    if folder is not None and not any(folder.rglob("*.nbi")):
+        _log.warning(
+            "First run of this version of uuv_marl: compiling takes about half a minute, once. It is kept in %s.",
+            folder,
+        )
 
 
 def compiled(function: F) -> F:
@@ -64,8 +69,8 @@ def compiled(function: F) -> F:
 
 
 def compiled_inline(function: F) -> F:
-    """As ``compiled``, but copied into its callers: for innermost bodies, where a call costs more than they do."""
-    return _jit(function, inline="always")
+    """As ``compiled``, but always copied into its callers: for what loops are to run on vector registers."""
+    return _jit(function, forceinline=True)
 
 
 def compiled_parallel(function: F) -> F:
@@ -81,7 +86,11 @@ def _jit(function: F, **options: object) -> F:
     try:
         if folder is not None:
             settings.CACHE_DIR = str(folder)
-        decorate = cast(Any, numba).njit(cache=folder is not None, **options, error_model="numpy", nogil=True)
+        # Without Numba's runtime nothing is allocated, and no array's references are counted: with it, that counting
+        # takes more time than the physics, since every call counts every array it is given.
+        decorate = cast(Any, numba).njit(
+            cache=folder is not None, **options, error_model="numpy", nogil=True, _nrt=False
+        )
         return cast(F, decorate(function))
     finally:
         settings.CACHE_DIR = before

@@ -63,6 +63,6 @@ def _scatter(candidates: Float64, spacing: float, places: Float64) -> int:
                 free = False
                 break
         if free:
-            places[found] = candidates[k]
+            places[found, 0], places[found, 1] = candidates[k, 0], candidates[k, 1]
             found += 1
     return found

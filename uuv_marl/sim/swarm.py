@@ -3,26 +3,41 @@
 import operator
 import os
 from collections.abc import Sequence
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
+from numba import config, get_num_threads
 from numba.np.ufunc.parallel import threading_layer
 from numpy.typing import NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario, growth
+from uuv_marl.sim.compiled import announce_compilation
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
-from uuv_marl.sim.sonar import Survey, suite
+from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trajectory import arrival_times
 from uuv_marl.sim.vehicle import plant
-from uuv_marl.sim.world import Course, Facts, Rules, State, observe_world, step_world, step_worlds
+from uuv_marl.sim.world import (
+    Course,
+    Facts,
+    Rules,
+    Senses,
+    State,
+    observe_world,
+    scratch,
+    step_alone,
+    step_worlds,
+)
 
 Float32 = NDArray[np.float32]
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
 """Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
 ends on the scenario's own, so that the time within a smaller radius is often missing."""
+
+_CELL_SPACINGS = 1.25
+"""Side of a cell, in spacings of the start, for swarms that are searched by cells (perf/, docs/speed.md)."""
 
 _threads_of_parent = False
 
@@ -55,6 +70,7 @@ class Swarm:
         self.num_worlds = operator.index(num_worlds)
         if num_worlds < 1:
             raise ValueError(f"num_worlds must be at least 1, got {num_worlds}")
+        announce_compilation()
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
@@ -63,7 +79,11 @@ class Swarm:
         self._rules = _rules(scenario)
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready = np.zeros(num_worlds, np.bool_)
+        self._duration_s = np.zeros(num_worlds)
         self._allocate(num_worlds, self.num_vehicles, max(scenario.max_obstacles, 1))
+        self._scratch = scratch(
+            min(num_worlds, cast(Any, config).NUMBA_NUM_THREADS), self.num_vehicles, scenario.sonar.num_sectors
+        )
 
     def _allocate(self, worlds: int, n: int, m: int) -> None:
         field = self.scenario.random_field
@@ -102,38 +122,31 @@ class Swarm:
             saturated=np.zeros(worlds),
             arrival_s=np.full((worlds, radii), np.nan),
         )
-        self._found = Survey(
+        self._senses = Senses(
             heading=np.zeros((worlds, n, 2)),
-            nearest=np.zeros((worlds, n, sectors)),
             heard=np.zeros((worlds, n, sectors), np.int32),
-            spacing=np.zeros((worlds, n)),
-            clearance=np.zeros((worlds, n)),
-            obstacle_clearance=np.zeros((worlds, m)),
-            contacts=np.zeros((worlds, n), np.int64),
-            extremes=np.zeros((worlds, 3)),
+            percept=np.zeros((worlds, n, self.layout.size), np.float32),
         )
-        self._forces = np.zeros((worlds, n, 3))
-        self._flat = np.zeros((worlds, n, self.layout.size), np.float32)
 
     @property
     def percept(self) -> Percept:
         """What every vehicle knows now, shape (world, vehicle, ...)."""
-        return Percept(self._flat, self.layout)
+        return Percept(self._senses.percept, self.layout)
 
     @property
     def heard(self) -> NDArray[np.int32]:
         """Index of the vehicle heard in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
-        return self._found.heard
+        return self._senses.heard
 
     @property
     def heading(self) -> NDArray[np.float64]:
         """Cosine and sine of every vehicle's heading psi, shape (world, vehicle, 2)."""
-        return self._found.heading
+        return self._senses.heading
 
     @property
     def duration_s(self) -> NDArray[np.float64]:
         """Time that l(t) takes to its end, the bound on any task time, shape (world,)."""
-        return self.course.times[np.arange(self.num_worlds), self.course.last]
+        return self._duration_s
 
     @property
     def time_limit_s(self) -> NDArray[np.float64]:
@@ -178,6 +191,7 @@ class Swarm:
         times = arrival_times(field.waypoints, self.scenario.trajectory.speed_mps)
         course.times[w, :points], course.times[w, points:] = times, times[-1]
         course.last[w] = points - 1
+        self._duration_s[w] = times[-1]
         course.obstacles[w, :m], course.obstacles[w, m:] = field.obstacles, 0.0
         course.num_obstacles[w] = m
         state.eta[w], state.nu[w] = start_state(self.scenario, field.waypoints, rng)
@@ -195,8 +209,8 @@ class Swarm:
 
     def _observe(self, w: int) -> None:
         observe_world(
-            w, self.state, self.course, self.facts, self._rules, self._suite, self._found, self.layout.offsets,
-            self._flat,
+            w, self.state, self.course, self.facts, self._senses, self._rules, self._suite, self.layout.offsets,
+            self._scratch,
         )  # fmt: skip
 
     def step(self, action: Float32, active: NDArray[np.bool_] | None = None) -> Percept:
@@ -213,23 +227,23 @@ class Swarm:
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
             w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
-        running = np.ones(self.num_worlds, np.bool_) if active is None else active
-        if not self._ready[running].all():
+        if not (self._ready if active is None else self._ready | ~active).all():
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
         arrays = (
-            np.ascontiguousarray(action), self._forces, self.state, self.course, self.facts, self._plant, self._rules,
-            self._suite, self._found, self.layout.offsets, self._flat,
+            np.ascontiguousarray(action), self.state, self.course, self.facts, self._senses, self._plant, self._rules,
+            self._suite, self.layout.offsets, self._scratch,
         )  # fmt: skip
         if self.num_worlds == 1:
-            if running[0]:
-                step_world(0, *arrays)
+            if active is None or active[0]:
+                step_alone(*arrays)
         else:
             if _threads_of_parent:
                 raise RuntimeError(
                     "several worlds can't be stepped in a process forked after Numba's threads had started; "
                     "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
                 )
-            step_worlds(running, *arrays)
+            running = np.ones(self.num_worlds, np.bool_) if active is None else active
+            step_worlds(min(get_num_threads(), len(self._scratch.reals)), running, *arrays)
         return self.percept
 
 
@@ -256,4 +270,5 @@ def _rules(scenario: Scenario) -> Rules:
         spread=scenario.arrival.spread_m * growth(scenario.swarm.num_vehicles),
         arrival_radii=np.array([scenario.arrival.radius_m, *ARRIVAL_RADII_M]),
         loss_ticks=loss_ticks(scenario),
+        cell_side=_CELL_SPACINGS * scenario.start.spacing_m,
     )

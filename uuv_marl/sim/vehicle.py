@@ -8,7 +8,8 @@ import math
 from typing import NamedTuple
 
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.compiled import compiled_inline
+from uuv_marl.sim.trigonometry import cos_sin
 
 Vector3 = tuple[float, float, float]
 State6 = tuple[float, float, float, float, float, float]
@@ -76,7 +77,7 @@ def plant(scenario: Scenario) -> Plant:
     )
 
 
-@compiled
+@compiled_inline
 def coriolis(u: float, v: float, r: float, p: Plant) -> Vector3:
     """C(nu) nu = (C_RB + C_A) nu [N, N, N m]. Eq. 4. Does no work: nu . C nu = 0."""
     a = p.m * (p.x_G * r + v) - p.Y_vdot * v - p.Y_rdot * r
@@ -84,7 +85,7 @@ def coriolis(u: float, v: float, r: float, p: Plant) -> Vector3:
     return -a * r, b * r, a * u - b * v
 
 
-@compiled
+@compiled_inline
 def damping(u: float, v: float, r: float, p: Plant) -> Vector3:
     """D(nu) nu = (D_l + D_nl) nu [N, N, N m]. Eq. 4."""
     return (
@@ -94,7 +95,7 @@ def damping(u: float, v: float, r: float, p: Plant) -> Vector3:
     )
 
 
-@compiled
+@compiled_inline
 def acceleration(u: float, v: float, r: float, tau_u: float, tau_r: float, p: Plant) -> Vector3:
     """Nu' = M^-1 (tau - C(nu) nu - D(nu) nu) [m/s2, m/s2, rad/s2]. Eq. 2."""
     c_u, c_v, c_r = coriolis(u, v, r, p)
@@ -107,15 +108,15 @@ def acceleration(u: float, v: float, r: float, tau_u: float, tau_r: float, p: Pl
     )
 
 
-@compiled
+@compiled_inline
 def derivative(psi: float, u: float, v: float, r: float, tau_u: float, tau_r: float, p: Plant) -> State6:
     """Rate of the joint state (eta, nu). Eq. 1-2; R(psi) takes body to north-east."""
-    c, s = math.cos(psi), math.sin(psi)
+    c, s = cos_sin(psi)
     du, dv, dr = acceleration(u, v, r, tau_u, tau_r, p)
     return c * u - s * v, s * u + c * v, r, du, dv, dr
 
 
-@compiled
+@compiled_inline
 def advance(
     x: float, y: float, psi: float, u: float, v: float, r: float, tau_u: float, tau_r: float, h: float, p: Plant
 ) -> State6:
@@ -136,30 +137,30 @@ def advance(
     )
 
 
-@compiled
+@compiled_inline
 def wrap(angle: float) -> float:
     """The same angle [rad] in [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@compiled
+@compiled_inline
 def project(a_x: float, a_y: float) -> tuple[float, float]:
     """The nearest action on the unit disc, direction kept."""
-    norm = math.hypot(a_x, a_y)
+    norm = math.sqrt(a_x * a_x + a_y * a_y)
     if norm > 1.0:
         return a_x / norm, a_y / norm
     return a_x, a_y
 
 
-@compiled
+@compiled_inline
 def turned(a_x: float, a_y: float, angle: float, p: Plant) -> tuple[float, float]:
     """The action that keeps the same horizontal force in the world after the vehicle has turned by an angle [rad]."""
     f_x, f_y = a_x * p.max_force, a_y * p.max_torque / p.lever_arm
-    c, s = math.cos(angle), math.sin(angle)
+    c, s = cos_sin(angle)
     return (c * f_x + s * f_y) / p.max_force, (c * f_y - s * f_x) * p.lever_arm / p.max_torque
 
 
-@compiled
+@compiled_inline
 def actuators(a_x: float, a_y: float, r: float, p: Plant) -> tuple[float, float]:
     """Thrust [N] and torque [N m] of a body-frame action on the unit disc, with the inner yaw-damping loop. Eq. 22."""
     torque = p.max_torque * a_y - p.yaw_damping * r

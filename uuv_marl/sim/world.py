@@ -1,4 +1,4 @@
-"""One world, compiled: move, lose, survey, judge arrival, write percepts. ``Swarm`` holds the arrays it works on.
+"""One world, compiled: move, lose, measure, judge arrival, hear. ``Swarm`` holds the arrays it works on.
 
 Every array's first axis is the world; each function touches the rows of one world only, so that a world's run never
 depends on its neighbours in the batch.
@@ -12,13 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.percept import Offsets
+from uuv_marl.sim.cells import Cells, Grid, max_cells, sort
 from uuv_marl.sim.compiled import compiled, compiled_parallel
-from uuv_marl.sim.sonar import Suite, Survey, survey_world, write_percept
+from uuv_marl.sim.motion import Columns, aim, load, move, push
+from uuv_marl.sim.sonar import Ear, Suite, hear, write_percept
+from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
 from uuv_marl.sim.trajectory import reference
-from uuv_marl.sim.vehicle import Plant, actuators, advance, project, turned, wrap
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.sim.vehicle import Plant
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
+Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
@@ -55,6 +60,17 @@ class Course(NamedTuple):
     """Obstacles of each world, shape (world,)."""
     losses: Int64
     """Vehicle lost at each scheduled loss, shape (world, loss)."""
+
+
+class Senses(NamedTuple):
+    """What was heard at the latest step, and the percept made of it."""
+
+    heading: Float64
+    """Cosine and sine of psi, shape (world, vehicle, 2)."""
+    heard: Int32
+    """Index of the vehicle heard in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
+    percept: Float32
+    """Flat percepts in physical units, zero for the lost, shape (world, vehicle, entry)."""
 
 
 class Facts(NamedTuple):
@@ -103,33 +119,65 @@ class Rules(NamedTuple):
     spread: float
     arrival_radii: Float64
     loss_ticks: Int64
+    cell_side: float
+
+
+class Scratch(NamedTuple):
+    """Room to work in, for each thread. A few arrays, since each that is passed from Python costs time."""
+
+    reals: Float64
+    """Columns of vehicles, shape (thread, column, vehicle)."""
+    wholes: Int64
+    """The same."""
+    shorts: Int32
+    """The same."""
+    sector_reals: Float64
+    """Columns of sub-sectors, shape (thread, column, sector + 1)."""
+    sector_wholes: Int64
+    """The same."""
+    first: Int64
+    """``Cells.first``, shape (thread, cell + 1)."""
+
+
+def scratch(threads: int, num_vehicles: int, num_sectors: int) -> Scratch:
+    """Scratch with a cache line between one thread's and the next's."""
+    n, k = num_vehicles + 16, num_sectors + 9
+    return Scratch(
+        reals=np.zeros((threads, 24, n)),
+        wholes=np.zeros((threads, 5, n), np.int64),
+        shorts=np.zeros((threads, 2, n), np.int32),
+        sector_reals=np.zeros((threads, 4, k)),
+        sector_wholes=np.zeros((threads, 1, k), np.int64),
+        first=np.zeros((threads, max_cells(num_vehicles) + 9), np.int64),
+    )
 
 
 @compiled
-def move(w: int, forces: Float64, state: State, facts: Facts, plant: Plant, rules: Rules) -> None:
-    """One control hold: actions become forces, forces become motion. Eq. 1-4, 22-24.
+def desk(room: Scratch, t: int) -> tuple[Columns, Cells, Ear]:
+    """Thread t's scratch by name."""
+    a, b, c, d = room.reals[t], room.wholes[t], room.shorts[t], room.sector_reals[t]
+    return (
+        Columns(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13]),
+        Cells(a[14], a[15], a[16], a[17], b[0], b[1], a[18], b[2], room.first[t]),
+        Ear(
+            room.sector_wholes[t, 0], d[0], d[1], d[2], d[3], a[19], a[20], b[3], a[21], a[22], a[23], c[0], b[4], c[1]
+        ),
+    )
 
-    ``forces`` (vehicle, 3) keeps each vehicle's projected action and the heading at which it was decided.
-    """
-    eta, nu = state.eta[w], state.nu[w]
-    for i in range(eta.shape[0]):
-        state.before[w, i, 0], state.before[w, i, 1] = eta[i, 0], eta[i, 1]
+
+@compiled
+def hold(w: int, first: bool, state: State, facts: Facts, plant: Plant, rules: Rules, now: Columns) -> None:
+    """Actions become forces, forces become motion. Eq. 1-4, 22-24."""
+    push(first, now, plant)
+    move(rules.steps, rules.step_s, now, plant)
+    for i in range(state.eta.shape[1]):
+        state.before[w, i, 0], state.before[w, i, 1] = state.eta[w, i, 0], state.eta[w, i, 1]
         if not state.alive[w, i]:
             continue
-        x, y, psi, u, v, r = eta[i, 0], eta[i, 1], eta[i, 2], nu[i, 0], nu[i, 1], nu[i, 2]
-        turn = psi - forces[i, 2]
-        a_x, a_y = forces[i, 0], forces[i, 1]
-        if turn != 0.0:
-            a_x, a_y = turned(a_x, a_y, turn, plant)
-            a_x, a_y = project(a_x, a_y)
-        tau_u, tau_r = actuators(a_x, a_y, r, plant)
-        for _ in range(rules.steps):
-            x, y, psi, u, v, r = advance(x, y, psi, u, v, r, tau_u, tau_r, rules.step_s, plant)
-        eta[i, 0], eta[i, 1], eta[i, 2] = x, y, wrap(psi)
-        nu[i, 0], nu[i, 1], nu[i, 2] = u, v, r
-        squared = a_x * a_x + a_y * a_y
-        facts.effort[w, i] += squared / rules.holds
-        if squared >= 1.0 - 1e-6:
+        state.eta[w, i, 0], state.eta[w, i, 1], state.eta[w, i, 2] = now.x[i], now.y[i], now.psi[i]
+        state.nu[w, i, 0], state.nu[w, i, 1], state.nu[w, i, 2] = now.u[i], now.v[i], now.r[i]
+        facts.effort[w, i] += now.effort[i] / rules.holds
+        if now.effort[i] >= 1.0 - 1e-6:
             facts.saturated[w] += 1.0
 
 
@@ -151,26 +199,24 @@ def drop(w: int, i: int, state: State, facts: Facts) -> None:
 
 
 @compiled
-def look(w: int, listens: bool, state: State, course: Course, rules: Rules, suite: Suite, found: Survey) -> None:
-    """Survey the pairs of a world as it stands."""
-    survey_world(
-        state.eta[w], state.before[w], state.alive[w], course.obstacles[w], course.num_obstacles[w],
-        rules.hull, listens, suite, found,
-    )  # fmt: skip
+def arrange(w: int, state: State, rules: Rules, now: Columns, cells: Cells) -> Grid:
+    """Sort the living into cells."""
+    return sort(now.x, now.y, now.cos, now.sin, state.alive, w, rules.cell_side, cells)
 
 
 @compiled
-def keep(w: int, facts: Facts, found: Survey) -> None:
-    """Fold one survey into the facts of the step."""
-    for i in range(found.spacing.shape[0]):
-        facts.spacing[w, i] = min(facts.spacing[w, i], found.spacing[i])
-        facts.clearance[w, i] = min(facts.clearance[w, i], found.clearance[i])
-        facts.contacts[w, i] += found.contacts[i]
-    for k in range(found.obstacle_clearance.shape[0]):
-        facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], found.obstacle_clearance[k])
-    facts.min_spacing[w] = min(facts.min_spacing[w], found.extremes[0])
-    facts.max_spacing[w] = found.extremes[1]
-    facts.collisions[w] += int(found.extremes[2])
+def measure(w: int, state: State, course: Course, facts: Facts, rules: Rules, cells: Cells, grid: Grid) -> int:
+    """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
+    began = measure_vehicles(w, rules.hull, state.before, cells, grid, facts.spacing, facts.contacts)
+    began += measure_obstacles(
+        w, rules.hull, state.before, course.obstacles, course.num_obstacles[w], cells, grid,
+        facts.clearance, facts.obstacle_clearance, facts.contacts,
+    )  # fmt: skip
+    for i in range(state.alive.shape[1]):
+        facts.min_spacing[w] = min(facts.min_spacing[w], facts.spacing[w, i])
+    facts.max_spacing[w] = extent(cells, grid)
+    facts.collisions[w] += began
+    return began
 
 
 @compiled
@@ -203,18 +249,25 @@ def judge(w: int, state: State, course: Course, facts: Facts, rules: Rules) -> N
 
 @compiled
 def perceive(
-    w: int, state: State, course: Course, facts: Facts, suite: Suite, found: Survey, at: Offsets, percept: Float32
-) -> None:
-    """Write the percepts of a world; those of lost vehicles are zero."""
-    l_now = (facts.reference[w, 0], facts.reference[w, 1], facts.reference[w, 2], facts.reference[w, 3])
-    for i in range(state.eta.shape[1]):
-        if state.alive[w, i]:
-            write_percept(
-                i, state.eta[w], state.nu[w], found.heading, found.heard[i], l_now,
-                course.obstacles[w], course.num_obstacles[w], suite, at, percept[w, i],
-            )  # fmt: skip
-        else:
-            percept[w, i] = 0.0
+    w: int, state: State, course: Course, facts: Facts, suite: Suite, at: Offsets, senses: Senses, now: Columns,
+    cells: Cells, grid: Grid, ear: Ear,
+) -> None:  # fmt: skip
+    """What the living hear, and everybody's percept."""
+    for i in range(state.alive.shape[1]):
+        senses.heading[w, i, 0], senses.heading[w, i, 1] = now.cos[i], now.sin[i]
+        if not state.alive[w, i]:  # its columns have moved on, its state has not
+            senses.heading[w, i, 0], senses.heading[w, i, 1] = cos_sin(state.eta[w, i, 2])
+            senses.heard[w, i] = -1
+            senses.percept[w, i] = 0.0
+    num_obstacles = course.num_obstacles[w]
+    for p in range(grid.living):
+        hear(p, w, course.obstacles, num_obstacles, cells, grid, suite, ear)
+        i = cells.vehicle[p]
+        for k in range(suite.lower.shape[0]):
+            senses.heard[w, i, k] = ear.heard[k]
+        write_percept(
+            p, w, state.nu, facts.reference, course.obstacles, num_obstacles, cells, suite, ear, at, senses.percept
+        )
 
 
 @compiled
@@ -232,66 +285,80 @@ def clear(w: int, facts: Facts) -> None:
 
 
 @compiled
-def scratch(found: Survey, w: int) -> Survey:
-    """One world's rows of the scratch arrays."""
-    return Survey(
-        found.heading[w], found.nearest[w], found.heard[w], found.spacing[w], found.clearance[w],
-        found.obstacle_clearance[w], found.contacts[w], found.extremes[w],
-    )  # fmt: skip
-
-
-@compiled
 def observe_world(
-    w: int, state: State, course: Course, facts: Facts, rules: Rules, suite: Suite, found: Survey, at: Offsets,
-    percept: Float32,
+    w: int, state: State, course: Course, facts: Facts, senses: Senses, rules: Rules, suite: Suite, at: Offsets,
+    room: Scratch,
 ) -> None:  # fmt: skip
     """Facts and percepts of a world that has just been reset."""
-    mine = scratch(found, w)
+    now, cells, ear = desk(room, 0)
     clear(w, facts)
     state.dwell[w] = 0
     facts.arrival_s[w] = math.nan
-    look(w, True, state, course, rules, suite, mine)
-    keep(w, facts, mine)
+    load(w, state.eta, state.nu, now)
+    grid = arrange(w, state, rules, now, cells)
+    measure(w, state, course, facts, rules, cells, grid)
     judge(w, state, course, facts, rules)
-    perceive(w, state, course, facts, suite, mine, at, percept)
+    perceive(w, state, course, facts, suite, at, senses, now, cells, grid, ear)
+
+
+@compiled
+def pass_hold(
+    w: int, first: bool, state: State, course: Course, facts: Facts, plant: Plant, rules: Rules, now: Columns,
+    cells: Cells,
+) -> Grid:  # fmt: skip
+    """One control hold of world w and what becomes true by it; the cells of the living afterwards."""
+    hold(w, first, state, facts, plant, rules, now)
+    state.tick[w] += 1
+    lose(w, state, course, facts, rules)
+    grid = arrange(w, state, rules, now, cells)
+    began = measure(w, state, course, facts, rules, cells, grid)
+    if rules.contact_ends and began > 0:
+        for i in range(state.alive.shape[1]):
+            if facts.contacts[w, i] > 0:
+                drop(w, i, state, facts)
+        grid = arrange(w, state, rules, now, cells)
+    judge(w, state, course, facts, rules)
+    return grid
 
 
 @compiled
 def step_world(
-    w: int, action: Float32, forces: Float64, state: State, course: Course, facts: Facts, plant: Plant, rules: Rules,
-    suite: Suite, found: Survey, at: Offsets, percept: Float32,
+    w: int, action: Float32, state: State, course: Course, facts: Facts, senses: Senses, plant: Plant, rules: Rules,
+    suite: Suite, at: Offsets, now: Columns, cells: Cells, ear: Ear,
 ) -> None:  # fmt: skip
     """One decision period of a world. ``action`` (world, vehicle, 2) holds shares of full force, body frame."""
-    mine = scratch(found, w)
     clear(w, facts)
     num_alive = 0
     for i in range(action.shape[1]):
-        a_x, a_y = project(float(action[w, i, 0]), float(action[w, i, 1]))
-        forces[w, i, 0], forces[w, i, 1], forces[w, i, 2] = a_x, a_y, state.eta[w, i, 2]
         num_alive += int(state.alive[w, i])
-    for hold in range(rules.holds):
-        move(w, forces[w], state, facts, plant, rules)
-        state.tick[w] += 1
-        lose(w, state, course, facts, rules)
-        listens = hold == rules.holds - 1
-        look(w, listens, state, course, rules, suite, mine)
-        keep(w, facts, mine)
-        if rules.contact_ends and mine.extremes[2] > 0.0:
-            for i in range(action.shape[1]):
-                if mine.contacts[i] > 0:
-                    drop(w, i, state, facts)
-            look(w, listens, state, course, rules, suite, mine)
-        judge(w, state, course, facts, rules)
+    load(w, state.eta, state.nu, now)
+    aim(w, action, now)
+    grid = pass_hold(w, True, state, course, facts, plant, rules, now, cells)
+    for _ in range(1, rules.holds):
+        grid = pass_hold(w, False, state, course, facts, plant, rules, now, cells)
     facts.saturated[w] /= max(num_alive * rules.holds, 1)
-    perceive(w, state, course, facts, suite, mine, at, percept)
+    perceive(w, state, course, facts, suite, at, senses, now, cells, grid, ear)
+
+
+@compiled
+def step_alone(
+    action: Float32, state: State, course: Course, facts: Facts, senses: Senses, plant: Plant, rules: Rules,
+    suite: Suite, at: Offsets, room: Scratch,
+) -> None:  # fmt: skip
+    """One decision period of the only world."""
+    now, cells, ear = desk(room, 0)
+    step_world(0, action, state, course, facts, senses, plant, rules, suite, at, now, cells, ear)
 
 
 @compiled_parallel
 def step_worlds(
-    active: Bool, action: Float32, forces: Float64, state: State, course: Course, facts: Facts, plant: Plant,
-    rules: Rules, suite: Suite, found: Survey, at: Offsets, percept: Float32,
+    threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
+    plant: Plant, rules: Rules, suite: Suite, at: Offsets, room: Scratch,
 ) -> None:  # fmt: skip
-    """One decision period of every active world, worlds spread over threads."""
-    for w in numba.prange(action.shape[0]):
-        if active[w]:
-            step_world(w, action, forces, state, course, facts, plant, rules, suite, found, at, percept)
+    """One decision period of every active world; each thread takes a run of worlds."""
+    share = (action.shape[0] + threads - 1) // threads
+    for t in numba.prange(threads):
+        now, cells, ear = desk(room, t)
+        for w in range(t * share, min((t + 1) * share, action.shape[0])):
+            if active[w]:
+                step_world(w, action, state, course, facts, senses, plant, rules, suite, at, now, cells, ear)

@@ -1,0 +1,455 @@
+"""Speed never changes physics: same neighbours, and states within 4 ulp per control hold of the plain kernel."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from tests import plain
+from uuv_marl import load_scenario
+from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.sim.vehicle import plant
+
+BASE = load_scenario("tracking")
+SIZES = (1, 2, 3, 54, 300, 600)
+GRIDS = [n for n in SIZES if n > ONE_CELL_UP_TO]
+
+
+def agree(ours, theirs, summed=0.0, ulps=4):
+    """Equal within ``ulps`` of the larger of the value and what it sums, since cancellation is no error."""
+    ours, theirs = np.asarray(ours), np.asarray(theirs)
+    with np.errstate(invalid="ignore"):
+        room = ulps * np.spacing(np.maximum(np.maximum(np.abs(ours), np.abs(theirs)), summed))
+        wrong = ~((ours == theirs) | (np.abs(ours - theirs) <= room))
+    assert not wrong.any(), (np.argwhere(wrong)[:5], ours[wrong][:5], theirs[wrong][:5])
+
+
+# --- Motion ---
+
+
+def summed_in_a_hold(speed, push, p, hold_s):
+    """Sizes of what a control hold adds to (x, y, psi, u, v, r) at these speeds and this share of full force.
+
+    The heading also sums pi, which ``wrap`` adds and takes away.
+    """
+    u, v, r = speed
+    thrust, torque = push * p.max_force, push * p.max_torque + p.yaw_damping * r
+    surge = p.inverse_11 * (thrust + (p.m - p.Y_vdot) * v * r + (p.X_u + p.X_uu * u) * u)
+    sway = p.inverse_22 * ((p.m - p.X_udot) * u * r + (p.Y_v + p.Y_vv * v) * v)
+    yaw = p.inverse_33 * (torque + (p.X_udot - p.Y_vdot) * u * v + (p.N_r + p.N_rr * r) * r)
+    far = hold_s * (u + v)
+    return np.array([far, far, np.full_like(u, math.pi), hold_s * surge, hold_s * sway, hold_s * yaw])
+
+
+CLOCKS = {
+    "one hold": {},
+    "five holds": {"timing.decision_period_s": 0.5},
+    "fine steps": {"timing.integration_step_s": 0.02},
+    "five holds of fine steps": {"timing.decision_period_s": 0.5, "timing.integration_step_s": 0.02},
+    "yaw damping": {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0},
+    "coupled": {"timing.decision_period_s": 0.5, "vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0,
+                "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0, "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0},
+}  # fmt: skip
+
+
+@functools.cache
+def fleet(clock):
+    swarm = Swarm(load_scenario(BASE, num_vehicles=54, overrides=CLOCKS[clock]))
+    swarm.reset(0)
+    return swarm
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+@settings(max_examples=12)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, 1e-6]), st.booleans())
+def test_states_are_those_of_the_plain_kernel(clock, seed, small, astern):
+    rng, swarm = np.random.default_rng(seed), fleet(clock)
+    n, p, timing = swarm.num_vehicles, plant(swarm.scenario), swarm.scenario.timing
+    eta, nu = swarm.state.eta[0], swarm.state.nu[0]
+    eta[:, :2] = rng.uniform(-1000, 1000, (n, 2)) * small
+    eta[:, 2] = rng.uniform(-math.pi, math.pi, n)
+    if astern:  # where the heading wraps
+        eta[:, 2] = math.pi * (1.0 - 10.0 ** rng.uniform(-16, -1, n)) * rng.choice([-1, 1], n)
+    nu[:] = rng.uniform(-1, 1, (n, 3)) * [6, 3, 3] * small
+    action = (rng.uniform(-1.5, 1.5, (1, n, 2)) * small).astype(np.float32)
+    clocks = timing.holds_per_decision, timing.steps_per_hold, timing.integration_step_s
+    was = np.abs(np.hstack([eta, nu]))
+    slow = [
+        plain.decide(*vehicle, p, *clocks)
+        for vehicle in zip(eta.tolist(), nu.tolist(), action[0].tolist(), strict=True)
+    ]
+    swarm.step(action)
+    then = np.array([[*place, *velocity] for place, velocity, _ in slow])
+    now = np.hstack([eta, nu])
+    # -pi and the heading just below pi are the same.
+    now[:, 2] = then[:, 2] + [math.remainder(turn, 2.0 * math.pi) for turn in now[:, 2] - then[:, 2]]
+    push = np.minimum(np.hypot(*action[0].T.astype(float)), 1.0)
+    summed = summed_in_a_hold(np.maximum(was, np.abs(then))[:, 3:].T, push, p, timing.control_hold_s)
+    agree(now, then, np.maximum(was, summed.T), ulps=4 * timing.holds_per_decision)
+    np.testing.assert_allclose(swarm.facts.effort[0], [effort for _, _, effort in slow], rtol=1e-14)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e10, 1e25, 3e38])
+def test_an_action_of_any_size_is_projected_onto_the_unit_disc(size):
+    swarm = fleet("one hold")
+    swarm.reset(0)
+    swarm.step(np.full((1, 54, 2), size, np.float32))
+    np.testing.assert_allclose(swarm.facts.effort, 1.0, rtol=1e-15)
+
+
+def test_headings_are_those_of_the_poses_also_for_the_lost():
+    swarm = fleet("five holds")
+    swarm.reset(0)
+    swarm.state.alive[0, ::3] = False
+    action = np.full((1, 54, 2), 0.7, np.float32)
+    action[0, ::6] = np.nan
+    for _ in range(3):
+        swarm.step(action)
+        psi = swarm.state.eta[0, :, 2]
+        np.testing.assert_allclose(swarm.heading[0], np.stack([np.cos(psi), np.sin(psi)], 1), rtol=0, atol=1e-15)
+
+
+# --- Sine and cosine ---
+
+
+@given(st.floats(-1000, 1000))
+@example(1000.0)
+@example(-math.pi)
+def test_cos_sin_is_the_library_s(angle):
+    c, s = cos_sin(angle)
+    assert abs(c - math.cos(angle)) <= 1e-15
+    assert abs(s - math.sin(angle)) <= 1e-15
+    assert abs(c * c + s * s - 1.0) <= 1e-15
+
+
+def test_cos_sin_at_and_around_the_edges_of_quadrants():
+    for quarter in range(-640, 641):
+        for edge in (quarter * math.pi / 2, quarter * math.pi / 2 + math.pi / 4):
+            for angle in (edge, math.nextafter(edge, math.inf), math.nextafter(edge, -math.inf)):
+                c, s = cos_sin(angle)
+                assert abs(c - math.cos(angle)) <= 1e-15
+                assert abs(s - math.sin(angle)) <= 1e-15
+                mirrored = cos_sin(-angle)
+                assert abs(c - mirrored[0]) <= 2.3e-16
+                assert abs(s + mirrored[1]) <= 2.3e-16
+
+
+def test_cosine_is_even_and_sine_odd_and_both_exact_at_zero():
+    for angle in np.random.default_rng(0).uniform(-1000, 1000, 1000):
+        c, s = cos_sin(angle)
+        assert cos_sin(-angle) == (c, -s)
+    assert cos_sin(0.0) == (1.0, 0.0)
+    assert cos_sin(1e-200) == (1.0, 1e-200)
+    assert all(map(math.isnan, cos_sin(math.nan)))
+
+
+# --- Neighbours, distances, contacts ---
+
+
+def array(name, mounting, aperture, sub_sectors, range_m, kind="passive"):
+    return {"name": name, "kind": kind, "mounting_deg": mounting, "aperture_deg": aperture, "range_m": range_m,
+            "sub_sectors": sub_sectors}  # fmt: skip
+
+
+SUITES = {
+    "as set": None,
+    "hiding": None,
+    "overlapping": [
+        array("a", 0, 120, 7, 100, "active"), array("b", 20, 180, 5, 300.5), array("c", 7, 360, 9, 150),
+        array("d", -55, 33, 4, 4000),
+    ],
+    "twice": [array("a", 0, 120, 4, 100), array("b", 0, 120, 4, 500), array("c", 0, 120, 4, 100)],
+    "blind gaps": [array("a", 0, 60, 3, 100, "active"), array("b", 180, 30, 1, 500), array("c", 32, 4, 1, 250)],
+    "one wide": [array("a", 0, 120, 1, 500)],
+    "narrow": [array("a", 0, 5, 64, 500), array("b", 180, 5, 64, 500)],
+    "nearly coincident edges": [
+        array("a", 0, 60, 2, 500), array("b", 45 + 1e-7, 30, 1, 500), array("c", 90, 60 - 2e-7, 1, 500),
+        array("d", -30, 60 + 2e-7, 3, 300), array("e", 180, 120, 3, 500),
+    ],
+}  # fmt: skip
+
+
+def turned_by_30(rng, n):
+    return rng.integers(-6, 6, n) * (math.pi / 6)
+
+
+def headed(rng, x, y, psi=None):
+    n = len(x)
+    return np.stack([x, y, rng.uniform(-math.pi, math.pi, n) if psi is None else psi], 1)
+
+
+def uniform(rng, n):
+    return headed(rng, *rng.uniform(-30, 30, (2, n)) * math.sqrt(n))
+
+
+def lattice(rng, n):
+    """Equal distances, and bearings on edges."""
+    side = math.ceil(math.sqrt(1.3 * n))
+    chosen = rng.permutation(side * side)[:n]
+    return headed(rng, chosen // side * 20.0, chosen % side * 20.0, turned_by_30(rng, n))
+
+
+def line(rng, n):
+    along = rng.permutation(n) * 13.0
+    return headed(rng, *((along, 0.0 * along) if rng.random() < 0.5 else (0.0 * along, along)), turned_by_30(rng, n))
+
+
+def oblique_line(rng, n):
+    along = rng.uniform(0, 20.0 * n, n)
+    return headed(rng, 0.6 * along, -0.8 * along)
+
+
+def all_in_a_metre(rng, n):
+    return headed(rng, *rng.uniform(50, 51, (2, n)))
+
+
+def coincident(rng, n):
+    x, y = rng.uniform(-100, 100, (2, (n + 2) // 3))
+    return headed(rng, np.resize(x, n), np.resize(y, n))
+
+
+def two_clusters(rng, n):
+    away = rng.integers(0, 2, n)
+    return headed(rng, *rng.normal(0, 40, (2, n)) + np.outer([3000.0, -4000.0], away))
+
+
+def outlier(rng, n):
+    eta = uniform(rng, n)
+    eta[rng.integers(n), :2] = 12000.0, -16000.0
+    return eta
+
+
+def range_edges(rng, n):
+    """Around the first vehicle, one ulp inside, at and outside the ranges of 100 m and 500 m."""
+    edge = rng.choice([100.0, 500.0], n)
+    radius = np.choose(rng.integers(0, 3, n), [edge, np.nextafter(edge, 0), np.nextafter(edge, 1e9)])
+    where = rng.integers(0, 12, n)
+    axes = np.array([[1, 0], [0, 1], [-1, 0], [0, -1], [0.6, 0.8], [-0.8, 0.6]])[where % 6].T
+    angle = rng.uniform(-math.pi, math.pi, n)
+    x, y = radius * np.where(where < 6, axes, [np.cos(angle), np.sin(angle)])
+    x[0] = y[0] = 0.0
+    return headed(rng, x, y, turned_by_30(rng, n))
+
+
+def rows_on_cell_edges(rng, n):
+    """Few vehicles far apart on a lattice of whole cells, the others in a corner; bearings on edges."""
+    along = np.arange(36) * 97.5
+    x, y = (along % (6 * 97.5))[:n], (along // (6 * 97.5) * 97.5)[:n]
+    eta = headed(rng, np.zeros(n), np.zeros(n), turned_by_30(rng, n))
+    eta[: len(x), 0], eta[: len(x), 1] = x, y
+    eta[36:, :2] = rng.uniform(0, 0.5, (max(n - 36, 0), 2))
+    return rng.permuted(eta, axis=0) if n < 36 else eta
+
+
+def far_away(rng, n):
+    return uniform(rng, n) + np.array([1e7, -3e7, 0.0])
+
+
+def some_lost(rng, n):
+    return uniform(rng, n)
+
+
+def all_lost(rng, n):
+    return uniform(rng, n)
+
+
+def all_lost_but_one(rng, n):
+    return uniform(rng, n)
+
+
+LAYOUTS = (uniform, lattice, line, oblique_line, all_in_a_metre, coincident, two_clusters, outlier, range_edges,
+           rows_on_cell_edges, far_away, some_lost, all_lost, all_lost_but_one)  # fmt: skip
+DISCS = ((40.0, 30.0, 25.0), (-80.0, 20.0, 10.0), (50.5, 50.5, 0.3), (150.0, -200.0, 60.0))
+
+
+@functools.cache
+def world(suite, n):
+    """A world to be filled by hand."""
+    changes = {"sonar.obstacles_hide_vehicles": suite == "hiding"}
+    if SUITES[suite]:
+        changes["sonar.arrays"] = SUITES[suite]
+    discs = [{"centre_m": [5000.0 + 200.0 * k, 9000.0], "radius_m": disc[2]} for k, disc in enumerate(DISCS)]
+    swarm = Swarm(load_scenario(BASE, num_vehicles=n, overrides={**changes, "obstacles": discs}))
+    swarm.reset(0)
+    swarm.course.obstacles[0] = DISCS
+    return swarm
+
+
+def fill(swarm, layout, seed):
+    rng, n = np.random.default_rng(seed), swarm.num_vehicles
+    state = swarm.state
+    state.eta[0] = layout(rng, n)
+    state.before[0] = state.eta[0, :, :2] + rng.normal(0, 1, (n, 2))
+    state.alive[0] = rng.random(n) < {some_lost: 0.7, all_lost: 0.0, all_lost_but_one: 0.0}.get(layout, 1.0)
+    if layout is all_lost_but_one:
+        state.alive[0, rng.integers(n)] = True
+    if layout is far_away:
+        swarm.course.obstacles[0, :, :2] = np.array(DISCS)[:, :2] + [1e7, -3e7]
+    else:
+        swarm.course.obstacles[0] = DISCS
+    swarm.observe()
+
+
+def check(swarm):
+    """The world as the plain kernel sees it."""
+    sonar, facts = swarm.scenario.sonar, swarm.facts
+    eta, before, alive = swarm.state.eta[0], swarm.state.before[0], swarm.state.alive[0]
+    discs = swarm.course.obstacles[0]
+    heading, hull = swarm.heading[0], swarm.scenario.contact.hull_radius_m
+    np.testing.assert_allclose(heading, np.stack([np.cos(eta[:, 2]), np.sin(eta[:, 2])], 1), rtol=0, atol=1e-15)
+
+    hiding = discs if sonar.obstacles_hide_vehicles else discs[:0]
+    heard = plain.hear(eta, heading, alive, *plain.sub_sectors(sonar.arrays), hiding)
+    np.testing.assert_array_equal(swarm.heard[0], heard)
+    dx, dy = (eta[heard, axis] - eta[:, None, axis] for axis in (0, 1))
+    c, s = heading[:, None, 0], heading[:, None, 1]
+    there = np.stack([c * dx + s * dy, c * dy - s * dx], 2).astype(np.float32)
+    np.testing.assert_array_equal(swarm.percept["neighbour"][0], np.where(heard[:, :, None] >= 0, there, 0))
+
+    spacing, largest, met = plain.measure_vehicles(eta, before, alive, hull)
+    agree(facts.spacing[0], spacing)
+    agree(facts.min_spacing[0], spacing.min())
+    agree(facts.max_spacing[0], largest)
+    clearance, reached, touched = plain.measure_obstacles(eta, before, alive, hull, discs)
+    span = np.abs(np.subtract.outer(eta[:, :2], discs[:, :2])).max() + discs[:, 2].max()
+    agree(facts.clearance[0], clearance, span)
+    agree(facts.obstacle_clearance[0], reached, span)
+    np.testing.assert_array_equal(facts.contacts[0], met + touched)
+    assert facts.collisions[0] == met.sum() // 2 + touched.sum()
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
+@pytest.mark.parametrize("suite", SUITES)
+def test_neighbours_distances_and_contacts_are_those_of_the_plain_kernel(suite, layout):
+    for n in SIZES if suite in ("as set", "hiding") else (3, 54, 300):
+        for seed in range(2 if n > 54 else 4):
+            swarm = world(suite, n)
+            fill(swarm, layout, seed)
+            check(swarm)
+
+
+@pytest.mark.parametrize("n", [ONE_CELL_UP_TO, ONE_CELL_UP_TO + 1])
+@pytest.mark.parametrize("suite", ["as set", "overlapping"])
+def test_the_last_swarm_of_one_cell_and_the_first_of_many(suite, n):
+    for layout in LAYOUTS:
+        fill(world(suite, n), layout, 5)
+        check(world(suite, n))
+
+
+def test_a_bearing_on_an_edge_along_the_border_of_a_cell_is_heard():
+    """Far from the listener, where rounding puts the sub-sector's edge into the next row or column of cells."""
+    n, cell = 300, 16.25
+    for mounting in np.arange(-166.0, -158.0) + 0.3:
+        sonar = {"sonar.arrays": [array("a", mounting, 60, 1, 500)]}
+        swarm = Swarm(load_scenario(BASE, num_vehicles=n, overrides=sonar))
+        swarm.reset(0)
+        (lower,), (upper,), _ = sectors = plain.sub_sectors(swarm.scenario.sonar.arrays)
+        for k, distance in ((k, distance) for k in range(8) for distance in (6 * cell, 8 * cell)):
+            edge, quarter = (lower, upper)[k // 4], k % 4
+            ahead = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)][quarter])
+            eta = np.zeros((n, 3))
+            eta[:, :2] = -12 * cell
+            eta[:, 1 - quarter % 2] = -cell
+            eta[0, 2] = math.remainder(quarter * math.pi / 2 - math.atan2(edge[1], edge[0]), 2 * math.pi)
+            eta[0, :2], eta[1, :2], eta[2, :2] = 0.0, distance * ahead, 12 * cell
+            swarm.state.eta[0], swarm.state.before[0] = eta, eta[:, :2]
+            swarm.observe()
+            heard = plain.hear(eta, swarm.heading[0], swarm.state.alive[0], *sectors, np.zeros((0, 3)))
+            np.testing.assert_array_equal(swarm.heard[0], heard)
+
+
+def test_bearings_within_rounding_of_an_edge_where_two_bins_of_direction_meet():
+    """There the bearing may fall into the one bin and the edge into the other."""
+    for bearing in range(-127, 128, 15):
+        share = bearing / 128.0
+        lower = math.degrees(math.atan2(share, 1.0 - abs(share)))
+        sonar = {"sonar.arrays": [array("a", lower - 10, 20, 2, 500), array("b", lower + 10, 20, 2, 500)]}
+        swarm = Swarm(load_scenario(BASE, num_vehicles=2, overrides=sonar))
+        swarm.reset(0)
+        sectors = plain.sub_sectors(swarm.scenario.sonar.arrays)
+        edge = sectors[1][1] * 64.0
+        for nudge in np.ndindex(5, 5):
+            swarm.state.eta[0] = 0.0
+            swarm.state.eta[0, 1, :2] = edge + (np.array(nudge) - 2) * np.spacing(edge)
+            swarm.observe()
+            heard = plain.hear(swarm.state.eta[0], swarm.heading[0], np.ones(2, bool), *sectors, np.zeros((0, 3)))
+            np.testing.assert_array_equal(swarm.heard[0], heard)
+
+
+def grid_of(eta, side=16.25):
+    return fit(eta[:, 0].copy(), eta[:, 1].copy(), np.ones((1, len(eta)), bool), 0, side)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
+def test_large_swarms_have_a_grid_of_bounded_size_and_small_ones_one_cell(layout):
+    for n in GRIDS:
+        grid = grid_of(layout(np.random.default_rng(0), n))
+        assert 1 <= grid.rows * grid.columns <= max_cells(n)
+        if layout not in (all_in_a_metre,):
+            assert grid.rows * grid.columns > 1
+    for n in (1, ONE_CELL_UP_TO):
+        grid = grid_of(layout(np.random.default_rng(0), n))
+        assert (grid.rows, grid.columns) == (1, 1)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
+def test_one_lost_vehicle_more_calls_for_a_grid_and_changes_nothing(layout):
+    few, more = world("as set", ONE_CELL_UP_TO), world("as set", ONE_CELL_UP_TO + 1)
+    few.state.nu[0] = 0.0
+    fill(few, layout, 7)
+    for ours, theirs in zip(more.state[:4], few.state[:4], strict=True):
+        ours[0, :-1] = theirs[0]
+    more.state.alive[0, -1] = False
+    more.course.obstacles[0] = few.course.obstacles[0]
+    more.observe()
+    np.testing.assert_array_equal(more.heard[0, :-1], few.heard[0])
+    np.testing.assert_array_equal(more.percept.flat[0, :-1], few.percept.flat[0])
+    np.testing.assert_array_equal(more.facts.spacing[0, :-1], few.facts.spacing[0])
+    np.testing.assert_array_equal(more.facts.contacts[0, :-1], few.facts.contacts[0])
+    assert more.facts.max_spacing[0] == few.facts.max_spacing[0]
+
+
+def test_a_vehicle_at_rest_on_a_hull_s_distance_from_an_obstacle_never_touches_it():
+    """Where two ways of computing a distance differ by an ulp, an old gap must not count as a new contact."""
+    offset = np.random.default_rng(0).uniform(20, 40, (10000, 2))
+    x, y = next((x, y) for x, y in offset if math.sqrt(x * x + y * y) < math.hypot(x, y))
+    disc = {"centre_m": [9e3, 9e3], "radius_m": 1.0}
+    one = Swarm(load_scenario(BASE, num_vehicles=1, overrides={"obstacles": [disc]}))
+    one.reset(0)
+    one.state.eta[0], one.state.nu[0], one.course.obstacles[0, 0] = 0.0, 0.0, (x, y, math.hypot(x, y) - 1.0)
+    for _ in range(3):
+        one.step(np.zeros((1, 1, 2), np.float32))
+        assert one.facts.collisions[0] == 0
+
+
+SHAPES = {
+    "single": lambda n: np.zeros((1, 2)),
+    "two": lambda n: np.array([[0.0, 0.0], [3.0, 4.0]]),
+    "identical": lambda n: np.full((n, 2), 7.3),
+    "circle": lambda n: 200.0 * np.array([[math.cos(6.3 * k / n), math.sin(6.3 * k / n)] for k in range(n)]),
+    "triangle": lambda n: np.array([[0.0, 0.0], [100.0, 0.0], [50.0, 50.0 * math.sqrt(3)]])[np.arange(n) % 3],
+    "line": lambda n: np.outer(np.arange(n), [3.0, 4.0]),
+    "heavy end": lambda n: np.vstack([np.zeros((n - 2, 2)), [[300.0, 0.0], [280.0, 120.0]]]),
+    "lens": lambda n: np.vstack([np.outer(np.linspace(-1, 1, n - 2), [99.0, 0.0]), [[0.0, 100.0], [0.0, -100.0]]]),
+    "random": lambda n: np.random.default_rng(n).normal(0, 100, (n, 2)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [54, 300])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_largest_distance_is_found_whatever_the_shape(shape, n):
+    for shift in (0.0, 1e6):
+        points = SHAPES[shape](n) + shift
+        swarm = world("as set", n)
+        swarm.state.eta[0, : len(points), :2] = swarm.state.before[0, : len(points)] = points
+        swarm.state.alive[0] = np.arange(n) < len(points)
+        swarm.observe()
+        _, largest, _ = plain.measure_vehicles(
+            swarm.state.eta[0], swarm.state.before[0], swarm.state.alive[0], swarm.scenario.contact.hull_radius_m
+        )
+        agree(swarm.facts.max_spacing[0], largest)

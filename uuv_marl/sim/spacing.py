@@ -1,0 +1,171 @@
+"""Distances between vehicles and to obstacles, and the contacts that begin: what is measured, whoever hears it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.cells import Cells, Grid, place
+from uuv_marl.sim.compiled import compiled, compiled_inline
+
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+
+@compiled
+def find_nearest(cells: Cells, grid: Grid) -> None:
+    """Fill ``cells.nearest``, infinite where there is nobody else."""
+    cells.nearest[: grid.living] = math.inf
+    if grid.rows * grid.columns == 1:
+        for p in range(grid.living):
+            lower_all(0, p, cells.x[p], cells.y[p], cells)
+            lower_all(p + 1, grid.living, cells.x[p], cells.y[p], cells)
+    else:
+        for p in range(grid.living):
+            cells.nearest[p] = search(p, cells, grid)
+
+
+@compiled_inline
+def lower_all(first: int, end: int, x: float, y: float, cells: Cells) -> None:
+    """Let the entries ``first`` to ``end`` know of somebody at (x, y)."""
+    for q in range(first, end):
+        dx, dy = cells.x[q] - x, cells.y[q] - y
+        squared = dx * dx + dy * dy
+        cells.nearest[q] = squared if squared < cells.nearest[q] else cells.nearest[q]
+
+
+@compiled
+def search(p: int, cells: Cells, grid: Grid) -> float:
+    """Squared distance [m2] of entry p from the nearest other: in the cells around it, then in ever larger blocks."""
+    x, y, least, reach = cells.x[p], cells.y[p], math.inf, grid.side
+    while True:
+        top, bottom = (
+            place(x - reach, grid.x_min, grid.side, grid.rows),
+            place(x + reach, grid.x_min, grid.side, grid.rows),
+        )
+        left, right = (
+            place(y - reach, grid.y_min, grid.side, grid.columns),
+            place(y + reach, grid.y_min, grid.side, grid.columns),
+        )
+        for r in range(top, bottom + 1):
+            for q in range(cells.first[r * grid.columns + left], cells.first[r * grid.columns + right + 1]):
+                dx, dy = cells.x[q] - x, cells.y[q] - y
+                squared = dx * dx + dy * dy
+                least = squared if squared < least and q != p else least
+        everybody = top == 0 and left == 0 and bottom == grid.rows - 1 and right == grid.columns - 1
+        if least <= reach * reach or everybody:
+            return least
+        reach *= 2.0
+
+
+@compiled
+def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, grid: Grid) -> int:
+    """Contact episodes of entry p that begin: vehicles nearer than ``touch`` [m] now that were not ``before``."""
+    i, count = cells.vehicle[p], 0
+    rings = 0.0 if grid.rows * grid.columns == 1 else touch
+    top, bottom = (
+        place(cells.x[p] - rings, grid.x_min, grid.side, grid.rows),
+        place(cells.x[p] + rings, grid.x_min, grid.side, grid.rows),
+    )
+    left, right = (
+        place(cells.y[p] - rings, grid.y_min, grid.side, grid.columns),
+        place(cells.y[p] + rings, grid.y_min, grid.side, grid.columns),
+    )
+    for r in range(top, bottom + 1):
+        for q in range(cells.first[r * grid.columns + left], cells.first[r * grid.columns + right + 1]):
+            dx, dy = cells.x[q] - cells.x[p], cells.y[q] - cells.y[p]
+            if q == p or dx * dx + dy * dy >= touch * touch:
+                continue
+            j = cells.vehicle[q]
+            was_x, was_y = before[w, j, 0] - before[w, i, 0], before[w, j, 1] - before[w, i, 1]
+            count += int(was_x * was_x + was_y * was_y >= touch * touch)
+    return count
+
+
+@compiled
+def measure_vehicles(
+    w: int, hull: float, before: Float64, cells: Cells, grid: Grid, spacing: Float64, contacts: Int64
+) -> int:
+    """Lower ``spacing`` [m] and raise ``contacts``, shape (world, vehicle); how many episodes between vehicles began.
+
+    A contact episode begins where two hulls overlap now and did not at ``before``, shape (world, vehicle, 2) [m].
+    """
+    touch, began = 2.0 * hull, 0
+    find_nearest(cells, grid)
+    for p in range(grid.living):
+        i = cells.vehicle[p]
+        spacing[w, i] = min(spacing[w, i], math.sqrt(cells.nearest[p]))
+        if cells.nearest[p] < touch * touch:
+            new = new_contacts(w, p, touch, before, cells, grid)
+            contacts[w, i] += new
+            began += new
+    return began // 2
+
+
+@compiled
+def measure_obstacles(
+    w: int, hull: float, before: Float64, obstacles: Float64, num_obstacles: int, cells: Cells, grid: Grid,
+    clearance: Float64, obstacle_clearance: Float64, contacts: Int64,
+) -> int:  # fmt: skip
+    """Lower the clearances [m], per vehicle and per obstacle, and raise ``contacts``; how many episodes began."""
+    began = 0
+    for p in range(grid.living):
+        i = cells.vehicle[p]
+        for k in range(num_obstacles):
+            x, y, radius = obstacles[w, k, 0], obstacles[w, k, 1], obstacles[w, k, 2]
+            dx, dy = x - cells.x[p], y - cells.y[p]
+            gap = math.sqrt(dx * dx + dy * dy) - radius
+            clearance[w, i] = min(clearance[w, i], gap)
+            obstacle_clearance[w, k] = min(obstacle_clearance[w, k], gap)
+            was_x, was_y = x - before[w, i, 0], y - before[w, i, 1]
+            if gap < hull and math.sqrt(was_x * was_x + was_y * was_y) - radius >= hull:
+                contacts[w, i] += 1
+                began += 1
+    return began
+
+
+@compiled
+def farthest(x: float, y: float, cells: Cells, grid: Grid) -> int:
+    """The entry of ``cells`` farthest from (x, y), -1 for none."""
+    best, most = -1, -1.0
+    for p in range(grid.living):
+        dx, dy = cells.x[p] - x, cells.y[p] - y
+        squared = dx * dx + dy * dy
+        if squared > most:
+            best, most = p, squared
+    return best
+
+
+@compiled
+def extent(cells: Cells, grid: Grid) -> float:
+    """Largest distance between two of the living [m], infinite for fewer than two.
+
+    A pair is at most as far apart as the two are, together, from the middle; few vehicles can beat a good first guess.
+    """
+    n = grid.living
+    if n < 2:
+        return math.inf
+    x, y = 0.0, 0.0
+    for p in range(n):
+        x, y = x + cells.x[p], y + cells.y[p]
+    x, y = x / n, y / n
+    a = farthest(x, y, cells, grid)
+    b = farthest(cells.x[a], cells.y[a], cells, grid)
+    c = farthest(cells.x[b], cells.y[b], cells, grid)
+    rim = math.hypot(cells.x[a] - x, cells.y[a] - y)
+    dx, dy = cells.x[c] - cells.x[b], cells.y[c] - cells.y[b]
+    most = dx * dx + dy * dy
+    needed = max(math.sqrt(most) * (1.0 - 1e-9) - rim - 1e-9, 0.0)
+    num = 0
+    for p in range(n):
+        dx, dy = cells.x[p] - x, cells.y[p] - y
+        if dx * dx + dy * dy >= needed * needed:
+            cells.some[num] = p
+            num += 1
+    for k in range(num):
+        p = cells.some[k]
+        for m in range(k):
+            q = cells.some[m]
+            dx, dy = cells.x[p] - cells.x[q], cells.y[p] - cells.y[q]
+            most = max(most, dx * dx + dy * dy)
+    return math.sqrt(most)
