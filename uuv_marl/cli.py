@@ -123,7 +123,7 @@ def benchmark(
         from uuv_marl.benchmark.runner import DEFAULT_POLICIES, make_tables, run_missing, write_report
         from uuv_marl.benchmark.tables import rich_table
         from uuv_marl.scenario_files import ScenarioError, load_scenario, parse_override
-        from uuv_marl.sim.compiled import is_first_compilation
+        from uuv_marl.sim.compiled import announce_compilation
 
         changes = dict(parse_override(text) for text in overrides or [])
         for field in sorted({"sonar.channels", "actuators.yaw_damping_nms"} & set(changes)):
@@ -138,8 +138,7 @@ def benchmark(
             policy_class(name)
         evaluator, cluster = _where(ray, policies)
         results = Results(output, scenarios)
-        if is_first_compilation():
-            console.print("First run of this version: compiling takes about a minute, once.")
+        announce_compilation()
         wanted = list(range(seeds))
         try:
             with cluster, _progress() as progress:
@@ -279,13 +278,13 @@ def train_rllib(
         with _extra("distributed", "training with RLlib"):
             from uuv_marl.train.rllib import Settings, train
 
-        from uuv_marl.sim.compiled import is_first_compilation
+        from uuv_marl.sim.compiled import announce_compilation
 
         settings = Settings(scenario=scenario, num_vehicles=num_vehicles, seed=seed)
         records = train(output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume)
         last = "no iteration was needed: --steps are done already"
-        compiling = ", and compiling this version about a minute, once" if is_first_compilation() else ""
-        console.print(f"Starting Ray takes about 15 s{compiling}.")
+        announce_compilation()
+        console.print("Starting Ray takes about 15 s.")
         try:
             with _progress() as progress:
                 task = progress.add_task("sampling", total=steps)

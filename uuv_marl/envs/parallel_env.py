@@ -39,6 +39,7 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
+        self._rows: slice | NDArray[np.int64] = slice(None)
         layout = task.swarm.layout
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
@@ -69,6 +70,7 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
         """Start an episode. Without a seed the environment's own random stream goes on. ``options`` are ignored."""
         observation = self._task.reset(seed)[0]
         self.agents = list(self.possible_agents)
+        self._rows = slice(None)
         self._view.update(self.swarm)
         return {agent: observation[i] for i, agent in enumerate(self.agents)}, {agent: {} for agent in self.agents}
 
@@ -85,42 +87,55 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
             self._task.need_reset("step")
             raise RuntimeError("the episode is over; call reset() to start an episode")
         outcome = self._task.step(self._action_array(actions))
-        acted = self.agents
-        index = {agent: self._index[agent] for agent in acted}
-        self.agents = [agent for agent in acted if outcome.acting[0, index[agent]]]
+        acted, rows = self.agents, self._rows
+        going = outcome.acting[0, rows]
+        if not going.all():
+            self.agents = [agent for agent, goes in zip(acted, going.tolist(), strict=True) if goes]
+            self._rows = np.array([self._index[agent] for agent in self.agents], np.int64)
         self._view.update(self.swarm)
-        rewards, terminated, truncated = (
-            values[0].tolist() for values in (outcome.reward, outcome.terminated, outcome.truncated)
-        )
         return (
-            {agent: outcome.observation[0, i] for agent, i in index.items()},
-            {agent: rewards[i] for agent, i in index.items()},
-            {agent: terminated[i] for agent, i in index.items()},
-            {agent: truncated[i] for agent, i in index.items()},
-            {agent: self._info(outcome, i) for agent, i in index.items()},
+            dict(zip(acted, outcome.observation[0, rows], strict=True)),
+            dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True)),
+            dict(zip(acted, outcome.terminated[0, rows].tolist(), strict=True)),
+            dict(zip(acted, outcome.truncated[0, rows].tolist(), strict=True)),
+            self._infos(outcome, acted, rows),
         )
 
-    def _info(self, outcome: Outcome, i: int) -> dict[str, Any]:
+    def _infos(self, outcome: Outcome, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
         if not self._info_terms:
-            return {}
-        return {"reward_terms": {name: float(term[0, i]) for name, term in outcome.terms.items()}}
+            return {agent: {} for agent in agents}
+        if not outcome.terms:
+            return {agent: {"reward_terms": {}} for agent in agents}
+        terms = np.stack([term[0, rows] for term in outcome.terms.values()], axis=1).tolist()
+        return {
+            agent: {"reward_terms": dict(zip(outcome.terms, values, strict=True))}
+            for agent, values in zip(agents, terms, strict=True)
+        }
 
     def _action_array(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
-        unknown = set(actions) - self._index.keys()
-        if unknown:
-            raise ValueError(f"there is no agent {min(unknown)!r}; agents are uuv_0 to {self.possible_agents[-1]}")
         array = np.zeros((1, len(self.possible_agents), 2), np.float32)
+        try:
+            given = np.array([actions[agent] for agent in self.agents], np.float32)
+        except (KeyError, TypeError, ValueError):
+            given = None
+        if given is None or given.shape != (len(self.agents), 2) or not np.isfinite(given).all():
+            self._name_bad_action(actions)
+        if not actions.keys() <= self._index.keys():
+            unknown = min(actions.keys() - self._index.keys())
+            raise ValueError(f"there is no agent {unknown!r}; agents are uuv_0 to {self.possible_agents[-1]}")
+        array[0, self._rows] = given
+        return array
+
+    def _name_bad_action(self, actions: Mapping[str, ArrayLike | None]) -> None:
+        """Raise ValueError with the first agent whose action can't be used."""
         for agent in self.agents:
             if agent not in actions:
                 raise ValueError(f"the action of {agent} is missing; give one for each of env.agents")
             action = np.asarray(actions[agent], np.float32)
             if action.shape != (2,):
                 raise ValueError(f"the action of {agent} must have shape (2,), got {action.shape}")
-            array[0, self._index[agent]] = action
-        if not np.isfinite(array).all():
-            i = int(np.argwhere(~np.isfinite(array))[0, 1])
-            raise ValueError(f"the action of {self.possible_agents[i]} must be finite, got {array[0, i].tolist()}")
-        return array
+            if not np.isfinite(action).all():
+                raise ValueError(f"the action of {agent} must be finite, got {action.tolist()}")
 
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""

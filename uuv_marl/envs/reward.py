@@ -7,14 +7,21 @@ collided again and again). No term depends on the number of vehicles. One thing 
 swarm from arriving, the others gain from its loss.
 """
 
+import math
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled, compiled_parallel
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.world import Facts, State
 
 Float64 = NDArray[np.float64]
+Bool = NDArray[np.bool_]
 
 RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""
@@ -32,21 +39,97 @@ TERMS: Mapping[str, str] = {
 """What each term is; w is its weight in the scenario's ``reward``, the period that between decisions [s]."""
 
 
+class Rates(NamedTuple):
+    """The scenario's weights and lengths, as numbers for the compiled functions."""
+
+    period_s: float
+    tracking: float
+    obstacle: float
+    spacing: float
+    effort: float
+    collision: float
+    arrival: float
+    s_l_m: float
+    s_o_m: float
+    s_u_m: float
+
+
+class Payment(NamedTuple):
+    """What the latest step pays, shape (world, vehicle) each; zero for vehicles lost before."""
+
+    reward: Float64
+    """The sum of the terms."""
+    terms: Mapping[str, Float64]
+    """The weighted ``TERMS``."""
+
+
+def rates(scenario: Scenario) -> Rates:
+    """The scenario's weights and lengths."""
+    weight, limit = scenario.reward, scenario.constraints
+    return Rates(
+        scenario.timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
+        weight.collision, weight.arrival, limit.s_l_m, limit.s_o_m, limit.s_u_m,
+    )  # fmt: skip
+
+
 def reward_terms(swarm: Swarm) -> Mapping[str, Float64]:
     """The weighted ``TERMS`` of the latest step, shape (world, vehicle) each; zero for vehicles lost before."""
-    scenario, facts, state = swarm.scenario, swarm.facts, swarm.state
-    weight, limit, period = scenario.reward, scenario.constraints, scenario.timing.decision_period_s
-    present = state.alive | facts.lost
-    away = np.hypot(*np.moveaxis(state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
-    left_s = np.maximum(swarm.time_limit_s - facts.time_s, 0.0)[:, None]
-    worst_rate = weight.tracking + weight.obstacle + weight.spacing + weight.effort
-    terms = {
-        "tracking": -weight.tracking * period * np.clip(away / limit.s_l_m - 1.0, 0.0, 1.0),
-        "obstacle": -weight.obstacle * period * np.clip(1.0 - facts.clearance / limit.s_o_m, 0.0, 1.0),
-        "spacing": -weight.spacing * period * np.clip(1.0 - facts.spacing / limit.s_u_m, 0.0, 1.0),
-        "effort": -weight.effort * period * facts.effort,
-        "collision": -weight.collision * facts.contacts.astype(np.float64),
-        "loss": -(weight.collision + weight.arrival + worst_rate * left_s) * facts.lost,
-        "arrival": weight.arrival * (state.alive & swarm.arrived[:, None]),
-    }
-    return {name: np.where(present, term, 0.0) for name, term in terms.items()}
+    return pay(swarm, rates(swarm.scenario), np.ones(swarm.num_worlds, np.bool_)).terms
+
+
+def pay(swarm: Swarm, by: Rates, running: Bool) -> Payment:
+    """The reward of the latest step for the worlds that are ``running``, shape (world,); others are paid nothing."""
+    terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
+    reward = np.zeros(terms.shape[1:])
+    fill = _fill_one if swarm.num_worlds == 1 else _fill_all
+    fill(running, swarm.time_limit_s, swarm.state, swarm.facts, by, terms, reward)
+    return Payment(reward, dict(zip(TERMS, terms, strict=True)))
+
+
+@compiled
+def shortfall(share: float) -> float:
+    """A cost between 0 and 1 [1]."""
+    return min(max(share, 0.0), 1.0)
+
+
+@compiled
+def _fill(
+    w: int, time_limit_s: Float64, state: State, facts: Facts, by: Rates, terms: Float64, reward: Float64
+) -> None:
+    left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
+    worst_rate = by.tracking + by.obstacle + by.spacing + by.effort
+    arrived = not math.isnan(facts.arrival_s[w, 0])
+    for i in range(state.alive.shape[1]):
+        alive, lost = state.alive[w, i], facts.lost[w, i]
+        if not (alive or lost):
+            continue
+        dx, dy = state.eta[w, i, 0] - facts.reference[w, 0], state.eta[w, i, 1] - facts.reference[w, 1]
+        away = math.sqrt(dx * dx + dy * dy)
+        terms[0, w, i] = -by.tracking * by.period_s * shortfall(away / by.s_l_m - 1.0)
+        terms[1, w, i] = -by.obstacle * by.period_s * shortfall(1.0 - facts.clearance[w, i] / by.s_o_m)
+        terms[2, w, i] = -by.spacing * by.period_s * shortfall(1.0 - facts.spacing[w, i] / by.s_u_m)
+        terms[3, w, i] = -by.effort * by.period_s * facts.effort[w, i]
+        terms[4, w, i] = -by.collision * facts.contacts[w, i]
+        if lost:
+            terms[5, w, i] = -(by.collision + by.arrival + worst_rate * left_s)
+        if alive and arrived:
+            terms[6, w, i] = by.arrival
+        for k in range(terms.shape[0]):
+            reward[w, i] += terms[k, w, i]
+
+
+@compiled
+def _fill_one(
+    running: Bool, time_limit_s: Float64, state: State, facts: Facts, by: Rates, terms: Float64, reward: Float64
+) -> None:
+    if running[0]:
+        _fill(0, time_limit_s, state, facts, by, terms, reward)
+
+
+@compiled_parallel
+def _fill_all(
+    running: Bool, time_limit_s: Float64, state: State, facts: Facts, by: Rates, terms: Float64, reward: Float64
+) -> None:
+    for w in numba.prange(running.shape[0]):
+        if running[w]:
+            _fill(w, time_limit_s, state, facts, by, terms, reward)

@@ -9,7 +9,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.envs.reward import RewardFunction, reward_terms
+from uuv_marl.envs.observation import observe
+from uuv_marl.envs.reward import RewardFunction, pay, rates
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import ScenarioError, load_scenario
@@ -68,6 +69,7 @@ class Task:
             raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
         self.swarm = Swarm(scenario, num_worlds)
         self.state_layout = state_layout(scenario)
+        self._rates = rates(scenario)
         self._ready = np.zeros(num_worlds, np.bool_)
         self._over = np.zeros(num_worlds, np.bool_)
         self.max_cycles = max_cycles
@@ -109,7 +111,7 @@ class Task:
         if len(seeded) < len(chosen):
             self.swarm.reset(None, [world for world in chosen if world not in seeded])
         self._ready[chosen], self._over[chosen] = True, False
-        return self.swarm.percept.to_observation()
+        return observe(self.swarm)
 
     def need_reset(self, what: str) -> None:
         """Raise RuntimeError where a world was never reset."""
@@ -124,7 +126,7 @@ class Task:
         self.need_reset("step")
         swarm = self.swarm
         before = swarm.state.alive.copy()
-        observation = swarm.step(np.asarray(action, np.float32), ~self._over).to_observation()
+        swarm.step(np.asarray(action, np.float32), ~self._over)
         alive, arrived = swarm.state.alive, swarm.arrived
         reward, world_reward, terms = self._rewards(before & ~self._over[:, None])
         late = swarm.timed_out | (swarm.state.tick >= self._last_tick)
@@ -132,7 +134,7 @@ class Task:
         world_truncated = late & ~world_terminated
         self._over = world_terminated | world_truncated
         return Outcome(
-            observation=observation,
+            observation=observe(swarm),
             reward=reward,
             terminated=before & (arrived[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
@@ -153,10 +155,7 @@ class Task:
         if callable(self._reward):
             own = np.where(before, self._own_reward(self._reward, before), 0.0)
             return own, own.mean(axis=1), {}
-        terms = reward_terms(self.swarm)
-        if self._over.any():
-            terms = {name: np.where(before, term, 0.0) for name, term in terms.items()}
-        reward = sum(terms.values(), np.zeros(before.shape))
+        reward, terms = pay(self.swarm, self._rates, ~self._over)
         mean = reward.mean(axis=1)
         if self._reward == "team":
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
