@@ -1,5 +1,6 @@
 """Run a policy on a scenario over seeds."""
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -15,6 +16,8 @@ Float32 = NDArray[np.float32]
 
 BATCH = 32
 """Seeds stepped together."""
+MOST_POSITIONS = 4_000_000
+"""Positions kept of a run; with more vehicles and steps than this, routes are thinned in time."""
 
 
 class Run(NamedTuple):
@@ -25,7 +28,7 @@ class Run(NamedTuple):
     series: dict[str, Float32]
     """Samples over time, see ``Meter.series``."""
     routes: Float32
-    """Positions [m], shape (time, vehicle, 2); NaN once a vehicle is lost."""
+    """Positions [m] from start to end, shape (time, vehicle, 2); NaN once a vehicle is lost. See ``MOST_POSITIONS``."""
     obstacles: Float32
     """Centre north, east and radius [m], shape (obstacle, 3)."""
     waypoints: Float32
@@ -64,26 +67,32 @@ def _batch(
     meter = Meter(swarm)
     active = np.ones(len(seeds), np.bool_)
     meter.update(active)
-    routes = [_positions(swarm)]
-    limits = swarm.time_limit_s
-    report_every = max(1, round(2.0 / scenario.timing.decision_period_s))
+    limits, period = swarm.time_limit_s, scenario.timing.decision_period_s
+    steps, step = math.ceil(limits.max() / period) + 1, 0
+    every = math.ceil(steps * swarm.num_vehicles / MOST_POSITIONS)
+    # Room for the longest episode, of which the system only hands out what is written.
+    routes = np.empty((len(seeds), steps // every + 2, swarm.num_vehicles, 2), np.float32)
+    routes[:, 0], num = _positions(swarm), 1
+    report_every = max(1, round(2.0 / period))
     while active.any():
         percept = swarm.step(actor.act(percept), active)
         meter.update(active)
-        routes.append(_positions(swarm))
+        step += 1
+        routes[:, num] = _positions(swarm)
         ended = active & (swarm.arrived | swarm.timed_out | ~swarm.state.alive.any(axis=1))
         for w in (int(index) for index in np.flatnonzero(ended)):
-            course, num = swarm.course, int(swarm.course.num_obstacles[w])
+            course, discs = swarm.course, int(swarm.course.num_obstacles[w])
             yield Run(
                 seed=seeds[w],
                 metrics=meter.metrics(w, int(actor.clamps[w])),
                 series=meter.series(w),
-                routes=np.array([positions[w] for positions in routes]),
-                obstacles=course.obstacles[w, :num].astype(np.float32),
+                routes=routes[w, : num + 1],
+                obstacles=course.obstacles[w, :discs].astype(np.float32),
                 waypoints=course.waypoints[w, : int(course.last[w]) + 1].astype(np.float32),
             )
         active &= ~ended
-        if len(routes) % report_every == 0:
+        num += int(step % every == 0)
+        if step % report_every == 0:
             done = np.where(active, swarm.facts.time_s, limits)
             yield Progress(float(done.sum() / limits.sum()))
 
