@@ -5,14 +5,15 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark test test-adapters test-benchmarl test-rllib check clean
+.PHONY: help benchmark test test-adapters test-benchmarl test-rllib check perf clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
 	@echo "make check                          ruff, pyright and import-linter only"
-	@echo "make clean                          remove .venv, .venv-benchmarl and .venv-rllib"
+	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS and JaxMARL, about 15 minutes: docs/speed.md"
+	@echo "make clean                          remove .venv and .venv-*"
 
 benchmark: .venv/base.stamp
 	$(BIN)/uuv-marl benchmark $(ARGS)
@@ -33,13 +34,23 @@ check: .venv/dev.stamp
 	$(BIN)/lint-imports
 	$(BIN)/pyright
 
+PEERS := mpe2 vmas jaxmarl
+PEER_STAMPS := $(foreach peer,$(PEERS),.venv-perf-$(peer)/perf-$(peer).stamp)
+
+perf: .venv/dev.stamp $(PEER_STAMPS)
+	$(BIN)/python perf/compare.py $(ARGS)
+	$(BIN)/python perf/report.py
+
 # A stamp without its environment is worth nothing.
 STAMPS := .venv/base.stamp .venv/dev.stamp .venv-benchmarl/benchmarl.stamp .venv-rllib/rllib.stamp
 .PHONY: $(foreach stamp,$(STAMPS),$(if $(wildcard $(dir $(stamp))bin/uuv-marl),,$(stamp)))
+.PHONY: $(foreach stamp,$(PEER_STAMPS),$(if $(wildcard $(dir $(stamp))bin/python),,$(stamp)))
 
 $(STAMPS): pyproject.toml constraints.txt constraints-benchmarl.txt constraints-rllib.txt tools/setup_venv.py
+$(PEER_STAMPS): $(PEERS:%=constraints-perf-%.txt) tools/setup_venv.py
+$(STAMPS) $(PEER_STAMPS):
 	@command -v "$(PYTHON)" >/dev/null || { echo "There is no '$(PYTHON)' here. Install Python 3.11 or later, or name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }
 	@"$(PYTHON)" tools/setup_venv.py $(basename $(notdir $@))
 
 clean:
-	rm -rf .venv .venv-benchmarl .venv-rllib
+	rm -rf .venv .venv-benchmarl .venv-rllib $(PEERS:%=.venv-perf-%)

@@ -16,6 +16,12 @@ ENVIRONMENTS = {
     "benchmarl": (".venv-benchmarl", "[benchmarl,test]", "constraints-benchmarl.txt"),
     "rllib": (".venv-rllib", "[distributed,render,test]", "constraints-rllib.txt"),
 }
+# What perf/compare.py measures beside uuv_marl, without it.
+PEERS = {
+    "perf-mpe2": ("mpe2", "stable-baselines3"),
+    "perf-vmas": ("vmas", "stable-baselines3"),
+    "perf-jaxmarl": ("jaxmarl",),
+}
 
 
 def stop(message):
@@ -60,7 +66,11 @@ def run(*command):
 def main(name):
     """Make the environment of this name."""
     check_python()
-    folder, extras, constraints = ENVIRONMENTS[name]
+    if name in PEERS:
+        folder, wanted, constraints = ".venv-" + name, PEERS[name], "constraints-%s.txt" % name
+    else:
+        folder, extras, constraints = ENVIRONMENTS[name]
+        wanted = ("-e", "." + extras)
     venv = os.path.join(ROOT, folder)
     python = os.path.join(venv, "bin", "python")
     if not os.path.exists(python):
@@ -74,8 +84,8 @@ def main(name):
             "The %s here is of Python %s, not of this %s; 'make clean' first."
             % (folder, made_with, sys.version.split()[0])
         )
-    print("Installing uuv_marl%s into %s; the first time takes a few minutes" % (extras, folder))
-    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", constraints, "-e", "." + extras)
+    print("Installing %s into %s; the first time takes a few minutes" % (" ".join(wanted), folder))
+    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", constraints, *wanted)
     with open(os.path.join(venv, name + ".stamp"), "w"):
         pass
 

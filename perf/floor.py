@@ -1,0 +1,238 @@
+"""What a step must do, and how fast this machine does just that.
+
+Kernels without any of the package's code, the same for one world (one thread) and for many (all threads).
+"""
+
+import math
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Float64 = NDArray[np.float64]
+Loop = tuple[Callable[[int], object], float]
+"""Work as a function of how often, and what one time holds."""
+PERCEPT = 98
+"""Float32 numbers that a vehicle is told in each step."""
+SECTORS = 21
+"""Sub-sectors of a vehicle."""
+
+
+class Work(NamedTuple):
+    """What one step of one world must do, whatever the code."""
+
+    pairs: float
+    """Every vehicle may hear every other: n (n - 1) / 2."""
+    keeps: float
+    """Each of a pair is compared with the nearest in the other's sub-sector so far: n (n - 1)."""
+    sines: float
+    """Sines and cosines: the Runge-Kutta method's three later stages and the new heading; the first stage's heading is
+    the last step's."""
+    exponentials: float
+    """None: only controllers have them."""
+    bytes: float
+    """Action read, pose and velocity read and written as float64, percept written as float32."""
+
+
+def work(vehicles: int) -> Work:
+    """The work of a step of 0.1 s in one world."""
+    per_vehicle = 2 * 4 + 2 * 6 * 8 + 4 * PERCEPT
+    pairs = vehicles * (vehicles - 1) / 2
+    return Work(pairs, 2.0 * pairs, 8.0 * vehicles, 0.0, float(per_vehicle * vehicles))
+
+
+def least_seconds(vehicles: int, worlds: int, ceilings: Work) -> float:
+    """The least time of a step [s], from ceilings per second. Arithmetic adds up; memory may work meanwhile."""
+    need = work(vehicles)
+    *arithmetic, memory = (amount / rate for amount, rate in zip(need, ceilings, strict=True))
+    return worlds * max(sum(arithmetic), memory)
+
+
+@numba.njit(fastmath=True)
+def all_pairs(x: Float64, y: Float64) -> float:
+    """Sum of the squared distances of all pairs [m2]: a pair loop that does nothing else.
+
+    The n positions come twice, one after the other, so that each vehicle meets those 1, 2, ... places on in a loop
+    without gaps, which vector registers like.
+    """
+    n, total = x.size // 2, 0.0
+    for on in range(1, n // 2 + 1):
+        for i in range(n // 2 if 2 * on == n else n):
+            dx, dy = x[i + on] - x[i], y[i + on] - y[i]
+            total += dx * dx + dy * dy
+    return total
+
+
+@numba.njit
+def all_keeps(distance: Float64, sector: Float64, nearest: Float64) -> None:
+    """The smallest distance in each sub-sector, without a branch, since nobody can guess who is nearer."""
+    nearest[:SECTORS] = math.inf
+    for k in range(distance.size):
+        at = np.uintp(sector[k])
+        nearest[at] = distance[k] if distance[k] < nearest[at] else nearest[at]
+
+
+@numba.njit(fastmath=True)
+def all_sines(angle: Float64, out: Float64) -> None:
+    """Sine plus cosine of every angle [rad], by polynomials of an angle reduced to a quarter turn, to about 1e-9."""
+    for k in range(angle.size):
+        quarters = math.floor(angle[k] * (2.0 / math.pi) + 0.5)
+        rest = angle[k] - quarters * (0.5 * math.pi)
+        z = rest * rest
+        sine = rest * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0)))))
+        cosine = 1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0))))
+        halves = math.floor(0.5 * quarters)
+        turned = sine + cosine if quarters == 2.0 * halves else cosine - sine
+        out[k] = turned * (1.0 - 2.0 * (halves - 2.0 * math.floor(0.5 * halves)))
+
+
+@numba.njit
+def all_exponentials(value: Float64, out: Float64) -> None:
+    """The exponential of every value, by the C library."""
+    for k in range(value.size):
+        out[k] = math.exp(value[k])
+
+
+@numba.njit
+def all_copied(value: Float64, out: Float64) -> None:
+    """A copy."""
+    for k in range(value.size):
+        out[k] = value[k]
+
+
+@numba.njit
+def pairs_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """The pair loop of a world, so many times; the nudge makes each a new one for the compiler."""
+    for k in range(times):
+        x[w, 0] = 1e-9 * k
+        out[w, 0] = all_pairs(x[w], y[w])
+
+
+@numba.njit
+def keeps_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """The loop of nearest ones of a world, so many times."""
+    for k in range(times):
+        x[w, 0] = 1e-9 * k
+        all_keeps(x[w], y[w], out[w])
+
+
+@numba.njit
+def sines_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """The sine loop of a world, so many times."""
+    for k in range(times):
+        x[w, 0] = 1e-9 * k
+        all_sines(x[w], out[w])
+
+
+@numba.njit
+def exponentials_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """The exponential loop of a world, so many times."""
+    for k in range(times):
+        x[w, 0] = 1e-9 * k
+        all_exponentials(x[w], out[w])
+
+
+@numba.njit
+def copy_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """The copy of a world, so many times."""
+    for k in range(times):
+        x[w, 0] = 1e-9 * k
+        all_copied(x[w], out[w])
+
+
+@numba.njit(parallel=True)
+def pairs_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """``pairs_of`` of all worlds, spread over threads."""
+    for w in numba.prange(x.shape[0]):
+        pairs_of(w, times, x, y, out)
+
+
+@numba.njit(parallel=True)
+def keeps_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """``keeps_of`` of all worlds, spread over threads."""
+    for w in numba.prange(x.shape[0]):
+        keeps_of(w, times, x, y, out)
+
+
+@numba.njit(parallel=True)
+def sines_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """``sines_of`` of all worlds, spread over threads."""
+    for w in numba.prange(x.shape[0]):
+        sines_of(w, times, x, y, out)
+
+
+@numba.njit(parallel=True)
+def exponentials_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """``exponentials_of`` of all worlds, spread over threads."""
+    for w in numba.prange(x.shape[0]):
+        exponentials_of(w, times, x, y, out)
+
+
+@numba.njit(parallel=True)
+def copy_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
+    """``copy_of`` of all worlds, spread over threads."""
+    for w in numba.prange(x.shape[0]):
+        copy_of(w, times, x, y, out)
+
+
+KERNELS = {
+    "pairs": (pairs_of, pairs_of_all),
+    "keeps": (keeps_of, keeps_of_all),
+    "sines": (sines_of, sines_of_all),
+    "exponentials": (exponentials_of, exponentials_of_all),
+    "copy": (copy_of, copy_of_all),
+}
+
+
+def loop(kind: str, vehicles: int, worlds: int) -> Loop:
+    """A loop of this kind; one time holds all worlds.
+
+    As much as a step of these worlds: pairs of so many vehicles, and for each of them 16 distances kept, 8 angles or 50
+    numbers copied. One world runs on one thread, several run on all, as the package does it.
+    """
+    length = {"pairs": 2, "keeps": 16, "sines": 8, "exponentials": 8, "copy": 50}[kind] * vehicles
+    x, y = np.random.default_rng(0).uniform(-3.0, 3.0, (2, worlds, length))
+    if kind == "keeps":
+        y = np.floor((y + 3.0) / 6.0 * SECTORS)
+    out = np.zeros((worlds, max(length, SECTORS)))
+    serial, parallel = KERNELS[kind]
+    amount = {"pairs": vehicles * (vehicles - 1) / 2, "sines": 2 * length, "copy": 2 * 8 * length}.get(kind, length)
+
+    def run(times: int) -> None:
+        if worlds == 1:
+            serial(0, times, x, y, out)
+        else:
+            parallel(times, x, y, out)
+
+    return run, worlds * amount
+
+
+def best_rates(
+    loops: dict[str, tuple[Callable[[int], object], float]], rounds: int, seconds: float
+) -> dict[str, float]:
+    """The best rate of each loop [1/s], all in turn so that a busy machine hits all alike.
+
+    ``seconds`` is a loop's share of a round.
+    """
+    times = {}
+    for name, (run, _) in loops.items():
+        run(1)
+        times[name], spent = 1, _seconds(run, 1)
+        while spent < seconds / 4:
+            times[name] *= 2
+            spent = _seconds(run, times[name])
+        times[name] = max(1, round(times[name] * seconds / spent))
+    best = dict.fromkeys(loops, 0.0)
+    for _ in range(rounds):
+        for name, (run, amount) in loops.items():
+            best[name] = max(best[name], times[name] * amount / _seconds(run, times[name]))
+    return best
+
+
+def _seconds(run: Callable[[int], object], times: int) -> float:
+    start = time.perf_counter()
+    run(times)
+    return time.perf_counter() - start

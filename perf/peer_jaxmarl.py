@@ -1,0 +1,64 @@
+"""Case of JaxMARL's MPE_simple_spread_v3 for perf/compare.py: ``step`` over worlds and time, compiled as one."""
+
+import os
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jaxmarl
+from worker import Case, serve
+
+SETS, MEMORY_SHARE = 8, 0.6
+Pytree = Any
+bytes_per_world: dict[int, float] = {}
+
+
+def simple_spread(agents: int, worlds: int) -> Case:
+    """``jit`` of a loop over ``vmap(env.step)``, resets included, as its documents do it.
+
+    The latest observations, rewards and dones leave the loop, so that none of them is optimised away. As many landmarks
+    as agents, as in MPE2.
+    """
+    refuse_too_large(agents, worlds)
+    env = jaxmarl.make("MPE_simple_spread_v3", num_agents=agents, num_landmarks=agents)
+    key = jax.random.key(0)
+    keys = jax.random.split(key, worlds)
+    with jax.disable_jit():  # compiling it takes longer than running it once
+        observation, state = jax.vmap(env.reset)(keys)
+    actions = jax.random.randint(key, (SETS, agents, worlds), 0, 5)
+    zeros, no = jnp.zeros(worlds), jnp.zeros(worlds, bool)
+    start = (
+        keys,
+        observation,
+        state,
+        dict.fromkeys(env.agents, zeros),
+        dict.fromkeys([*env.agents, "__all__"], no),
+    )
+
+    def one(k: int, carry: Pytree) -> Pytree:
+        keys, _, state, _, _ = carry
+        keys = jax.vmap(jax.random.split)(keys)
+        chosen = dict(zip(env.agents, actions[k % SETS], strict=True))
+        return keys[:, 0], *jax.vmap(env.step)(keys[:, 1], state, chosen)[:4]
+
+    loop = jax.jit(lambda units, carry: jax.lax.fori_loop(0, units, one, carry)).lower(1, start).compile()
+    needed = loop.memory_analysis()
+    bytes_per_world[agents] = (needed.temp_size_in_bytes + 2 * needed.output_size_in_bytes) / worlds
+    latest = [start]
+
+    def run(units: int) -> None:
+        latest[0] = jax.block_until_ready(loop(units, latest[0]))
+
+    return Case(run, agents * worlds, {"entries": observation[env.agents[0]].shape[-1]})
+
+
+def refuse_too_large(agents: int, worlds: int) -> None:
+    """Raise MemoryError where XLA's own count, taken with fewer worlds, goes beyond ``MEMORY_SHARE`` of the memory."""
+    needed = bytes_per_world.get(agents, 0.0) * worlds
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > MEMORY_SHARE * there:
+        raise MemoryError(f"would need {needed / 2**30:.0f} GiB, by XLA's count with fewer worlds")
+
+
+if __name__ == "__main__":
+    serve({"jaxmarl": simple_spread}, ("jaxmarl", "jax", "jaxlib", "numpy"))

@@ -1,0 +1,87 @@
+"""Cases of VMAS's flocking for perf/compare.py: its batched step on the CPU, and PPO over its agents."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+import vmas
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+from ppo import Rows, training
+from worker import Case, serve
+
+DEFAULT_THREADS = torch.get_num_threads()
+SETS, CROWD, CROWD_SPACING, STEP_LIMIT_S = 8, 54, 0.02, 90.0
+
+
+def flocking(agents: int, worlds: int, **settings: float) -> Any:
+    """The scenario with its defaults: 5 obstacles, a lidar of 12 rays.
+
+    More than 54 agents start closer than its 0.15: so many don't fit into its area, and the search for free places
+    would never end.
+    """
+    if agents > CROWD:
+        settings["min_dist_between_entities"] = CROWD_SPACING
+    return vmas.make_env("flocking", worlds, "cpu", seed=0, n_agents=agents, **settings)
+
+
+def steps(env: Any) -> Callable[[int], None]:
+    """So many steps of all worlds, with random actions drawn before."""
+    actions = [list(one) for one in torch.rand(SETS, env.n_agents, env.num_envs, 2) * 2 - 1]
+
+    def run(units: int) -> None:
+        for k in range(units):
+            env.step(actions[k % SETS])
+
+    return run
+
+
+def choose_threads(agents: int, worlds: int) -> None:
+    """Torch's own number of threads or one, what is faster with at most 54 agents: small tensors suffer from threads.
+
+    Raises TimeoutError where a step of all agents would take too long; it grows with their square.
+    """
+    few = min(agents, CROWD)
+    run = steps(flocking(few, worlds, min_dist_between_entities=CROWD_SPACING))
+    seconds = {}
+    for threads in {1, DEFAULT_THREADS}:
+        torch.set_num_threads(threads)
+        run(1)
+        start = time.perf_counter()
+        run(2)
+        seconds[threads] = (time.perf_counter() - start) / 2
+    best = min(seconds, key=lambda threads: seconds[threads])
+    expected = seconds[best] * (agents / few) ** 2
+    if expected > STEP_LIMIT_S:
+        raise TimeoutError(f"a step would take about {expected:.0f} s, judging by one of {few} agents")
+    torch.set_num_threads(best)
+
+
+def step(agents: int, worlds: int) -> Case:
+    """``step`` of all worlds."""
+    choose_threads(agents, worlds)
+    env = flocking(agents, worlds)
+    facts = {"entries": env.observation_space[0].shape[0], "threads": torch.get_num_threads()}
+    return Case(steps(env), agents * worlds, facts)
+
+
+def ppo(agents: int, worlds: int) -> Case:
+    """PPO of Stable-Baselines3, a row per agent."""
+    choose_threads(agents, worlds)
+    env = flocking(agents, worlds)
+
+    def rows(tensors: list[torch.Tensor]) -> NDArray[Any]:
+        return torch.stack(tensors).flatten(0, 1).numpy()
+
+    def row_step(actions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        observations, rewards, _, _ = env.step(list(torch.from_numpy(actions).view(agents, worlds, 2)))
+        return rows(observations), rows(rewards)
+
+    start = rows(env.reset())
+    return training(Rows(start, row_step, Box(-np.inf, np.inf, start.shape[1:]), Box(-1.0, 1.0, (2,))))
+
+
+if __name__ == "__main__":
+    serve({"vmas": step, "vmas_ppo": ppo}, ("vmas", "torch", "numpy", "stable_baselines3"))
