@@ -3,6 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -61,10 +62,8 @@ def _routes(results: Results, scenario: str, policies: Sequence[str], folder: Pa
         axes[k // columns, k % columns].axis("off")
     figure.supxlabel("east [m]")
     figure.supylabel("north [m]")
-    figure.suptitle(
-        f"{_name(results, scenario)}: routes, seed 0; green start, orange end, dashed trajectory, grey obstacles",
-        fontsize=10,
-    )
+    title = f"{_name(results, scenario)}: routes, seed 0; green start, orange end, dashed trajectory, grey obstacles"
+    figure.suptitle(textwrap.fill(title, 55 * columns), fontsize=10)
     return _save(figure, folder / f"{scenario}_routes.png")
 
 
