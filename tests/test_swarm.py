@@ -64,6 +64,7 @@ def test_another_process_gives_the_same_run():
 
 FORKED = """
 import os, numpy as np
+import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.sim.swarm import Swarm
 scenario = load_scenario("single_obstacle")
@@ -72,6 +73,7 @@ batch = Swarm(scenario, 2); batch.reset(0); batch.step(action)
 pid = os.fork()
 if pid == 0:
     one = Swarm(scenario, 1); one.reset(0); one.step(action[:1])
+    uuv_marl.parallel_env(scenario).reset(seed=0); uuv_marl.vector_env(2, scenario).reset(seed=0)
     try:
         batch.step(action)
     except RuntimeError as error:

@@ -111,7 +111,7 @@ class Task:
         if len(seeded) < len(chosen):
             self.swarm.reset(None, [world for world in chosen if world not in seeded])
         self._ready[chosen], self._over[chosen] = True, False
-        return observe(self.swarm)
+        return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
 
     def need_reset(self, what: str) -> None:
         """Raise RuntimeError where a world was never reset."""
