@@ -70,6 +70,7 @@ def plan() -> Iterator[Cell]:
             names = ["core", "vector_env", "parallel_env", *(CEILINGS if (agents, worlds) in FLOOR_CELLS else ())]
             ours = dict.fromkeys(names, ("uuv_marl", worlds))
             yield Cell("rates", agents, ours | {peer: (peer, worlds) for peer in PEERS})
+    yield Cell("terms", 54, dict.fromkeys(("parallel_env", "parallel_env_terms"), ("uuv_marl", 1)))
     yield Cell("profile", 54, dict.fromkeys(PARTS, ("uuv_marl", 64)))
     yield Cell("training", 54, {"ppo": ("uuv_marl", 64), "mpe2_ppo": ("mpe2", 4), "vmas_ppo": ("vmas", 64)})
     for agents in CURVE:
@@ -271,7 +272,7 @@ def chosen(cell: Cell, arguments: argparse.Namespace, done: Records) -> Cell:
 def main() -> None:
     """Measure, and write the results file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", help="cases, libraries, kinds (rates, profile, training, curve)")
+    parser.add_argument("--only", nargs="+", help="cases, libraries, kinds (rates, terms, profile, training, curve)")
     parser.add_argument("--resume", action="store_true", help="keep what the file has, measure the rest")
     parser.add_argument("--rounds", type=int, default=5, help="repeats of each case (default 5)")
     parser.add_argument("--seconds", type=float, default=0.3, help="length of a repeat [s] (default 0.3)")

@@ -50,11 +50,11 @@ def vector_env(agents: int, worlds: int) -> Case:
     return Case(repeated(envs.step, random_actions(agents, worlds)), agents * worlds, {"entries": entries})
 
 
-def parallel_env(agents: int, worlds: int) -> Case:
+def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
     """``parallel_env``: dicts of agents, worlds one after the other, reset when over. A unit is a step of one world."""
     envs, start = [], time.perf_counter()
     while len(envs) < worlds and time.perf_counter() - start < BUILD_S:
-        env = uuv_marl.parallel_env("single_obstacle", num_vehicles=agents)
+        env = uuv_marl.parallel_env("single_obstacle", num_vehicles=agents, info_terms=info_terms)
         env.reset(seed=len(envs))
         envs.append(env)
     actions = [dict(zip(env.possible_agents, one, strict=True)) for one in random_actions(agents, 1)[:, 0]]
@@ -67,6 +67,11 @@ def parallel_env(agents: int, worlds: int) -> Case:
             env.step(actions[k % SETS])
 
     return Case(run, agents, {"entries": env.observation_space(env.possible_agents[0]).shape[0], "built": len(envs)})
+
+
+def parallel_env_terms(agents: int, worlds: int) -> Case:
+    """The same with the reward's terms in every agent's info."""
+    return parallel_env(agents, worlds, info_terms=True)
 
 
 def idle(agents: int, worlds: int) -> Case:
@@ -115,8 +120,10 @@ def compiled(maker: Maker) -> Maker:
     return made
 
 
+CASES = (core, vector_env, parallel_env, parallel_env_terms, idle, bio_inspired, ppo)
+
 if __name__ == "__main__":
-    cases = {case.__name__: case for case in (core, vector_env, parallel_env, idle, bio_inspired, ppo)}
+    cases = {case.__name__: case for case in CASES}
     cases |= {kind: ceiling(kind) for kind in KERNELS} | {name: part(name) for name in PARTS}
     serve(
         {name: compiled(case) for name, case in cases.items()},

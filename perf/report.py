@@ -53,6 +53,7 @@ Versions: {versions}.
 
 {failures}
 
+With 54 agents `parallel_env` makes {plain} agent-steps/s, and {terms} with `info_terms=True`.
 `parallel_env` and MPE2 have no batch: their worlds are stepped one after the other in one process. JaxMARL
 took {compiled} s to build and compile with {sizes} agents in 64 worlds, which is not counted.
 
@@ -398,6 +399,8 @@ def text(results: Results) -> str:
         three_agents=54,
         three=three(cases),
         best=best(cases),
+        plain=cases.cell("terms", "parallel_env", 54, 1),
+        terms=cases.cell("terms", "parallel_env_terms", 54, 1),
         differs=table(DIFFERS[0], list(DIFFERS[1:])),
         sizes=", ".join(map(str, AGENTS)),
         compiled=", ".join(f"{record['build_s']:.0f}" if "build_s" in record else "–" for record in built),
