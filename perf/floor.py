@@ -6,7 +6,7 @@ Kernels without any of the package's code, the same for one world (one thread) a
 import math
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -52,7 +52,7 @@ def least_seconds(vehicles: int, worlds: int, ceilings: Work) -> float:
 
 
 @numba.njit(fastmath=True)
-def all_pairs(x: Float64, y: Float64) -> float:
+def all_pairs(x: Float64, y: Float64, out: Float64) -> None:
     """Sum of the squared distances of all pairs [m2]: a pair loop that does nothing else.
 
     The n positions come twice, one after the other, so that each vehicle meets those 1, 2, ... places on in a loop
@@ -63,7 +63,7 @@ def all_pairs(x: Float64, y: Float64) -> float:
         for i in range(n // 2 if 2 * on == n else n):
             dx, dy = x[i + on] - x[i], y[i + on] - y[i]
             total += dx * dx + dy * dy
-    return total
+    out[0] = total
 
 
 @numba.njit
@@ -76,7 +76,7 @@ def all_keeps(distance: Float64, sector: Float64, nearest: Float64) -> None:
 
 
 @numba.njit(fastmath=True)
-def all_sines(angle: Float64, out: Float64) -> None:
+def all_sines(angle: Float64, y: Float64, out: Float64) -> None:
     """Sine plus cosine of every angle [rad], by polynomials of an angle reduced to a quarter turn, to about 1e-9."""
     for k in range(angle.size):
         quarters = math.floor(angle[k] * (2.0 / math.pi) + 0.5)
@@ -90,101 +90,43 @@ def all_sines(angle: Float64, out: Float64) -> None:
 
 
 @numba.njit
-def all_exponentials(value: Float64, out: Float64) -> None:
+def all_exponentials(value: Float64, y: Float64, out: Float64) -> None:
     """The exponential of every value, by the C library."""
     for k in range(value.size):
         out[k] = math.exp(value[k])
 
 
 @numba.njit
-def all_copied(value: Float64, out: Float64) -> None:
+def all_copied(value: Float64, y: Float64, out: Float64) -> None:
     """A copy."""
     for k in range(value.size):
         out[k] = value[k]
 
 
-@numba.njit
-def pairs_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """The pair loop of a world, so many times; the nudge makes each a new one for the compiler."""
-    for k in range(times):
-        x[w, 0] = 1e-9 * k
-        out[w, 0] = all_pairs(x[w], y[w])
-
-
-@numba.njit
-def keeps_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """The loop of nearest ones of a world, so many times."""
-    for k in range(times):
-        x[w, 0] = 1e-9 * k
-        all_keeps(x[w], y[w], out[w])
-
-
-@numba.njit
-def sines_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """The sine loop of a world, so many times."""
-    for k in range(times):
-        x[w, 0] = 1e-9 * k
-        all_sines(x[w], out[w])
-
-
-@numba.njit
-def exponentials_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """The exponential loop of a world, so many times."""
-    for k in range(times):
-        x[w, 0] = 1e-9 * k
-        all_exponentials(x[w], out[w])
-
-
-@numba.njit
-def copy_of(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """The copy of a world, so many times."""
-    for k in range(times):
-        x[w, 0] = 1e-9 * k
-        all_copied(x[w], out[w])
-
-
-@numba.njit(parallel=True)
-def pairs_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """``pairs_of`` of all worlds, spread over threads."""
-    for w in numba.prange(x.shape[0]):
-        pairs_of(w, times, x, y, out)
-
-
-@numba.njit(parallel=True)
-def keeps_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """``keeps_of`` of all worlds, spread over threads."""
-    for w in numba.prange(x.shape[0]):
-        keeps_of(w, times, x, y, out)
-
-
-@numba.njit(parallel=True)
-def sines_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """``sines_of`` of all worlds, spread over threads."""
-    for w in numba.prange(x.shape[0]):
-        sines_of(w, times, x, y, out)
-
-
-@numba.njit(parallel=True)
-def exponentials_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """``exponentials_of`` of all worlds, spread over threads."""
-    for w in numba.prange(x.shape[0]):
-        exponentials_of(w, times, x, y, out)
-
-
-@numba.njit(parallel=True)
-def copy_of_all(times: int, x: Float64, y: Float64, out: Float64) -> None:
-    """``copy_of`` of all worlds, spread over threads."""
-    for w in numba.prange(x.shape[0]):
-        copy_of(w, times, x, y, out)
-
-
 KERNELS = {
-    "pairs": (pairs_of, pairs_of_all),
-    "keeps": (keeps_of, keeps_of_all),
-    "sines": (sines_of, sines_of_all),
-    "exponentials": (exponentials_of, exponentials_of_all),
-    "copy": (copy_of, copy_of_all),
+    "pairs": all_pairs,
+    "keeps": all_keeps,
+    "sines": all_sines,
+    "exponentials": all_exponentials,
+    "copy": all_copied,
 }
+
+
+def repeated(kernel: Callable[[Float64, Float64, Float64], None]) -> tuple[Any, Any]:
+    """A kernel so many times over one world, and over all of them spread over threads; arrays (world, entry)."""
+
+    @numba.njit
+    def one(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
+        for k in range(times):
+            x[w, 0] = 1e-9 * k  # makes each time a new one for the compiler
+            kernel(x[w], y[w], out[w])
+
+    @numba.njit(parallel=True)
+    def every(times: int, x: Float64, y: Float64, out: Float64) -> None:
+        for w in numba.prange(x.shape[0]):
+            one(w, times, x, y, out)
+
+    return one, every
 
 
 def loop(kind: str, vehicles: int, worlds: int) -> Loop:
@@ -198,7 +140,7 @@ def loop(kind: str, vehicles: int, worlds: int) -> Loop:
     if kind == "keeps":
         y = np.floor((y + 3.0) / 6.0 * SECTORS)
     out = np.zeros((worlds, max(length, SECTORS)))
-    serial, parallel = KERNELS[kind]
+    serial, parallel = repeated(KERNELS[kind])
     amount = {"pairs": vehicles * (vehicles - 1) / 2, "sines": 2 * length, "copy": 2 * 8 * length}.get(kind, length)
 
     def run(times: int) -> None:

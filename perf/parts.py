@@ -10,7 +10,7 @@ import numpy as np
 from worker import Case, Maker
 
 from uuv_marl import load_scenario
-from uuv_marl.sim import motion, sonar, world
+from uuv_marl.sim import arrays, hearing, motion, world
 from uuv_marl.sim.swarm import Swarm
 
 
@@ -48,7 +48,7 @@ def heard(num: int, action: Any, state: Any, course: Any, facts: Any, senses: An
         motion.load(w, state.eta, state.nu, desk[0])
         grid = world.arrange(w, state, fixed[1], desk[0], desk[1])
         for p in range(grid.living):
-            sonar.hear(p, w, course.obstacles, course.num_obstacles[w], desk[1], grid, fixed[2], desk[2])
+            hearing.hear(p, w, course.obstacles, course.num_obstacles[w], desk[1], grid, fixed[2], desk[2])
 
 
 @numba.njit(error_model="numpy", _nrt=False)
@@ -80,12 +80,12 @@ def part(name: str) -> Maker:
         swarm.reset(0)
         action = np.zeros((worlds, agents, 2), np.float32)
         fixed = swarm._plant, swarm._rules, swarm._suite, swarm.layout.offsets
-        desk = world.desk.py_func(swarm._scratch, 0)  # type: ignore[attr-defined]
-        arrays = worlds, action, swarm.state, swarm.course, swarm.facts, swarm._senses, fixed, desk
+        desk = arrays.desk.py_func(swarm._scratch, 0)  # type: ignore[attr-defined]
+        given = worlds, action, swarm.state, swarm.course, swarm.facts, swarm._senses, fixed, desk
 
         def run(units: int) -> None:
             for _ in range(units):
-                PARTS[name](*arrays)
+                PARTS[name](*given)
 
         return Case(run, agents * worlds)
 

@@ -54,6 +54,16 @@ def test_a_run_does_not_depend_on_the_seeds_beside_it():
     assert sorted(together) == list(range(40))
 
 
+def test_long_routes_are_thinned_in_time_and_keep_start_and_end(monkeypatch):
+    whole = runs_of(quick(), "idle", [3])[3]
+    monkeypatch.setattr("uuv_marl.benchmark.evaluate.MOST_POSITIONS", len(whole.routes) * 8 // 4)
+    thin = runs_of(quick(), "idle", [3])[3]
+    fourths = whole.routes[:-1:4]
+    np.testing.assert_array_equal(thin.routes, [*fourths, whole.routes[-1]])
+    assert len(thin.routes) < len(whole.routes) / 3
+    assert thin.metrics == whole.metrics
+
+
 def test_never_arriving_and_no_obstacles_are_null():
     metrics = runs_of(quick("tracking"), "idle", [0])[0].metrics
     assert metrics["task_time_s"] is None

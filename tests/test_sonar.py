@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
-from uuv_marl.sim.sonar import echo, suite
+from uuv_marl.sim.perception import echo
+from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.swarm import Swarm
 
 seeds = st.integers(0, 2**32 - 1)

@@ -18,7 +18,8 @@ Float32 = NDArray[np.float32]
 
 _POSITION_SCALE_M = 64.0
 _SPEED_SCALE_MPS = 4.0
-_MAX_SPEED = 64.0
+MAX_SPEED = 64.0
+"""Velocities in a percept saturate here [m/s, rad/s], so that observation bounds are finite."""
 _MAX_VEHICLES = 16384.0
 
 
@@ -59,11 +60,11 @@ class Offsets(NamedTuple):
 def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = ()) -> tuple[PerceptField, ...]:
     """The fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
     position = ("m", _POSITION_SCALE_M, -MAX_RANGE_M, MAX_RANGE_M)
-    speed = ("m/s", _SPEED_SCALE_MPS, -_MAX_SPEED, _MAX_SPEED)
+    speed = ("m/s", _SPEED_SCALE_MPS, -MAX_SPEED, MAX_SPEED)
     flag = ("1", 1.0, 0.0, 1.0)
     table = [
         PerceptField("velocity", (2,), *speed, "own surge and sway velocity"),
-        PerceptField("yaw_rate", (1,), "rad/s", 1.0, -_MAX_SPEED, _MAX_SPEED, "own yaw rate"),
+        PerceptField("yaw_rate", (1,), "rad/s", 1.0, -MAX_SPEED, MAX_SPEED, "own yaw rate"),
         PerceptField("reference", (2,), *position, "from the vehicle to l(t); saturates, direction kept"),
         PerceptField("reference_velocity", (2,), *speed, "velocity of the reference point"),
         PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard"),

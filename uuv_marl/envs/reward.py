@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled, compiled_parallel
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.world import Facts, State
 
 Float64 = NDArray[np.float64]
 Bool = NDArray[np.bool_]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario, growth
+from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
 from uuv_marl.sim.compiled import announce_compilation
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
@@ -19,17 +20,7 @@ from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trajectory import arrival_times
 from uuv_marl.sim.vehicle import plant
-from uuv_marl.sim.world import (
-    Course,
-    Facts,
-    Rules,
-    Senses,
-    State,
-    observe_world,
-    scratch,
-    step_alone,
-    step_worlds,
-)
+from uuv_marl.sim.world import observe_world, step_alone, step_worlds
 
 Float32 = NDArray[np.float32]
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
