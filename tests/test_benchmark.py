@@ -26,7 +26,8 @@ def runs_of(scenario, policy, seeds):
     return {run.seed: run for run in evaluate(granted(policy, scenario), policy, seeds) if isinstance(run, Run)}
 
 
-def test_metrics_are_those_of_the_series():
+def test_metrics_are_those_of_the_series(monkeypatch):
+    monkeypatch.setattr("uuv_marl.benchmark.evaluate.ROUTE_PERIOD_S", 0.1)
     run = runs_of(load_scenario("single_obstacle"), "bio_inspired", [4])[4]
     series, metrics = run.series, run.metrics
     assert metrics["min_spacing_m"] == pytest.approx(series["min_spacing_m"].min())
@@ -34,12 +35,13 @@ def test_metrics_are_those_of_the_series():
     assert metrics["max_spacing_m"] == pytest.approx(series["max_spacing_m"].max())
     assert metrics["min_obstacle_distance_m"] == pytest.approx(series["obstacle_distance_m"].min())
     # Independently, from the routes alone.
-    away = np.hypot(*(run.routes - 350.0).transpose(2, 0, 1)) - 25.0
+    position = run.routes.position
+    away = np.hypot(*(position - 350.0).transpose(2, 0, 1)) - 25.0
     assert metrics["min_obstacle_distance_m"] == pytest.approx(away.min(), abs=1e-3)
-    pairs = np.hypot(*(run.routes[:, :, None] - run.routes[:, None]).transpose(3, 0, 1, 2))
+    pairs = np.hypot(*(position[:, :, None] - position[:, None]).transpose(3, 0, 1, 2))
     pairs[:, np.arange(54), np.arange(54)] = np.inf
     np.testing.assert_allclose(series["min_spacing_m"], pairs.min(axis=(1, 2)), atol=1e-3)
-    centre = run.routes.mean(axis=1)
+    centre = position.mean(axis=1)
     arrived = np.hypot(*(centre[-51:] - 600.0).T)
     assert (arrived <= 2.0 + 1e-3).all()
     assert series["time_s"][-1] == pytest.approx(metrics["task_time_s"] + 5.0, abs=1e-3)
@@ -54,13 +56,32 @@ def test_a_run_does_not_depend_on_the_seeds_beside_it():
     assert sorted(together) == list(range(40))
 
 
+def test_routes_show_the_motion():
+    run = runs_of(load_scenario("single_obstacle"), "bio_inspired_plus", [3])[3]
+    routes = run.routes
+    np.testing.assert_allclose(np.diff(routes.time_s)[:-1], 0.5, atol=1e-4)
+    assert routes.time_s[-1] == run.series["time_s"][-1]
+    # At the start a vehicle only surges, at 0 to 4 m/s.
+    bow = np.stack([np.cos(routes.heading[0]), np.sin(routes.heading[0])], axis=1)
+    surge = (routes.velocity[0] * bow).sum(axis=1)
+    assert surge.min() >= 0.0
+    assert surge.max() <= 4.0
+    np.testing.assert_allclose(routes.velocity[0], surge[:, None] * bow, atol=1e-5)
+    # Velocity is the rate of the position.
+    middle = (routes.velocity[1:] + routes.velocity[:-1])[:-1] / 2
+    off = np.abs(np.diff(routes.position, axis=0)[:-1] / 0.5 - middle)
+    assert off.mean() < 0.05
+
+
 def test_long_routes_are_thinned_in_time_and_keep_start_and_end(monkeypatch):
     whole = runs_of(quick(), "idle", [3])[3]
-    monkeypatch.setattr("uuv_marl.benchmark.evaluate.MOST_POSITIONS", len(whole.routes) * 8 // 4)
+    times = len(whole.routes.time_s)
+    monkeypatch.setattr("uuv_marl.benchmark.evaluate.MOST_SAMPLES", times * 8 // 4)
     thin = runs_of(quick(), "idle", [3])[3]
-    fourths = whole.routes[:-1:4]
-    np.testing.assert_array_equal(thin.routes, [*fourths, whole.routes[-1]])
-    assert len(thin.routes) < len(whole.routes) / 3
+    for name, values in whole.routes._asdict().items():
+        few = getattr(thin.routes, name)
+        np.testing.assert_array_equal(few[[0, -1]], values[[0, -1]])
+        assert len(few) < times / 2
     assert thin.metrics == whole.metrics
 
 

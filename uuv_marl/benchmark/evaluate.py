@@ -16,8 +16,23 @@ Float32 = NDArray[np.float32]
 
 BATCH = 32
 """Seeds stepped together."""
-MOST_POSITIONS = 4_000_000
-"""Positions kept of a run; with more vehicles and steps than this, routes are thinned in time."""
+ROUTE_PERIOD_S = 0.5
+"""Between two samples of the routes."""
+MOST_SAMPLES = 1_500_000
+"""Samples of vehicles kept of a run; with more than this, routes are thinned further in time."""
+
+
+class Routes(NamedTuple):
+    """Where everybody was, from start to end; NaN once a vehicle is lost. Frame north, east."""
+
+    time_s: Float32
+    """Shape (time,): every ``ROUTE_PERIOD_S`` (see ``MOST_SAMPLES``), and the end."""
+    position: Float32
+    """Shape (time, vehicle, 2) [m]."""
+    heading: Float32
+    """Shape (time, vehicle) [rad], in [-pi, pi), clockwise from north."""
+    velocity: Float32
+    """Shape (time, vehicle, 2) [m/s]."""
 
 
 class Run(NamedTuple):
@@ -27,8 +42,8 @@ class Run(NamedTuple):
     metrics: Metrics
     series: dict[str, Float32]
     """Samples over time, see ``Meter.series``."""
-    routes: Float32
-    """Positions [m] from start to end, shape (time, vehicle, 2); NaN once a vehicle is lost. See ``MOST_POSITIONS``."""
+    routes: Routes
+    """Sampled in time."""
     obstacles: Float32
     """Centre north, east and radius [m], shape (obstacle, 3)."""
     waypoints: Float32
@@ -69,16 +84,13 @@ def _batch(
     meter.update(active)
     limits, period = swarm.time_limit_s, scenario.timing.decision_period_s
     steps, step = math.ceil(limits.max() / period) + 1, 0
-    every = math.ceil(steps * swarm.num_vehicles / MOST_POSITIONS)
-    # Room for the longest episode, of which the system only hands out what is written.
-    routes = np.empty((len(seeds), steps // every + 2, swarm.num_vehicles, 2), np.float32)
-    routes[:, 0], num = _positions(swarm), 1
+    every = max(round(ROUTE_PERIOD_S / period), math.ceil(steps * swarm.num_vehicles / MOST_SAMPLES), 1)
+    samples = [_sample(swarm)]
     report_every = max(1, round(2.0 / period))
     while active.any():
         percept = swarm.step(actor.act(percept), active)
         meter.update(active)
         step += 1
-        routes[:, num] = _positions(swarm)
         ended = active & (swarm.arrived | swarm.timed_out | ~swarm.state.alive.any(axis=1))
         for w in (int(index) for index in np.flatnonzero(ended)):
             course, discs = swarm.course, int(swarm.course.num_obstacles[w])
@@ -86,16 +98,30 @@ def _batch(
                 seed=seeds[w],
                 metrics=meter.metrics(w, int(actor.clamps[w])),
                 series=meter.series(w),
-                routes=routes[w, : num + 1],
+                routes=_routes(swarm, samples, w),
                 obstacles=course.obstacles[w, :discs].astype(np.float32),
                 waypoints=course.waypoints[w, : int(course.last[w]) + 1].astype(np.float32),
             )
         active &= ~ended
-        num += int(step % every == 0)
+        if step % every == 0:
+            samples.append(_sample(swarm))
         if step % report_every == 0:
             done = np.where(active, swarm.facts.time_s, limits)
             yield Progress(float(done.sum() / limits.sum()))
 
 
-def _positions(swarm: Swarm) -> Float32:
-    return np.where(swarm.state.alive[:, :, None], swarm.state.eta[:, :, :2], np.nan).astype(np.float32)
+def _sample(swarm: Swarm) -> tuple[Float32, Float32]:
+    """Time (world,) and position, heading and velocity of everybody (world, vehicle, 5)."""
+    eta, nu = swarm.state.eta, swarm.state.nu
+    cos, sin = np.moveaxis(swarm.heading, -1, 0)
+    u, v = nu[:, :, 0], nu[:, :, 1]
+    motion = np.stack([eta[:, :, 0], eta[:, :, 1], eta[:, :, 2], cos * u - sin * v, sin * u + cos * v], axis=2)
+    motion[~swarm.state.alive] = np.nan
+    return swarm.facts.time_s.astype(np.float32), motion.astype(np.float32)
+
+
+def _routes(swarm: Swarm, samples: Sequence[tuple[Float32, Float32]], w: int) -> Routes:
+    """The routes of a world that ends now."""
+    time, motion = zip(*((t[w], m[w]) for t, m in [*samples, _sample(swarm)]), strict=True)
+    moved = np.array(motion, np.float32)
+    return Routes(np.array(time, np.float32), moved[:, :, :2], moved[:, :, 2], moved[:, :, 3:])

@@ -48,7 +48,7 @@ def _routes(results: Results, scenario: str, policies: Sequence[str], folder: Pa
     for k, policy in enumerate(shown):
         ax: Axes = axes[k // columns, k % columns]
         trace = results.trace(scenario, policy, 0)
-        routes, waypoints = trace["routes"], trace["waypoints"]
+        routes, waypoints = trace["route_position"], trace["waypoints"]
         ax.plot(routes[:, :, 1], routes[:, :, 0], color=COLOURS[0], linewidth=0.4, alpha=0.6)
         ax.plot(waypoints[:, 1], waypoints[:, 0], color="black", linewidth=1.0, linestyle="--")
         ax.plot(routes[0, :, 1], routes[0, :, 0], ".", color=COLOURS[2], markersize=3)

@@ -5,7 +5,7 @@ import inspect
 import json
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -43,14 +43,14 @@ class Results:
     Args:
         folder: made if missing. What it holds already is continued, if it comes from the same code and scenarios.
         scenarios: the scenarios that runs will name.
-        route_seed: the seed whose routes are kept, for pictures.
+        route_seeds: seeds whose routes are kept.
     """
 
-    def __init__(self, folder: Path, scenarios: Iterable[Scenario], route_seed: int = 0) -> None:
+    def __init__(self, folder: Path, scenarios: Iterable[Scenario], route_seeds: Container[int] = (0,)) -> None:
         self.folder = folder
         self.scenarios = {scenario.name: scenario for scenario in scenarios}
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
-        self._route_seed = route_seed
+        self._route_seeds = route_seeds
         self._fingerprint = source_fingerprint()
         self.rows: list[Row] = []
         self._path = folder / "results.json"
@@ -95,8 +95,8 @@ class Results:
     def add(self, scenario: str, policy: str, run: Run) -> None:
         """Keep a run, on disk at once."""
         arrays = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
-        if run.seed == self._route_seed:
-            arrays["routes"] = run.routes
+        if run.seed in self._route_seeds:
+            arrays |= {f"route_{name}": values for name, values in run.routes._asdict().items()}
         trace = self.trace_path(scenario, policy, run.seed)
         partial = trace.with_suffix(".partial.npz")
         np.savez_compressed(partial, allow_pickle=False, **arrays)
@@ -117,7 +117,8 @@ class Results:
     def trace(self, scenario: str, policy: str, seed: int) -> dict[str, NDArray[np.float32]]:
         """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
 
-        Beside them ``obstacles``, ``waypoints``, and ``routes`` for the first seed.
+        Beside them ``obstacles``, ``waypoints``, and for the seeds whose routes are kept the fields of
+        ``evaluate.Routes``, as ``route_time_s`` and so on.
         """
         with np.load(self.trace_path(scenario, policy, seed)) as file:
             return {name: file[name] for name in file.files}
