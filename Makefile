@@ -1,14 +1,16 @@
-# `make benchmark` is the main job, `make test` checks everything, `make test-adapters` what needs BenchMARL or RLlib.
+# `make benchmark` and `make reproduce` are the main jobs, `make test` checks everything, `make test-adapters` what needs BenchMARL or RLlib.
 # They set up .venv* themselves; they need Python 3.11 or later and the package registries. Another interpreter:
 # make benchmark PYTHON=python3.12
 PYTHON ?= python3
 BIN := .venv/bin
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark test test-adapters test-benchmarl test-rllib check perf clean
+.PHONY: help benchmark reproduce paper test test-adapters test-benchmarl test-rllib check perf clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
+	@echo "make reproduce [ARGS='--seeds 5']   the paper's figures, numbers and a ledger: about ten minutes"
+	@echo "make paper                          the same, then the page in docs/paper from it"
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
 	@echo "make check                          ruff, pyright and import-linter only"
@@ -17,6 +19,12 @@ help:
 
 benchmark: .venv/base.stamp
 	$(BIN)/uuv-marl benchmark $(ARGS)
+
+reproduce: .venv/base.stamp
+	$(BIN)/uuv-marl reproduce $(ARGS)
+
+paper: reproduce
+	$(BIN)/python tools/ship_paper.py results/reproduce
 
 test: check
 	$(BIN)/python -m pytest $(ARGS)

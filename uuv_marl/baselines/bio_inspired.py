@@ -16,8 +16,10 @@ Int64 = NDArray[np.int64]
 
 FEED_FORWARD = 1.2
 """Of ``bio_inspired_plus``: a little more than the drag, since it acts along the reference and not along the bow."""
-_MAX_EXPONENT = 50.0
-_MIN_DISTANCE_M = 0.5
+MAX_EXPONENT = 50.0
+"""exp(length / distance) is bounded here [1]."""
+MIN_DISTANCE_M = 0.5
+"""And distances here."""
 
 
 class Gains(NamedTuple):
@@ -83,10 +85,10 @@ class BioInspiredPlus(BioInspired):
 @compiled
 def bounded_exp(length: float, distance: float) -> tuple[float, int]:
     """exp(length / distance) [1], with the distance kept above 0.5 m and the exponent below 50; 1 if either bound."""
-    clamped = int(distance < _MIN_DISTANCE_M)
-    exponent = length / max(distance, _MIN_DISTANCE_M)
-    if exponent > _MAX_EXPONENT:
-        return math.exp(_MAX_EXPONENT), 1
+    clamped = int(distance < MIN_DISTANCE_M)
+    exponent = length / max(distance, MIN_DISTANCE_M)
+    if exponent > MAX_EXPONENT:
+        return math.exp(MAX_EXPONENT), 1
     return math.exp(exponent), clamped
 
 

@@ -21,6 +21,7 @@ from uuv_marl.scenario import Scenario
 
 SCHEMA = 1
 _PACKAGE = Path(__file__).resolve().parent.parent
+_SOURCES = ("percept.py", "scenario*.py", "sim/*.py", "baselines/*.py", "baselines/tuned/*.json", "benchmark/*.py")
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
 
 
@@ -152,9 +153,10 @@ def knowledge(policy: str) -> dict[str, Any]:
 
 
 def source_fingerprint() -> str:
-    """Hash of all that a run's numbers come from: the package's code and tuned gains."""
+    """Hash of all that a run's numbers come from: code of the layers up to the benchmark's, and tuned gains."""
     digest = hashlib.sha256()
-    for path in sorted([*_PACKAGE.rglob("*.py"), *_PACKAGE.glob("baselines/tuned/*.json")]):
+    code = [path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)]
+    for path in sorted(code):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 

@@ -1,0 +1,210 @@
+"""Laws of the stability study: the linear part is that of the real swarm, and exponents are exponents."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import make
+from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.reproduce import formation, rest, softening, stability
+from uuv_marl.reproduce.columns import read_columns, write_columns
+from uuv_marl.sim.swarm import Swarm
+
+GAINS = Gains()
+
+
+@pytest.fixture(scope="module")
+def seven():
+    """A formation of seven vehicles in balance."""
+    return formation.formations(formation.straight_leg(7), GAINS, [0])[0]
+
+
+def timed(scenario, hold_s, steps=1):
+    overrides = {"control_hold_s": hold_s, "integration_step_s": hold_s / steps, "decision_period_s": hold_s}
+    return load_scenario(scenario, overrides={f"timing.{clock}": value for clock, value in overrides.items()})
+
+
+def placed(scenario, found, worlds=1):
+    """A swarm in steady tracking at l(0) = 0, and the paper's law."""
+    swarm = Swarm(scenario, worlds)
+    swarm.reset(0)
+    swarm.state.eta[:, :, :2], swarm.state.eta[:, :, 2] = found.places, 0.0
+    swarm.state.nu[:] = [scenario.trajectory.speed_mps, 0.0, 0.0]
+    law = rest.Variant("", yaw_damping_nms=scenario.actuators.yaw_damping_nms)
+    return swarm, law.policy(scenario, worlds)
+
+
+def relative(swarm):
+    """States (x, y, psi, u, v, r) relative to l(t), shape (world, 6 vehicle)."""
+    states = np.concatenate([swarm.state.eta, swarm.state.nu], axis=2)
+    states[:, :, :2] -= swarm.facts.reference[:, None, :2]
+    return states.reshape(len(states), -1)
+
+
+def test_stiffness_is_the_slope_of_the_force():
+    rng = np.random.default_rng(0)
+    places = rng.uniform(-60.0, 60.0, (12, 2))
+    heard = np.where(rng.random((12, 5)) < 0.8, rng.integers(0, 12, (12, 5)), -1)
+    heard[heard == np.arange(12)[:, None]] = -1
+    slopes = []
+    for step in 1e-5 * np.eye(24):
+        ahead, astern = places + step.reshape(12, 2), places - step.reshape(12, 2)
+        slopes.append(formation.forces(ahead, heard, GAINS) - formation.forces(astern, heard, GAINS))
+    expected = np.reshape(slopes, (24, 24)).T / 2e-5
+    np.testing.assert_allclose(formation.stiffness(places, heard, GAINS), expected, rtol=1e-5, atol=1e-3)
+
+
+def test_the_real_swarm_stays_in_a_settled_formation(seven):
+    assert seven.settled
+    scenario = formation.straight_leg(7)
+    swarm, policy = placed(scenario, seven)
+    before = relative(swarm)
+    for _ in range(3):
+        swarm.step(policy.act(swarm.observe()))
+    np.testing.assert_allclose(relative(swarm), before, atol=2e-5)
+
+
+@pytest.mark.parametrize(("hold_s", "damping"), [(0.1, 0.0), (0.05, 60.0)])
+def test_the_loop_is_the_slope_of_one_step_of_the_real_swarm(seven, hold_s, damping):
+    scenario = timed(formation.straight_leg(7, damping), hold_s, steps=5)
+    steps = np.diag(np.tile([2e-2, 2e-2, 1e-3, 1e-3, 1e-3, 1e-3], 7))
+    shifts = np.concatenate([steps, -steps])
+    swarm, policy = placed(scenario, seven, len(shifts))
+    swarm.state.eta[:] += shifts.reshape(-1, 7, 6)[..., :3]
+    swarm.state.nu[:] += shifts.reshape(-1, 7, 6)[..., 3:]
+    percept = swarm.observe()
+    assert (swarm.heard == seven.heard).all()
+    swarm.step(policy.act(percept))
+    after = relative(swarm)
+    slope = (after[:42] - after[42:]).T / (2.0 * steps.sum(axis=0))
+    rigid = formation.stiffness(seven.places, seven.heard, GAINS)
+    np.testing.assert_allclose(slope, stability.loop(scenario, rigid, hold_s), atol=5e-3)
+
+
+def test_a_formation_in_balance_may_be_turned_for_nothing_and_else_settles(seven):
+    rigid = formation.stiffness(seven.places, seven.heard, GAINS)
+    found = stability.rates(stability.eigenvalues(formation.straight_leg(7), rigid, 0.0))
+    assert (found.neutral, found.unstable) == (1, 0)
+
+
+def test_short_holds_approach_continuous_feedback(seven):
+    rigid = formation.stiffness(seven.places, seven.heard, GAINS)
+    scenario = formation.straight_leg(7)
+    grown = [stability.rates(stability.eigenvalues(scenario, rigid, hold_s)).weaving for hold_s in (0.0, 1e-3, 1e-2)]
+    assert grown[1] - grown[0] == pytest.approx(0.1 * (grown[2] - grown[0]), rel=0.05)
+
+
+def test_what_stands_for_a_missing_formation_says_so():
+    found = formation.formations(formation.straight_leg(), GAINS, [0], rounds=400)[0]
+    swarm, _ = placed(formation.straight_leg(), found)
+    swarm.observe()
+    assert (swarm.heard[0] == found.heard).all()
+    missing = formation.forces(found.places, found.heard, GAINS) - [1880.0, 0.0]
+    assert found.residual_n == pytest.approx(math.sqrt((missing**2).sum(axis=1).mean()))
+    assert not found.settled
+    assert found.residual_n < 0.05 * 1880.0
+
+
+@pytest.mark.parametrize("hold_s", [0.02, 0.06])
+def test_a_lone_vehicle_weaves_as_predicted(hold_s):
+    """Below the critical hold it straightens, above it swings up, at the rate that the eigenvalues say."""
+    lone = stability.lone_stiffness(GAINS)
+    scenario = timed(formation.straight_leg(1), hold_s)
+    critical = stability.critical_hold_s(scenario, lone)
+    assert 0.02 < critical < 2.0 * 50.0 / 1880.0  # the sway takes its part of the yaw damping
+    rate = stability.rates(stability.eigenvalues(scenario, lone, hold_s)).weaving
+    assert (rate > 0.0) == (hold_s > critical)
+    found = formation.formations(scenario, GAINS, [0], rounds=200)[0]
+    swarm, policy = placed(scenario, found)
+    swarm.state.nu[0, 0, 2] = 2e-3
+    percept, yaw = swarm.observe(), []
+    for _ in range(round(24.0 / hold_s)):
+        percept = swarm.step(policy.act(percept))
+        yaw.append(abs(swarm.state.nu[0, 0, 2]))
+    early, late = (max(yaw[round(t / hold_s) : round((t + 3.0) / hold_s)]) for t in (6.0, 20.0))
+    assert math.log(late / early) / 14.0 == pytest.approx(rate, abs=0.02)
+
+
+def test_exponents_of_systems_that_are_known():
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]]) * 0.4
+    spread = np.diag([0.3, -1.0])
+    for matrix, expected in ((spread, 0.3), (turn, 0.0)):
+        values, vectors = np.linalg.eig(0.5 * matrix)
+        step = (vectors * np.exp(values) @ np.linalg.inv(vectors)).real.T
+        found = rest.largest_exponent(lambda states, step=step: states @ step, np.zeros((2, 2)), 1e-3, 200, 0.5)
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+    logistic = rest.largest_exponent(lambda x: 4.0 * x * (1.0 - x), np.array([[0.3], [0.41]]), 1e-7, 4000, 2.0)
+    np.testing.assert_allclose(logistic, math.log(2.0) / 2.0, rtol=0.05)
+
+
+def test_the_exponent_of_a_smooth_law_does_not_depend_on_the_displacement():
+    smooth = dataclasses.replace(rest.Variant("", softening=rest.SMOOTH), settle_s=30.0)
+    table = rest.measure(smooth, (0, 1))
+    large, small = table["exponent_per_s"].mean(), table["small_exponent_per_s"].mean()
+    assert large == pytest.approx(small, abs=0.15)
+    assert large > 0.4
+
+
+def test_a_law_with_jumps_parts_copies_faster_when_they_are_farther_apart():
+    table = rest.measure(dataclasses.replace(rest.Variant(""), settle_s=30.0), (0,))
+    assert table["exponent_per_s"] > table["small_exponent_per_s"] + 0.5
+    assert 0.8 < table["yaw_rate_rms_rad_per_s"] < 1.3  # about 1 rad/s: the swarm does not settle
+
+
+def test_a_stiff_pull_alone_keeps_a_vehicle_moving_and_yaw_damping_stops_it():
+    stiff = rest.Variant("", num_vehicles=1, gains=Gains(zeta_l=1000.0))
+    damped = dataclasses.replace(stiff, yaw_damping_nms=600.0)
+    assert rest.measure(stiff, (0,))["yaw_rate_rms_rad_per_s"] > 1.0
+    assert rest.measure(damped, (0,))["yaw_rate_rms_rad_per_s"] < 0.05
+
+
+def test_a_measure_depends_on_its_seed_alone():
+    law = rest.Variant("", num_vehicles=6, settle_s=5.0)
+    alone, batch = rest.measure(law, (1,)), rest.measure(law, (0, 1))
+    for name in ("yaw_rate_rms_rad_per_s", "speed_rms_mps", "exponent_per_s", "min_spacing_m"):
+        assert alone[name][0] == batch[name][1]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_without_softening_the_law_is_the_papers(seed):
+    scenario = load_scenario("single_obstacle")
+    swarm = Swarm(scenario)
+    swarm.reset(seed)
+    swarm.state.eta[0, :, :2] += 150.0  # before and beside the obstacle
+    percept = swarm.observe()
+    assert percept["echo"].any()
+    law = make("bio_inspired", scenario).act(percept)
+    np.testing.assert_allclose(softening.Softened(scenario).act(percept), law, atol=1e-6)
+    for soft in (rest.SMOOTH, softening.Softening(torque_gate_n=3e3), softening.Softening(dead_zone_n=3e3)):
+        softened = rest.Variant("", softening=soft).policy(scenario, 1).act(percept)
+        assert np.abs(softened - law).max() > 1e-3
+
+
+def test_the_fade_is_smooth():
+    distance = np.linspace(10.0, 25.0, 1501)
+    share = softening.fade(distance, 14.0, 20.0)
+    assert (share[distance <= 14.0] == 1.0).all()
+    assert (share[distance >= 20.0] == 0.0).all()
+    assert (np.diff(share) <= 0.0).all()
+    assert np.abs(np.diff(share, 2)).max() < 1e-4
+
+
+def test_pictures_are_drawn_from_the_tables_on_disk(tmp_path, monkeypatch):
+    monkeypatch.setattr(stability, "SEEDS", (0,))
+    monkeypatch.setattr(formation.formations, "__defaults__", (50,))
+    monkeypatch.setattr(stability, "HOLDS_S", (0.0, 0.1))
+    monkeypatch.setattr(stability, "SWEEPS", {name: values[:2] for name, values in stability.SWEEPS.items()})
+    monkeypatch.setattr(rest, "VARIANTS", (rest.Variant("one", num_vehicles=1), rest.Variant("two", num_vehicles=2)))
+    monkeypatch.setattr(rest, "SEEDS", (0, 1))
+    for module in (stability, rest):
+        shares = []
+        for name, columns in module.tables(None, shares.append).items():
+            assert len({len(values) for values in columns.values()}) == 1
+            write_columns(tmp_path / f"{name}.csv", columns)
+        assert shares == sorted(shares)
+        assert shares[-1] == 1.0
+    assert len(stability.draw({n: read_columns(tmp_path / f"{n}.csv") for n in ("eigenvalues", "margins")}).axes) == 6
+    assert len(rest.draw({"rest": read_columns(tmp_path / "rest.csv")}).axes) == 3

@@ -1,0 +1,42 @@
+"""The command line: ``uuv-marl --help``."""
+
+from typing import Annotated
+
+import typer
+
+from uuv_marl import __version__
+from uuv_marl.cli import benchmark, lists, reproduce, train
+from uuv_marl.cli.console import console
+
+app = typer.Typer(
+    help="Swarms of unmanned underwater vehicles: scenarios, controllers and their benchmark.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_show_locals=False,
+    rich_markup_mode="markdown",
+)
+for command in (
+    benchmark.benchmark, reproduce.reproduce, lists.scenarios, lists.policies, benchmark.tune, reproduce.identify,
+):  # fmt: skip
+    app.command()(command)
+app.add_typer(train.app, name="train")
+
+
+def _show_version(value: bool) -> None:
+    if value:
+        console.print(f"uuv_marl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Entry point of ``uuv-marl``."""
+    app()

@@ -1,0 +1,142 @@
+"""``uuv-marl benchmark``, and ``tune``, which found the gains of what it compares."""
+
+import sys
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.progress import TaskID
+
+from uuv_marl.cli.console import console, explained, extra, progress_bar
+
+if TYPE_CHECKING:
+    from uuv_marl.benchmark.runner import Evaluate
+
+
+def benchmark(
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Name or TOML file; repeat for several. Default: single_obstacle.")
+    ] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Name, or module:Class; repeat for several. Default: the paper's three and stronger variants."
+        ),
+    ] = None,
+    seeds: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1; tuning and training use those above 9,999.")
+    ] = 20,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as sonar.echo_reports=surface."),
+    ] = None,
+    output: Annotated[Path, typer.Option(help="Folder of results, table and pictures.")] = Path("results/benchmark"),
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Spread the seeds over this Ray cluster (auto: the one here). Needs: distributed."
+        ),
+    ] = None,
+) -> None:
+    """Compare policies on scenarios over seeds.
+
+    Prints a table beside the paper's figures and writes results.json (every seed and metric), table.md and
+    figures/*.png. Ctrl-C keeps the finished seeds; the same command goes on.
+
+    Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
+    """
+    with explained():
+        from uuv_marl.baselines import PolicyError
+        from uuv_marl.baselines.registry import policy_class
+        from uuv_marl.benchmark.results import Results
+        from uuv_marl.benchmark.runner import DEFAULT_POLICIES, make_tables, run_missing, write_report
+        from uuv_marl.benchmark.tables import rich_table
+        from uuv_marl.scenario_files import ScenarioError, load_scenario, parse_override
+        from uuv_marl.sim.compiled import announce_compilation
+
+        changes = dict(parse_override(text) for text in overrides or [])
+        for field in sorted({"sonar.channels", "actuators.yaw_damping_nms"} & set(changes)):
+            raise PolicyError(f"{field} can't be set here: every policy brings its own, see 'uuv-marl policies'")
+        scenarios = [load_scenario(name, overrides=changes) for name in scenario or ["single_obstacle"]]
+        names = [loaded.name for loaded in scenarios]
+        if len(set(names)) < len(names):
+            raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
+        policies = list(dict.fromkeys(policy or DEFAULT_POLICIES))
+        sys.path.insert(0, "")  # --policy module:Class finds modules of this folder
+        for name in policies:
+            policy_class(name)
+        evaluator, cluster = _where(ray, policies)
+        results = Results(output, scenarios)
+        announce_compilation()
+        wanted = list(range(seeds))
+        try:
+            with cluster, progress_bar() as bar:
+                tasks: dict[tuple[str, str], TaskID] = {}
+
+                def report(name: str, policy_name: str, share: float) -> None:
+                    key = (name, policy_name)
+                    if key not in tasks:
+                        tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
+                    bar.update(tasks[key], completed=share)
+
+                run_missing(results, scenarios, policies, wanted, report, evaluator)
+        except KeyboardInterrupt:
+            console.print(
+                f"Stopped. {len(results.rows)} finished runs are in {output}/results.json; the same command goes on."
+            )
+            raise typer.Exit(130) from None
+        tables = make_tables(results, scenarios, policies, wanted)
+        written = write_report(results, tables, scenarios, policies, wanted)
+        for table in tables:
+            console.print(rich_table(table.title, table.rows))
+        console.print(f"Every seed: {output}/results.json   table: {written[0]}   pictures:")
+        for path in written[1:]:
+            console.print(f"  {path}", highlight=False)
+
+
+def _where(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
+    """What runs the seeds, and the connection that it needs: this machine, or the Ray cluster at an address."""
+    from uuv_marl.benchmark.evaluate import evaluate
+
+    if ray is None:
+        return evaluate, nullcontext()
+    with extra("distributed", "--ray"):
+        from uuv_marl.benchmark.distributed import connected, evaluate_on_cluster
+    own = any(":" in name for name in policies)
+    return evaluate_on_cluster, connected(ray, working_dir=Path.cwd() if own else None)
+
+
+def tune(
+    policy: Annotated[list[str] | None, typer.Option(help="Name; repeat for several. Default: all.")] = None,
+    trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
+    output: Annotated[Path, typer.Option(help="Folder of the trials.")] = Path("results/tune"),
+) -> None:
+    """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
+
+    Needs the extra "tune". Takes ten to fifteen minutes per policy. Ctrl-C keeps the finished trials; the same command
+    goes on. The shipped results are in uuv_marl/baselines/tuned.
+    """
+    with explained():
+        from uuv_marl.baselines import PolicyError
+        from uuv_marl.benchmark.tuning import SPACES
+        from uuv_marl.benchmark.tuning import tune as search
+
+        for name in policy or SPACES:
+            if name not in SPACES:
+                raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
+        try:
+            with extra("tune", "tuning"), progress_bar() as bar:
+                for name in policy or SPACES:
+                    task = bar.add_task(name, total=trials)
+                    path = search(
+                        name, output, trials,
+                        lambda done, best, task=task, name=name: bar.update(
+                            task, completed=done, description=f"{name}: best {best:.1f} s"
+                        ),
+                    )  # fmt: skip
+                    bar.console.print(f"{path}", highlight=False)
+        except KeyboardInterrupt:
+            console.print(f"Stopped. The finished trials are in {output}; the same command goes on.")
+            raise typer.Exit(130) from None

@@ -1,0 +1,132 @@
+"""The runs that figures and ledger are made of: a case is one policy on one scenario, with what is changed in both."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines import granted
+from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.results import Results
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+
+Float64 = NDArray[np.float64]
+Trace = dict[str, NDArray[np.float32]]
+Report = Callable[[float], None]
+"""Called with the share of the work that is done."""
+NOTHING: Mapping[str, object] = MappingProxyType({})
+
+
+class Case(NamedTuple):
+    """One policy on one scenario."""
+
+    name: str
+    """Names its folder; unique."""
+    scenario: str
+    policy: str = "bio_inspired"
+    overrides: Mapping[str, object] = NOTHING
+    """Fields of the scenario that are changed."""
+    parameters: Mapping[str, object] = NOTHING
+    """Of the policy."""
+    routes: bool = False
+    """Whether every seed's routes are kept."""
+
+    def load(self) -> Scenario:
+        """The scenario as it is run."""
+        return granted(self.policy, load_scenario(self.scenario, overrides=self.overrides))
+
+    def label(self, seed: int) -> str:
+        """Scenario, vehicles, policy, what is changed and seed, for captions."""
+        loaded = self.load()
+        changed = [f"{field.rpartition('.')[2]} = {value}" for field, value in self.overrides.items()]
+        for name, value in self.parameters.items():
+            changed += _gains(value) if isinstance(value, Gains) else [f"{name} = {value}"]
+        parts = [f"{loaded.name} v{loaded.version}", f"n = {loaded.swarm.num_vehicles}", self.policy]
+        return ", ".join([*parts, *changed, f"seed {seed}"])
+
+
+def _gains(gains: Gains) -> list[str]:
+    """The gains that are not Table 1's."""
+    table_1 = Gains()._asdict()
+    return [f"{name} = {value:g}" for name, value in gains._asdict().items() if value != table_1[name]]
+
+
+def folder_name(words: str) -> str:
+    """A case's name from any words."""
+    return "".join(c if c.isalnum() or c in ".-" else "_" for c in words)
+
+
+def obstacle_gains(name: str, **gains: float) -> Case:
+    """Figures 12 and 13: other obstacle gains on the single obstacle."""
+    return Case(name, "single_obstacle", parameters={"gains": Gains(**gains)}, routes=True)
+
+
+TRACKING = Case("tracking", "tracking", routes=True)
+SINGLE = Case("single_obstacle", "single_obstacle", routes=True)
+MULTI = Case("multi_obstacle", "multi_obstacle", routes=True)
+# The paper names no values for figures 12 and 13. Assumed: a tenth and five times Table 1's zeta_o (ten times, and the
+# swarm does not pass at all), half and twice its delta_o.
+ZETA_SMALL = obstacle_gains("zeta_o-small", zeta_o=0.8)
+ZETA_LARGE = obstacle_gains("zeta_o-large", zeta_o=40.0)
+DELTA_SMALL = obstacle_gains("delta_o-small", delta_o=40.0)
+DELTA_LARGE = obstacle_gains("delta_o-large", delta_o=160.0)
+COMPARATORS = {
+    policy: Case(policy, "single_obstacle", policy) for policy in ("sff", "sdc", "sff_informed", "sdc_informed")
+}
+
+
+class Study:
+    """Runs of cases in a folder, kept as they are made, so that a stopped job goes on.
+
+    Args:
+        folder: one sub-folder for each case.
+        seeds: benchmark seeds 0 to ``seeds - 1``.
+    """
+
+    def __init__(self, folder: Path, seeds: int) -> None:
+        self.folder = folder
+        self.seeds = range(seeds)
+        self._open: dict[str, Results] = {}
+
+    def run(self, cases: Iterable[Case], report: Report, seeds: Sequence[int] | None = None) -> None:
+        """Run what is missing of these cases."""
+        wanted, todo = self.seeds if seeds is None else seeds, list(cases)
+        for k, case in enumerate(todo):
+            results, scenario = self._results(case), case.load()
+            missing = [seed for seed in wanted if not results.has(scenario.name, case.policy, seed)]
+            for event in evaluate(scenario, case.policy, missing, **case.parameters):
+                if isinstance(event, Run):
+                    results.add(scenario.name, case.policy, event)
+                else:
+                    report((k + event.share) / len(todo))
+            report((k + 1) / len(todo))
+
+    def metric(self, case: Case, name: str, seeds: Sequence[int] | None = None) -> Float64:
+        """A metric by seed; NaN where there is none."""
+        rows = self._results(case).select(case.load().name, case.policy, self.seeds if seeds is None else seeds)
+        values = [row.metrics[name] for row in rows]
+        return np.array([value if isinstance(value, (int, float)) else np.nan for value in values], np.float64)
+
+    def trace(self, case: Case, seed: int) -> Trace:
+        """A run's time series and routes, see ``Results.trace``."""
+        return self._results(case).trace(case.load().name, case.policy, seed)
+
+    def traces(self, case: Case) -> list[Trace]:
+        """Those of all seeds."""
+        return [self.trace(case, seed) for seed in self.seeds]
+
+    def _results(self, case: Case) -> Results:
+        if case.name not in self._open:
+            kept = self.seeds if case.routes else ()
+            scenario = case.load()
+            # What is changed names the folder, so that a changed case never finds the runs of the old one.
+            changed = hashlib.sha256(repr((scenario, case.policy, sorted(case.parameters.items()))).encode())
+            folder = self.folder / f"{case.name}.{changed.hexdigest()[:8]}"
+            self._open[case.name] = Results(folder, [scenario], route_seeds=kept)
+        return self._open[case.name]

@@ -1,0 +1,143 @@
+"""The paper's equations read as printed, where that fails: how it fails."""
+
+# pyright: reportUnknownMemberType=false
+# Matplotlib leaves the types of its keyword arguments open.
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from uuv_marl.reproduce.assumptions import ASSUMPTIONS, FORWARD_ONLY, ONCE_PER_CENTRE, Alternative
+from uuv_marl.reproduce.cases import SINGLE, TRACKING, Case, Report, Study
+from uuv_marl.reproduce.columns import Columns
+from uuv_marl.reproduce.drawing import BLACK, BLUE, GREY, ORANGE, against_time, letter, panels
+from uuv_marl.reproduce.parts import Part, Tables
+from uuv_marl.reproduce.sensitivity import case_of
+from uuv_marl.scenario_files import load_scenario
+from uuv_marl.sim.vehicle import Plant, advance, plant
+
+FORCE = (1500.0, 150.0)
+"""Held surge force [N] and yaw torque [N m] of the lone vehicle: a turning circle, from rest."""
+DURATION_S = 20.0
+STEPS_S = (0.4, 0.2, 0.1, 0.05, 0.025, 0.0125)
+State = tuple[float, float, float, float, float, float]
+
+
+def printed_step(state: State, h: float, p: Plant) -> State:
+    """Eq. 23-24 as printed: velocity by Runge-Kutta; then the pose, whose k4 takes V(t), not V(t + t_r).
+
+    V(t + t_r / 2) is defined nowhere; the mean of V(t) and V(t + t_r) stands for it.
+    """
+    x, y, psi, u, v, r = state
+    _, _, _, u_next, v_next, r_next = advance(*state, *FORCE, h, p)
+    middle = ((u + u_next) / 2, (v + v_next) / 2, (r + r_next) / 2)
+
+    def rate(angle: float, nu: tuple[float, float, float]) -> tuple[float, float, float]:
+        c, s = math.cos(angle), math.sin(angle)
+        return c * nu[0] - s * nu[1], s * nu[0] + c * nu[1], nu[2]
+
+    k1 = rate(psi, (u, v, r))
+    k2 = rate(psi + k1[2] * h / 2, middle)
+    k3 = rate(psi + k2[2] * h / 2, middle)
+    k4 = rate(psi + k3[2] * h, (u, v, r))
+    dx, dy, dpsi = (h / 6 * (a + 2 * b + 2 * c + d) for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
+    return x + dx, y + dy, psi + dpsi, u_next, v_next, r_next
+
+
+def classical_step(state: State, h: float, p: Plant) -> State:
+    """What we use: Runge-Kutta on pose and velocity together."""
+    return advance(*state, *FORCE, h, p)
+
+
+def convergence() -> Columns:
+    """Position error at the end, against an eighth of the finest step, by step and reading."""
+    p = plant(load_scenario("tracking"))
+    truth = _travel(classical_step, STEPS_S[-1] / 8, p)
+    rows = [
+        (name, h, math.dist(_travel(step, h, p)[:2], truth[:2]))
+        for name, step in (("as printed", printed_step), ("classical", classical_step))
+        for h in STEPS_S
+    ]
+    heads = ("reading", "step_s", "position_error_m")
+    return {head: np.array(column) for head, column in zip(heads, zip(*rows, strict=True), strict=True)}
+
+
+def _travel(step: Callable[[State, float, Plant], State], h: float, p: Plant) -> State:
+    state: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for _ in range(round(DURATION_S / h)):
+        state = step(state, h, p)
+    return state
+
+
+def _case(alternative: Alternative, scenario: str) -> Case:
+    """The sensitivity's own case of this reading."""
+    (assumption,) = (a for a in ASSUMPTIONS if alternative in a.alternatives)
+    return case_of(assumption, alternative, scenario)
+
+
+AHEAD, INSIDE = _case(FORWARD_ONLY, "tracking"), _case(ONCE_PER_CENTRE, "single_obstacle")
+
+
+def tables(study: Study, _report: Report) -> Tables:
+    """Spacing with both sectors ahead, distance with one term per obstacle's centre, error of Eq. 24."""
+    made: dict[str, Columns] = {"literal-eq-24": convergence()}
+    for name, series, pair in (
+        ("literal-forward-only", "min_spacing_m", (TRACKING, AHEAD)),
+        ("literal-centre-once", "obstacle_distance_m", (SINGLE, INSIDE)),
+    ):
+        ours, printed = (study.trace(case, 0) for case in pair)
+        length = min(len(ours["time_s"]), len(printed["time_s"]))
+        pick = slice(0, length, 5)
+        made[name] = {
+            "time_s": ours["time_s"][pick],
+            "as_taken_m": ours[series].reshape(len(ours["time_s"]), -1)[pick].min(axis=1),
+            "as_printed_m": printed[series].reshape(len(printed["time_s"]), -1)[pick].min(axis=1),
+        }
+    return made
+
+
+def draw(made: Tables) -> Figure:
+    """One panel for each reading."""
+    figure, axes = panels(3, 4.6, 4.2)
+    contact = {"literal-forward-only": 2.0, "literal-centre-once": 1.0}
+    words = {
+        "literal-forward-only": ("(a) both sectors ahead: tracking", "smallest spacing [m]"),
+        "literal-centre-once": (
+            "(b) centre, once per obstacle: single obstacle",
+            "smallest distance to its surface [m]",
+        ),
+    }
+    for ax, (name, (heading, what)) in zip(axes, words.items(), strict=False):
+        table = made[name]
+        ax.plot(table["time_s"], table["as_taken_m"], color=BLUE, label="as taken", linewidth=1.2)
+        ax.plot(table["time_s"], table["as_printed_m"], "--", color=ORANGE, label="as printed", linewidth=1.0)
+        ax.axhline(contact[name], color=BLACK, linestyle=":", linewidth=1.0, label="collision")
+        against_time(ax, what)
+        letter(ax, heading)
+        ax.legend(fontsize=8)
+    axes[1].set_ylim(-15.0, 60.0)
+    table, ax = made["literal-eq-24"], axes[2]
+    for name, colour, mark in (("as printed", ORANGE, "s--"), ("classical", BLUE, "o-")):
+        own = table["reading"] == name
+        ax.loglog(table["step_s"][own], table["position_error_m"][own], mark, color=colour, label=name)
+    ax.axvline(0.1, color=GREY, linestyle=":", label="t_r = 0.1 s")
+    ax.set_xticks(STEPS_S, [f"{step:g}" for step in STEPS_S], fontsize=8)
+    ax.set_xticks([], minor=True)
+    ax.set_xlabel("integration step [s]")
+    ax.set_ylabel(f"position error after {DURATION_S:g} s [m]")
+    letter(ax, "(c) Eq. 24: a lone vehicle's turn")
+    ax.legend(fontsize=8)
+    return figure
+
+
+PART = Part(
+    name="literal-readings",
+    title="Three readings as printed, and how they fail",
+    cases=(TRACKING, SINGLE, AHEAD, INSIDE),
+    tables=tables,
+    draw=draw,
+    caption="bio_inspired, n = 54, seed 0; (c) from rest under 1500 N and 150 N m; V(t + t_r / 2) read as a mean",
+    seeds=range(1),
+)

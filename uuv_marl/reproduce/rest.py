@@ -1,0 +1,275 @@
+"""At rest the swarm does not settle: how much it moves, how chaotically, and what removes it.
+
+Each variant of the paper's law runs long after the reference point has stopped, with a displaced copy beside it:
+amplitudes, and the largest Lyapunov exponent after Benettin, Galgani, Giorgilli and Strelcyn (1980).
+"""
+
+# pyright: reportUnknownMemberType=false
+# Matplotlib leaves the types of its keyword arguments open.
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.bio_inspired import BioInspired, Gains
+from uuv_marl.baselines.policy import Policy
+from uuv_marl.benchmark.figures import COLOURS
+from uuv_marl.reproduce.cases import Report, Study
+from uuv_marl.reproduce.columns import Columns, stack
+from uuv_marl.reproduce.parts import Part
+from uuv_marl.reproduce.softening import PAPER, Softened, Softening
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+from uuv_marl.sim.swarm import Swarm
+
+Float64 = NDArray[np.float64]
+
+SEEDS = (0, 1, 2, 3)
+"""Starts of every variant."""
+SETTLE_S = 100.0
+"""Time left to settle before anything is measured."""
+MEASURE_S = 60.0
+"""Time measured; a displacement that grows with time alone and not exponentially shows as up to ln(60) / 60 = 0.07."""
+RENORMALISE_S = 0.5
+"""Time between two renormalisations of the displaced copy."""
+DISPLACEMENT = 1e-2
+"""Length of the displacement over all states [m, rad, m/s, rad/s]: 5e-4 each, far above the percept's rounding."""
+SMALL_DISPLACEMENT = 3e-5
+"""A second one, just above the rounding. The exponents agree where the law is smooth. Where neighbours come and go
+with a jump, the larger one is that of displacements that can be measured: copies that switch a step apart part."""
+
+
+TABLE_1 = Gains()
+"""Its gains."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Variant:
+    """One case of the table."""
+
+    name: str
+    hold_s: float = 0.1
+    yaw_damping_nms: float = 0.0
+    softening: Softening = PAPER
+    gains: Gains = TABLE_1
+    num_vehicles: int = 54
+    tracking: bool = False
+    """Measured on a long straight leg instead of at rest."""
+    settle_s: float = SETTLE_S
+    """Longer where surge damping makes the swarm creep to l(t), with a time constant of damping / zeta_l = 67 s."""
+
+    def scenario(self) -> Scenario:
+        """Open water; the reference point rests after a second, or never in the time measured."""
+        clocks = ("control_hold_s", "integration_step_s", "decision_period_s")
+        leg_m = 4.0 * (self.settle_s + 2.5 * MEASURE_S) if self.tracking else 4.0
+        overrides = {f"timing.{clock}": self.hold_s for clock in clocks} | {
+            "trajectory.waypoints_m": [[0.0, 0.0], [leg_m, 0.0]],
+            "actuators.yaw_damping_nms": self.yaw_damping_nms,
+        }
+        return load_scenario("tracking", num_vehicles=self.num_vehicles, overrides=overrides)
+
+    def policy(self, scenario: Scenario, num_worlds: int) -> Policy:
+        """The law for this scenario: the paper's own code where nothing is softened."""
+        base = BioInspired if self.softening == PAPER else Softened
+        declared = {"yaw_damping_nms": self.yaw_damping_nms, "softening": self.softening}
+        made = cast(type[BioInspired], type(base.__name__, (base,), declared))
+        return made(scenario, num_worlds, gains=self.gains)
+
+
+SMOOTH = Softening(near_m=14.0, far_m=20.0)
+"""Fades neighbours between the first shell (about 12 m) and the second (about 21 m), where most come and go."""
+SURGE_DAMPED = Softening(surge_damping=2000.0)
+"""Half of what a hold of 0.1 s bears, 2 (m - X_u') / t_r = 4300."""
+SMOOTH_DAMPED = SMOOTH._replace(surge_damping=SURGE_DAMPED.surge_damping)
+"""Both."""
+VARIANTS = (
+    Variant("Table 1, while tracking", tracking=True),
+    Variant("Table 1"),
+    Variant("Table 1", hold_s=0.05),
+    Variant("Table 1", hold_s=0.02),
+    Variant("Table 1", yaw_damping_nms=60.0),
+    Variant("Table 1", yaw_damping_nms=200.0),
+    Variant("Table 1", yaw_damping_nms=600.0),
+    Variant("smooth neighbours", softening=SMOOTH),
+    Variant("smooth neighbours", yaw_damping_nms=600.0, softening=SMOOTH),
+    Variant("surge damping", yaw_damping_nms=600.0, softening=SURGE_DAMPED, settle_s=300.0),
+    Variant("smooth, surge damping", yaw_damping_nms=600.0, softening=SMOOTH_DAMPED, settle_s=300.0),
+    Variant("torque gate 300 N", softening=Softening(torque_gate_n=300.0)),
+    Variant("dead zone 300 N", softening=Softening(dead_zone_n=300.0)),
+    Variant("dead zone 600 N", softening=Softening(dead_zone_n=600.0)),
+    Variant("dead zone 600 N", hold_s=0.05, softening=Softening(dead_zone_n=600.0)),
+    Variant("one vehicle", num_vehicles=1),
+    Variant("one vehicle, zeta_l = 1000 N/m", num_vehicles=1, gains=Gains(zeta_l=1000.0)),
+    Variant("one vehicle, zeta_l = 1000 N/m", num_vehicles=1, gains=Gains(zeta_l=1000.0), yaw_damping_nms=600.0),
+)
+"""Rows of the table, in the order drawn."""
+
+
+def largest_exponent(
+    advance: Callable[[Float64], Float64], start: Float64, size: float, rounds: int, interval_s: float
+) -> Float64:
+    """Largest Lyapunov exponent of every row of ``start`` [1/s], shape (row,). Benettin et al. 1980.
+
+    Args:
+        advance: states (2 rows, entry), the second half displaced, one interval later.
+        start: states, shape (row, entry).
+        size: length to which the displacement is brought back after each interval.
+        rounds: how many intervals; the first tenth turns the displacement into the direction that grows, uncounted.
+        interval_s: their length.
+    """
+    now, rows = start, len(start)
+    away: Float64 = np.zeros_like(start) + np.random.default_rng(0).normal(size=(1, start.shape[1]))
+    growth, skipped = np.zeros(rows), rounds // 10
+    for k in range(rounds):
+        away *= size / np.linalg.norm(away, axis=1, keepdims=True)
+        after = advance(np.concatenate([now, now + away]))
+        now, away = after[:rows], after[rows:] - after[:rows]
+        if k >= skipped:
+            growth += np.log(np.maximum(np.linalg.norm(away, axis=1), 1e-300) / size)
+    return growth / ((rounds - skipped) * interval_s)
+
+
+class Pairs:
+    """Worlds with a displaced copy each, and sums over what the first of each pair does."""
+
+    def __init__(self, variant: Variant, seeds: tuple[int, ...]) -> None:
+        scenario = variant.scenario()
+        self._swarm = Swarm(scenario, 2 * len(seeds))
+        self._policy = variant.policy(scenario, 2 * len(seeds))
+        self._rows, self._hold_s = len(seeds), variant.hold_s
+        self._percept = self._swarm.reset([*seeds, *seeds])
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what was measured."""
+        self._ticks, self.min_spacing_m = 0, np.full(self._rows, np.inf)
+        self._yaw, self._speed = np.zeros(self._rows), np.zeros(self._rows)
+
+    def run(self, duration_s: float) -> None:
+        """Step all worlds and measure the first of each pair."""
+        swarm, rows = self._swarm, slice(self._rows)
+        for _ in range(round(duration_s / self._hold_s)):
+            self._percept = swarm.step(self._policy.act(self._percept))
+            u, v, r = np.moveaxis(swarm.state.nu[rows], -1, 0)
+            c, s = np.moveaxis(swarm.heading[rows], -1, 0)
+            north, east = swarm.facts.reference[rows, 2, None], swarm.facts.reference[rows, 3, None]
+            self._yaw += (r**2).mean(axis=1)
+            self._speed += ((c * u - s * v - north) ** 2 + (s * u + c * v - east) ** 2).mean(axis=1)
+            self.min_spacing_m = np.minimum(self.min_spacing_m, swarm.facts.min_spacing[rows])
+            self._ticks += 1
+
+    @property
+    def yaw_rate_rms(self) -> Float64:
+        """Root mean square over vehicles and time [rad/s], shape (row,)."""
+        return np.sqrt(self._yaw / self._ticks)
+
+    @property
+    def speed_rms(self) -> Float64:
+        """The same of the velocity relative to the reference's [m/s]."""
+        return np.sqrt(self._speed / self._ticks)
+
+    def states(self) -> Float64:
+        """Poses and velocities of all worlds, shape (2 rows, 6 vehicle); a copy's heading next to its original's."""
+        eta, nu = self._swarm.state.eta.copy(), self._swarm.state.nu
+        turn = eta[self._rows :, :, 2] - eta[: self._rows, :, 2]
+        eta[self._rows :, :, 2] -= 2.0 * math.pi * np.round(turn / (2.0 * math.pi))
+        return np.concatenate([eta, nu], axis=2).reshape(2 * self._rows, -1)
+
+    def advance(self, states: Float64, duration_s: float) -> Float64:
+        """Run from these states."""
+        each = states.reshape(2 * self._rows, -1, 6)
+        self._swarm.state.eta[:], self._swarm.state.nu[:] = each[..., :3], each[..., 3:]
+        self._swarm.state.before[:] = each[..., :2]
+        self._percept = self._swarm.observe()
+        self.run(duration_s)
+        return self.states()
+
+
+def exponents(pairs: Pairs, size: float) -> Float64:
+    """Largest exponent of each pair's first world, run on from where it is [1/s], shape (row,)."""
+    states = pairs.states()
+    rounds = round(MEASURE_S / RENORMALISE_S)
+    return largest_exponent(
+        lambda now: pairs.advance(now, RENORMALISE_S), states[: len(states) // 2], size, rounds, RENORMALISE_S
+    )
+
+
+def measure(variant: Variant, seeds: tuple[int, ...] = SEEDS) -> Columns:
+    """Rows of the table for one variant, one per seed."""
+    pairs = Pairs(variant, seeds)
+    pairs.run(variant.settle_s)
+    pairs.restart()
+    exponent = exponents(pairs, DISPLACEMENT)
+    n, spacing = len(seeds), pairs.min_spacing_m
+    return {
+        "variant": np.array([variant.name] * n),
+        "t_r_s": np.full(n, variant.hold_s),
+        "yaw_damping_nms": np.full(n, variant.yaw_damping_nms),
+        "seed": np.array(seeds),
+        "yaw_rate_rms_rad_per_s": pairs.yaw_rate_rms,
+        "speed_rms_mps": pairs.speed_rms,
+        "min_spacing_m": np.where(np.isfinite(spacing), spacing, np.nan),
+        "exponent_per_s": exponent,
+        "small_exponent_per_s": exponents(pairs, SMALL_DISPLACEMENT),
+    }
+
+
+def tables(_study: Study, report: Report) -> dict[str, Columns]:
+    """``rest``: every variant and seed."""
+    rows: list[Columns] = []
+    for k, variant in enumerate(VARIANTS):
+        rows.append(measure(variant))
+        report((k + 1) / len(VARIANTS))
+    return {"rest": stack(rows)}
+
+
+def draw(tables: Mapping[str, Columns]) -> Figure:
+    """Amplitudes and exponents by variant: all seeds as points, their mean as a bar; from the table alone."""
+    table = tables["rest"]
+    names = [
+        f"{name}, $t_r$ = {hold:g} s" + (f", yaw damping {c:g} N m s" if c else "")
+        for name, hold, c in zip(table["variant"], table["t_r_s"], table["yaw_damping_nms"], strict=True)
+    ]
+    rows = list(dict.fromkeys(names))
+    figure = Figure(figsize=(13.0, 0.36 * len(rows) + 1.6), layout="constrained")
+    axes = figure.subplots(1, 3, sharey=True)
+    place = np.array([float(rows.index(name)) for name in names])
+    _points(axes[0], place, table["yaw_rate_rms_rad_per_s"], "o", COLOURS[0])
+    _points(axes[1], place, table["speed_rms_mps"], "o", COLOURS[2])
+    _points(axes[2], place - 0.15, table["exponent_per_s"], "o", COLOURS[1], f"displaced by {DISPLACEMENT:g}")
+    small = table["small_exponent_per_s"]
+    _points(axes[2], place + 0.15, small, "s", COLOURS[5], f"displaced by {SMALL_DISPLACEMENT:g}")
+    axes[2].legend(fontsize=8, loc="lower right")
+    axes[0].set_yticks(range(len(rows)), labels=rows, fontsize=8)
+    axes[0].invert_yaxis()
+    axes[0].set_xlabel("yaw rate, rms [rad/s]")
+    axes[1].set_xlabel("speed relative to the reference, rms [m/s]")
+    axes[2].set_xlabel("largest Lyapunov exponent [1/s]")
+    return figure
+
+
+def _points(ax: Axes, place: Float64, values: Float64, marker: str, colour: str, label: str = "") -> None:
+    for row in np.unique(place):
+        of = values[place == row]
+        ax.plot([of.mean()] * 2, [row - 0.3, row + 0.3], color="black", linewidth=1.2)
+        ax.plot(of, np.full(len(of), row), marker, color=colour, markersize=4, alpha=0.7, label=label or None)
+        label = ""
+    ax.axvline(0.0, color="black", linewidth=0.8)
+    ax.grid(alpha=0.25)
+
+
+PART = Part(
+    name="rest",
+    title="Motion long after the reference point has stopped (first row: while it moves)",
+    cases=(),
+    tables=tables,
+    draw=draw,
+    caption="n = 54, Table 1 but for what is named; points: seeds 0-3, bars: means; exponents for two displacements",
+    seconds=60.0,
+)

@@ -1,0 +1,210 @@
+"""What the paper leaves out: each unknown with its range, what it stands for, and how far a choice is from the paper.
+
+Only sections 5.1 and 5.2.1 (with Table 2) are looked at here; section 5.2.2 stays a prediction.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.benchmark.paper import PAPER
+from uuv_marl.scenario_files import ScenarioError, load_scenario
+
+Value = float | int | str
+
+SCENARIOS = ("single_obstacle", "tracking")
+"""The search looks at these alone; the quick one first."""
+SEEDS = (10_000, 10_001, 10_002, 10_003)
+"""Of the tuning range 10,000-99,999; the benchmark never uses them."""
+OBJECTIVES = ("spacing_error", "distance_error", "time_error")
+"""One per published claim: the spacing of 5.1 (the larger error of its two numbers), and Table 2's two columns."""
+_POLICY = "bio_inspired"
+_START_WIDTH_M = 200.0
+"""Both start rectangles and the gap between them, across the first leg. Section 5.1."""
+
+
+class Unknown(NamedTuple):
+    """A number or a reading that the paper doesn't state."""
+
+    default: Value
+    """Of the shipped scenarios."""
+    meaning: str
+    unit: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    log: bool = False
+    choices: tuple[Value, ...] = ()
+    """Instead of a range."""
+
+
+UNKNOWNS: dict[str, Unknown] = {
+    "sub_sectors": Unknown(7, "sub-sectors of each of the three arrays, k_a (Eq. 12)", "", 4, 12),
+    "flank_mounting": Unknown(120.0, "flank arrays' axis from the bow; 120 closes the circle", "deg", 100.0, 150.0),
+    "surge_resistance": Unknown(1.0, "factor on X_u and X_u|u| of the literature's vehicle", "1", 0.6, 1.6, log=True),
+    "yaw_resistance": Unknown(1.0, "factor on N_r and N_r|r|", "1", 0.5, 4.0, log=True),
+    "inertia": Unknown(1.0, "factor on mass, moment of inertia and added masses", "1", 0.5, 3.0, log=True),
+    "max_force": Unknown(3000.0, "limit of the surge force", "N", 1000.0, 10000.0, log=True),
+    "max_torque": Unknown(3000.0, "limit of the yaw torque", "N m", 1000.0, 10000.0, log=True),
+    "start_spacing": Unknown(13.0, "smallest distance between vehicles at the start", "m", 10.0, 16.0),
+    "start_gap": Unknown(20.0, "between the two groups at the start, which together stay 200 m wide", "m", 16.0, 60.0),
+    "arrival_radius": Unknown(2.0, "the swarm's centre this close to the end", "m", 1.0, 20.0, log=True),
+    "arrival_dwell": Unknown(5.0, "for so long", "s", 0.0, 10.0),
+    "arrival_spread": Unknown(80.0, "with every vehicle this close", "m", 50.0, 120.0),
+    "bow_range": Unknown(
+        default=100.0,
+        meaning="how near a surface must be for an echo; Eq. 11 measures to the centre: 75 for these discs",
+        unit="m",
+        choices=(75.0, 100.0),
+    ),
+    "echo_reports": Unknown(
+        default="centre",
+        meaning="O_j of Eq. 21: the centre, or the nearest point in the beam",
+        choices=("centre", "surface"),
+    ),
+    "obstacle_term": Unknown(default="per_echo", meaning="what Eq. 21 sums over", choices=("per_echo", "per_obstacle")),
+}
+"""The space. Not in it: both sonar sectors ahead, with which the swarm collides (docs/reproduction)."""
+
+DEFAULTS: dict[str, Value] = {name: unknown.default for name, unknown in UNKNOWNS.items()}
+
+
+class Setting(NamedTuple):
+    """A choice of every unknown, as the package takes it."""
+
+    overrides: dict[str, object]
+    """For ``load_scenario``."""
+    policy: dict[str, object]
+    """For the policy ``bio_inspired``."""
+
+
+class Numbers(NamedTuple):
+    """The paper's numbers under a setting, means over seeds; NaN where nothing was measured."""
+
+    min_spacing_m: float = math.nan
+    """Section 5.1."""
+    mean_min_spacing_m: float = math.nan
+    """Section 5.1."""
+    min_obstacle_distance_m: float = math.nan
+    """Table 2 and section 5.2.1."""
+    task_time_s: float = math.nan
+    """Table 2."""
+    failed: float = 1.0
+    """Share of runs that collide or never arrive, or that were not made since others had failed."""
+
+
+def setting(values: Mapping[str, Value]) -> Setting:
+    """What a choice of the unknowns means for the scenarios and the policy; ``DEFAULTS`` change nothing."""
+    vehicle = load_scenario("tracking").vehicle
+    scaled = {
+        "surge_resistance": ("X_u", "X_uu"),
+        "yaw_resistance": ("N_r", "N_rr"),
+        "inertia": ("m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"),
+    }
+    overrides: dict[str, object] = {
+        f"vehicle.{field}": getattr(vehicle, field) * float(values[name])
+        for name, fields in scaled.items()
+        for field in fields
+    }
+    overrides |= {f"sonar.arrays.{array}.sub_sectors": values["sub_sectors"] for array in ("bow", "port", "starboard")}
+    overrides |= {
+        "sonar.arrays.port.mounting_deg": -float(values["flank_mounting"]),
+        "sonar.arrays.starboard.mounting_deg": values["flank_mounting"],
+        "sonar.arrays.bow.range_m": values["bow_range"],
+        "sonar.echo_reports": values["echo_reports"],
+        "actuators.max_force_n": values["max_force"],
+        "actuators.max_torque_nm": values["max_torque"],
+        "start.spacing_m": values["start_spacing"],
+        "start.gap_m": values["start_gap"],
+        "start.width_m": (_START_WIDTH_M - float(values["start_gap"])) / 2,
+        "arrival.radius_m": values["arrival_radius"],
+        "arrival.dwell_s": values["arrival_dwell"],
+        "arrival.spread_m": values["arrival_spread"],
+    }
+    return Setting(overrides, {"obstacle_term": values["obstacle_term"]})
+
+
+def runs(choice: Setting, scenario: str, seeds: Sequence[int]) -> Iterator[Run]:
+    """Episodes of the paper's controller under a setting."""
+    loaded = load_scenario(scenario, overrides=choice.overrides)
+    return (run for run in evaluate(loaded, _POLICY, seeds, **choice.policy) if isinstance(run, Run))
+
+
+def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Numbers:
+    """The paper's numbers of 5.1 and 5.2.1; the longer scenario is skipped where a swarm fails the other already."""
+    choice = setting(values)
+    metrics: dict[str, list[Metrics]] = {}
+    failed, total = 0, len(SCENARIOS) * len(seeds)
+    for scenario in SCENARIOS:
+        try:
+            metrics[scenario] = [run.metrics for run in runs(choice, scenario, seeds)]
+        except ScenarioError:
+            return Numbers()
+        failed += sum(_fails(m) for m in metrics[scenario])
+        if failed:
+            skipped = total - sum(len(m) for m in metrics.values())
+            return _numbers(metrics, (failed + skipped) / total)
+    return _numbers(metrics, 0.0)
+
+
+def errors(numbers: Numbers) -> tuple[float, float, float]:
+    """How far the paper's numbers are missed, relative, by ``OBJECTIVES``; from 0 to 1, above 1 where runs fail.
+
+    An obstacle distance between the paper's two for one case is no error. Any swarm that always arrives without a
+    collision is better in all three than any that doesn't.
+    """
+    if numbers.failed:
+        failing = round(1.0 + numbers.failed, 5)
+        return failing, failing, failing
+    spacing, obstacle = PAPER["tracking", _POLICY], PAPER["single_obstacle", _POLICY]
+    near, far = min(obstacle.min_obstacle_distance_m or ()), max(obstacle.min_obstacle_distance_m or ())
+    distance = numbers.min_obstacle_distance_m
+    found = (
+        max(
+            _relative(numbers.min_spacing_m, spacing.min_spacing_m),
+            _relative(numbers.mean_min_spacing_m, spacing.mean_min_spacing_m),
+        ),
+        _relative(distance, min(max(distance, near), far)),
+        _relative(numbers.task_time_s, obstacle.task_time_s),
+    )
+    spacing_error, distance_error, time_error = (round(min(error, 1.0), 5) for error in found)
+    return spacing_error, distance_error, time_error
+
+
+def front(losses: np.ndarray) -> list[int]:
+    """Rows of the Pareto front of losses, shape (trial, objective): none is as good in all and better in one."""
+    no_worse = (losses[:, None, :] <= losses[None, :, :]).all(axis=2)
+    better = (losses[:, None, :] < losses[None, :, :]).any(axis=2)
+    return [int(row) for row in np.flatnonzero(~(no_worse & better).any(axis=0))]
+
+
+def best(losses: np.ndarray) -> int:
+    """Row with the smallest largest loss; of equals the smallest sum, then the first."""
+    return int(np.lexsort((losses.sum(axis=1), losses.max(axis=1)))[0])
+
+
+def _relative(found: float, wanted: float | None) -> float:
+    if wanted is None:
+        raise ValueError("the paper states no such number")
+    return abs(found - wanted) / wanted
+
+
+def _fails(metrics: Metrics) -> bool:
+    return bool(metrics["collisions"]) or metrics["task_time_s"] is None
+
+
+def _numbers(metrics: Mapping[str, Sequence[Metrics]], failed: float) -> Numbers:
+    def mean(scenario: str, name: str) -> float:
+        found = [value for m in metrics.get(scenario, ()) if isinstance(value := m[name], float)]
+        return sum(found) / len(found) if found else math.nan
+
+    return Numbers(
+        min_spacing_m=mean("tracking", "min_spacing_m"),
+        mean_min_spacing_m=mean("tracking", "mean_min_spacing_m"),
+        min_obstacle_distance_m=mean("single_obstacle", "min_obstacle_distance_m"),
+        task_time_s=mean("single_obstacle", "task_time_s"),
+        failed=failed,
+    )

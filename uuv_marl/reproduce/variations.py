@@ -1,0 +1,161 @@
+"""Beyond the paper: control hold and integration step, swarm size, lost vehicles. One picture and table each."""
+
+# pyright: reportUnknownMemberType=false
+# Matplotlib leaves the types of its keyword arguments open.
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from uuv_marl.benchmark.paper import PAPER
+from uuv_marl.reproduce.cases import Case, Report, Study, folder_name
+from uuv_marl.reproduce.columns import Columns
+from uuv_marl.reproduce.drawing import BLACK, BLUE, ORANGE
+from uuv_marl.reproduce.parts import Part, Tables
+
+SEEDS = range(6)
+
+
+class Variant(NamedTuple):
+    """One point of the horizontal axis."""
+
+    label: str
+    overrides: Mapping[str, object]
+
+
+class Quantity(NamedTuple):
+    """One panel."""
+
+    scenario: str
+    metric: str
+    words: str
+
+
+OWN = (
+    Quantity("tracking", "min_spacing_m", "tracking: smallest spacing [m]"),
+    Quantity("tracking", "mean_min_spacing_m", "tracking: its time mean [m]"),
+    Quantity("tracking", "order_parameter", "tracking: order parameter, time mean [1]"),
+    Quantity("single_obstacle", "min_obstacle_distance_m", "single obstacle: smallest distance [m]"),
+    Quantity("single_obstacle", "task_time_s", "single obstacle: task time [s]"),
+    Quantity("multi_obstacle", "min_obstacle_distance_m", "four obstacles: smallest distance [m]"),
+    Quantity("multi_obstacle", "task_time_s", "four obstacles: task time [s]"),
+    Quantity("multi_obstacle", "collisions", "four obstacles: collisions [1]"),
+)
+LOSSES = (
+    Quantity("single_obstacle", "task_time_s", "task time [s]"),
+    Quantity("single_obstacle", "min_obstacle_distance_m", "smallest distance to the obstacle [m]"),
+    Quantity("single_obstacle", "min_spacing_m", "smallest spacing [m]"),
+    Quantity("single_obstacle", "collisions", "collisions [1]"),
+)
+
+
+def variation(name: str, title: str, axis: str, variants: Sequence[Variant], quantities: Sequence[Quantity]) -> Part:
+    """A part that runs the paper's controller on every variant and shows every seed."""
+    scenarios = list(dict.fromkeys(quantity.scenario for quantity in quantities))
+
+    def case(variant: Variant, scenario: str) -> Case:
+        words = f"{name} {variant.label} {scenario}"
+        return Case(folder_name(words), scenario, overrides=variant.overrides)
+
+    def tables(study: Study, _report: Report) -> Tables:
+        rows = [
+            (variant.label, quantity.scenario, quantity.metric, seed, value)
+            for variant in variants
+            for quantity in quantities
+            for seed, value in zip(
+                SEEDS, study.metric(case(variant, quantity.scenario), quantity.metric, SEEDS), strict=True
+            )
+        ]
+        heads = ("variant", "scenario", "metric", "seed", "value")
+        return {name: {head: np.array(column) for head, column in zip(heads, zip(*rows, strict=True), strict=True)}}
+
+    def draw(made: Tables) -> Figure:
+        columns = min(4, len(quantities))
+        figure = Figure(figsize=(3.6 * columns, 3.1 * -(-len(quantities) // columns)), layout="constrained")
+        for k, quantity in enumerate(quantities):
+            ax = figure.add_subplot(-(-len(quantities) // columns), columns, k + 1)
+            _panel(ax, made[name], quantity, [variant.label for variant in variants])
+            ax.set_xlabel(axis, fontsize=8)
+        return figure
+
+    return Part(
+        name=name,
+        title=title,
+        cases=tuple(case(variant, scenario) for variant in variants for scenario in scenarios),
+        tables=tables,
+        draw=draw,
+        caption=f"bio_inspired, seeds 0-{SEEDS[-1]}: points; line: mean of those that have a value; dashed: the paper",
+        seeds=SEEDS,
+    )
+
+
+def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) -> None:
+    means: list[float] = []
+    for k, label in enumerate(labels):
+        own = table["variant"] == label
+        own &= (table["scenario"] == quantity.scenario) & (table["metric"] == quantity.metric)
+        values = table["value"][own].astype(np.float64)
+        found = values[np.isfinite(values)]
+        ax.plot(np.full(len(found), k), found, "o", color=BLUE, markersize=4, alpha=0.5)
+        means.append(float(found.mean()) if found.size else np.nan)
+        if found.size < values.size:
+            ax.annotate(f"{values.size - found.size} none", (k, 1.0), xycoords=("data", "axes fraction"), ha="center",
+                        va="top", fontsize=8, color=ORANGE)  # fmt: skip
+    ax.plot(range(len(labels)), means, "-", color=BLUE, linewidth=1.0)
+    for value in _stated(quantity):
+        ax.axhline(value, color=BLACK, linestyle="--", linewidth=1.0)
+    ax.set_xticks(range(len(labels)), labels, fontsize=8)
+    ax.set_title(quantity.words, fontsize=9, loc="left")
+    ax.margins(x=0.1, y=0.15)
+    if quantity.metric == "collisions":
+        ax.set_ylim(-0.5, max(5.0, ax.get_ylim()[1]))
+    ax.grid(alpha=0.25)
+
+
+def _stated(quantity: Quantity) -> tuple[float, ...]:
+    figure = PAPER[quantity.scenario, "bio_inspired"]
+    value: float | tuple[float, ...] | None = getattr(figure, quantity.metric, None)
+    if value is None:
+        return ()
+    return value if isinstance(value, tuple) else (value,)
+
+
+def clocks(hold: float, step: float) -> Variant:
+    """A control hold and an integration step [s]; the policy decides at every hold."""
+    return Variant(
+        f"{hold:g}\n{step:g}",
+        {"timing.control_hold_s": hold, "timing.decision_period_s": hold, "timing.integration_step_s": step},
+    )
+
+
+def losses(num: int) -> Variant:
+    """So many vehicles lost one by one, between 30 and 105 s: before, at and after the obstacle."""
+    return Variant(f"{num}", {"disturbance.loss_times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, num)]})
+
+
+PARTS = (
+    variation(
+        "time-steps",
+        "Control hold and integration step, separately",
+        "control hold [s] over integration step [s]",
+        [clocks(*pair) for pair in ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))],
+        OWN,
+    ),
+    variation(
+        "swarm-size",
+        "The paper's figures for other swarm sizes",
+        "vehicles",
+        [Variant(f"{n}", {"swarm.num_vehicles": n}) for n in (10, 20, 54, 100, 200)],
+        OWN,
+    ),
+    variation(
+        "losses",
+        "Vehicles lost on the way",
+        "vehicles lost of 54",
+        [losses(n) for n in (0, 6, 12, 24, 36)],
+        LOSSES,
+    ),
+)
