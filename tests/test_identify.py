@@ -170,16 +170,6 @@ def test_the_shipped_point_is_loaded_and_runs_as_recorded(shipped):
         assert getattr(numbers, name) == pytest.approx(value, rel=0.02)
 
 
-def test_a_prediction_has_a_row_per_run_of_both_parameter_sets():
-    seen = []
-    table = identify.prediction([0], lambda scenario, done: seen.append((scenario, done)))
-    assert list(table["parameters"]) == ["default"] * 3 + ["identified"] * 3
-    assert list(table["scenario"]) == list(identify.PREDICTED) * 2
-    assert [done for _, done in seen] == list(range(1, 7))
-    assert np.isnan(table["min_obstacle_distance_m"][table["scenario"] == "tracking"]).all()
-    assert (table["collisions"] == 0).all()
-
-
 def test_the_picture_shows_the_papers_numbers_beside_the_trials():
     figure = identify.draw(identify.trials())
     for ax, across, up in (

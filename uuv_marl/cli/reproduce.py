@@ -52,7 +52,7 @@ def identify(
 ) -> None:
     """Search what the paper leaves open against sections 5.1 and 5.2.1; 5.2.2 stays a prediction.
 
-    Needs the extra "tune". Takes some seconds a trial. Ctrl-C keeps the finished trials; the same command goes on. The
+    Needs the extra "tune". Takes about an hour. Ctrl-C keeps the finished trials; the same command goes on. The
     shipped result is in uuv_marl/reproduce/identified.
     """
     with explained():

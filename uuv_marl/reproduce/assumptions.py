@@ -75,7 +75,10 @@ ASSUMPTIONS: tuple[Assumption, ...] = (
                     {"obstacle_term": "per_obstacle"}, OBSTACLES),
     )),
     Assumption("range of an echo", "surface within 100 m", NONE, (
-        Alternative("centre within 100 m", {"sonar.arrays.bow.range_m": 75.0}),)),
+        Alternative("centre within 100 m", {"sonar.arrays.bow.range_m": 75.0}),
+        Alternative("150 m, against Table 1", {"sonar.arrays.bow.range_m": 150.0}),
+        Alternative("190 m, against Table 1", {"sonar.arrays.bow.range_m": 190.0}),
+    )),
     Assumption("obstacles hide vehicles", "no", NONE, (
         Alternative("yes", {"sonar.obstacles_hide_vehicles": True}, NOTHING, OBSTACLES),)),
     Assumption("the vehicle's surge resistance", "70 kg/s, 100 kg/m", ALL, tuple(

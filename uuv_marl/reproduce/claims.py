@@ -116,7 +116,7 @@ CLAIMS: tuple[Claim, ...] = (
     Claim("5.1", "at [800, 100] vehicles expand towards the swarm's edge",
           "largest spacing within 40 s after that corner over its mean in the 40 s before",
           "1", each(TRACKING, measures.extent_at_first_corner), 1.05, INF,
-          "the swarm turns as a whole and keeps its extent; with more inertia or fewer neighbours it may not"),
+          "the swarm turns as a whole and keeps its extent"),
     Claim("5.1", "the largest distance stays within a range",
           "range that holds 90 % of the time over its mean, after 60 s",
           "1", each(TRACKING, measures.spread_of("max_spacing_m")), 0.0, 0.1),

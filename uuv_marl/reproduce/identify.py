@@ -26,13 +26,11 @@ from uuv_marl.reproduce import unknowns
 from uuv_marl.reproduce.columns import Columns, read_columns, write_columns
 from uuv_marl.reproduce.unknowns import DEFAULTS, OBJECTIVES, SCENARIOS, SEEDS, UNKNOWNS, Numbers, Setting, Value
 
-TRIALS = 500
+TRIALS = 600
 STARTUP = 60
 """Trials drawn at random before the optimiser learns from them."""
 GOAL = 0.05
-PREDICTED = ("tracking", "single_obstacle", "multi_obstacle")
 _STUDY = "identify"
-_METRICS = ("task_time_s", "min_obstacle_distance_m", "min_spacing_m", "mean_min_spacing_m", "collisions")
 
 
 class Identified(NamedTuple):
@@ -117,23 +115,6 @@ def pareto(table: Columns) -> tuple[list[int], int]:
     """Rows of the Pareto front among trials, and the chosen one: the smallest largest error."""
     losses = np.stack([table[name] for name in OBJECTIVES], axis=1)
     return unknowns.front(losses), unknowns.best(losses)
-
-
-def prediction(seeds: Sequence[int], report: Callable[[str, int], None]) -> Columns:
-    """The default and the identified parameters on 5.1, 5.2.1 and, as a prediction, 5.2.2: a row per run.
-
-    Columns: ``parameters`` (default or identified), ``scenario``, ``seed`` and the metrics of the paper's numbers, NaN
-    where there is nothing. ``report`` is called with the scenario and the number of runs done.
-    """
-    rows: list[list[object]] = []
-    for name, choice in (("default", unknowns.setting(DEFAULTS)), ("identified", identified().setting)):
-        for scenario in PREDICTED:
-            for run in sorted(unknowns.runs(choice, scenario, seeds), key=lambda run: run.seed):
-                measured = [run.metrics[metric] for metric in _METRICS]
-                rows.append([name, scenario, run.seed, *(np.nan if value is None else value for value in measured)])
-                report(scenario, len(rows))
-    columns = ("parameters", "scenario", "seed", *_METRICS)
-    return {column: np.array(values) for column, values in zip(columns, zip(*rows, strict=True), strict=True)}
 
 
 def draw(table: Columns) -> Figure:

@@ -9,9 +9,11 @@ from string import Template
 import numpy as np
 
 from uuv_marl.benchmark.tables import estimate
+from uuv_marl.reproduce import identify
 from uuv_marl.reproduce.columns import Columns, read_columns
 from uuv_marl.reproduce.ledger import Entry, markdown, read_ledger
 from uuv_marl.reproduce.parts import Part
+from uuv_marl.reproduce.unknowns import OBJECTIVES
 
 NEEDED = ("identification", "margins", "rest", "critical")
 """Tables that the text takes numbers from."""
@@ -34,6 +36,7 @@ def page(folder: Path, parts: Sequence[Part]) -> str:
         {part.name.replace("-", "_"): picture(part) for part in parts},
         seeds=str(seeds),
         summary=summary(entries),
+        **search_errors(),
         prediction=prediction(tables["identification"]),
         rest_table=rest_table(tables["rest"]),
         ledger="\n".join(markdown(entries)).strip(),
@@ -68,12 +71,20 @@ def _count(entries: Sequence[Entry], verdict: str) -> int:
     return sum(entry.verdict == verdict for entry in entries)
 
 
+def search_errors() -> dict[str, str]:
+    """Largest errors of the identification's chosen point and of the defaults."""
+    table = identify.trials()
+    _, chosen = identify.pareto(table)
+    largest = np.max([table[name] for name in OBJECTIVES], axis=0)
+    return {"largest_error": f"{largest[chosen]:.1%}", "default_error": f"{largest[0]:.1%}"}
+
+
 def prediction(table: Columns) -> str:
-    """Defaults and identified parameters, scenario by scenario."""
+    """Every set of parameters, scenario by scenario."""
     names = [name for name in table if name not in ("parameters", "scenario", "seed")]
     lines = [f"| scenario | parameters | {' | '.join(names)} |", f"| {' | '.join(['---'] * (len(names) + 2))} |"]
     for scenario in dict.fromkeys(table["scenario"].tolist()):
-        for parameters in ("default", "identified"):
+        for parameters in dict.fromkeys(table["parameters"].tolist()):
             own = (table["scenario"] == scenario) & (table["parameters"] == parameters)
             cells = [_estimate(table[name][own].tolist()) for name in names]
             lines.append(f"| {scenario} | {parameters} | {' | '.join(cells)} |")
