@@ -12,7 +12,7 @@ from uuv_marl import load_scenario
 from uuv_marl.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 ELSEWHERE = {"benchmarl.md", "rllib.md"}
 """Pages whose Python runs in tests/adapters, where their libraries are."""
 
@@ -57,8 +57,13 @@ def test_pages_of_other_environments_are_run_there(page):
 )
 def test_commands_are_understood(line, monkeypatch, tmp_path):
     """Parsed as written, options and names checked, then stopped before the long work."""
-    monkeypatch.setattr("uuv_marl.benchmark.runner.run_missing", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
-    monkeypatch.setattr("uuv_marl.benchmark.tuning.tune", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
+    for work in (
+        "benchmark.runner.run_missing",
+        "benchmark.tuning.tune",
+        "reproduce.job.make",
+        "reproduce.identify.identify",
+    ):
+        monkeypatch.setattr(f"uuv_marl.{work}", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, line.split()[1:])
     # Ray has an environment of its own; without it a command says so once its options are understood.

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
 
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.figures import COLOURS
@@ -150,6 +151,12 @@ def critical_hold_s(scenario: Scenario, rigid: Float64) -> float:
 
 def tables(_study: Study, report: Report) -> dict[str, Columns]:
     """``eigenvalues`` of the nominal swarm (first seed), and ``margins``: growth rates as parameters change."""
+    # Two BLAS threads fight over a busy core, and round differently.
+    with threadpool_limits(1, user_api="blas"):
+        return _tables(report)
+
+
+def _tables(report: Report) -> dict[str, Columns]:
     nominal = formations(straight_leg(), Gains(), SEEDS)
     rigid = stiffness(nominal[0].places, nominal[0].heard, Gains())
     spectra = [eigenvalues(straight_leg(), rigid, hold_s) for hold_s in SHOWN_HOLDS_S]
@@ -165,18 +172,16 @@ def tables(_study: Study, report: Report) -> dict[str, Columns]:
         "imaginary_rad_per_s": np.concatenate(spectra).imag,
     }
     margins = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return {"eigenvalues": spectrum, "margins": margins, "critical": _critical(nominal)}
+    return {"eigenvalues": spectrum, "margins": margins, "critical": _critical()}
 
 
-def _critical(nominal: Sequence[Formation]) -> Columns:
-    """Control holds above which weaving grows, of a lone vehicle and of the nominal swarm (mean over seeds)."""
-    rows: list[tuple[float, float, float]] = []
-    for damping in CRITICAL_DAMPING_NMS:
-        scenario = straight_leg(yaw_damping_nms=damping)
-        swarm = [critical_hold_s(scenario, stiffness(f.places, f.heard, Gains())) for f in nominal]
-        rows.append((damping, critical_hold_s(scenario, lone_stiffness(Gains())), float(np.mean(swarm))))
-    names = ("yaw_damping_nms", "lone_critical_hold_s", "swarm_critical_hold_s")
-    return {name: np.array(values) for name, values in zip(names, zip(*rows, strict=True), strict=True)}
+def _critical() -> Columns:
+    """Control hold above which a vehicle alone weaves, by its yaw damping."""
+    holds = [
+        critical_hold_s(straight_leg(1, yaw_damping_nms=damping), lone_stiffness(Gains()))
+        for damping in CRITICAL_DAMPING_NMS
+    ]
+    return {"yaw_damping_nms": np.array(CRITICAL_DAMPING_NMS), "lone_critical_hold_s": np.array(holds)}
 
 
 def loop_name(hold_s: float) -> str:
