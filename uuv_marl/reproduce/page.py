@@ -76,7 +76,7 @@ def search_errors() -> dict[str, str]:
     table = identify.trials()
     _, chosen = identify.pareto(table)
     largest = np.max([table[name] for name in OBJECTIVES], axis=0)
-    return {"largest_error": f"{largest[chosen]:.1%}", "default_error": f"{largest[0]:.1%}"}
+    return {"largest_error": f"{100 * largest[chosen]:.1f} %", "default_error": f"{100 * largest[0]:.1f} %"}
 
 
 def prediction(table: Columns) -> str:
