@@ -76,8 +76,8 @@ def _of(case: Case) -> tuple[str, str]:
 
 LAW = PAPER[_of(SINGLE)]
 SPACING = (
-    "fewer vehicles than 54 (the paper names the number in 5.2.1 only) or half the inertia would give it; sub-sectors and "
-    "start spacing hardly move it (sensitivity)"
+    "fewer vehicles than 54 (the paper names the number in 5.2.1 only) or half the inertia would give it; sub-sectors "
+    "and start spacing hardly move it (sensitivity)"
 )
 DISTANCE = "the paper's larger value lies within the spread of our seeds; six sub-sectors would give it (sensitivity)"
 COMPARATOR = "the paper only names this method; ours is a reconstruction, tuned on this scenario for time with s_o kept"
