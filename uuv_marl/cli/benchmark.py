@@ -22,7 +22,8 @@ def benchmark(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, or module:Class; repeat for several. Default: the paper's three and stronger variants."
+            help="Name, checkpoint (runs/mappo/best) or module:Class; repeat for several. Default: the paper's three "
+            "and stronger variants."
         ),
     ] = None,
     seeds: Annotated[
