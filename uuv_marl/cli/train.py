@@ -22,7 +22,7 @@ def train_mappo(
     ] = None,
     noise: Annotated[
         tuple[float, float] | None,
-        typer.Option(min=1e-3, help="Of actions, at the start and at the end [full force]. Default: 0.5 0.1."),
+        typer.Option(min=1e-3, help="Of actions, at the start and at the end [full force]. Default: 0.4 0.08."),
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder of settings, progress, checkpoint and best.")] = Path(
         "results/mappo"

@@ -36,7 +36,7 @@ class Hyperparameters:
     """Decisions between updates."""
     actor_epochs: int = 3
     critic_epochs: int = 2
-    minibatch: int = 4096
+    minibatch: int = 2048
     """Rows of a gradient step."""
     clip: float = 0.2
     """Of PPO's ratio."""
@@ -44,7 +44,7 @@ class Hyperparameters:
     """The actor's epochs end where a minibatch diverges further from the policy that sampled it."""
     learning_rate: tuple[float, float] = (1.5e-3, 1.5e-4)
     """At the start and at the end."""
-    noise: tuple[float, float] = (0.5, 0.1)
+    noise: tuple[float, float] = (0.4, 0.08)
     """Standard deviation of actions [full force], at the start and at the end."""
     max_gradient: float = 1.0
     value_decay: float = 0.99
