@@ -110,13 +110,11 @@ class Fleet:
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All but the generator, for ``restore``."""
-        return {
-            **{
-                f"{k}.{name}": array for k, swarm in enumerate(self._swarms) for name, array in swarm.snapshot().items()
-            },
-            **{f"{k}.sums": sums.copy() for k, sums in enumerate(self._sums)},
-            "episodes": np.array(self.episodes, np.float64),
-        }
+        kept: dict[str, NDArray[Any]] = {"episodes": np.array(self.episodes, np.float64)}
+        for k, (swarm, sums) in enumerate(zip(self._swarms, self._sums, strict=True)):
+            kept |= {f"{k}.{name}": array for name, array in swarm.snapshot().items()}
+            kept[f"{k}.sums"] = sums.copy()
+        return kept
 
     def restore(self, snapshot: Arrays) -> None:
         """Go on from a snapshot of a fleet of the same sizes."""
