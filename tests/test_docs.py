@@ -62,6 +62,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "benchmark.tuning.tune",
         "reproduce.job.make",
         "reproduce.identify.identify",
+        "train.training.train",
     ):
         monkeypatch.setattr(f"uuv_marl.{work}", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
     monkeypatch.chdir(tmp_path)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.floors import Idle, Random
+from uuv_marl.baselines.learned import is_checkpoint, learned_class
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
@@ -68,7 +69,9 @@ class EnvPolicy:
 
 
 def policy_class(name: str) -> type[Policy]:
-    """A policy's class by its name, or by ``module:Class``. Raises PolicyError with the nearest name."""
+    """A policy's class by its name, checkpoint, or ``module:Class``. Raises PolicyError with the nearest name."""
+    if name not in POLICIES and is_checkpoint(name):
+        return learned_class(name)
     if ":" in name:
         module, _, attribute = name.partition(":")
         try:
@@ -82,7 +85,8 @@ def policy_class(name: str) -> type[Policy]:
         near = difflib.get_close_matches(name, POLICIES, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise PolicyError(
-            f"policy {name!r} is unknown; {hint}There are {', '.join(POLICIES)}, and module:Class for your own"
+            f"policy {name!r} is unknown; {hint}There are {', '.join(POLICIES)}, module:Class for your own, "
+            "and paths of checkpoints"
         )
     return POLICIES[name]
 
@@ -107,7 +111,7 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
     """A policy by name.
 
     Args:
-        name: one of ``POLICIES``.
+        name: one of ``POLICIES``, the path of a checkpoint (``runs/mappo/best``), or ``module:Class``.
         target: a scenario, for a policy that maps ``Percept`` to actions; or a parallel environment of ours, wrapped
             or not, for one that maps its observation dictionaries to action dictionaries.
         num_worlds: worlds stepped together; 1 for an environment.

@@ -9,11 +9,13 @@ from collections.abc import Container, Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl import __version__
+from uuv_marl.baselines.learned import Learned
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
@@ -113,7 +115,7 @@ class Results:
 
     def trace_path(self, scenario: str, policy: str, seed: int) -> Path:
         """Where a run's time series are."""
-        return self.folder / "traces" / f"{scenario}.{policy.replace(':', '-')}.{seed}.npz"
+        return self.folder / "traces" / f"{scenario}.{quote(policy.replace(':', '-'), safe='')}.{seed}.npz"
 
     def trace(self, scenario: str, policy: str, seed: int) -> dict[str, NDArray[np.float32]]:
         """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
@@ -147,8 +149,11 @@ class Results:
 def knowledge(policy: str) -> dict[str, Any]:
     """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
     made = policy_class(policy)
-    file = inspect.getsourcefile(made) if ":" in policy else None
-    source = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16] if file else None
+    if issubclass(made, Learned):
+        source = made.checkpoint.digest
+    else:
+        file = inspect.getsourcefile(made) if ":" in policy else None
+        source = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16] if file else None
     return {"channels": list(made.channels), "yaw_damping_nms": made.yaw_damping_nms, "source": source}
 
 

@@ -22,7 +22,8 @@ def benchmark(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, or module:Class; repeat for several. Default: the paper's three and stronger variants."
+            help="Name, checkpoint (runs/mappo/best) or module:Class; repeat for several. Default: the paper's three "
+            "and stronger variants."
         ),
     ] = None,
     seeds: Annotated[
@@ -104,7 +105,9 @@ def _where(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, Abstrac
         return evaluate, nullcontext()
     with extra("distributed", "--ray"):
         from uuv_marl.benchmark.distributed import connected, evaluate_on_cluster
-    own = any(":" in name for name in policies)
+    from uuv_marl.baselines import POLICIES
+
+    own = any(name not in POLICIES for name in policies)
     return evaluate_on_cluster, connected(ray, working_dir=Path.cwd() if own else None)
 
 

@@ -2,7 +2,7 @@
 
 import operator
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -203,6 +203,24 @@ class Swarm:
             w, self.state, self.course, self.facts, self._senses, self._rules, self._suite, self.layout.offsets,
             self._scratch,
         )  # fmt: skip
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All that a later run depends on, copied, for ``restore``; the worlds' random streams are not part of it."""
+        return {name: array.copy() for name, array in self._arrays().items()}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Percept:
+        """Go on from a snapshot of a swarm of the same scenario and number of worlds; seed a world's next reset."""
+        for name, array in self._arrays().items():
+            array[...] = snapshot[name]
+        self._ready[:] = True
+        return self.percept
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        groups = (self.state, self.course, self.facts, self._senses)
+        return {
+            "duration_s": self._duration_s,
+            **{k: array for group in groups for k, array in group._asdict().items()},
+        }
 
     def step(self, action: Float32, active: NDArray[np.bool_] | None = None) -> Percept:
         """Advance by one decision period.

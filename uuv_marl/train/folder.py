@@ -5,9 +5,26 @@ import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from uuv_marl.benchmark.results import ResultsError
+
+
+class Row(Protocol):
+    """A NamedTuple that is a row of ``progress.csv``."""
+
+    @property
+    def iteration(self) -> int:
+        """From 1; 0 before the first."""
+        ...
+
+    @property
+    def _fields(self) -> tuple[str, ...]: ...
+
+    def _asdict(self) -> dict[str, Any]: ...
+
+
+R = TypeVar("R", bound=Row)
 
 
 class Record(NamedTuple):
@@ -24,7 +41,7 @@ class Record(NamedTuple):
     """Spent on training so far."""
 
 
-class TrainingFolder:
+class TrainingFolder(Generic[R]):
     """``config.json``, ``progress.csv`` and ``checkpoints/`` of a training.
 
     Nothing is written before ``begin``.
@@ -33,16 +50,18 @@ class TrainingFolder:
         path: new or empty, or with ``resume`` that of an earlier training.
         settings: what must be the same throughout a training, as JSON can hold it.
         resume: go on with what the folder holds.
+        start: the record before the first iteration, all of whose fields have defaults.
 
     Raises:
         ResultsError: the folder is used, holds no training, or one of other settings.
     """
 
-    def __init__(self, path: Path, settings: Mapping[str, Any], resume: bool) -> None:
+    def __init__(self, path: Path, settings: Mapping[str, Any], resume: bool, start: R) -> None:
         self.path = path
         self._settings: dict[str, Any] = json.loads(json.dumps(settings))
         self._sessions: list[dict[str, Any]] = []
-        self.record = Record()
+        self._start = start
+        self.record = start
         """The last iteration that is kept; iteration 0 where there is none."""
         if resume:
             self._resume()
@@ -64,7 +83,7 @@ class TrainingFolder:
         self._sessions = config["sessions"]
         finished = [path for path in self._checkpoints.glob("*/record.json") if path.parent.suffix != ".partial"]
         if finished:
-            self.record = Record(**json.loads(max(finished).read_text(encoding="utf-8")))
+            self.record = type(self._start)(**json.loads(max(finished).read_text(encoding="utf-8")))
 
     @property
     def _checkpoints(self) -> Path:
@@ -86,12 +105,12 @@ class TrainingFolder:
         # An iteration whose checkpoint was cut off will come again.
         kept = [row for row in self._rows() if int(row[0]) <= self.record.iteration]
         with self._table.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([Record._fields, *kept])
+            csv.writer(file).writerows([self._start._fields, *kept])
 
-    def keep(self, record: Record, save: Callable[[Path], object]) -> None:
+    def keep(self, record: R, save: Callable[[Path], object]) -> None:
         """A row, then the checkpoint, which ``save`` writes into the folder it is given; older ones go."""
         with self._table.open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow(record)
+            csv.writer(file).writerow(record._asdict().values())
         folder = self._checkpoints / f"{record.iteration:06d}"
         partial = folder.with_suffix(".partial")
         shutil.rmtree(partial, ignore_errors=True)

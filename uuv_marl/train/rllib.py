@@ -136,7 +136,9 @@ def train(
     """
     settings = settings or Settings()
     scenario = settings.load()
-    folder = TrainingFolder(output, {**asdict(settings), "scenario": scenario.model_dump(mode="json")}, resume)
+    folder = TrainingFolder(
+        output, {**asdict(settings), "scenario": scenario.model_dump(mode="json")}, resume, Record()
+    )
     if folder.record.agent_steps >= steps:
         return
     seed = world_seed(settings.seed, folder.record.agent_steps)

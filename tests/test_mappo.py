@@ -1,0 +1,380 @@
+"""MAPPO on problems with known answers, and trainings that can be stopped anywhere."""
+
+import csv
+import itertools
+import json
+import shutil
+
+import numpy as np
+import pytest
+import torch
+from typer.testing import CliRunner
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, learned_class
+from uuv_marl.benchmark.results import ResultsError
+from uuv_marl.cli import app
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.train import fleet as fleets
+from uuv_marl.train import training as trainings
+from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
+from uuv_marl.train.mappo import Hyperparameters, Learner, annealed, gae
+from uuv_marl.train.shaping import VIEW_SIZE, Weights, difference, shaped, view
+from uuv_marl.train.training import Record, Settings, Training, train
+from uuv_marl.train.validation import VALIDATION_SEEDS, cost, judge
+
+OPEN_WATER = {
+    "timing.decision_period_s": 0.5,
+    "actuators.yaw_damping_nms": 600.0,
+    "trajectory.waypoints_m": [[0.0, 0.0], [160.0, 0.0]],
+}
+TINY = Hyperparameters(hidden=(16, 16), horizon=8, minibatch=64)
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    torch.set_num_threads(1)
+
+
+def test_advantages_by_hand():
+    """gamma = lambda = 1/2. The second row's episode ends by the second of three steps."""
+    reward = np.array([[1, 1], [2, 2], [3, 3]], np.float32)
+    value = np.array([[4, 4], [8, 8], [16, 16], [32, 32]], np.float32)
+    ended = np.array([[False, False], [False, True], [False, False]])
+    # deltas, first row: 1 + 4 - 4 = 1, 2 + 8 - 8 = 2, 3 + 16 - 16 = 3; second row: 1, 2 - 8 = -6, 3
+    expected = [[1 + 0.25 * (2 + 0.25 * 3), 1 + 0.25 * -6], [2 + 0.25 * 3, -6], [3, 3]]
+    np.testing.assert_allclose(gae(reward, value, ended, 0.5, 0.5), expected)
+
+
+class Problem:
+    """Rows that see noise and are paid by a function of (seen, action); every ``length`` steps all of them end."""
+
+    features, size, rows = 2, 3, 64
+
+    def __init__(self, pay, length=1, cut_off=False):
+        self._pay, self._length, self._cut_off, self._t = pay, length, cut_off, 0
+        self._rng = np.random.default_rng(1)
+        self._draw()
+
+    def _draw(self):
+        self.seen = self._rng.uniform(-1, 1, (self.rows, self.size)).astype(np.float32)
+
+    def step(self, action):
+        self._t += 1
+        reward = np.asarray(self._pay(self.seen, action), np.float32)
+        self._draw()
+        over = np.full(self.rows, self._t % self._length == 0)
+        none = np.zeros(self.rows, np.bool_)
+        return Moment(
+            reward=reward,
+            terminated=none if self._cut_off else over,
+            truncated=over if self._cut_off else none,
+            last=self.seen[over] if self._cut_off else self.seen[none],
+        )
+
+
+def learned(problem, iterations, by, noise=(0.4, 0.1), rate=(3e-3, 5e-4)):
+    learner = Learner(problem.features, problem.size, by, np.random.default_rng(0))
+    rewards = []
+    for k in range(iterations):
+        share = k / iterations
+        batch, reward = learner.sample(problem, annealed(noise, share))
+        learner.update(batch, annealed(noise, share), annealed(rate, share))
+        rewards.append(reward)
+    return learner, rewards
+
+
+def test_a_one_step_task_is_solved():
+    """The reward is highest where the action is (x1, -x2) / 2, whatever the third number that only the critic sees."""
+
+    def pay(seen, action):
+        return 3.0 * seen[:, 2] - 10.0 * np.sum((action - seen[:, :2] * (0.5, -0.5)) ** 2, axis=1)
+
+    problem = Problem(pay)
+    learner, _ = learned(problem, 120, Hyperparameters(hidden=(32,), horizon=8, minibatch=128, kl_stop=0.05))
+    x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)
+    error = learner.act(x) - x[:, :2] * (0.5, -0.5)
+    assert np.sqrt(np.mean(error**2)) < 0.05
+
+
+@pytest.mark.parametrize(("cut_off", "values"), [(True, (10.0, 10.0)), (False, (1.0, 5.0))])
+def test_values_of_a_steady_income(cut_off, values):
+    """1 at every step, gamma 0.9: worth 10 where every fourth step only cuts the episode off; where it ends it, worth
+    between 1 (the last step) and 3.44 (all four), 2.33 on average, since nobody sees the time."""
+    by = Hyperparameters(hidden=(16,), horizon=16, minibatch=256, gamma=0.9, value_decay=0.9)
+    learner, _ = learned(Problem(lambda seen, _: np.ones(len(seen)), 4, cut_off), 80, by)
+    value = learner.value(np.random.default_rng(2).uniform(-1, 1, (200, 3)).astype(np.float32)).mean()
+    assert value == pytest.approx(10.0 if cut_off else 2.33, rel=0.05)
+    assert values[0] * 0.95 < value < values[1] * 1.05
+
+
+def test_a_new_scale_of_returns_keeps_values():
+    learner = Learner(2, 3, TINY, np.random.default_rng(0))
+    seen = np.random.default_rng(1).standard_normal((20, 3), np.float32)
+    learner._follow(torch.linspace(-50.0, -30.0, 9, dtype=torch.float64))
+    before = learner.value(seen)
+    learner._follow(torch.linspace(0.0, 900.0, 9, dtype=torch.float64))
+    np.testing.assert_allclose(learner.value(seen), before, rtol=1e-3, atol=1e-3)
+    assert learner._scale()[0] == pytest.approx((0.99 * -40 + 450) / 1.99)
+
+
+def test_the_actors_epochs_stop_where_it_has_gone_far():
+    def pay(seen, action):
+        return action[:, 0]
+
+    for limit, low, high in ((1e9, 0.1, np.inf), (0.01, 0.01, 0.05)):
+        by = Hyperparameters(hidden=(16,), horizon=8, minibatch=64, actor_epochs=20, kl_stop=limit)
+        learner = Learner(2, 3, by, np.random.default_rng(0))
+        batch, _ = learner.sample(Problem(pay), 0.3)
+        assert low < learner.update(batch, 0.3, 3e-3).kl < high
+
+
+def open_water(sizes, seed=0, weights=None, **overrides):
+    scenario = load_scenario("tracking", overrides={**OPEN_WATER, **overrides})
+    return Fleet(scenario, sizes, weights or Weights(), np.random.default_rng(seed))
+
+
+def test_a_swarm_of_one_finds_the_force_that_follows():
+    """The known optimum: on l(t) at its speed, at the force that its drag takes, (70 + 400) x 4 = 1880 of 3000 N."""
+    fleet = open_water([(1, 64)], **{"trajectory.waypoints_m": [[0.0, 0.0], [320.0, 0.0]]})
+    by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=512)
+    learner = Learner(fleet.features, fleet.size, by, np.random.default_rng(0))
+    for k in range(80):
+        noise = annealed((0.4, 0.1), k / 80)
+        batch, _ = learner.sample(fleet, noise)
+        learner.update(batch, noise, annealed((3e-3, 5e-4), k / 80))
+    scenario = load_scenario(
+        "tracking", num_vehicles=1, overrides={**OPEN_WATER, "trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
+    )
+    swarm, eyes = Swarm(scenario), Eyes(scenario, BARRIER)
+    swarm.reset(3)
+    features, barrier = np.empty((1, 1, eyes.size), np.float32), np.empty((1, 1, 2), np.float32)
+    actions = []
+    for _ in range(400):
+        eyes.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
+        actions.append(forward(learner.layers, features[0]))
+        swarm.step((actions[-1] + barrier[0])[None])
+    assert np.hypot(*(swarm.state.eta[0, 0, :2] - swarm.facts.reference[0, :2])) < 5.0
+    assert np.mean(actions[-100:], axis=0)[0] == pytest.approx([1880 / 3000, 0.0], abs=0.03)
+
+
+def test_a_short_training_beats_random_by_far():
+    fleet = open_water([(4, 8), (9, 4)])
+    rng = np.random.default_rng(0)
+    floors = []
+    for scale in (0.0, 1.0):
+        actions = (scale * rng.uniform(-1.0, 1.0, (60, fleet.rows, 2))).astype(np.float32)
+        floors.append(np.mean([fleet.step(action).reward for action in actions]))
+    fleet = open_water([(4, 8), (9, 4)])
+    _learner, rewards = learned(fleet, 60, Hyperparameters(hidden=(32, 32), horizon=32, minibatch=1024))
+    assert np.mean(rewards[-5:]) > max(floors) / 2, "rewards are negative: less than half of the cost"
+
+
+def test_a_fleet_ends_worlds_and_starts_them_anew(monkeypatch):
+    monkeypatch.setattr(fleets, "_PATIENCE_S", -38.0)  # cut off 2 s after the start of 40 s
+    fleet = open_water([(1, 2), (3, 2)])
+    assert fleet.seen.shape == (8, fleet.features + VIEW_SIZE)
+    idle = np.zeros((8, 2), np.float32)
+    for _ in range(3):
+        moment = fleet.step(idle)
+        assert not (moment.terminated | moment.truncated).any()
+        assert moment.last.shape == (0, fleet.size)
+    before = fleet.seen.copy()
+    moment = fleet.step(idle)
+    assert moment.truncated.all()
+    assert moment.last.shape == fleet.seen.shape
+    assert np.abs(moment.last - before).max() < np.abs(fleet.seen - before).max()
+    assert fleet.take_episodes().number == 4
+    assert fleet.take_episodes().number == 0
+
+
+def test_arrival_terminates():
+    fleet = open_water(
+        [(1, 2)],
+        **{"trajectory.waypoints_m": [[0.0, 0.0], [4.0, 0.0]], "arrival.radius_m": 500.0, "arrival.spread_m": 500.0},
+    )
+    idle = np.zeros((2, 2), np.float32)
+    moments = [fleet.step(idle) for _ in range(13)]
+    assert [bool(m.terminated.all()) for m in moments] == [False] * 11 + [True, False]
+    assert not any(m.truncated.any() for m in moments)
+    assert fleet.take_episodes().arrived == 2
+
+
+def test_training_worlds_are_not_those_of_validation():
+    fleet = open_water([(1, 2)])
+    seeds = []
+    fleet._swarms[0].reset = lambda drawn, worlds: seeds.extend(drawn)
+    for _ in range(500):
+        fleet._restart(0, [0, 1])
+    assert TRAINING_SEEDS == (100_000, VALIDATION_SEEDS)
+    assert 100_000 <= min(seeds) < 110_000
+    assert 890_000 < max(seeds) < VALIDATION_SEEDS
+
+
+def test_the_reward_by_hand(place):
+    swarm = place("single_obstacle", [[0, 0, 0], [4.0, 0, 0], [0, 300.0, 0]], obstacles=[(0.0, -37.0, 25.0)])
+    swarm.facts.reference[0, :2] = (0.0, 40.0)
+    swarm.facts.contacts[0, 2] = 1
+    swarm.facts.effort[0] = 0.5
+    only = Weights(centre=0.0)
+    per_step = swarm.scenario.timing.decision_period_s / 0.5
+    clearance = np.hypot(4.0, 37.0) - 25.0
+    expected = per_step * np.array(
+        [
+            -40 / 50 - 5 * (1 - 12 / 24) ** 2 - 8 * (1 - 4 / 10) ** 2 - 0.01,
+            -np.hypot(4, 40) / 50 - 5 * (1 - clearance / 24) ** 2 - 8 * (1 - 4 / 10) ** 2 - 0.01,
+            -260 / 50 - 0.01,
+        ]
+    )
+    np.testing.assert_allclose(shaped(swarm, only)[0], expected - [0, 0, 8], rtol=1e-12)
+
+
+def test_moving_the_centre_is_paid_in_full():
+    """One of n vehicles moves by 1 m towards where the centre should be: paid about 1 m, and not 1/n of it."""
+    swarm = Swarm(load_scenario("tracking", num_vehicles=50))
+    swarm.reset(0)
+    swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0)
+    before = difference(swarm)[0]
+    swarm.state.eta[0, 7, :2] += (0.6, 0.8)
+    swarm.observe()
+    swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0) - np.array([0.6, 0.8]) / 50
+    assert (difference(swarm)[0] - before)[7] == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_critics_view_does_not_depend_on_the_order_of_vehicles():
+    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=12))
+    swarm.reset(1)
+    views = []
+    order = np.random.default_rng(0).permutation(12)
+    for rows in (np.arange(12), order):
+        swarm.state.eta[0], swarm.state.nu[0] = swarm.state.eta[0, rows], swarm.state.nu[0, rows]
+        swarm.state.before[0] = swarm.state.eta[0, :, :2]
+        swarm.observe()
+        views.append(np.zeros((1, 12, VIEW_SIZE), np.float32))
+        view(swarm, views[-1])
+    np.testing.assert_allclose(views[0][:, order], views[1], atol=1e-5)
+    assert np.isfinite(views[0]).all()
+
+
+def settings(**changes):
+    few = {"sizes": ((3, 3), (6, 2)), "validation": ((3, 1),), "checkpoint_every": 2, "validate_every": 3}
+    rows = 8 * (3 * 3 + 6 * 2)
+    overrides = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0, "time_limit.factor": 0.02}
+    return Settings(**{"steps": 5 * rows, "algorithm": TINY, "overrides": overrides, **few, **changes})
+
+
+@pytest.fixture
+def no_validation(monkeypatch):
+    verdicts = itertools.cycle([-1.0, -0.5, -0.8])
+    monkeypatch.setattr(trainings, "validate", lambda *_: judge([episode()])._replace(score=next(verdicts)))
+
+
+def files(folder):
+    return {
+        path.name: path.read_bytes()
+        for path in (folder / "checkpoints" / "000005").iterdir()
+        if path.name not in ("record.json", WEIGHTS_FILE)
+    }
+
+
+def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, no_validation):
+    """Bit for bit: weights, optimisers, worlds and random numbers; stopped after a checkpoint, and between two."""
+    records = list(train(tmp_path / "whole", settings()))
+    assert [record.iteration for record in records] == [1, 2, 3, 4, 5]
+    for stop in (2, 3):
+        first = train(tmp_path / f"{stop}", settings())
+        for _ in range(stop):
+            next(first)
+        first.close()
+        rest = list(train(tmp_path / f"{stop}", settings(), resume=True))
+        assert [record.iteration for record in rest] == [3, 4, 5]
+        assert [record.reward for record in rest] == [record.reward for record in records[2:]]
+        assert files(tmp_path / f"{stop}") == files(tmp_path / "whole")
+    with (tmp_path / "3" / "progress.csv").open() as file:
+        assert [row["iteration"] for row in csv.DictReader(file)] == ["2", "4", "5"]
+    assert list(train(tmp_path / "whole", settings(), resume=True)) == []
+
+
+def test_a_seed_is_a_training(tmp_path, no_validation):
+    trained = [Training(settings(seed=seed)) for seed in (0, 0, 1)]
+    for training in trained:
+        training.iterate(Record())
+    one, same, other = (training.learner.arrays() for training in trained)
+    assert all(np.array_equal(one[name], same[name]) for name in one)
+    assert not np.array_equal(one["actor.0.weight"], other["actor.0.weight"])
+
+
+def test_the_best_policy_is_kept_and_can_be_started_from(tmp_path, monkeypatch):
+    scores = iter([-1.0, -0.5, -0.8, -0.9])
+    monkeypatch.setattr(trainings, "validate", lambda *_: judge([episode()])._replace(score=next(scores)))
+    records = list(train(tmp_path / "a", settings(validate_every=1, steps=4 * 168)))
+    assert [record.best for record in records] == [-1.0, -0.5, -0.5, -0.5]
+    made = learned_class(str(tmp_path / "a" / "best"))
+    assert made.checkpoint.card.training["record"]["iteration"] == 2
+    again = Training(settings(start=str(tmp_path / "a" / "best"), seed=9))
+    x = np.random.default_rng(0).standard_normal((30, again.fleet.features), np.float32)
+    np.testing.assert_allclose(forward(made.checkpoint.layers, x), again.learner.act(x), atol=1e-5)
+    with pytest.raises(ResultsError, match="give a folder best or a checkpoint"):
+        Training(settings(start=str(tmp_path / "nowhere")))
+
+
+def test_a_policy_is_validated_by_the_benchmark_itself(tmp_path):
+    (record,) = train(tmp_path / "a", settings(steps=1))
+    assert record.score < -1.0
+    assert record.arrived == 0.0
+    config = json.loads((tmp_path / "a" / "config.json").read_text())
+    assert config["sessions"][0]["versions"]["torch"]
+    assert config["settings"]["scenario"]["name"] == "random_field"
+    assert any((tmp_path / "a" / "tensorboard").iterdir())
+
+
+def test_a_folder_of_other_settings_is_refused(tmp_path, no_validation):
+    list(train(tmp_path / "a", settings(steps=1)))
+    with pytest.raises(ResultsError, match="not empty; give --resume"):
+        next(train(tmp_path / "a", settings()))
+    with pytest.raises(ResultsError, match="trained with another seed"):
+        next(train(tmp_path / "a", settings(steps=1, seed=4), resume=True))
+    shutil.rmtree(tmp_path / "a")
+    with pytest.raises(ResultsError, match="holds no training to resume"):
+        next(train(tmp_path / "a", settings(), resume=True))
+
+
+def episode(**changes):
+    good = {"task_time_s": 130.0, "duration_s": 100.0, "collisions": 0, "min_spacing_m": 6.5}
+    return {**good, "min_obstacle_distance_m": None, **changes}
+
+
+def test_costs_by_hand():
+    assert cost(episode()) == 0.5
+    assert cost(episode(task_time_s=None)) == 2.0
+    assert cost(episode(collisions=7, min_obstacle_distance_m=6.5, min_spacing_m=3.25)) == 0.5 + 2.0 + 0.5 + 0.5
+    verdict = judge([episode(), episode(task_time_s=None, min_obstacle_distance_m=20.0, collisions=2)])
+    assert verdict == (-2.25, 0.5, 2, 30.0, 6.5, 20.0)
+
+
+def test_the_command(tmp_path, monkeypatch):
+    seen = []
+
+    def fake(output, settings, *, resume):
+        seen.append((output, settings, resume))
+        yield Record(1, 500, 2.0, -1.5, 0.01, 0.5, -0.25, -0.25, 1.0, 0, 3.0, 7.0, 15.0)
+        if resume:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(trainings, "train", fake)
+    command = ["train", "mappo", "--steps=1000", "--seed=3", f"--output={tmp_path}", "--noise", "0.3", "0.1"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert "250 agent-steps/s" in done.output
+    assert "arrived 100%" in done.output
+    output, settings, resume = seen[0]
+    assert (output, settings.seed, settings.steps, settings.algorithm.noise, resume) == (
+        tmp_path,
+        3,
+        1000,
+        (0.3, 0.1),
+        False,
+    )
+    stopped = CliRunner().invoke(app, [*command, "--resume"])
+    assert stopped.exit_code == 130
+    assert "--resume goes on" in stopped.output

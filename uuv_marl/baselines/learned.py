@@ -1,0 +1,292 @@
+"""Learned policies: an actor from a checkpoint, in NumPy, beside a fixed short-range barrier.
+
+A checkpoint is one safetensors file: the weights, and in its header a ``Card`` as JSON, which says what they were
+trained on. Loading it executes nothing.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Literal, NamedTuple, cast
+
+import numpy as np
+import pydantic
+import safetensors
+import safetensors.numpy
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
+from uuv_marl.baselines.policy import Limits, Policy, PolicyError
+from uuv_marl.percept import Offsets, Percept, PerceptLayout
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.vehicle import project
+
+Float32 = NDArray[np.float32]
+Int64 = NDArray[np.int64]
+Row = tuple[str, int, str, float]
+
+WEIGHTS_FILE = "policy.safetensors"
+"""The checkpoint within a folder."""
+BARRIER = Gains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)
+"""Eq. 20-21 at short range, without the pull to l(t): half the paper's delta_n, and weaker but steeper at obstacles."""
+_MOST_BARRIER = 8.0
+"""The barrier is bounded here [full force]; the action is bounded by 1 after the sum."""
+_CARD = "uuv_marl"
+
+
+class Card(pydantic.BaseModel, frozen=True, extra="forbid"):
+    """What a checkpoint says of itself."""
+
+    format: Literal[1] = 1
+    percept: tuple[Row, ...]
+    """Name, size, unit and scale of every field of the percept."""
+    decision_period_s: tuple[float, float] = (0.1, 0.5)
+    """Shortest and longest period between decisions that it may be run with [s]."""
+    yaw_damping_nms: float = 600.0
+    """Inner loop that it was trained with [N m s]."""
+    channels: tuple[str, ...] = ()
+    """Channels beyond the percept."""
+    barrier: Gains = BARRIER
+    """Of Eq. 20-21; what the actor says is added to their force."""
+    training: dict[str, Any] = {}
+    """How it came about: settings, versions, agent-steps, validation."""
+
+
+class Layer(NamedTuple):
+    """Weight (in, out) and bias (out,)."""
+
+    weight: Float32
+    bias: Float32
+
+
+class Checkpoint(NamedTuple):
+    """A file's content."""
+
+    card: Card
+    layers: tuple[Layer, ...]
+    digest: str
+    """Of the whole file."""
+
+
+class Learned(Policy):
+    """A checkpoint's actor: tanh layers from local, body-frame features to a force, plus the barrier. Deterministic.
+
+    ``learned_class`` makes the subclass of a checkpoint.
+    """
+
+    checkpoint: ClassVar[Checkpoint]
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
+        super().__init__(scenario, num_worlds)
+        name, card = type(self).__name__, self.checkpoint.card
+        trained, here = card.percept, rows_of(self.layout)
+        if trained != here:
+            raise PolicyError(
+                f"{name} was trained on another percept than scenario {scenario.name!r} has: "
+                f"{_difference(trained, here)}; use a scenario with the sonar suite of its training, or train on this "
+                "one (uuv-marl train mappo)"
+            )
+        shortest, longest = card.decision_period_s
+        if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
+            raise PolicyError(
+                f"{name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
+                f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
+            )
+        self._eyes = Eyes(scenario, card.barrier)
+
+    def act(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        worlds, n = percept.flat.shape[:2]
+        features = np.empty((worlds, n, self._eyes.size), np.float32)
+        barrier = np.empty((worlds, n, 2), np.float32)
+        self._eyes.look(percept.flat, features, barrier, self.clamps)
+        wish = forward(self.checkpoint.layers, features.reshape(worlds * n, -1))
+        action = np.empty((worlds * n, 2), np.float32)
+        _add(wish, barrier.reshape(worlds * n, 2), action)
+        return action.reshape(worlds, n, 2)
+
+
+class Eyes:
+    """What actors see of a percept: bounded features, the same in training and in use, and the barrier's force.
+
+    Args:
+        scenario: gives the percept's layout and the vehicle's limits.
+        gains: the barrier's.
+    """
+
+    def __init__(self, scenario: Scenario, gains: Gains) -> None:
+        layout, actuators = PerceptLayout.of(scenario), scenario.actuators
+        self._at = layout.offsets
+        self._gains = gains
+        self._limits = Limits(
+            actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, scenario.vehicle.X_u,
+            scenario.vehicle.X_uu,
+        )  # fmt: skip
+        self.size = 11 + 4 * scenario.sonar.num_sectors + 4 * scenario.sonar.num_active_sectors
+
+    def look(self, flat: Float32, features: Float32, barrier: Float32, clamps: Int64) -> None:
+        """Fill features (world, vehicle, size) and barrier (world, vehicle, 2) [full force] from flat percepts.
+
+        ``clamps`` (world,) counts numerical bounds that bound.
+        """
+        _look(flat, self._at, self._gains, self._limits, features, barrier, clamps)
+
+
+def forward(layers: Sequence[Layer], x: Float32) -> Float32:
+    """The network's output (row, out) for inputs (row, in): tanh between layers, none after the last.
+
+    A row's result does not depend on the rows beside it, which a BLAS library does not promise.
+    """
+    for k, layer in enumerate(layers):
+        y = np.empty((len(x), len(layer.bias)), np.float32)
+        _dense(x, layer.weight, layer.bias, y)
+        x = np.tanh(y) if k < len(layers) - 1 else y
+    return x
+
+
+def rows_of(layout: PerceptLayout) -> tuple[Row, ...]:
+    """A percept's table as a card keeps it."""
+    return tuple((field.name, field.size, field.unit, field.scale) for field in layout.table)
+
+
+def is_checkpoint(name: str) -> bool:
+    """Whether a policy's name means a file or folder."""
+    return "/" in name or os.sep in name or (":" not in name and Path(name).exists())
+
+
+_classes: dict[str, type[Learned]] = {}
+
+
+def learned_class(name: str) -> type[Learned]:
+    """The policy in a checkpoint, a file or the folder that holds it. Raises PolicyError where there is none."""
+    checkpoint = load_checkpoint(Path(name))
+    if name not in _classes or _classes[name].checkpoint.digest != checkpoint.digest:
+        card = checkpoint.card
+        declared = {"channels": card.channels, "yaw_damping_nms": card.yaw_damping_nms, "checkpoint": checkpoint}
+        _classes[name] = type(name, (Learned,), {**declared, "__doc__": Learned.__doc__, "__module__": __name__})
+    return _classes[name]
+
+
+def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:
+    """Write a checkpoint file, whole or not at all."""
+    tensors = {f"{k}.{name}": array for k, layer in enumerate(layers) for name, array in layer._asdict().items()}
+    contiguous = {name: np.ascontiguousarray(array, np.float32) for name, array in tensors.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".partial")
+    partial.write_bytes(safetensors.numpy.save(contiguous, {_CARD: card.model_dump_json()}))
+    partial.replace(path)
+
+
+def load_checkpoint(path: Path) -> Checkpoint:
+    """A checkpoint from its file, or from the folder that holds it. Raises PolicyError naming what is wrong."""
+    file = path / WEIGHTS_FILE if path.is_dir() else path
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise PolicyError(
+            f"policy {str(path)!r} can't be read ({error.strerror}: {file}); give a checkpoint, such as the folder "
+            "best of a training"
+        ) from None
+    try:
+        tensors: dict[str, NDArray[Any]] = safetensors.numpy.load(data)
+        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        card = Card.model_validate_json(header["__metadata__"][_CARD])
+        layers = tuple(Layer(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(len(tensors) // 2))
+        _check(card, layers)
+    except (ValueError, KeyError, safetensors.SafetensorError) as error:
+        raise PolicyError(
+            f"{file} holds no policy of uuv_marl ({error}); give a folder that train mappo wrote"
+        ) from None
+    return Checkpoint(card, layers, hashlib.sha256(data).hexdigest()[:16])
+
+
+def _check(card: Card, layers: Sequence[Layer]) -> None:
+    sizes: Mapping[str, int] = {name: size for name, size, _, _ in card.percept}
+    width = 11 + 4 * sizes["heard"] + 4 * sizes.get("echo", 0)
+    for weight, bias in layers:
+        if weight.dtype != np.float32 or bias.dtype != np.float32 or weight.shape != (width, *bias.shape):
+            raise ValueError(f"a layer has weights {weight.dtype} {weight.shape}, expected float32 ({width}, ...)")
+        width = cast(int, weight.shape[1])
+    if width != 2:
+        raise ValueError(f"the last layer has {width} outputs, expected 2")
+
+
+def _difference(trained: Sequence[Row], here: Sequence[Row]) -> str:
+    """The first row of the tables that differs, for a message."""
+    for k in range(max(len(trained), len(here))):
+        rows = [" ".join(map(str, table[k])) if k < len(table) else "nothing" for table in (trained, here)]
+        if rows[0] != rows[1]:
+            return f"{rows[0]!r} against {rows[1]!r}"
+    return "nothing"
+
+
+@compiled
+def _dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
+    for i in range(x.shape[0]):
+        for k in range(out.shape[1]):
+            out[i, k] = bias[k]
+        for j in range(x.shape[1]):
+            value = x[i, j]
+            for k in range(out.shape[1]):
+                out[i, k] += value * weight[j, k]
+
+
+@compiled
+def _add(wish: Float32, barrier: Float32, action: Float32) -> None:
+    """Body-frame shares of full force, summed and projected onto the unit disc."""
+    for i in range(wish.shape[0]):
+        a_x, a_y = project(wish[i, 0] + barrier[i, 0], wish[i, 1] + barrier[i, 1])
+        action[i, 0], action[i, 1] = a_x, a_y
+
+
+@compiled
+def _put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
+    """A position [m] as four features: its direction, longer the nearer than about ``near`` it is, and itself."""
+    length = np.sqrt(p_x * p_x + p_y * p_y)
+    weight = near / ((length + 0.5 * near) * max(length, 1e-3))
+    far = 1.0 / max(64.0, 0.5 * length)
+    out[k], out[k + 1], out[k + 2], out[k + 3] = weight * p_x, weight * p_y, far * p_x, far * p_y
+
+
+@compiled
+def _look(
+    flat: Float32, at: Offsets, gains: Gains, limits: Limits, features: Float32, barrier: Float32, clamps: Int64
+) -> None:
+    """``Eyes.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do."""
+    sectors, active = at.neighbour - at.heard, at.echo_range - at.echo
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            row, out = flat[w, i], features[w, i]
+            out[:] = 0.0
+            out[0], out[1], out[2] = row[at.velocity] / 4.0, row[at.velocity + 1], row[at.yaw_rate]
+            out[3], out[4] = row[at.reference_velocity] / 4.0, row[at.reference_velocity + 1] / 4.0
+            l_x, l_y = row[at.reference], row[at.reference + 1]
+            length = np.sqrt(l_x * l_x + l_y * l_y)
+            out[5], out[6] = l_x / max(64.0, 0.5 * length), l_y / max(64.0, 0.5 * length)
+            out[7], out[8] = l_x / (length + 8.0), l_y / (length + 8.0)
+            f_x, f_y, k = 0.0, 0.0, 9
+            for s in range(sectors):
+                if row[at.heard + s] > 0.0:
+                    p_x, p_y = row[at.neighbour + 2 * s], row[at.neighbour + 2 * s + 1]
+                    _put(p_x, p_y, 10.0, out, k)
+                    d_x, d_y, clamped = neighbour_force(p_x, p_y, gains)
+                    f_x, f_y, clamps[w] = f_x + d_x, f_y + d_y, clamps[w] + clamped
+                k += 4
+            for a in range(active):
+                if row[at.echo + a] > 0.0:
+                    p_x, p_y = row[at.echo_position + 2 * a], row[at.echo_position + 2 * a + 1]
+                    reach = row[at.echo_range + a]
+                    away = max(np.sqrt(p_x * p_x + p_y * p_y), 1e-3)
+                    out[k], out[k + 1] = 20.0 / (reach + 10.0), reach / 64.0
+                    out[k + 2], out[k + 3] = out[k] * p_x / away, out[k] * p_y / away
+                    d_x, d_y, clamped = obstacle_force(p_x, p_y, gains)
+                    f_x, f_y, clamps[w] = f_x + d_x, f_y + d_y, clamps[w] + clamped
+                k += 4
+            f_x, f_y = f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque
+            shrink = min(1.0, _MOST_BARRIER / max(np.sqrt(f_x * f_x + f_y * f_y), 1e-9))
+            barrier[w, i, 0], barrier[w, i, 1] = shrink * f_x, shrink * f_y
+            away = 1.0 + np.sqrt(barrier[w, i, 0] ** 2 + barrier[w, i, 1] ** 2)
+            out[k], out[k + 1] = barrier[w, i, 0] / away, barrier[w, i, 1] / away

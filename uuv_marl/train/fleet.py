@@ -1,0 +1,151 @@
+"""Fleet: several ``Swarm``s of different sizes, stepped as one flat array of vehicles, ended worlds started anew."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.learned import BARRIER, Eyes
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.train.shaping import VIEW_SIZE, Weights, shaped, view
+
+Float32 = NDArray[np.float32]
+Bool = NDArray[np.bool_]
+Arrays = Mapping[str, NDArray[Any]]
+
+TRAINING_SEEDS = (100_000, 900_000)
+"""Worlds are drawn from these; 900,000-999,999 are for validation."""
+_PATIENCE_S = 40.0
+"""An episode is cut off so long after l(t) came to rest: waiting for stragglers teaches little."""
+
+
+class Moment(NamedTuple):
+    """One decision of every vehicle, a row each."""
+
+    reward: Float32
+    terminated: Bool
+    """The swarm arrived."""
+    truncated: Bool
+    """The episode was cut off."""
+    last: Float32
+    """What the critic would have seen next, for the truncated rows, in their order."""
+
+
+class Episodes(NamedTuple):
+    """Sums over episodes that ended."""
+
+    number: int = 0
+    arrived: int = 0
+    collisions: int = 0
+    returns: float = 0.0
+    """Of the mean over vehicles."""
+    decisions: int = 0
+
+
+class Fleet:
+    """Vehicles of many worlds as rows; ``seen`` (row, ``size``) is what the critic sees of each now.
+
+    The first ``features`` entries are the actor's. Rows run over swarms, their worlds, and vehicles. Worlds are seeded
+    from the generator, so that it and a snapshot determine all that follows.
+
+    Args:
+        scenario: what to simulate.
+        sizes: number of vehicles and of worlds of each swarm.
+        weights: of the reward.
+        rng: draws the worlds.
+    """
+
+    def __init__(
+        self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, rng: np.random.Generator
+    ) -> None:
+        self._rng, self._weights = rng, weights
+        self._swarms = [Swarm(load_scenario(scenario, num_vehicles=n), worlds) for n, worlds in sizes]
+        self._eyes = Eyes(scenario, BARRIER)
+        self.features = self._eyes.size
+        self.size = self.features + VIEW_SIZE
+        self._ends = np.cumsum([n * worlds for n, worlds in sizes])
+        self.rows = int(self._ends[-1])
+        self.seen = np.zeros((self.rows, self.size), np.float32)
+        self._barrier = np.zeros((self.rows, 2), np.float32)
+        self._sums = [np.zeros((worlds, 3)) for _, worlds in sizes]
+        self.episodes = Episodes()
+        for k, swarm in enumerate(self._swarms):
+            self._restart(k, list(range(swarm.num_worlds)))
+            self._look(k)
+
+    def step(self, action: Float32) -> Moment:
+        """One decision; ``action`` (row, 2) is what the actor adds to the barrier [full force]."""
+        moment = Moment(
+            reward=np.zeros(self.rows, np.float32),
+            terminated=np.zeros(self.rows, np.bool_),
+            truncated=np.zeros(self.rows, np.bool_),
+            last=np.empty((0, self.size), np.float32),
+        )
+        last = [moment.last]
+        for k, swarm in enumerate(self._swarms):
+            rows, shape = self._rows(k), (swarm.num_worlds, swarm.num_vehicles)
+            swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
+            reward = shaped(swarm, self._weights)
+            arrived = swarm.arrived
+            late = (swarm.timed_out | (swarm.facts.time_s >= swarm.duration_s + _PATIENCE_S)) & ~arrived
+            for flags, values in ((moment.terminated, arrived), (moment.truncated, late)):
+                flags[rows] = np.repeat(values, shape[1])
+            moment.reward[rows] = reward.reshape(-1)
+            self._sums[k] += np.stack([reward.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
+            self._look(k)
+            if (over := arrived | late).any():
+                last.append(self.seen[rows][moment.truncated[rows]])
+                self._count(k, over, arrived)
+                self._restart(k, [int(w) for w in np.flatnonzero(over)])
+                self._look(k)
+        return moment._replace(last=np.concatenate(last))
+
+    def take_episodes(self) -> Episodes:
+        """Sums over the episodes that ended since the last call."""
+        taken, self.episodes = self.episodes, Episodes()
+        return taken
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All but the generator, for ``restore``."""
+        kept: dict[str, NDArray[Any]] = {"episodes": np.array(self.episodes, np.float64)}
+        for k, (swarm, sums) in enumerate(zip(self._swarms, self._sums, strict=True)):
+            kept |= {f"{k}.{name}": array for name, array in swarm.snapshot().items()}
+            kept[f"{k}.sums"] = sums.copy()
+        return kept
+
+    def restore(self, snapshot: Arrays) -> None:
+        """Go on from a snapshot of a fleet of the same sizes."""
+        for k, swarm in enumerate(self._swarms):
+            swarm.restore({name.split(".")[1]: array for name, array in snapshot.items() if name.startswith(f"{k}.")})
+            self._sums[k][...] = snapshot[f"{k}.sums"]
+            self._look(k)
+        number, arrived, collisions, returns, decisions = snapshot["episodes"]
+        self.episodes = Episodes(int(number), int(arrived), int(collisions), float(returns), int(decisions))
+
+    def _rows(self, k: int) -> slice:
+        return slice(int(self._ends[k - 1]) if k else 0, int(self._ends[k]))
+
+    def _look(self, k: int) -> None:
+        swarm, rows = self._swarms[k], self._rows(k)
+        seen = self.seen[rows].reshape(swarm.num_worlds, swarm.num_vehicles, self.size)
+        barrier = self._barrier[rows].reshape(swarm.num_worlds, swarm.num_vehicles, 2)
+        self._eyes.look(swarm.percept.flat, seen[:, :, : self.features], barrier, np.zeros(swarm.num_worlds, np.int64))
+        view(swarm, seen[:, :, self.features :])
+
+    def _restart(self, k: int, worlds: Sequence[int]) -> None:
+        self._swarms[k].reset(self._rng.integers(*TRAINING_SEEDS, len(worlds)), worlds)
+
+    def _count(self, k: int, over: Bool, arrived: Bool) -> None:
+        returns, collisions, decisions = self._sums[k][over].sum(axis=0)
+        before = self.episodes
+        self.episodes = Episodes(
+            before.number + int(over.sum()),
+            before.arrived + int((over & arrived).sum()),
+            before.collisions + int(collisions),
+            before.returns + float(returns),
+            before.decisions + int(decisions),
+        )
+        self._sums[k][over] = 0.0

@@ -1,0 +1,267 @@
+"""MAPPO (Yu et al. 2022): PPO for all vehicles at once, with one actor that they share and a critic that sees all.
+
+The actor is local and small, so that it runs without torch (``uuv_marl.baselines.learned``). The critic's input adds
+means and extremes over the world (``uuv_marl.train.shaping.view``), so that neither depends on how many vehicles there
+are. Action noise is not learned but annealed. One seed gives one training, bit for bit, on one thread. Needs ``train``.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from uuv_marl.baselines.learned import Layer
+from uuv_marl.train.fleet import Moment
+
+Float32 = NDArray[np.float32]
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hyperparameters:
+    """Of the algorithm; see ``Learner`` and ``gae``."""
+
+    hidden: tuple[int, ...] = (96, 96)
+    """Units of the actor's and of the critic's layers, tanh."""
+    gamma: float = 0.98
+    """Discount per decision; with 0.5 s a horizon of 25 s, about the time that passing an obstacle takes."""
+    gae_lambda: float = 0.95
+    horizon: int = 48
+    """Decisions between updates."""
+    actor_epochs: int = 3
+    critic_epochs: int = 2
+    minibatch: int = 2048
+    """Rows of a gradient step."""
+    clip: float = 0.2
+    """Of PPO's ratio."""
+    kl_stop: float = 0.02
+    """The actor's epochs end where a minibatch diverges further from the policy that sampled it."""
+    learning_rate: tuple[float, float] = (1.5e-3, 1.5e-4)
+    """At the start and at the end."""
+    noise: tuple[float, float] = (0.4, 0.08)
+    """Standard deviation of actions [full force], at the start and at the end."""
+    max_gradient: float = 1.0
+    value_decay: float = 0.99
+    """Of the running mean and variance by which returns are normalised."""
+
+
+class Environment(Protocol):
+    """What sampling needs: a ``Fleet``, or a problem with a known answer."""
+
+    features: int
+    size: int
+    rows: int
+    seen: Float32
+
+    def step(self, action: Float32) -> Moment:
+        """One decision of every row."""
+        ...
+
+
+class Batch(NamedTuple):
+    """Samples as rows."""
+
+    seen: Tensor
+    action: Tensor
+    mean: Tensor
+    """Of the policy that sampled."""
+    advantage: Tensor
+    returns: Tensor
+
+
+class Update(NamedTuple):
+    """How an update went."""
+
+    kl: float
+    explained: float
+
+
+def gae(reward: Float32, value: Float32, ended: Bool, gamma: float, lam: float) -> Float32:
+    """Generalised advantages (Schulman et al. 2016, Eq. 16), shape (time, row).
+
+    Args:
+        reward: shape (time, row); where an episode was cut off, plus gamma times the value of where it would go on.
+        value: shape (time + 1, row).
+        ended: the episode ended by this step, and the next value is another episode's; shape (time, row).
+        gamma: discount.
+        lam: weight of longer returns.
+    """
+    advantage = np.zeros_like(reward)
+    ahead = np.zeros_like(reward[0])
+    for t in reversed(range(len(reward))):
+        goes_on = np.float32(gamma) * ~ended[t]
+        ahead = reward[t] + goes_on * value[t + 1] - value[t] + np.float32(lam) * goes_on * ahead
+        advantage[t] = ahead
+    return advantage
+
+
+class Learner:
+    """Actor, critic, their optimisers, and the scale of returns.
+
+    Args:
+        features: the actor's inputs, the first of what the critic sees.
+        size: the critic's inputs.
+        by: the algorithm's numbers.
+        rng: draws the first weights, and the order of samples.
+    """
+
+    def __init__(self, features: int, size: int, by: Hyperparameters, rng: np.random.Generator) -> None:
+        self.by, self._rng, self._features = by, rng, features
+        self.actor = network((features, *by.hidden, 2), 0.01, rng)
+        self.critic = network((size, *by.hidden, 1), 1.0, rng)
+        self._optimisers = [torch.optim.Adam(net.parameters(), eps=1e-5) for net in (self.actor, self.critic)]
+        self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
+
+    @property
+    def layers(self) -> list[Layer]:
+        """The actor's, for a checkpoint."""
+        linear = [layer for layer in self.actor if isinstance(layer, nn.Linear)]
+        return [Layer(x.weight.detach().numpy().T.copy(), x.bias.detach().numpy().copy()) for x in linear]
+
+    @torch.no_grad()
+    def act(self, seen: Float32) -> Float32:
+        """Mean action of every row."""
+        return self.actor(torch.from_numpy(seen)[:, : self._features]).numpy()
+
+    @torch.no_grad()
+    def value(self, seen: Float32) -> Float32:
+        """Expected return of every row, shape (..., row) for inputs (..., row, size)."""
+        mean, std = self._scale()
+        return self.critic(torch.from_numpy(seen)).squeeze(-1).numpy() * np.float32(std) + np.float32(mean)
+
+    def sample(self, env: Environment, noise: float) -> tuple[Batch, float]:
+        """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
+        by, shape = self.by, (self.by.horizon, env.rows)
+        seen = np.empty((by.horizon + 1, env.rows, env.size), np.float32)
+        action, mean = np.empty((*shape, 2), np.float32), np.empty((*shape, 2), np.float32)
+        reward, paid, ended = np.empty(shape, np.float32), 0.0, np.empty(shape, np.bool_)
+        for t in range(by.horizon):
+            seen[t] = env.seen
+            mean[t] = self.act(seen[t])
+            action[t] = mean[t] + np.float32(noise) * self._rng.standard_normal(mean[t].shape, np.float32)
+            moment = env.step(action[t])
+            paid += float(moment.reward.mean()) / by.horizon
+            reward[t], ended[t] = moment.reward, moment.terminated | moment.truncated
+            if len(moment.last):
+                reward[t][moment.truncated] += np.float32(by.gamma) * self.value(moment.last)
+        seen[-1] = env.seen
+        value = self.value(seen)
+        advantage = gae(reward, value, ended, by.gamma, by.gae_lambda)
+        arrays = (seen[:-1], action, mean, advantage, advantage + value[:-1])
+        return Batch(*(torch.from_numpy(array.reshape(-1, *array.shape[2:])) for array in arrays)), paid
+
+    def update(self, batch: Batch, noise: float, learning_rate: float) -> Update:
+        """Some epochs of PPO on a batch, and of regression to its returns."""
+        for optimiser in self._optimisers:
+            for group in optimiser.param_groups:
+                group["lr"] = learning_rate
+        error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
+        self._follow(batch.returns.double())
+        kl = self._improve(batch._replace(advantage=_standard(batch.advantage)), noise)
+        self._regress(batch.seen, batch.returns)
+        return Update(kl, 1.0 - error)
+
+    def _improve(self, batch: Batch, noise: float) -> float:
+        """PPO's clipped objective; the last divergence measured."""
+        by, kl = self.by, 0.0
+        for rows in self._minibatches(len(batch.seen), by.actor_epochs):
+            old, action = batch.mean[rows], batch.action[rows]
+            new = self.actor(batch.seen[rows, : self._features])
+            log_ratio = ((action - old).square() - (action - new).square()).sum(-1) / (2.0 * noise * noise)
+            kl = (new.detach() - old).square().sum(-1).mean().item() / (2.0 * noise * noise)
+            if kl > by.kl_stop:
+                break
+            ratio, advantage = log_ratio.exp(), batch.advantage[rows]
+            clipped = ratio.clamp(1.0 - by.clip, 1.0 + by.clip)
+            self._descend(0, self.actor, -torch.minimum(ratio * advantage, clipped * advantage).mean())
+        return kl
+
+    def _regress(self, seen: Tensor, returns: Tensor) -> None:
+        mean, std = self._scale()
+        target = (returns - mean) / std
+        for rows in self._minibatches(len(seen), self.by.critic_epochs):
+            loss = (self.critic(seen[rows]).squeeze(-1) - target[rows]).square().mean()
+            self._descend(1, self.critic, loss)
+
+    def _descend(self, k: int, net: nn.Sequential, loss: Tensor) -> None:
+        self._optimisers[k].zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(net.parameters(), self.by.max_gradient)
+        self._optimisers[k].step()
+
+    def _minibatches(self, rows: int, epochs: int) -> Iterator[Tensor]:
+        for _ in range(epochs):
+            order = torch.from_numpy(self._rng.permutation(rows))
+            yield from order.split(self.by.minibatch)
+
+    def _scale(self) -> tuple[float, float]:
+        """Mean and standard deviation of returns; 0 and 1 before the first."""
+        weight, total, squares = self._moments
+        if weight == 0.0:
+            return 0.0, 1.0
+        mean = total / weight
+        return float(mean), math.sqrt(max(squares / weight - mean * mean, 1e-4))
+
+    @torch.no_grad()
+    def _follow(self, returns: Tensor) -> None:
+        """Note these returns, and keep the critic's values where their scale moves (PopArt, Hessel et al. 2019)."""
+        first, (mean, std), decay = not self._moments.any(), self._scale(), self.by.value_decay
+        fresh = np.array([1.0, returns.mean().item(), returns.square().mean().item()])
+        self._moments = decay * self._moments + (1.0 - decay) * fresh
+        new_mean, new_std = self._scale()
+        last = self.critic[-1]
+        if not first and isinstance(last, nn.Linear):
+            last.weight.mul_(std / new_std)
+            last.bias.mul_(std).add_(mean - new_mean).div_(new_std)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All of it, for ``restore``."""
+        arrays: dict[str, NDArray[Any]] = {"moments": self._moments.copy()}
+        for name, net, optimiser in self._parts():
+            arrays |= {f"{name}.{key}": value.numpy().copy() for key, value in net.state_dict().items()}
+            for k, state in optimiser.state_dict()["state"].items():
+                arrays |= {f"{name}_adam.{k}.{key}": value.numpy().copy() for key, value in state.items()}
+        return arrays
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on with the ``arrays`` of a learner of the same sizes."""
+        tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
+        self._moments = np.array(arrays["moments"])
+        for name, net, optimiser in self._parts():
+            net.load_state_dict({key: tensors[f"{name}.{key}"] for key in net.state_dict()})
+            state: dict[int, dict[str, Tensor]] = {}
+            for path in (path for path in tensors if path.startswith(f"{name}_adam.")):
+                _, k, key = path.split(".")
+                state.setdefault(int(k), {})[key] = tensors[path]
+            optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
+
+    def _parts(self) -> list[tuple[str, nn.Sequential, torch.optim.Adam]]:
+        return [("actor", self.actor, self._optimisers[0]), ("critic", self.critic, self._optimisers[1])]
+
+
+def network(sizes: Sequence[int], last_gain: float, rng: np.random.Generator) -> nn.Sequential:
+    """Linear layers with tanh between them, orthogonal weights, zero biases."""
+    generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
+    layers: list[nn.Module] = []
+    for k, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
+        linear = nn.Linear(inputs, outputs)
+        is_last = k == len(sizes) - 2
+        nn.init.orthogonal_(linear.weight, last_gain if is_last else math.sqrt(2.0), generator=generator)
+        nn.init.zeros_(linear.bias)
+        layers += [linear] if is_last else [linear, nn.Tanh()]
+    return nn.Sequential(*layers)
+
+
+def annealed(ends: tuple[float, float], share: float) -> float:
+    """From the first to the second in equal ratios, as ``share`` goes from 0 to 1."""
+    return ends[0] * (ends[1] / ends[0]) ** min(share, 1.0)
+
+
+def _standard(x: Tensor) -> Tensor:
+    return (x - x.mean()) / (x.std() + 1e-8)

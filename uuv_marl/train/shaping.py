@@ -1,0 +1,116 @@
+"""What training is paid, and what its critic sees: both from the truth, which the actor never knows.
+
+The reward is dense and steeper than the environment's own (``uuv_marl.envs.reward``), which is made to be sound and to
+compare. All numbers here are our own.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.swarm import Swarm
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+
+VIEW_SIZE = 18
+"""Entries that the critic sees beyond the actor's features."""
+
+
+class Weights(NamedTuple):
+    """Of the terms of one decision of 0.5 s; shorter ones are paid in proportion, collisions whole."""
+
+    distance_m: float = 50.0
+    """A vehicle pays its distance to l(t) over this."""
+    centre: float = 0.04
+    """Per metre that the swarm's centre is off l(t), paid by each vehicle as far as it is its own doing."""
+    obstacle: float = 5.0
+    obstacle_m: float = 24.0
+    """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
+    spacing: float = 8.0
+    spacing_m: float = 10.0
+    """The same for the distance to the nearest vehicle: rare close approaches would hide in a mean of a linear term."""
+    collision: float = 8.0
+    """Per contact that begins."""
+    effort: float = 0.02
+    """Times the squared action."""
+
+
+def shaped(swarm: Swarm, by: Weights) -> Float64:
+    """The reward of the latest decision, shape (world, vehicle)."""
+    facts, share = swarm.facts, swarm.scenario.timing.decision_period_s / 0.5
+    away = np.hypot(*np.moveaxis(swarm.state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
+    near = np.clip(1.0 - facts.clearance / by.obstacle_m, 0.0, 1.5)
+    close = np.clip(1.0 - facts.spacing / by.spacing_m, 0.0, 1.0)
+    rate = (
+        -np.minimum(away, 300.0) / by.distance_m
+        + by.centre * difference(swarm)
+        - by.obstacle * near * near
+        - by.spacing * close * close
+        - by.effort * facts.effort
+    )
+    return share * rate - by.collision * facts.contacts
+
+
+def difference(swarm: Swarm) -> Float64:
+    """N times how much better the swarm's centre is with a vehicle than without it [m], shape (world, vehicle).
+
+    A difference reward (Wolpert and Tumer 2002): moving towards l(t) pays a vehicle as if it moved the centre alone.
+    From a shared centre error each would get 1/n of that, which its own noise hides. The error is rounded at zero.
+    """
+    n = swarm.num_vehicles
+    if n == 1:
+        return np.zeros((swarm.num_worlds, 1))
+    error = swarm.facts.centre - swarm.facts.reference[:, :2]
+    without = (n * swarm.facts.centre[:, None] - swarm.state.eta[:, :, :2]) / (n - 1) - swarm.facts.reference[
+        :, None, :2
+    ]
+    return n * (_rounded(without) - _rounded(error)[:, None])
+
+
+def _rounded(error: Float64) -> Float64:
+    """Length of a vector, smooth at zero [m]."""
+    return np.sqrt(np.sum(error * error, axis=-1) + 1.0)
+
+
+def view(swarm: Swarm, out: Float32) -> None:
+    """Fill what the critic sees beyond the actor's features, shape (world, vehicle, ``VIEW_SIZE``), body frame.
+
+    Means and extremes over the world's vehicles, however many: where the centre is and how it moves, how far the
+    swarm spreads, its smallest distances, the vehicle's own in all directions, and how much time is left.
+    """
+    state, facts = swarm.state, swarm.facts
+    c, s = np.moveaxis(swarm.heading, -1, 0)
+    to_reference = facts.reference[:, None, :2] - state.eta[:, :, :2]
+    away = np.hypot(*np.moveaxis(to_reference, -1, 0))
+    u, v = state.nu[:, :, 0], state.nu[:, :, 1]
+    velocity = np.stack([c * u - s * v, s * u + c * v], axis=-1)
+    drift = velocity.mean(axis=1) - facts.reference[:, 2:]
+    error = facts.centre - facts.reference[:, :2]
+    size = np.hypot(*error.T)[:, None]
+    left = swarm.duration_s - facts.time_s
+    columns = [
+        *_turned(np.clip(facts.centre[:, None] - state.eta[:, :, :2], -256.0, 256.0) / 64.0, c, s),
+        *_turned((error * np.minimum(1.0, 64.0 / np.maximum(size, 1e-6)) / 16.0)[:, None], c, s),
+        *_turned((error / (size + 2.0))[:, None], c, s),
+        *_turned((drift / 4.0)[:, None], c, s),
+        np.minimum(away.mean(axis=1, keepdims=True), 256.0) / 64.0,
+        np.minimum(away.max(axis=1, keepdims=True), 512.0) / 128.0,
+        np.minimum(away, 256.0) / 64.0,
+        8.0 / (facts.spacing + 4.0),
+        20.0 / (np.maximum(facts.clearance, -5.0) + 10.0),
+        8.0 / (facts.min_spacing[:, None] + 4.0),
+        20.0 / (np.maximum(facts.clearance.min(axis=1, keepdims=True), -5.0) + 10.0),
+        np.clip(left, -50.0, 200.0)[:, None] / 100.0,
+        (left <= 0.0)[:, None].astype(np.float64),
+        (state.dwell[:, :1] > 0) * (0.5 + 0.1 * state.dwell[:, :1] * swarm.scenario.timing.control_hold_s),
+    ]
+    for k, column in enumerate(columns):
+        out[:, :, k] = column
+
+
+def _turned(vector: Float64, c: Float64, s: Float64) -> tuple[Float64, Float64]:
+    """A north-east vector (world, vehicle or 1, 2) in the frame of bodies whose headings have cosine c and sine s."""
+    x, y = vector[..., 0], vector[..., 1]
+    return c * x + s * y, c * y - s * x

@@ -1,0 +1,238 @@
+"""A training of MAPPO from its settings: iterations, validation, TensorBoard, and files from which it goes on exactly.
+
+``config.json``, ``progress.csv`` and ``checkpoints/`` as ``uuv_marl.train.folder`` keeps them; ``best/``, the policy of
+the best validation; ``tensorboard/``. Needs ``train``.
+"""
+
+import json
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from safetensors.numpy import load_file, save_file
+from torch.utils.tensorboard.writer import SummaryWriter
+
+from uuv_marl import __version__
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, rows_of, save_checkpoint
+from uuv_marl.benchmark.results import ResultsError
+from uuv_marl.percept import PerceptLayout
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+from uuv_marl.train.fleet import Episodes, Fleet
+from uuv_marl.train.folder import TrainingFolder
+from uuv_marl.train.mappo import Hyperparameters, Learner, annealed
+from uuv_marl.train.shaping import Weights
+from uuv_marl.train.validation import Verdict, validate
+
+_LIBRARIES = ("torch", "numpy", "numba", "safetensors")
+_LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What is trained, and how."""
+
+    scenario: str = "random_field"
+    """Name or TOML file."""
+    overrides: Mapping[str, object] = field(
+        default_factory=lambda: {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
+    )
+    """Fields of the scenario: a fifth of the decisions, and an inner loop, so that noise does not spin vehicles."""
+    sizes: tuple[tuple[int, int], ...] = ((10, 20), (25, 9), (54, 5), (100, 3))
+    """Vehicles and worlds of each swarm: about as many vehicles of each size."""
+    steps: int = 30_000_000
+    """Agent-steps: one is one decision of one vehicle. Annealing ends here."""
+    seed: int = 0
+    start: str | None = None
+    """A folder with a learner to start from: ``best`` or a checkpoint of another training."""
+    weights: Weights = field(default_factory=Weights)
+    """Of the training's reward."""
+    algorithm: Hyperparameters = field(default_factory=Hyperparameters)
+    checkpoint_every: int = 25
+    """Iterations."""
+    validate_every: int = 100
+    """Iterations; a multiple of ``checkpoint_every`` wastes least where a training is cut off."""
+    validation: tuple[tuple[int, int], ...] = ((10, 8), (54, 12), (100, 4))
+    """Vehicles and episodes of each size."""
+
+    def load(self) -> Scenario:
+        """The scenario that is trained on."""
+        return load_scenario(self.scenario, overrides=self.overrides)
+
+
+class Record(NamedTuple):
+    """One iteration; those with a checkpoint are rows of ``progress.csv``."""
+
+    iteration: int = 0
+    agent_steps: int = 0
+    seconds: float = 0.0
+    """Spent on training and validation so far."""
+    reward: float | None = None
+    """Mean per decision and vehicle, of this iteration's samples."""
+    kl: float | None = None
+    """From the policy that sampled to the one that learned."""
+    explained: float | None = None
+    """Share of the returns' variance that the critic explains."""
+    best: float | None = None
+    """Score of the best validation so far."""
+    score: float | None = None
+    """Of this iteration's validation, where there was one; as are the following."""
+    arrived: float | None = None
+    collisions: int | None = None
+    lateness_s: float | None = None
+    min_spacing_m: float | None = None
+    min_obstacle_distance_m: float | None = None
+
+
+class Training:
+    """Learner, worlds and random numbers, and the numbers of the iterations so far.
+
+    Args:
+        settings: of the training.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.scenario = settings.load()
+        self._rng = np.random.default_rng(settings.seed)
+        self.fleet = Fleet(self.scenario, settings.sizes, settings.weights, self._rng)
+        self.learner = Learner(self.fleet.features, self.fleet.size, settings.algorithm, self._rng)
+        if settings.start is not None:
+            self.learner.restore(_load(Path(settings.start) / _LEARNER_FILE))
+
+    def iterate(self, before: Record) -> Record:
+        """Sample and update once."""
+        started, by = time.perf_counter(), self.settings.algorithm
+        share = before.agent_steps / self.settings.steps
+        noise = annealed(by.noise, share)
+        batch, reward = self.learner.sample(self.fleet, noise)
+        update = self.learner.update(batch, noise, annealed(by.learning_rate, share))
+        return Record(
+            iteration=before.iteration + 1,
+            agent_steps=before.agent_steps + by.horizon * self.fleet.rows,
+            seconds=before.seconds + time.perf_counter() - started,
+            reward=reward,
+            kl=update.kl,
+            explained=update.explained,
+            best=before.best,
+        )
+
+    def save(self, folder: Path, record: Record) -> None:
+        """All that ``restore`` needs, and the policy."""
+        folder.mkdir(parents=True, exist_ok=True)
+        self.save_policy(folder, record)
+        save_file(self.fleet.snapshot(), folder / _WORLDS_FILE)
+        (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state) + "\n", encoding="utf-8")
+
+    def save_policy(self, folder: Path, record: Record) -> None:
+        """The policy, and the learner that a later training may start from."""
+        training = {**asdict(self.settings), "versions": _versions(), "record": record._asdict()}
+        card = Card(
+            percept=rows_of(PerceptLayout.of(self.scenario)),
+            yaw_damping_nms=self.scenario.actuators.yaw_damping_nms,
+            channels=self.scenario.sonar.channels,
+            barrier=BARRIER,
+            training=training,
+        )
+        save_checkpoint(folder / WEIGHTS_FILE, card, self.learner.layers)
+        save_file(self.learner.arrays(), folder / _LEARNER_FILE)
+
+    def restore(self, folder: Path) -> None:
+        """Go on from what ``save`` wrote, as if there had been no break."""
+        self.learner.restore(_load(folder / _LEARNER_FILE))
+        self.fleet.restore(_load(folder / _WORLDS_FILE))
+        self._rng.bit_generator.state = json.loads((folder / _RANDOM_FILE).read_text(encoding="utf-8"))
+
+
+def train(output: Path, settings: Settings | None = None, *, resume: bool = False) -> Iterator[Record]:
+    """Train to ``settings.steps``; a record for each iteration.
+
+    Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
+    come without the break, bit for bit. Uses one thread of torch.
+
+    Args:
+        output: a new or empty folder, or with ``resume`` that of an earlier training.
+        settings: the default ones if None; a resume needs the same.
+        resume: go on from the last checkpoint.
+
+    Raises:
+        ResultsError: the folder is used, or holds no training of these settings.
+    """
+    settings = settings or Settings()
+    scenario = settings.load()
+    described = {**asdict(settings), "scenario": scenario.model_dump(mode="json")}
+    folder = TrainingFolder(output, described, resume, Record())
+    record = folder.record
+    if record.agent_steps >= settings.steps:
+        return
+    torch.set_num_threads(1)  # sums in another order give other bits
+    training = Training(settings)
+    if folder.checkpoint:
+        training.restore(folder.checkpoint)
+    folder.begin({"agent_steps": record.agent_steps, "seed": settings.seed, "versions": _versions()})
+    with SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps) as board:
+        while record.agent_steps < settings.steps:
+            record = training.iterate(record)
+            done = record.agent_steps >= settings.steps
+            if done or record.iteration % settings.validate_every == 0:
+                record = _validated(training, record, output)
+            if done or record.iteration % settings.checkpoint_every == 0:
+                folder.keep(record, lambda path, record=record: training.save(path, record))
+            _show(board, record, training.fleet.take_episodes())
+            yield record
+
+
+def _validated(training: Training, record: Record, output: Path) -> Record:
+    """The record with a verdict on the policy as it stands, which becomes ``best`` where it is."""
+    started, settings = time.perf_counter(), training.settings
+    candidate, best = output / "candidate", output / "best"
+    training.save_policy(candidate, record)
+    verdict: Verdict = validate(candidate, settings.scenario, settings.validation)
+    better = record.best is None or verdict.score > record.best
+    record = record._replace(
+        seconds=record.seconds + time.perf_counter() - started,
+        best=verdict.score if better else record.best,
+        **verdict._asdict(),
+    )
+    if better:
+        training.save_policy(candidate, record)
+        best.mkdir(exist_ok=True)
+        for file in (_LEARNER_FILE, WEIGHTS_FILE):
+            (candidate / file).replace(best / file)
+    shutil.rmtree(candidate)
+    return record
+
+
+def _show(board: SummaryWriter, record: Record, episodes: Episodes) -> None:
+    """Numbers for TensorBoard."""
+    names = {"reward": "train", "kl": "train", "explained": "train"}
+    numbers = {f"{names.get(name, 'validation')}/{name}": value for name, value in record._asdict().items()}
+    for name in ("iteration", "agent_steps", "seconds"):
+        del numbers[f"validation/{name}"]
+    if episodes.number:
+        numbers |= {
+            "episodes/return": episodes.returns / episodes.number,
+            "episodes/arrived": episodes.arrived / episodes.number,
+            "episodes/collisions": episodes.collisions / episodes.number,
+            "episodes/decisions": episodes.decisions / episodes.number,
+        }
+    for name, value in numbers.items():
+        if value is not None:
+            board.add_scalar(name, value, record.agent_steps)
+
+
+def _load(path: Path) -> Mapping[str, Any]:
+    try:
+        return load_file(path)
+    except OSError as error:
+        raise ResultsError(f"{path} can't be read ({error}); give a folder best or a checkpoint") from None
+
+
+def _versions() -> dict[str, str]:
+    return {"uuv_marl": __version__, **{library: version(library) for library in _LIBRARIES}}

@@ -1,0 +1,92 @@
+"""How good a checkpoint is: deterministic episodes on validation seeds, through the benchmark's own ``evaluate``."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.scenario_files import load_scenario
+
+VALIDATION_SEEDS = 900_000
+"""The first of the validation seeds: the end of the training range, which training itself does not use."""
+SAFE_OBSTACLE_M = 13.0
+SAFE_SPACING_M = 6.5
+"""Distances below these cost: a little more than what we want of the worst seed."""
+
+
+class Verdict(NamedTuple):
+    """Over all episodes."""
+
+    score: float
+    """Minus the mean cost, see ``cost``."""
+    arrived: float
+    """Share of episodes."""
+    collisions: int
+    """Contacts."""
+    lateness_s: float | None
+    """Mean over arrivals, of the task time beyond l(t)'s own."""
+    min_spacing_m: float | None
+    """Of the worst episode."""
+    min_obstacle_distance_m: float | None
+    """Of the worst episode."""
+
+
+def validate(policy: Path, scenario: str, sizes: Sequence[tuple[int, int]], period_s: float | None = None) -> Verdict:
+    """Run a checkpoint on a scenario's validation seeds.
+
+    Args:
+        policy: the checkpoint.
+        scenario: name or TOML file.
+        sizes: number of vehicles, and of episodes with so many.
+        period_s: between decisions; the scenario's own if None.
+    """
+    overrides = {} if period_s is None else {"timing.decision_period_s": period_s}
+    metrics: list[Metrics] = []
+    for n, count in sizes:
+        loaded = load_scenario(scenario, num_vehicles=n, overrides=overrides)
+        seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + count)
+        events = evaluate(granted(str(policy), loaded), str(policy), seeds)
+        metrics += [event.metrics for event in events if isinstance(event, Run)]
+    return judge(metrics)
+
+
+def judge(metrics: Sequence[Metrics]) -> Verdict:
+    """The verdict on these episodes."""
+    times = [late for late in map(lateness, metrics) if late is not None]
+    return Verdict(
+        score=-sum(map(cost, metrics)) / len(metrics),
+        arrived=len(times) / len(metrics),
+        collisions=sum(int(_number(m, "collisions") or 0) for m in metrics),
+        lateness_s=sum(times) / len(times) if times else None,
+        min_spacing_m=_least(metrics, "min_spacing_m"),
+        min_obstacle_distance_m=_least(metrics, "min_obstacle_distance_m"),
+    )
+
+
+def cost(metrics: Metrics) -> float:
+    """Of one episode [1]: lateness in minutes (2 where it never arrives), 2 with a collision, and short distances."""
+    late = lateness(metrics)
+    total = 2.0 if late is None else min(late / 60.0, 2.0)
+    total += 2.0 * min(_number(metrics, "collisions") or 0.0, 1.0)
+    for name, safe in (("min_obstacle_distance_m", SAFE_OBSTACLE_M), ("min_spacing_m", SAFE_SPACING_M)):
+        distance = _number(metrics, name)
+        if distance is not None:
+            total += min(max(1.0 - distance / safe, 0.0), 1.0)
+    return total
+
+
+def lateness(metrics: Metrics) -> float | None:
+    """Task time beyond the time that l(t) takes [s]; None where the swarm never arrived."""
+    time, duration = _number(metrics, "task_time_s"), _number(metrics, "duration_s")
+    return None if time is None or duration is None else time - duration
+
+
+def _number(metrics: Metrics, name: str) -> float | None:
+    value = metrics[name]
+    return None if value is None or isinstance(value, dict) else float(value)
+
+
+def _least(metrics: Sequence[Metrics], name: str) -> float | None:
+    return min((value for value in (_number(m, name) for m in metrics) if value is not None), default=None)
