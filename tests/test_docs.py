@@ -44,6 +44,14 @@ def test_pages_of_other_environments_are_run_there(page):
     assert f'"{page}"' in test.read_text()
 
 
+def stop(*args, **kwargs):
+    raise KeyboardInterrupt
+
+
+def stop_at_once(*args, **kwargs):
+    yield from iter(stop, None)
+
+
 @pytest.mark.parametrize(
     "line",
     sorted(
@@ -62,9 +70,9 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "benchmark.tuning.tune",
         "reproduce.job.make",
         "reproduce.identify.identify",
-        "train.training.train",
     ):
-        monkeypatch.setattr(f"uuv_marl.{work}", lambda *a: (_ for _ in ()).throw(KeyboardInterrupt))
+        monkeypatch.setattr(f"uuv_marl.{work}", stop)
+    monkeypatch.setattr("uuv_marl.train.training.train", stop_at_once)
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, line.split()[1:])
     # Ray has an environment of its own; without it a command says so once its options are understood.
