@@ -205,3 +205,15 @@ def test_one_table_holds_names_and_checkpoints(best, tmp_path, monkeypatch):
     table = (tmp_path / "out" / "table.md").read_text()
     assert "| idle |" in table
     assert "| runs/best | yaw damping 600 N m s |" in table
+
+
+def test_weights_that_change_during_a_benchmark_are_refused(best, tmp_path):
+    scenario = granted(str(best), load_scenario("tracking", num_vehicles=4, overrides=SHORT))
+    results = Results(tmp_path / "out", [scenario])
+    results.use(str(best))
+    runs = [run for run in evaluate(scenario, str(best), [0, 1]) if isinstance(run, Run)]
+    results.add(scenario.name, str(best), runs[0])
+    save_checkpoint(learned_file(best), card(), actor(seed=1))
+    with pytest.raises(ResultsError, match="before its file changed"):
+        results.add(scenario.name, str(best), runs[1])
+    assert [row.seed for row in results.rows] == [0]

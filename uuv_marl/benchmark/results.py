@@ -55,6 +55,7 @@ class Results:
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
         self._route_seeds = route_seeds
         self._fingerprint = source_fingerprint()
+        self._policies: dict[str, dict[str, Any]] = {}
         self.rows: list[Row] = []
         self._path = folder / "results.json"
         try:
@@ -82,21 +83,28 @@ class Results:
                     f"{self._path} holds runs of another {name!r} (different --set or file); "
                     "move it away or give another --output"
                 )
-        for policy, before in data["policies"].items():
-            if before.get("source") != knowledge(policy)["source"]:
-                raise ResultsError(
-                    f"{self._path} holds runs of {policy!r} as it was before its file changed; "
-                    "move it away or give another --output"
-                )
+        self._policies = data["policies"]
+        for policy in self._policies:
+            self.use(policy)
         self._dumps = {**known, **self._dumps}
         self.rows = [row for row in rows if self.trace_path(row.scenario, row.policy, row.seed).exists()]
+
+    def use(self, policy: str) -> None:
+        """Remember what a policy is, before its first run. Raises ResultsError once its file has changed."""
+        now = knowledge(policy)
+        if self._policies.setdefault(policy, now).get("source") != now["source"]:
+            raise ResultsError(
+                f"{self._path} holds runs of {policy!r} as it was before its file changed; "
+                "move it away or give another --output, and benchmark a copy of what is still being trained"
+            )
 
     def has(self, scenario: str, policy: str, seed: int) -> bool:
         """Whether this run is done."""
         return any((row.scenario, row.policy, row.seed) == (scenario, policy, seed) for row in self.rows)
 
     def add(self, scenario: str, policy: str, run: Run) -> None:
-        """Keep a run, on disk at once."""
+        """Keep a run, on disk at once; refused where the policy's file has changed, so that no table mixes two."""
+        self.use(policy)
         arrays = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
         if run.seed in self._route_seeds:
             arrays |= {f"route_{name}": values for name, values in run.routes._asdict().items()}
@@ -127,7 +135,6 @@ class Results:
             return {name: file[name] for name in file.files}
 
     def _write(self) -> None:
-        policies = dict.fromkeys(row.policy for row in self.rows)
         data = {
             "schema": SCHEMA,
             "fingerprint": self._fingerprint,
@@ -138,7 +145,7 @@ class Results:
             },
             "machine": {"platform": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
             "scenarios": self._dumps,
-            "policies": {name: knowledge(name) for name in policies},
+            "policies": self._policies,
             "runs": [row._asdict() for row in self.rows],
         }
         partial = self._path.with_suffix(".partial")

@@ -37,6 +37,7 @@ def run_missing(
     """Run what ``results`` lacks; every finished seed is kept at once."""
     for scenario in scenarios:
         for policy in policies:
+            results.use(policy)
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
             done, fresh = len(seeds) - len(missing), 0
             report(scenario.name, policy, done / len(seeds))

@@ -109,13 +109,13 @@ class Study:
 
     def metric(self, case: Case, name: str, seeds: Sequence[int] | None = None) -> Float64:
         """A metric by seed; NaN where there is none."""
-        rows = self._results(case).select(case.load().name, case.policy, self.seeds if seeds is None else seeds)
+        rows = self._results(case).select(case.scenario, case.policy, self.seeds if seeds is None else seeds)
         values = [row.metrics[name] for row in rows]
         return np.array([value if isinstance(value, (int, float)) else np.nan for value in values], np.float64)
 
     def trace(self, case: Case, seed: int) -> Trace:
         """A run's time series and routes, see ``Results.trace``."""
-        return self._results(case).trace(case.load().name, case.policy, seed)
+        return self._results(case).trace(case.scenario, case.policy, seed)
 
     def traces(self, case: Case) -> list[Trace]:
         """Those of all seeds."""

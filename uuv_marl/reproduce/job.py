@@ -93,7 +93,9 @@ def make(part: Part, study: Study, folder: Path, report: Report) -> Path:
         for name, table in part.tables(study, report).items():
             paths.append(folder / "data" / f"{name}.csv")
             write_columns(paths[-1], table)
-        stamp.write_text(json.dumps({"code": _code(), "tables": [path.stem for path in paths]}), encoding="utf-8")
+        if not part.cases:
+            kept = {"code": _code(), "tables": [path.stem for path in paths]}
+            stamp.write_text(json.dumps(kept), encoding="utf-8")
     figure = part.draw({path.stem: read_columns(path) for path in paths})
     return _save(figure, part, folder / "figures" / f"{part.name}.png")
 

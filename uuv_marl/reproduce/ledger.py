@@ -81,7 +81,7 @@ SPACING = (
 )
 DISTANCE = "the paper's larger value lies within the spread of our seeds; six sub-sectors would give it (sensitivity)"
 COMPARATOR = "the paper only names this method; ours is a reconstruction, tuned on this scenario for time with s_o kept"
-MULTI_TIME = "the approach to the end differs; speed of l(t), inertia and yaw resistance move it most (sensitivity)"
+TIME = "the approach to the end differs; speed of l(t), inertia and yaw resistance move it most (sensitivity)"
 MULTI_DISTANCE = (
     "not explained within what the paper states. Obstacles heard from 190 m, where Table 1 has 100 m, would give both "
     "numbers (identification, post hoc); more vehicles than 54 lower it too (swarm-size)"
@@ -100,17 +100,17 @@ def numbers() -> list[Number]:
                "min_obstacle_distance_m", np.nanmin, DISTANCE),
         Number("5.2.2", "smallest distance to an obstacle", "m", multi.min_obstacle_distance_m or (), MULTI,
                "min_obstacle_distance_m", np.nanmin, MULTI_DISTANCE),
-        Number("5.2.2", "task time", "s", _given(multi.task_time_s), MULTI, "task_time_s", np.nanmax, MULTI_TIME),
+        Number("5.2.2", "task time", "s", _given(multi.task_time_s), MULTI, "task_time_s", np.nanmax, TIME),
     ]  # fmt: skip
     for policy, case in {"sdc": COMPARATORS["sdc"], "sff": COMPARATORS["sff"], "bio_inspired": SINGLE}.items():
         stated, own = PAPER[_of(case)], case is SINGLE
         name = "proposed" if own else policy.upper()
-        why = DISTANCE if own else COMPARATOR
+        why = (TIME, DISTANCE) if own else (COMPARATOR, COMPARATOR)
         found += [
             Number("Table 2", f"{name}: task time", "s", _given(stated.task_time_s), case,
-                   "task_time_s", np.nanmax, why),
+                   "task_time_s", np.nanmax, why[0]),
             Number("Table 2", f"{name}: smallest distance to the obstacle", "m", stated.min_obstacle_distance_m or (),
-                   case, "min_obstacle_distance_m", np.nanmin, why),
+                   case, "min_obstacle_distance_m", np.nanmin, why[1]),
         ]  # fmt: skip
     return found
 

@@ -19,6 +19,8 @@ from uuv_marl.reproduce.motion import (
 
 Float64 = NDArray[np.float64]
 
+SPEED_MPS = 4.0
+"""Of l(t). Section 5.1."""
 SETTLED_S = 60.0
 """After this long the two groups have met (assumed; the paper's figure 9 shows no times)."""
 WINDOW_S = 40.0
@@ -34,8 +36,8 @@ def between(trace: Trace, name: str, start: float, end: float) -> NDArray[np.flo
 
 
 def corners(trace: Trace) -> Float64:
-    """When l(t), at 4 m/s, passes the corners, and the end [s]."""
-    return corner_times(trace["waypoints"], 4.0)
+    """When l(t) passes the corners, and the end [s]."""
+    return corner_times(trace["waypoints"], SPEED_MPS)
 
 
 def order_on_last_leg(trace: Trace) -> float:
