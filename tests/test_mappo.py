@@ -171,7 +171,7 @@ def test_a_short_training_beats_random_by_far():
 
 
 def test_a_fleet_ends_worlds_and_starts_them_anew(monkeypatch):
-    monkeypatch.setattr(fleets, "_PATIENCE_S", -38.0)  # cut off 2 s after the start of 40 s
+    monkeypatch.setattr(fleets, "PATIENCE_S", -38.0)  # cut off 2 s after the start of 40 s
     fleet = open_water([(1, 2), (3, 2)])
     assert fleet.seen.shape == (8, fleet.features + VIEW_SIZE)
     idle = np.zeros((8, 2), np.float32)
@@ -299,7 +299,7 @@ def test_a_seed_is_a_training(tmp_path, no_validation):
     trained = [Training(settings(seed=seed)) for seed in (0, 0, 1)]
     for training in trained:
         training.iterate(Record())
-    one, same, other = (training.learner.arrays() for training in trained)
+    one, same, other = (training.algorithm.arrays() for training in trained)
     assert all(np.array_equal(one[name], same[name]) for name in one)
     assert not np.array_equal(one["actor.0.weight"], other["actor.0.weight"])
 
@@ -312,8 +312,8 @@ def test_the_best_policy_is_kept_and_can_be_started_from(tmp_path, monkeypatch):
     made = learned_class(str(tmp_path / "a" / "best"))
     assert made.checkpoint.card.training["record"]["iteration"] == 2
     again = Training(settings(start=str(tmp_path / "a" / "best"), seed=9))
-    x = np.random.default_rng(0).standard_normal((30, again.fleet.features), np.float32)
-    np.testing.assert_allclose(forward(made.checkpoint.layers, x), again.learner.act(x), atol=1e-5)
+    x = np.random.default_rng(0).standard_normal((30, again.algorithm.fleet.features), np.float32)
+    np.testing.assert_allclose(forward(made.checkpoint.layers, x), again.algorithm.learner.act(x), atol=1e-5)
     with pytest.raises(ResultsError, match="give a folder best or a checkpoint"):
         Training(settings(start=str(tmp_path / "nowhere")))
 

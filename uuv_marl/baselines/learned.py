@@ -32,7 +32,7 @@ WEIGHTS_FILE = "policy.safetensors"
 """The checkpoint within a folder."""
 BARRIER = Gains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)
 """Eq. 20-21 at short range, without the pull to l(t): half the paper's delta_n, and weaker but steeper at obstacles."""
-_MOST_BARRIER = 8.0
+MOST_BARRIER = 8.0
 """The barrier is bounded here [full force]; the action is bounded by 1 after the sum."""
 _CARD = "uuv_marl"
 
@@ -286,7 +286,7 @@ def _look(
                     f_x, f_y, clamps[w] = f_x + d_x, f_y + d_y, clamps[w] + clamped
                 k += 4
             f_x, f_y = f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque
-            shrink = min(1.0, _MOST_BARRIER / max(np.sqrt(f_x * f_x + f_y * f_y), 1e-9))
+            shrink = min(1.0, MOST_BARRIER / max(np.sqrt(f_x * f_x + f_y * f_y), 1e-9))
             barrier[w, i, 0], barrier[w, i, 1] = shrink * f_x, shrink * f_y
             away = 1.0 + np.sqrt(barrier[w, i, 0] ** 2 + barrier[w, i, 1] ** 2)
             out[k], out[k + 1] = barrier[w, i, 0] / away, barrier[w, i, 1] / away

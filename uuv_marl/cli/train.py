@@ -1,7 +1,7 @@
 """``uuv-marl train``: a command for each library."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -10,24 +10,30 @@ from uuv_marl.cli.console import console, explained, extra, progress_bar
 app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
 
 
+Scenario = Annotated[str, typer.Option(help="Name or TOML file.")]
+Steps = Annotated[
+    int, typer.Option(min=1, help="Agent-steps in all: decisions times vehicles. Noise and rates anneal over them.")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
+Start = Annotated[
+    Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
+]
+Output = Annotated[Path, typer.Option(help="Folder of settings, progress, checkpoint and best.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")]
+
+
 @app.command("mappo")
 def train_mappo(
-    scenario: Annotated[str, typer.Option(help="Name or TOML file.")] = "random_field",
-    steps: Annotated[
-        int, typer.Option(min=1, help="Agent-steps in all: decisions times vehicles. Noise and rates anneal over them.")
-    ] = 30_000_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")] = 0,
-    start: Annotated[
-        Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
-    ] = None,
+    scenario: Scenario = "random_field",
+    steps: Steps = 30_000_000,
+    seed: Seed = 0,
+    start: Start = None,
     noise: Annotated[
         tuple[float, float] | None,
         typer.Option(min=1e-3, help="Of actions, at the start and at the end [full force]. Default: 0.4 0.08."),
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of settings, progress, checkpoint and best.")] = Path(
-        "results/mappo"
-    ),
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")] = False,
+    output: Output = Path("results/mappo"),
+    resume: Resume = False,
 ) -> None:
     """Train one policy for all vehicles with MAPPO, on swarms of 10 to 100 at once, on one core.
 
@@ -41,36 +47,60 @@ def train_mappo(
     with explained():
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
-            from uuv_marl.train.training import Settings, train
 
-        from uuv_marl.sim.compiled import announce_compilation
+        algorithm = Hyperparameters() if noise is None else Hyperparameters(noise=noise)
+        _train(output, resume, scenario=scenario, steps=steps, seed=seed, start=start, algorithm=algorithm)
 
-        settings = Settings(
-            scenario=scenario,
-            steps=steps,
-            seed=seed,
-            start=None if start is None else str(start),
-            algorithm=Hyperparameters() if noise is None else Hyperparameters(noise=noise),
-        )
-        records = train(output, settings, resume=resume)
-        last, validated = "no iteration was needed: --steps are done already", ""
-        announce_compilation()
-        try:
-            with progress_bar() as bar:
-                task = bar.add_task("starting", total=steps)
-                for record in records:
-                    rate = f"{record.agent_steps / record.seconds:,.0f} agent-steps/s"
-                    if record.score is not None:
-                        validated = (
-                            f", validation: score {record.score:.3f} (best {record.best:.3f}), arrived "
-                            f"{record.arrived:.0%}, collisions {record.collisions}"
-                        )
-                    last = f"{rate}, reward {record.reward:.3f}{validated}"
-                    bar.update(task, completed=record.agent_steps, description=last)
-        except KeyboardInterrupt:
-            console.print(f"Stopped. The last checkpoint is in {output}; the same command with --resume goes on.")
-            raise typer.Exit(130) from None
-        console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
+
+@app.command("ppo")
+def train_ppo(
+    scenario: Scenario = "random_field",
+    steps: Steps = 30_000_000,
+    seed: Seed = 0,
+    start: Start = None,
+    output: Output = Path("results/ppo"),
+    resume: Resume = False,
+) -> None:
+    """Train one policy for all vehicles with Stable-Baselines3's PPO, on swarms of 10 to 100 at once, on one core.
+
+    Problem, files and habits are those of uuv-marl train mappo: the critic sees what the actor sees, and noise is
+    learned. Needs the extra "train".
+
+    Example: uuv-marl train ppo --output runs/ppo
+    """
+    with explained():
+        with extra("train", "training with Stable-Baselines3"):
+            from uuv_marl.train.ppo import Hyperparameters
+
+        algorithm = Hyperparameters()
+        _train(output, resume, scenario=scenario, steps=steps, seed=seed, start=start, algorithm=algorithm)
+
+
+def _train(output: Path, resume: bool, *, steps: int, start: Path | None, **settings: Any) -> None:
+    """Train with these settings, and show how it goes."""
+    from uuv_marl.sim.compiled import announce_compilation
+    from uuv_marl.train.training import Settings, train
+
+    settings["start"] = None if start is None else str(start)
+    records = train(output, Settings(steps=steps, **settings), resume=resume)
+    last, validated = "no iteration was needed: --steps are done already", ""
+    announce_compilation()
+    try:
+        with progress_bar() as bar:
+            task = bar.add_task("starting", total=steps)
+            for record in records:
+                rate = f"{record.agent_steps / record.seconds:,.0f} agent-steps/s"
+                if record.score is not None:
+                    validated = (
+                        f", validation: score {record.score:.3f} (best {record.best:.3f}), arrived "
+                        f"{record.arrived:.0%}, collisions {record.collisions}"
+                    )
+                last = f"{rate}, reward {record.reward:.3f}{validated}"
+                bar.update(task, completed=record.agent_steps, description=last)
+    except KeyboardInterrupt:
+        console.print(f"Stopped. The last checkpoint is in {output}; the same command with --resume goes on.")
+        raise typer.Exit(130) from None
+    console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
 
 
 @app.command("rllib")

@@ -114,6 +114,18 @@ class SwarmVecEnv(TaskBased, VecEnv):
     def _forget(self, worlds: NDArray[np.bool_]) -> None:
         self._returns[worlds], self._lengths[worlds], self._starts[worlds] = 0.0, 0, time.perf_counter()
 
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All that later steps depend on, random streams too, copied, for ``restore``."""
+        kept = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
+        return kept | self.swarm.snapshot()
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Float32:
+        """Go on from a snapshot of an environment made alike; the observations of all rows."""
+        self._task.reset()  # ready, and no world at its end: those are reset in the step in which they end
+        self.swarm.restore(snapshot)
+        self._returns[...], self._lengths[...] = snapshot["returns"], snapshot["lengths"]
+        return self.swarm.percept.to_observation().reshape(self.num_envs, -1)
+
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of every world."""
         self._task.need_reset("render()")

@@ -18,6 +18,7 @@ from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.start import start_state
+from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.trajectory import arrival_times
 from uuv_marl.sim.vehicle import plant
 from uuv_marl.sim.world import observe_world, step_alone, step_worlds
@@ -205,13 +206,14 @@ class Swarm:
         )  # fmt: skip
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All that a later run depends on, copied, for ``restore``; the worlds' random streams are not part of it."""
-        return {name: array.copy() for name, array in self._arrays().items()}
+        """All that a later run depends on, copied, for ``restore``: random streams too."""
+        return {name: array.copy() for name, array in self._arrays().items()} | {"streams": packed(self._rngs)}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Percept:
-        """Go on from a snapshot of a swarm of the same scenario and number of worlds; seed a world's next reset."""
+        """Go on from a snapshot of a swarm of the same scenario and number of worlds."""
         for name, array in self._arrays().items():
             array[...] = snapshot[name]
+        self._rngs = unpacked(snapshot["streams"])
         self._ready[:] = True
         return self.percept
 

@@ -18,7 +18,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 TRAINING_SEEDS = (100_000, 900_000)
 """Worlds are drawn from these; 900,000-999,999 are for validation."""
-_PATIENCE_S = 40.0
+PATIENCE_S = 40.0
 """An episode is cut off so long after l(t) came to rest: waiting for stragglers teaches little."""
 
 
@@ -90,7 +90,7 @@ class Fleet:
             swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
             reward = shaped(swarm, self._weights)
             arrived = swarm.arrived
-            late = (swarm.timed_out | (swarm.facts.time_s >= swarm.duration_s + _PATIENCE_S)) & ~arrived
+            late = (swarm.timed_out | (swarm.facts.time_s >= swarm.duration_s + PATIENCE_S)) & ~arrived
             for flags, values in ((moment.terminated, arrived), (moment.truncated, late)):
                 flags[rows] = np.repeat(values, shape[1])
             moment.reward[rows] = reward.reshape(-1)

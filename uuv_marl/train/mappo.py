@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from uuv_marl.baselines.learned import Layer
-from uuv_marl.train.fleet import Moment
+from uuv_marl.scenario import Scenario
+from uuv_marl.train.fleet import Fleet, Moment
+from uuv_marl.train.shaping import Weights
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -27,6 +29,7 @@ Bool = NDArray[np.bool_]
 class Hyperparameters:
     """Of the algorithm; see ``Learner`` and ``gae``."""
 
+    name: str = "mappo"
     hidden: tuple[int, ...] = (96, 96)
     """Units of the actor's and of the critic's layers, tanh."""
     gamma: float = 0.98
@@ -49,6 +52,12 @@ class Hyperparameters:
     max_gradient: float = 1.0
     value_decay: float = 0.99
     """Of the running mean and variance by which returns are normalised."""
+    average: float = 0.98
+    """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
+
+    def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Mappo":
+        """A training that has not begun."""
+        return Mappo(self, scenario, sizes, weights, seed)
 
 
 class Environment(Protocol):
@@ -117,12 +126,14 @@ class Learner:
         self.critic = network((size, *by.hidden, 1), 1.0, rng)
         self._optimisers = [torch.optim.Adam(net.parameters(), eps=1e-5) for net in (self.actor, self.critic)]
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
+        self._average = [x.detach().clone() for x in self.actor.parameters()]
+        self._updates = 0
 
     @property
     def layers(self) -> list[Layer]:
-        """The actor's, for a checkpoint."""
-        linear = [layer for layer in self.actor if isinstance(layer, nn.Linear)]
-        return [Layer(x.weight.detach().numpy().T.copy(), x.bias.detach().numpy().copy()) for x in linear]
+        """The averaged actor's, for a checkpoint."""
+        weights, biases = self._average[::2], self._average[1::2]
+        return [Layer(w.numpy().T.copy(), b.numpy().copy()) for w, b in zip(weights, biases, strict=True)]
 
     @torch.no_grad()
     def act(self, seen: Float32) -> Float32:
@@ -161,10 +172,14 @@ class Learner:
         for optimiser in self._optimisers:
             for group in optimiser.param_groups:
                 group["lr"] = learning_rate
-        error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
+        by, error = self.by, (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
         kl = self._improve(batch._replace(advantage=_standard(batch.advantage)), noise)
         self._regress(batch.seen, batch.returns)
+        self._updates += 1
+        fresh = max(1.0 - by.average, 10.0 / (9.0 + self._updates))  # about the last tenth at first
+        for mean, now in zip(self._average, self.actor.parameters(), strict=True):
+            mean.lerp_(now.detach(), fresh)
         return Update(kl, 1.0 - error)
 
     def _improve(self, batch: Batch, noise: float) -> float:
@@ -222,7 +237,8 @@ class Learner:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All of it, for ``restore``."""
-        arrays: dict[str, NDArray[Any]] = {"moments": self._moments.copy()}
+        arrays: dict[str, NDArray[Any]] = {"moments": self._moments.copy(), "updates": np.array(self._updates)}
+        arrays |= {f"average.{k}": value.numpy().copy() for k, value in enumerate(self._average)}
         for name, net, optimiser in self._parts():
             arrays |= {f"{name}.{key}": value.numpy().copy() for key, value in net.state_dict().items()}
             for k, state in optimiser.state_dict()["state"].items():
@@ -232,7 +248,8 @@ class Learner:
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go on with the ``arrays`` of a learner of the same sizes."""
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
-        self._moments = np.array(arrays["moments"])
+        self._moments, self._updates = np.array(arrays["moments"]), int(arrays["updates"])
+        self._average = [tensors[f"average.{k}"] for k in range(len(self._average))]
         for name, net, optimiser in self._parts():
             net.load_state_dict({key: tensors[f"{name}.{key}"] for key in net.state_dict()})
             state: dict[int, dict[str, Tensor]] = {}
@@ -243,6 +260,56 @@ class Learner:
 
     def _parts(self) -> list[tuple[str, nn.Sequential, torch.optim.Adam]]:
         return [("actor", self.actor, self._optimisers[0]), ("critic", self.critic, self._optimisers[1])]
+
+
+class Mappo:
+    """A learner with its fleet, taken an iteration at a time.
+
+    Args:
+        by: the algorithm's numbers.
+        scenario: what to train on.
+        sizes: number of vehicles and of worlds of each swarm.
+        weights: of the reward.
+        seed: of weights, worlds and noise.
+    """
+
+    def __init__(
+        self,
+        by: Hyperparameters,
+        scenario: Scenario,
+        sizes: Sequence[tuple[int, int]],
+        weights: Weights,
+        seed: int,
+    ) -> None:
+        self._by = by
+        self._rng = np.random.default_rng(seed)
+        self.fleet = Fleet(scenario, sizes, weights, self._rng)
+        self.learner = Learner(self.fleet.features, self.fleet.size, by, self._rng)
+        self.agent_steps = by.horizon * self.fleet.rows
+        """Of an iteration."""
+        self.take_episodes = self.fleet.take_episodes
+        self.arrays, self.restore = self.learner.arrays, self.learner.restore
+        self.snapshot, self.put_back = self.fleet.snapshot, self.fleet.restore
+
+    def iterate(self, share: float) -> tuple[float, Update]:
+        """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
+        noise = annealed(self._by.noise, share)
+        batch, reward = self.learner.sample(self.fleet, noise)
+        return reward, self.learner.update(batch, noise, annealed(self._by.learning_rate, share))
+
+    @property
+    def layers(self) -> list[Layer]:
+        """The policy's, for a checkpoint."""
+        return self.learner.layers
+
+    @property
+    def random(self) -> Any:
+        """State of the random numbers, as JSON can hold it."""
+        return self._rng.bit_generator.state
+
+    @random.setter
+    def random(self, state: Any) -> None:
+        self._rng.bit_generator.state = state
 
 
 def network(sizes: Sequence[int], last_gain: float, rng: np.random.Generator) -> nn.Sequential:

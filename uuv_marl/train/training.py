@@ -1,4 +1,4 @@
-"""A training of MAPPO from its settings: iterations, validation, TensorBoard, and files from which it goes on exactly.
+"""A training from its settings: iterations, validation, TensorBoard, and files from which it goes on exactly.
 
 ``config.json``, ``progress.csv`` and ``checkpoints/`` as ``uuv_marl.train.folder`` keeps them; ``best/``, the policy of
 the best validation; ``tensorboard/``. Needs ``train``.
@@ -7,31 +7,79 @@ the best validation; ``tensorboard/``. Needs ``train``.
 import json
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
-import numpy as np
 import torch
+from numpy.typing import NDArray
 from safetensors.numpy import load_file, save_file
 from torch.utils.tensorboard.writer import SummaryWriter
 
 from uuv_marl import __version__
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, rows_of, save_checkpoint
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
 from uuv_marl.benchmark.results import ResultsError
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
-from uuv_marl.train.fleet import Episodes, Fleet
+from uuv_marl.train.fleet import Episodes
 from uuv_marl.train.folder import TrainingFolder
-from uuv_marl.train.mappo import Hyperparameters, Learner, annealed
+from uuv_marl.train.mappo import Hyperparameters, Update
 from uuv_marl.train.shaping import Weights
 from uuv_marl.train.validation import Verdict, validate
 
-_LIBRARIES = ("torch", "numpy", "numba", "safetensors")
+_LIBRARIES = ("torch", "stable-baselines3", "numpy", "numba", "safetensors")
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
+
+
+class Algorithm(Protocol):
+    """What a training repeats: ``uuv_marl.train.mappo.Mappo`` or ``uuv_marl.train.ppo.Ppo``."""
+
+    agent_steps: int
+    """Of an iteration."""
+    random: Any
+    """State of the random numbers, as JSON can hold it."""
+
+    def iterate(self, share: float) -> tuple[float, Update]:
+        """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
+        ...
+
+    @property
+    def layers(self) -> list[Layer]:
+        """The policy's, for a checkpoint."""
+        ...
+
+    def take_episodes(self) -> Episodes:
+        """Sums over the episodes that ended since the last call."""
+        ...
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What was learned, and the optimisers, for ``restore``."""
+        ...
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on with ``arrays``."""
+        ...
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """The worlds, for ``put_back``."""
+        ...
+
+    def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a ``snapshot``."""
+        ...
+
+
+class Recipe(Protocol):
+    """An algorithm's hyperparameters, a dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> Algorithm:
+        """A training that has not begun."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +101,7 @@ class Settings:
     """A folder with a learner to start from: ``best`` or a checkpoint of another training."""
     weights: Weights = field(default_factory=Weights)
     """Of the training's reward."""
-    algorithm: Hyperparameters = field(default_factory=Hyperparameters)
+    algorithm: Recipe = field(default_factory=Hyperparameters)
     checkpoint_every: int = 25
     """Iterations."""
     validate_every: int = 100
@@ -91,7 +139,7 @@ class Record(NamedTuple):
 
 
 class Training:
-    """Learner, worlds and random numbers, and the numbers of the iterations so far.
+    """An algorithm at work, and how it is kept on disk.
 
     Args:
         settings: of the training.
@@ -100,22 +148,17 @@ class Training:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.scenario = settings.load()
-        self._rng = np.random.default_rng(settings.seed)
-        self.fleet = Fleet(self.scenario, settings.sizes, settings.weights, self._rng)
-        self.learner = Learner(self.fleet.features, self.fleet.size, settings.algorithm, self._rng)
+        self.algorithm = settings.algorithm.begin(self.scenario, settings.sizes, settings.weights, settings.seed)
         if settings.start is not None:
-            self.learner.restore(_load(Path(settings.start) / _LEARNER_FILE))
+            self.algorithm.restore(_load(Path(settings.start) / _LEARNER_FILE))
 
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
-        started, by = time.perf_counter(), self.settings.algorithm
-        share = before.agent_steps / self.settings.steps
-        noise = annealed(by.noise, share)
-        batch, reward = self.learner.sample(self.fleet, noise)
-        update = self.learner.update(batch, noise, annealed(by.learning_rate, share))
+        started = time.perf_counter()
+        reward, update = self.algorithm.iterate(before.agent_steps / self.settings.steps)
         return Record(
             iteration=before.iteration + 1,
-            agent_steps=before.agent_steps + by.horizon * self.fleet.rows,
+            agent_steps=before.agent_steps + self.algorithm.agent_steps,
             seconds=before.seconds + time.perf_counter() - started,
             reward=reward,
             kl=update.kl,
@@ -127,8 +170,8 @@ class Training:
         """All that ``restore`` needs, and the policy."""
         folder.mkdir(parents=True, exist_ok=True)
         self.save_policy(folder, record)
-        save_file(self.fleet.snapshot(), folder / _WORLDS_FILE)
-        (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state) + "\n", encoding="utf-8")
+        save_file(self.algorithm.snapshot(), folder / _WORLDS_FILE)
+        (folder / _RANDOM_FILE).write_text(json.dumps(self.algorithm.random) + "\n", encoding="utf-8")
 
     def save_policy(self, folder: Path, record: Record) -> None:
         """The policy, and the learner that a later training may start from."""
@@ -140,14 +183,14 @@ class Training:
             barrier=BARRIER,
             training=training,
         )
-        save_checkpoint(folder / WEIGHTS_FILE, card, self.learner.layers)
-        save_file(self.learner.arrays(), folder / _LEARNER_FILE)
+        save_checkpoint(folder / WEIGHTS_FILE, card, self.algorithm.layers)
+        save_file(self.algorithm.arrays(), folder / _LEARNER_FILE)
 
     def restore(self, folder: Path) -> None:
         """Go on from what ``save`` wrote, as if there had been no break."""
-        self.learner.restore(_load(folder / _LEARNER_FILE))
-        self.fleet.restore(_load(folder / _WORLDS_FILE))
-        self._rng.bit_generator.state = json.loads((folder / _RANDOM_FILE).read_text(encoding="utf-8"))
+        self.algorithm.restore(_load(folder / _LEARNER_FILE))
+        self.algorithm.put_back(_load(folder / _WORLDS_FILE))
+        self.algorithm.random = json.loads((folder / _RANDOM_FILE).read_text(encoding="utf-8"))
 
 
 def train(output: Path, settings: Settings | None = None, *, resume: bool = False) -> Iterator[Record]:
@@ -184,7 +227,7 @@ def train(output: Path, settings: Settings | None = None, *, resume: bool = Fals
                 record = _validated(training, record, output)
             if done or record.iteration % settings.checkpoint_every == 0:
                 folder.keep(record, lambda path, record=record: training.save(path, record))
-            _show(board, record, training.fleet.take_episodes())
+            _show(board, record, training.algorithm.take_episodes())
             yield record
 
 

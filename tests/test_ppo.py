@@ -1,0 +1,223 @@
+"""Stable-Baselines3's PPO on problems with known answers, through the rows of several SwarmVecEnv."""
+
+import itertools
+
+import numpy as np
+import pytest
+import torch
+from gymnasium.spaces import Box
+from stable_baselines3.common.vec_env import VecEnv
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, learned_class
+from uuv_marl.sim.streams import packed, unpacked
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.train import ppo as ppos
+from uuv_marl.train import training as trainings
+from uuv_marl.train.crew import Crew
+from uuv_marl.train.fleet import Fleet
+from uuv_marl.train.ppo import Hyperparameters, Ppo
+from uuv_marl.train.shaping import Weights, shaped
+from uuv_marl.train.training import Settings, train
+from uuv_marl.train.validation import judge
+
+OPEN_WATER = {
+    "timing.decision_period_s": 0.5,
+    "actuators.yaw_damping_nms": 600.0,
+    "trajectory.waypoints_m": [[0.0, 0.0], [160.0, 0.0]],
+}
+SIZES = ((3, 3), (6, 2))
+TINY = Hyperparameters(hidden=(16, 16), horizon=8, minibatch=84)
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    torch.set_num_threads(1)
+
+
+def open_water(**overrides):
+    return load_scenario("tracking", overrides={**OPEN_WATER, **overrides})
+
+
+class OneStep(VecEnv):
+    """Rows see two numbers (x1, x2) and are paid most where the action is (x1, -x2) / 2; every step ends them."""
+
+    def __init__(self, *_):
+        self.render_mode, self.paid, self._rng = None, 0.0, np.random.default_rng(1)
+        super().__init__(64, Box(-1.0, 1.0, (2,)), Box(-8.0, 8.0, (2,), np.float32))
+
+    def reset(self):
+        self.seen = self._rng.uniform(-1, 1, (64, 2)).astype(np.float32)
+        return self.seen
+
+    def step_async(self, actions):
+        self._reward = -10.0 * np.sum((actions - self.seen * (0.5, -0.5)) ** 2, axis=1)
+
+    def step_wait(self):
+        self.paid += float(self._reward.mean())
+        infos = [{"terminal_observation": row, "TimeLimit.truncated": False} for row in self.seen]
+        return self.reset(), self._reward.astype(np.float32), np.ones(64, np.bool_), infos
+
+    def close(self): ...
+    def get_attr(self, attr_name, indices=None):
+        return [getattr(self, attr_name)] * 64
+
+    def set_attr(self, *_): ...
+    def env_method(self, *_): ...
+    def env_is_wrapped(self, *_):
+        return [False] * 64
+
+
+def test_a_one_step_task_is_solved(monkeypatch):
+    monkeypatch.setattr(ppos, "Crew", OneStep)
+    by = Hyperparameters(hidden=(32,), horizon=8, minibatch=128, kl_stop=0.05, learning_rate=(3e-3, 5e-4))
+    algorithm = Ppo(by, open_water(), SIZES, Weights(), 0)
+    rewards = [algorithm.iterate(k / 100)[0] for k in range(100)]
+    assert np.mean(rewards[:5]) < -2.0
+    x = np.random.default_rng(5).uniform(-1, 1, (500, 2)).astype(np.float32)
+    error = forward(algorithm.layers, x) - x * (0.5, -0.5)
+    assert np.sqrt(np.mean(error**2)) < 0.1
+
+
+def test_a_swarm_of_one_finds_the_force_that_follows():
+    """The known optimum: on l(t) at its speed, at the force that its drag takes, (70 + 400) x 4 = 1880 of 3000 N."""
+    scenario = open_water(**{"trajectory.waypoints_m": [[0.0, 0.0], [320.0, 0.0]]})
+    by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=256, epochs=6, kl_stop=0.1, learning_rate=(3e-3, 3e-4))
+    algorithm = Ppo(by, scenario, [(1, 64)], Weights(), 0)
+    for k in range(60):
+        algorithm.iterate(k / 60)
+    scenario = load_scenario(
+        "tracking", num_vehicles=1, overrides={**OPEN_WATER, "trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
+    )
+    swarm, eyes = Swarm(scenario), Eyes(scenario, BARRIER)
+    swarm.reset(3)
+    features, barrier = np.empty((1, 1, eyes.size), np.float32), np.empty((1, 1, 2), np.float32)
+    actions = []
+    for _ in range(400):
+        eyes.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
+        actions.append(forward(algorithm.layers, features[0]))
+        swarm.step((actions[-1] + barrier[0])[None])
+    assert np.hypot(*(swarm.state.eta[0, 0, :2] - swarm.facts.reference[0, :2])) < 10.0
+    assert np.mean(actions[-100:], axis=0)[0] == pytest.approx([1880 / 3000, 0.0], abs=0.03)
+
+
+def test_the_crew_lives_through_what_the_fleet_lives_through():
+    """Same worlds and actions: the same features and rewards, until the first reset draws other worlds."""
+    scenario, weights = load_scenario("random_field", overrides={"timing.decision_period_s": 0.5}), Weights()
+    crew = Crew(scenario, SIZES, lambda swarm: shaped(swarm, weights))
+    crew.seed(7)
+    crew.reset()
+    fleet = Fleet(scenario, SIZES, weights, np.random.default_rng(0))
+    for k, (swarm, first) in enumerate(zip(fleet._swarms, (7, 10), strict=True)):
+        swarm.reset(first)
+        fleet._look(k)
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        np.testing.assert_allclose(crew.seen, fleet.seen[:, : fleet.features], atol=1e-5)
+        action = rng.uniform(-1, 1, (21, 2)).astype(np.float32)
+        _, reward, dones, _ = crew.step(action)
+        np.testing.assert_allclose(reward, fleet.step(action).reward, rtol=1e-3, atol=1e-3)
+        assert not dones.any()
+
+
+def test_endings_are_told_as_sb3_wants_them():
+    arrives = {
+        "trajectory.waypoints_m": [[0.0, 0.0], [4.0, 0.0]],
+        "arrival.radius_m": 500.0,
+        "arrival.spread_m": 500.0,
+    }
+    for overrides, arrived in (
+        (arrives, 1),
+        ({**arrives, "arrival.radius_m": 1e-3, "time_limit.factor": 0.5, "time_limit.extra_s": 5.5}, 0),
+    ):
+        crew = Crew(open_water(**overrides), [(1, 1), (3, 1)], lambda swarm: np.ones((1, swarm.num_vehicles)))
+        crew.seed(0)
+        start = crew.reset()
+        for _ in range(12):
+            seen, _, dones, infos = crew.step(np.zeros((4, 2), np.float32))
+        assert dones.all()
+        for row in range(4):
+            last = infos[row]["terminal_observation"]
+            assert last.shape == start[row].shape
+            assert np.abs(last - seen[row]).max() > 0.01, "what comes next is another episode's start"
+            assert infos[row]["TimeLimit.truncated"] is not bool(arrived)
+        assert crew.episodes._asdict() == {
+            "number": 2,
+            "arrived": 2 * arrived,
+            "collisions": 0,
+            "returns": 24.0,
+            "decisions": 24,
+        }
+
+
+def test_streams_go_on_from_a_snapshot():
+    streams = [np.random.default_rng(3), None]
+    streams[0].integers(2, dtype=np.uint32)  # leaves half a number behind
+    again = unpacked(packed(streams))
+    assert again[1] is None
+    assert list(again[0].integers(9, size=5, dtype=np.uint32)) == list(streams[0].integers(9, size=5, dtype=np.uint32))
+    swarm = Swarm(load_scenario("random_field", num_vehicles=3), 2)
+    swarm.reset(5)
+    kept = swarm.snapshot()
+    swarm.reset()
+    later = swarm.snapshot()
+    swarm.restore(kept)
+    swarm.reset()
+    assert all(np.array_equal(array, later[name], equal_nan=True) for name, array in swarm.snapshot().items())
+
+
+def settings(**changes):
+    overrides = {
+        "timing.decision_period_s": 0.5,
+        "actuators.yaw_damping_nms": 600.0,
+        "trajectory.waypoints_m": [[0.0, 0.0], [36.0, 0.0]],
+        "time_limit.extra_s": 0.0,
+    }
+    few = {"sizes": SIZES, "validation": ((3, 1),), "checkpoint_every": 2, "validate_every": 3}
+    return Settings(
+        **{"scenario": "tracking", "steps": 5 * 168, "overrides": overrides, "algorithm": TINY, **few, **changes}
+    )
+
+
+def files(folder):
+    return {
+        path.name: path.read_bytes()
+        for path in (folder / "checkpoints" / "000005").iterdir()
+        if path.name not in ("record.json", WEIGHTS_FILE)
+    }
+
+
+def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch):
+    """Bit for bit, with episodes that end all the time, whatever others draw from the global generators meanwhile."""
+    scores = itertools.cycle([-1.0, -0.5])
+    verdict = judge([{"task_time_s": None, "duration_s": 1.0, "collisions": 0, "min_spacing_m": 7.0,
+                      "min_obstacle_distance_m": None}])  # fmt: skip
+    monkeypatch.setattr(trainings, "validate", lambda *_: verdict._replace(score=next(scores)))
+    before = torch.get_rng_state()
+    records = list(train(tmp_path / "whole", settings()))
+    assert torch.equal(torch.get_rng_state(), before), "the global generators are left as they were"
+    for stop in (2, 3):
+        first = train(tmp_path / f"{stop}", settings())
+        for _ in range(stop):
+            next(first)
+        first.close()
+        torch.rand(3)
+        rest = list(train(tmp_path / f"{stop}", settings(), resume=True))
+        assert [record.iteration for record in rest] == [3, 4, 5]
+        assert [record.reward for record in rest] == [record.reward for record in records[2:]]
+        assert files(tmp_path / f"{stop}") == files(tmp_path / "whole")
+    other = list(train(tmp_path / "other", settings(seed=1)))
+    assert other[0].reward != records[0].reward
+    assert learned_class(str(tmp_path / "whole" / "best")).checkpoint.card.training["algorithm"]["name"] == "ppo"
+
+
+def test_a_short_training_beats_random_by_far():
+    sizes = [(4, 8), (9, 4)]
+    by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=272, epochs=6, kl_stop=0.1, learning_rate=(3e-3, 3e-4))
+    algorithm = Ppo(by, open_water(), sizes, Weights(), 0)
+    rewards = [algorithm.iterate(k / 60)[0] for k in range(60)]
+    fleet = Fleet(open_water(), sizes, Weights(), np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (60, fleet.rows, 2)).astype(np.float32)
+    floor = np.mean([fleet.step(action).reward for action in actions])
+    assert np.mean(rewards[-8:]) > floor / 2, "rewards are negative: less than half of the cost"

@@ -1,0 +1,35 @@
+"""Random streams as arrays, so that a snapshot of worlds can hold them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+UInt64 = NDArray[np.uint64]
+_LOW = 2**64 - 1
+
+
+def packed(streams: Sequence[np.random.Generator | None]) -> UInt64:
+    """States of NumPy's default generators (PCG64), shape (stream, 6); zeros where there is none."""
+    rows = np.zeros((len(streams), 6), np.uint64)
+    for row, stream in zip(rows, streams, strict=True):
+        if stream is not None:
+            whole = stream.bit_generator.state
+            state, inc = whole["state"]["state"], whole["state"]["inc"]
+            row[:] = (state & _LOW, state >> 64, inc & _LOW, inc >> 64, whole["has_uint32"], whole["uinteger"])
+    return rows
+
+
+def unpacked(rows: UInt64) -> list[np.random.Generator | None]:
+    """Generators that go on from ``packed`` states."""
+    streams: list[np.random.Generator | None] = []
+    for low, high, inc_low, inc_high, has_half, half in rows.tolist():
+        stream = np.random.default_rng(0)
+        stream.bit_generator.state = {
+            "bit_generator": "PCG64",
+            "state": {"state": low | high << 64, "inc": inc_low | inc_high << 64},
+            "has_uint32": has_half,
+            "uinteger": half,
+        }
+        streams.append(stream if inc_low else None)  # a PCG's increment is odd
+    return streams

@@ -1,0 +1,200 @@
+"""PPO of Stable-Baselines3 on the problem that MAPPO is given: same rows, features, barrier and reward.
+
+What differs is the algorithm: the critic sees what the actor sees, and action noise is learned. Needs ``train``.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.vec_env import VecNormalize
+from torch import nn
+
+from uuv_marl.baselines.learned import Layer
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+from uuv_marl.train.crew import Crew
+from uuv_marl.train.fleet import PATIENCE_S, TRAINING_SEEDS, Episodes
+from uuv_marl.train.mappo import Update, annealed
+from uuv_marl.train.shaping import Weights, shaped
+
+Arrays = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hyperparameters:
+    """Of Stable-Baselines3's PPO; those that MAPPO has too are MAPPO's."""
+
+    name: str = "ppo"
+    hidden: tuple[int, ...] = (96, 96)
+    """Units of the actor's and of the critic's layers, tanh."""
+    gamma: float = 0.98
+    gae_lambda: float = 0.95
+    horizon: int = 48
+    """Decisions between updates."""
+    epochs: int = 3
+    minibatch: int = 1990
+    """Rows of a gradient step; SB3 asks for a factor of the batch, 48 decisions of 995 vehicles."""
+    clip: float = 0.2
+    kl_stop: float = 0.02
+    learning_rate: tuple[float, float] = (1.5e-3, 1.5e-4)
+    """At the start and at the end."""
+    noise: float = 0.4
+    """Standard deviation of actions at the start [full force]; then it is learned."""
+
+    def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Ppo":
+        """A training that has not begun."""
+        return Ppo(self, scenario, sizes, weights, seed)
+
+
+class Ppo:
+    """Stable-Baselines3's model with its environment, taken an iteration at a time.
+
+    SB3 draws from the global generators of NumPy and torch. Their states are swapped in while it works, so that nothing
+    outside is disturbed and a seed fixes a training.
+
+    Args:
+        by: the algorithm's numbers.
+        scenario: what to train on.
+        sizes: number of vehicles and of worlds of each swarm.
+        weights: of the reward.
+        seed: of weights, worlds and noise.
+    """
+
+    def __init__(
+        self,
+        by: Hyperparameters,
+        scenario: Scenario,
+        sizes: Sequence[tuple[int, int]],
+        weights: Weights,
+        seed: int,
+    ) -> None:
+        self._by, self._share = by, 0.0
+        patience = min(scenario.time_limit.extra_s, PATIENCE_S)
+        cut_off = load_scenario(scenario, overrides={"time_limit.factor": 1.0, "time_limit.extra_s": patience})
+        self._crew = Crew(cut_off, sizes, partial(shaped, by=weights))
+        self._env = VecNormalize(self._crew, norm_obs=False, gamma=by.gamma)
+        first = int(np.random.default_rng(seed).integers(*TRAINING_SEEDS))
+        self._random = _global_random()
+        with self._own_random():
+            self.model = self._make(first)
+            self.model.set_logger(Logger(None, []))
+        self.agent_steps = by.horizon * self._crew.num_envs
+        """Of an iteration."""
+
+    def _make(self, seed: int) -> PPO:
+        by = self._by
+        return PPO(
+            "MlpPolicy",
+            self._env,
+            learning_rate=lambda _: annealed(by.learning_rate, self._share),
+            n_steps=by.horizon,
+            batch_size=by.minibatch,
+            n_epochs=by.epochs,
+            gamma=by.gamma,
+            gae_lambda=by.gae_lambda,
+            clip_range=by.clip,
+            target_kl=by.kl_stop,
+            policy_kwargs={"net_arch": list(by.hidden), "log_std_init": math.log(by.noise)},
+            seed=seed,
+            device="cpu",
+        )
+
+    def iterate(self, share: float) -> tuple[float, Update]:
+        """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
+        self._share, before = share, self._crew.paid
+        with self._own_random():
+            self.model.learn(self.agent_steps, log_interval=10**9, reset_num_timesteps=False)
+        told = self.model.logger.name_to_value
+        update = Update(float(told["train/approx_kl"]), float(told["train/explained_variance"]))
+        return (self._crew.paid - before) / self._by.horizon, update
+
+    @property
+    def layers(self) -> list[Layer]:
+        """The actor's, for a checkpoint."""
+        policy: Any = self.model.policy
+        linear = [layer for layer in policy.mlp_extractor.policy_net if isinstance(layer, nn.Linear)]
+        weights = [(x.weight.detach().numpy(), x.bias.detach().numpy()) for x in (*linear, policy.action_net)]
+        return [Layer(weight.T.copy(), bias.copy()) for weight, bias in weights]
+
+    def take_episodes(self) -> Episodes:
+        """Sums over the episodes that ended since the last call; SB3 knows of no collisions."""
+        taken, self._crew.episodes = self._crew.episodes, Episodes()
+        return taken
+
+    def arrays(self) -> Arrays:
+        """Weights, optimiser and the scale of returns, for ``restore``."""
+        scale: Any = self._env.ret_rms
+        arrays: Arrays = {
+            "counters": np.array([self.model.num_timesteps, self.model._n_updates]),
+            "scale": np.array([scale.mean, scale.var, scale.count]),
+        }
+        arrays |= {f"policy.{key}": value.numpy().copy() for key, value in self.model.policy.state_dict().items()}
+        for k, state in self.model.policy.optimizer.state_dict()["state"].items():
+            arrays |= {f"adam.{k}.{key}": value.numpy().copy() for key, value in state.items()}
+        return arrays
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on with the ``arrays`` of a learner of the same sizes."""
+        tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
+        policy, scale = self.model.policy, self._env.ret_rms
+        policy.load_state_dict({key: tensors[f"policy.{key}"] for key in policy.state_dict()})
+        state: dict[int, dict[str, torch.Tensor]] = {}
+        for path in (path for path in tensors if path.startswith("adam.")):
+            _, k, key = path.split(".")
+            state.setdefault(int(k), {})[key] = tensors[path]
+        policy.optimizer.load_state_dict({**policy.optimizer.state_dict(), "state": state})
+        self.model.num_timesteps, self.model._n_updates = map(int, arrays["counters"])
+        scale.mean, scale.var, scale.count = arrays["scale"]
+
+    def snapshot(self) -> Arrays:
+        """The worlds, for ``put_back``."""
+        starts = self.model._last_episode_starts
+        assert starts is not None  # noqa: S101
+        return {**self._crew.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
+
+    def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a ``snapshot``."""
+        model: Any = self.model
+        self._crew.restore(snapshot)
+        self._env.returns[...] = snapshot["discounted"]
+        model._last_obs, model._last_episode_starts = self._crew.seen.copy(), snapshot["starts"] > 0
+
+    @property
+    def random(self) -> Any:
+        """State of the random numbers, as JSON can hold it."""
+        (name, keys, *rest), generator = self._random
+        return {"numpy": [name, keys.tolist(), *rest], "torch": generator.numpy().tobytes().hex()}
+
+    @random.setter
+    def random(self, state: Any) -> None:
+        name, keys, *rest = state["numpy"]
+        generator = torch.frombuffer(bytearray.fromhex(state["torch"]), dtype=torch.uint8)
+        self._random = ((name, np.array(keys, np.uint32), *rest), generator)
+
+    @contextmanager
+    def _own_random(self) -> Iterator[None]:
+        outside = _global_random()
+        _set_global_random(self._random)
+        try:
+            yield
+        finally:
+            self._random = _global_random()
+            _set_global_random(outside)
+
+
+def _global_random() -> Any:
+    return np.random.get_state(), torch.get_rng_state()  # noqa: NPY002 - SB3 draws from these
+
+
+def _set_global_random(state: Any) -> None:
+    np.random.set_state(state[0])  # noqa: NPY002
+    torch.set_rng_state(state[1])
