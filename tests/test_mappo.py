@@ -19,7 +19,7 @@ from uuv_marl.train import fleet as fleets
 from uuv_marl.train import training as trainings
 from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
 from uuv_marl.train.mappo import Hyperparameters, Learner, annealed, gae
-from uuv_marl.train.shaping import VIEW_SIZE, Weights, difference, shaped, view
+from uuv_marl.train.shaping import VIEW_SIZE, Weights, lead, shaped, view
 from uuv_marl.train.training import Record, Settings, Training, train
 from uuv_marl.train.validation import VALIDATION_SEEDS, cost, judge
 
@@ -234,11 +234,12 @@ def test_moving_the_centre_is_paid_in_full():
     swarm = Swarm(load_scenario("tracking", num_vehicles=50))
     swarm.reset(0)
     swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0)
-    before = difference(swarm)[0]
+    before = lead(swarm)[0]
     swarm.state.eta[0, 7, :2] += (0.6, 0.8)
     swarm.observe()
     swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0) - np.array([0.6, 0.8]) / 50
-    assert (difference(swarm)[0] - before)[7] == pytest.approx(1.0, abs=0.05)
+    assert (lead(swarm)[0] - before)[7] == pytest.approx(1.0, abs=0.05)
+    assert lead(swarm)[0].mean() == pytest.approx(0.0, abs=1e-9), "nobody is paid for a spread swarm"
 
 
 def test_the_critics_view_does_not_depend_on_the_order_of_vehicles():

@@ -99,14 +99,18 @@ class Learned(Policy):
 
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        worlds, n = percept.flat.shape[:2]
-        features = np.empty((worlds, n, self._eyes.size), np.float32)
-        barrier = np.empty((worlds, n, 2), np.float32)
-        self._eyes.look(percept.flat, features, barrier, self.clamps)
+        acting = np.flatnonzero(self.active)
+        worlds, n = len(acting), percept.flat.shape[1]
+        features, barrier = np.empty((worlds, n, self._eyes.size), np.float32), np.empty((worlds, n, 2), np.float32)
+        clamps = np.zeros(worlds, np.int64)
+        self._eyes.look(percept.flat[acting], features, barrier, clamps)
+        self.clamps[acting] += clamps
         wish = forward(self.checkpoint.layers, features.reshape(worlds * n, -1))
         action = np.empty((worlds * n, 2), np.float32)
         _add(wish, barrier.reshape(worlds * n, 2), action)
-        return action.reshape(worlds, n, 2)
+        whole = np.zeros((len(self.active), n, 2), np.float32)
+        whole[acting] = action.reshape(worlds, n, 2)
+        return whole
 
 
 class Eyes:
@@ -118,13 +122,9 @@ class Eyes:
     """
 
     def __init__(self, scenario: Scenario, gains: Gains) -> None:
-        layout, actuators = PerceptLayout.of(scenario), scenario.actuators
-        self._at = layout.offsets
+        self._at = PerceptLayout.of(scenario).offsets
         self._gains = gains
-        self._limits = Limits(
-            actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, scenario.vehicle.X_u,
-            scenario.vehicle.X_uu,
-        )  # fmt: skip
+        self._limits = Limits.of(scenario)
         self.size = 11 + 4 * scenario.sonar.num_sectors + 4 * scenario.sonar.num_active_sectors
 
     def look(self, flat: Float32, features: Float32, barrier: Float32, clamps: Int64) -> None:

@@ -18,6 +18,7 @@ from uuv_marl.sim.vehicle import project
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
 
 
 class Limits(NamedTuple):
@@ -28,6 +29,14 @@ class Limits(NamedTuple):
     lever_arm: float
     X_u: float
     X_uu: float
+
+    @staticmethod
+    def of(scenario: Scenario) -> "Limits":
+        """Those of a scenario's vehicle."""
+        actuators, vehicle = scenario.actuators, scenario.vehicle
+        return Limits(
+            actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, vehicle.X_u, vehicle.X_uu
+        )  # fmt: skip
 
 
 class PolicyError(ValueError):
@@ -65,19 +74,15 @@ class Policy(abc.ABC):
             )
         if num_worlds < 1:
             raise PolicyError(f"num_worlds must be at least 1, got {num_worlds}")
-        actuators = scenario.actuators
         self.scenario = scenario
         self.num_worlds = num_worlds
         self.layout = PerceptLayout.of(scenario)
-        self.limits = Limits(
-            actuators.max_force_n,
-            actuators.max_torque_nm,
-            actuators.lever_arm_m,
-            scenario.vehicle.X_u,
-            scenario.vehicle.X_uu,
-        )
+        self.limits = Limits.of(scenario)
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)
         """How often a numerical clamp bound since the reset, shape (world,)."""
+        self.active: Bool = np.ones(num_worlds, np.bool_)
+        """Worlds whose actions count, shape (world,), all unless a caller says otherwise; ``act`` may leave the others'
+        zero, to save time."""
 
     def reset(self, seed: int | Sequence[int] | NDArray[np.integer] = 0, worlds: Sequence[int] | None = None) -> None:
         """Forget the past of these worlds (default all); seeds as in ``Swarm.reset``."""

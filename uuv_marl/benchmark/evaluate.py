@@ -103,6 +103,7 @@ def _batch(
                 waypoints=course.waypoints[w, : int(course.last[w]) + 1].astype(np.float32),
             )
         active &= ~ended
+        actor.active[:] = active
         if step % every == 0:
             samples.append(_sample(swarm))
         if step % report_every == 0:

@@ -46,7 +46,10 @@ class Hyperparameters:
     kl_stop: float = 0.02
     """The actor's epochs end where a minibatch diverges further from the policy that sampled it."""
     learning_rate: tuple[float, float] = (1.5e-3, 1.5e-4)
-    """At the start and at the end."""
+    """The actor's, at the start and at the end. Where noise is small, so is the share of a return that it caused, and
+    steps must be small too."""
+    critic_rate: float = 1.0
+    """The critic's learning rate, in the actor's."""
     noise: tuple[float, float] = (0.4, 0.08)
     """Standard deviation of actions [full force], at the start and at the end."""
     max_gradient: float = 1.0
@@ -169,10 +172,11 @@ class Learner:
 
     def update(self, batch: Batch, noise: float, learning_rate: float) -> Update:
         """Some epochs of PPO on a batch, and of regression to its returns."""
-        for optimiser in self._optimisers:
+        by = self.by
+        for optimiser, rate in zip(self._optimisers, (1.0, by.critic_rate), strict=True):
             for group in optimiser.param_groups:
-                group["lr"] = learning_rate
-        by, error = self.by, (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
+                group["lr"] = rate * learning_rate
+        error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
         kl = self._improve(batch._replace(advantage=_standard(batch.advantage)), noise)
         self._regress(batch.seen, batch.returns)

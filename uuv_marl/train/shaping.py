@@ -23,8 +23,8 @@ class Weights(NamedTuple):
 
     distance_m: float = 50.0
     """A vehicle pays its distance to l(t) over this."""
-    centre: float = 0.04
-    """Per metre that the swarm's centre is off l(t), paid by each vehicle as far as it is its own doing."""
+    centre: float = 0.1
+    """Per metre of a vehicle's ``lead``."""
     obstacle: float = 5.0
     obstacle_m: float = 24.0
     """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
@@ -45,7 +45,7 @@ def shaped(swarm: Swarm, by: Weights) -> Float64:
     close = np.clip(1.0 - facts.spacing / by.spacing_m, 0.0, 1.0)
     rate = (
         -np.minimum(away, 300.0) / by.distance_m
-        + by.centre * difference(swarm)
+        + by.centre * np.clip(lead(swarm), -100.0, 100.0)
         - by.obstacle * near * near
         - by.spacing * close * close
         - by.effort * facts.effort
@@ -53,25 +53,16 @@ def shaped(swarm: Swarm, by: Weights) -> Float64:
     return share * rate - by.collision * facts.contacts
 
 
-def difference(swarm: Swarm) -> Float64:
-    """N times how much better the swarm's centre is with a vehicle than without it [m], shape (world, vehicle).
+def lead(swarm: Swarm) -> Float64:
+    """How far a vehicle is ahead of the swarm's centre, on the way that the centre has to go [m], (world, vehicle).
 
-    A difference reward (Wolpert and Tumer 2002): moving towards l(t) pays a vehicle as if it moved the centre alone.
-    From a shared centre error each would get 1/n of that, which its own noise hides. The error is rounded at zero.
+    To first order a difference reward (Wolpert and Tumer 2002): n times what the vehicle does for the centre. From a
+    shared centre error each would get 1/n of that, which its own noise hides. The whole difference also pays for being
+    far from the centre, whatever the direction, and so spreads the swarm; this one sums to zero. Fades within 2 m.
     """
-    n = swarm.num_vehicles
-    if n == 1:
-        return np.zeros((swarm.num_worlds, 1))
     error = swarm.facts.centre - swarm.facts.reference[:, :2]
-    without = (n * swarm.facts.centre[:, None] - swarm.state.eta[:, :, :2]) / (n - 1) - swarm.facts.reference[
-        :, None, :2
-    ]
-    return n * (_rounded(without) - _rounded(error)[:, None])
-
-
-def _rounded(error: Float64) -> Float64:
-    """Length of a vector, smooth at zero [m]."""
-    return np.sqrt(np.sum(error * error, axis=-1) + 1.0)
+    way = -error / np.sqrt(np.sum(error * error, axis=-1, keepdims=True) + 4.0)
+    return np.sum((swarm.state.eta[:, :, :2] - swarm.facts.centre[:, None]) * way[:, None], axis=-1)
 
 
 def view(swarm: Swarm, out: Float32) -> None:

@@ -1,0 +1,64 @@
+"""What is held out: worlds, swarm sizes, losses, echoes and decision periods that no training has seen."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from uuv_marl.benchmark.runner import DEFAULT_POLICIES
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario_files import load_scenario
+
+LEARNED = ("mappo", "ppo")
+"""The shipped checkpoints."""
+_FEW = ("bio_inspired", "bio_inspired_plus", "mappo")
+_ALL = (*DEFAULT_POLICIES, *LEARNED)
+
+
+class HeldOut(NamedTuple):
+    """Episodes of one kind, on the benchmark's seeds from 0."""
+
+    name: str
+    scenario: str
+    seeds: int
+    policies: tuple[str, ...] = _FEW
+    overrides: Mapping[str, object] = {}
+    note: str = ""
+    """What is different from the scenario as it is."""
+
+    def load(self) -> Scenario:
+        """The scenario of these episodes."""
+        return load_scenario(self.scenario, overrides=self.overrides)
+
+
+def _sized(scenario: str, n: int, seeds: int) -> HeldOut:
+    return HeldOut(f"{scenario}_n{n}", scenario, seeds, overrides={"swarm.num_vehicles": n}, note=f"{n} vehicles")
+
+
+def _period(period_s: float) -> HeldOut:
+    overrides: dict[str, object] = {"timing.decision_period_s": period_s}
+    note = f"a decision every {period_s:g} s"
+    return HeldOut(f"random_field_every_{period_s:g}_s", "random_field", 100, overrides=overrides, note=note)
+
+
+_SURFACE: dict[str, object] = {"sonar.echo_reports": "surface"}
+
+SETS = (
+    HeldOut("tracking", "tracking", 100, _ALL),
+    HeldOut("single_obstacle", "single_obstacle", 100, _ALL),
+    HeldOut("multi_obstacle", "multi_obstacle", 100, _ALL),
+    HeldOut("lossy", "lossy", 100, _ALL),
+    HeldOut("random_field", "random_field", 500, _ALL),
+    *(_sized("random_field", n, seeds) for n, seeds in ((10, 500), (100, 200), (200, 100))),
+    *(_sized("single_obstacle", n, seeds) for n, seeds in ((10, 100), (100, 100), (200, 50))),
+    HeldOut("single_obstacle_surface", "single_obstacle", 100, overrides=_SURFACE, note="echoes report the surface"),
+    HeldOut("random_field_surface", "random_field", 200, overrides=_SURFACE, note="echoes report the surface"),
+    _period(0.2),
+    _period(0.5),
+)
+"""In the order of the page."""
+
+ACROSS = (
+    HeldOut("single_obstacle", "single_obstacle", 20),
+    HeldOut("random_field", "random_field", 50),
+    HeldOut("random_field_n10", "random_field", 50, overrides={"swarm.num_vehicles": 10}, note="10 vehicles"),
+)
+"""For the policies of all training seeds: the first episodes of three sets, one per task of the comparison."""
