@@ -16,7 +16,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 for command in (
-    benchmark.benchmark, heldout.heldout, reproduce.reproduce, lists.scenarios, lists.policies, benchmark.tune, reproduce.identify,
+    benchmark.benchmark, heldout.heldout, reproduce.reproduce, lists.scenarios, lists.policies, benchmark.tune,
+    reproduce.identify,
 ):  # fmt: skip
     app.command()(command)
 app.add_typer(train.app, name="train")
