@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, cast
 
@@ -164,10 +165,20 @@ def learned_class(name: str) -> type[Learned]:
     """The policy in a checkpoint, a file or the folder that holds it. Raises PolicyError where there is none."""
     checkpoint = load_checkpoint(Path(name))
     if name not in _classes or _classes[name].checkpoint.digest != checkpoint.digest:
-        card = checkpoint.card
-        declared = {"channels": card.channels, "yaw_damping_nms": card.yaw_damping_nms, "checkpoint": checkpoint}
-        _classes[name] = type(name, (Learned,), {**declared, "__doc__": Learned.__doc__, "__module__": __name__})
+        _classes[name] = _class_of(name, checkpoint, Learned.__doc__)
     return _classes[name]
+
+
+def shipped(name: str, doc: str) -> type[Learned]:
+    """The policy of a checkpoint in ``uuv_marl/baselines/trained``."""
+    with resources.as_file(resources.files("uuv_marl.baselines").joinpath("trained", f"{name}.safetensors")) as path:
+        return _class_of(name, load_checkpoint(path), doc)
+
+
+def _class_of(name: str, checkpoint: Checkpoint, doc: str | None) -> type[Learned]:
+    card = checkpoint.card
+    declared = {"channels": card.channels, "yaw_damping_nms": card.yaw_damping_nms, "checkpoint": checkpoint}
+    return type(name, (Learned,), {**declared, "__doc__": doc, "__module__": __name__})
 
 
 def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.floors import Idle, Random
-from uuv_marl.baselines.learned import is_checkpoint, learned_class
+from uuv_marl.baselines.learned import is_checkpoint, learned_class, shipped
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
@@ -28,6 +28,8 @@ POLICIES: dict[str, type[Policy]] = {
     "sdc": Sdc,
     "sff_informed": SffInformed,
     "sdc_informed": SdcInformed,
+    "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
+    "ppo": shipped("ppo", "The same, trained by Stable-Baselines3's PPO."),
     "random": Random,
     "idle": Idle,
 }

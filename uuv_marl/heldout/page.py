@@ -8,7 +8,7 @@ import numpy as np
 
 from uuv_marl.benchmark.tables import Estimate, estimate
 from uuv_marl.heldout.across import SCORES, stratified
-from uuv_marl.heldout.episodes import Episode, write_episodes
+from uuv_marl.heldout.episodes import Episode, read_episodes, write_episodes
 from uuv_marl.heldout.figures import draw_efficiency, draw_fields
 from uuv_marl.heldout.marl_eval import write_marl_eval
 from uuv_marl.heldout.sets import ACROSS, SETS, HeldOut
@@ -28,6 +28,7 @@ def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trai
     page, table, raw = folder / "report.md", folder / "episodes.csv", folder / "marl_eval.json"
     pictures = [folder / "figures" / name for name in ("random_field.png", "training.png")]
     write_episodes(episodes, table)
+    episodes = read_episodes(table)  # rounded: the same page from the file
     written = [page, table]
     if any(e.set == "random_field" for e in episodes):
         draw_fields(episodes, "random_field", pictures[0])
@@ -63,7 +64,7 @@ def _targets(episodes: Sequence[Episode]) -> str:
     found = targets(episodes, "mappo")
     rows = [(t.set, t.demand, t.measured, "met" if t.met else "**missed**") for t in found]
     met = sum(t.met for t in found)
-    return f"{met} of {len(found)} are met.\n\n" + _table(("set", "demand", "measured", ""), rows)
+    return f"{met} of {len(found)} are met by `mappo`.\n\n" + _table(("set", "demand", "measured", ""), rows)
 
 
 def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:

@@ -21,15 +21,15 @@ VIEW_SIZE = 18
 class Weights(NamedTuple):
     """Of the terms of one decision of 0.5 s; shorter ones are paid in proportion, collisions whole."""
 
-    distance_m: float = 50.0
+    distance_m: float = 35.0
     """A vehicle pays its distance to l(t) over this."""
-    centre: float = 0.1
+    centre: float = 0.2
     """Per metre of a vehicle's ``lead``."""
-    obstacle: float = 5.0
-    obstacle_m: float = 24.0
+    obstacle: float = 20.0
+    obstacle_m: float = 28.0
     """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
-    spacing: float = 8.0
-    spacing_m: float = 10.0
+    spacing: float = 24.0
+    spacing_m: float = 11.0
     """The same for the distance to the nearest vehicle: rare close approaches would hide in a mean of a linear term."""
     collision: float = 8.0
     """Per contact that begins."""

@@ -102,11 +102,11 @@ class Settings:
     weights: Weights = field(default_factory=Weights)
     """Of the training's reward."""
     algorithm: Recipe = field(default_factory=Hyperparameters)
-    checkpoint_every: int = 25
+    checkpoint_every: int = 20
     """Iterations."""
-    validate_every: int = 100
+    validate_every: int = 20
     """Iterations; a multiple of ``checkpoint_every`` wastes least where a training is cut off."""
-    validation: tuple[tuple[int, int], ...] = ((10, 8), (54, 12), (100, 4))
+    validation: tuple[tuple[int, int], ...] = ((10, 4), (54, 8), (100, 2))
     """Vehicles and episodes of each size."""
 
     def load(self) -> Scenario:
