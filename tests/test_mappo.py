@@ -159,15 +159,16 @@ def test_a_swarm_of_one_finds_the_force_that_follows():
 
 
 def test_a_short_training_beats_random_by_far():
-    fleet = open_water([(4, 8), (9, 4)])
+    weights = Weights(distance_m=50.0, centre=0.0, spacing=8.0, spacing_m=10.0)
+    fleet = open_water([(4, 8), (9, 4)], weights=weights)
     rng = np.random.default_rng(0)
     floors = []
     for scale in (0.0, 1.0):
         actions = (scale * rng.uniform(-1.0, 1.0, (60, fleet.rows, 2))).astype(np.float32)
         floors.append(np.mean([fleet.step(action).reward for action in actions]))
-    fleet = open_water([(4, 8), (9, 4)])
+    fleet = open_water([(4, 8), (9, 4)], weights=weights)
     _learner, rewards = learned(fleet, 60, Hyperparameters(hidden=(32, 32), horizon=32, minibatch=1024))
-    assert np.mean(rewards[-5:]) > max(floors) / 2, "rewards are negative: less than half of the cost"
+    assert np.mean(rewards[-5:]) > 0.65 * max(floors), "rewards are negative; the last five are a whole episode"
 
 
 def test_a_fleet_ends_worlds_and_starts_them_anew(monkeypatch):
@@ -216,7 +217,7 @@ def test_the_reward_by_hand(place):
     swarm.facts.reference[0, :2] = (0.0, 40.0)
     swarm.facts.contacts[0, 2] = 1
     swarm.facts.effort[0] = 0.5
-    only = Weights(centre=0.0)
+    only = Weights(distance_m=50.0, centre=0.0, obstacle=5.0, obstacle_m=24.0, spacing=8.0, spacing_m=10.0)
     per_step = swarm.scenario.timing.decision_period_s / 0.5
     clearance = np.hypot(4.0, 37.0) - 25.0
     expected = per_step * np.array(
@@ -364,6 +365,7 @@ def test_the_command(tmp_path, monkeypatch):
 
     monkeypatch.setattr(trainings, "train", fake)
     command = ["train", "mappo", "--steps=1000", "--seed=3", f"--output={tmp_path}", "--noise", "0.3", "0.1"]
+    command += ["--rate", "0.0002", "0.00002"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     assert "250 agent-steps/s" in done.output
@@ -376,6 +378,7 @@ def test_the_command(tmp_path, monkeypatch):
         (0.3, 0.1),
         False,
     )
+    assert settings.algorithm.learning_rate == (2e-4, 2e-5)
     stopped = CliRunner().invoke(app, [*command, "--resume"])
     assert stopped.exit_code == 130
     assert "--resume goes on" in stopped.output

@@ -1,5 +1,6 @@
 """``uuv-marl train``: a command for each library."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,6 +33,10 @@ def train_mappo(
         tuple[float, float] | None,
         typer.Option(min=1e-3, help="Of actions, at the start and at the end [full force]. Default: 0.4 0.08."),
     ] = None,
+    rate: Annotated[
+        tuple[float, float] | None,
+        typer.Option(min=0.0, help="The actor's learning rate, at the start and at the end. Default: 0.0015 0.00015."),
+    ] = None,
     output: Output = Path("results/mappo"),
     resume: Resume = False,
 ) -> None:
@@ -48,7 +53,8 @@ def train_mappo(
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
 
-        algorithm = Hyperparameters() if noise is None else Hyperparameters(noise=noise)
+        by = Hyperparameters()
+        algorithm = replace(by, noise=noise or by.noise, learning_rate=rate or by.learning_rate)
         _train(output, resume, scenario=scenario, steps=steps, seed=seed, start=start, algorithm=algorithm)
 
 

@@ -262,6 +262,14 @@ class Learner:
                 state.setdefault(int(k), {})[key] = tensors[path]
             optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
 
+    def start_from(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Begin with what another learner of the same sizes had learned: its policy, the averaged actor."""
+        self.restore(arrays)
+        self._updates = 0
+        with torch.no_grad():
+            for now, mean in zip(self.actor.parameters(), self._average, strict=True):
+                now.copy_(mean)
+
     def _parts(self) -> list[tuple[str, nn.Sequential, torch.optim.Adam]]:
         return [("actor", self.actor, self._optimisers[0]), ("critic", self.critic, self._optimisers[1])]
 
@@ -292,7 +300,9 @@ class Mappo:
         self.agent_steps = by.horizon * self.fleet.rows
         """Of an iteration."""
         self.take_episodes = self.fleet.take_episodes
-        self.arrays, self.restore = self.learner.arrays, self.learner.restore
+        self.arrays, self.restore, self.start_from = (
+            self.learner.arrays, self.learner.restore, self.learner.start_from
+        )  # fmt: skip
         self.snapshot, self.put_back = self.fleet.snapshot, self.fleet.restore
 
     def iterate(self, share: float) -> tuple[float, Update]:

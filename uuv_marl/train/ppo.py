@@ -155,6 +155,8 @@ class Ppo:
         self.model.num_timesteps, self.model._n_updates = map(int, arrays["counters"])
         scale.mean, scale.var, scale.count = arrays["scale"]
 
+    start_from = restore
+
     def snapshot(self) -> Arrays:
         """The worlds, for ``put_back``."""
         starts = self.model._last_episode_starts

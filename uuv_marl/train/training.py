@@ -63,6 +63,10 @@ class Algorithm(Protocol):
         """Go on with ``arrays``."""
         ...
 
+    def start_from(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Begin with the policy in the ``arrays`` of another training."""
+        ...
+
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """The worlds, for ``put_back``."""
         ...
@@ -150,7 +154,7 @@ class Training:
         self.scenario = settings.load()
         self.algorithm = settings.algorithm.begin(self.scenario, settings.sizes, settings.weights, settings.seed)
         if settings.start is not None:
-            self.algorithm.restore(_load(Path(settings.start) / _LEARNER_FILE))
+            self.algorithm.start_from(_load(Path(settings.start) / _LEARNER_FILE))
 
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
