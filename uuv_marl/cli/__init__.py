@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl import __version__
-from uuv_marl.cli import benchmark, heldout, lists, reproduce, train
+from uuv_marl.cli import benchmark, export, heldout, lists, reproduce, train
 from uuv_marl.cli.console import console
 
 app = typer.Typer(
@@ -17,7 +17,7 @@ app = typer.Typer(
 )
 for command in (
     benchmark.benchmark, heldout.heldout, reproduce.reproduce, lists.scenarios, lists.policies, benchmark.tune,
-    reproduce.identify,
+    export.export, reproduce.identify,
 ):  # fmt: skip
     app.command()(command)
 app.add_typer(train.app, name="train")

@@ -1,0 +1,29 @@
+"""``uuv-marl export``: a learned policy for other runtimes."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from uuv_marl.cli.console import console, explained, extra
+
+
+def export(
+    policy: Annotated[str, typer.Argument(help="Checkpoint of a training: its file, or the folder that holds it.")],
+    output: Annotated[Path, typer.Argument(help="ONNX file.", dir_okay=False)],
+    scenario: Annotated[
+        str, typer.Option(help="Name or TOML file; the model keeps its sonar suite and vehicle.")
+    ] = "random_field",
+) -> None:
+    """Write a learned policy as an ONNX model, from an agent's observation to its action. Needs the extra "onnx".
+
+    Example: uuv-marl export runs/mappo/best policy.onnx
+    """
+    with explained():
+        with extra("onnx", "export to ONNX"):
+            from uuv_marl.baselines.export import write_onnx
+
+        from uuv_marl.scenario_files import load_scenario
+
+        write_onnx(policy, load_scenario(scenario), output)
+        console.print(f"Model: {output}")
