@@ -23,13 +23,15 @@ class Weights(NamedTuple):
 
     distance_m: float = 35.0
     """A vehicle pays its distance to l(t) over this."""
-    centre: float = 0.2
+    centre: float = 0.25
     """Per metre of a vehicle's ``lead``."""
-    obstacle: float = 20.0
-    obstacle_m: float = 28.0
+    rest: float = 4.0
+    """Times the centre's weight once l(t) rests: where the centre comes to rest decides the arrival."""
+    obstacle: float = 32.0
+    obstacle_m: float = 31.0
     """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
-    spacing: float = 24.0
-    spacing_m: float = 11.0
+    spacing: float = 32.0
+    spacing_m: float = 13.0
     """The same for the distance to the nearest vehicle: rare close approaches would hide in a mean of a linear term."""
     collision: float = 8.0
     """Per contact that begins."""
@@ -43,9 +45,10 @@ def shaped(swarm: Swarm, by: Weights) -> Float64:
     away = np.hypot(*np.moveaxis(swarm.state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
     near = np.clip(1.0 - facts.clearance / by.obstacle_m, 0.0, 1.5)
     close = np.clip(1.0 - facts.spacing / by.spacing_m, 0.0, 1.0)
+    resting = np.where(facts.time_s >= swarm.duration_s, by.rest, 1.0)[:, None]
     rate = (
         -np.minimum(away, 300.0) / by.distance_m
-        + by.centre * np.clip(lead(swarm), -100.0, 100.0)
+        + by.centre * resting * np.clip(lead(swarm), -100.0, 100.0)
         - by.obstacle * near * near
         - by.spacing * close * close
         - by.effort * facts.effort
