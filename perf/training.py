@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compare import BUILD_LIMIT_S, HERE, ROOT, CannotRun, Library, Record, Worker, machine
+from compare import HERE, ROOT, CannotRun, Library, Record, Worker, machine
 from footing import (
     CLIP,
     DECISIONS,
@@ -33,8 +33,8 @@ from footing import (
 PAGE = HERE / "training.md"
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 ONE_THREAD = dict.fromkeys(THREADS, "1")
-PATIENCE_S = 20.0
-"""For Ray to end its own processes."""
+LIMIT_S, PATIENCE_S = 600.0, 20.0
+"""For a first iteration, which may compile everything; and for Ray to end its own processes."""
 
 OURS = Library(sys.prefix, "train_ours.py", ONE_THREAD)
 SUPERSUIT = Library(".venv-perf-supersuit", "train_supersuit.py", ONE_THREAD)
@@ -136,14 +136,14 @@ def build(record: Record, worker: Worker, only: Sequence[str]) -> None:
     if not (ROOT / venv / "bin" / "python").exists():
         raise CannotRun(f"{venv} is missing, 'make perf-training' makes it")
     size = {"agents": VEHICLES, "worlds": CASES[PROFILES.get(name, name)].worlds}
-    record["built"] = worker.ask(BUILD_LIMIT_S, build=name, seconds=0.0, slow=0.0, **size)["facts"]
+    record["built"] = worker.ask(LIMIT_S, build=name, seconds=0.0, slow=0.0, **size)["facts"]
     record |= worker.about
     sys.stderr.write(f"{name}: ready\n")
 
 
 def repeat(record: Record, worker: Worker) -> None:
     """One more iteration."""
-    answer = worker.ask(BUILD_LIMIT_S, repeat=record["case"])
+    answer = worker.ask(LIMIT_S, repeat=record["case"])
     record["rates"].append(answer["rate"])
     record["facts"].append(answer["facts"])
 
@@ -171,8 +171,8 @@ def text(records: list[Record], about: dict[str, Any]) -> str:
         "",
         "Every case has a process of its own with one thread: `torch.set_num_threads(1)`, and 1 in "
         + ", ".join(f"`{name}`" for name in THREADS)
-        + f". After a first iteration, which compiles and is not counted, all take one in turn, {about['rounds']} "
-        "rounds. Medians over rounds [lowest, highest], ratios within a round.",
+        + f". After a first iteration, which compiles and is not counted, all take one in turn, rounds: {about['rounds']}. "
+        "Medians over rounds [lowest, highest], ratios within a round.",
         "",
         "| case | agent-steps/s | to SB3's PPO, same rows | to SB3's PPO, plain |",
         "| --- | --- | --- | --- |",
@@ -215,15 +215,15 @@ def row(name: str, records: dict[str, Record]) -> str:
 def differences(records: dict[str, Record]) -> list[str]:
     """Where the footing is not the same."""
     there = {name: records[name]["built"] for name in CASES if "built" in records[name]}
-    inputs = ", ".join(f"{CASES[name].title} {facts['inputs']}" for name, facts in there.items())
+    inputs = "; ".join(f"{CASES[name].title}: {facts['inputs']}" for name, facts in there.items())
     others = [f"{CASES[k].title} takes {facts['rows']:,}" for k, facts in there.items() if facts["rows"] != ROWS]
     return [
-        f"Inputs of the networks: {inputs}.",
+        f"Inputs of the networks. {inputs}.",
         f"Rows of an iteration: {'; '.join(others) or 'the same for all that were measured'}.",
         "MAPPO takes its actor's gradient steps first and then its critic's, each with half of the parameters; the "
         "others take one of both.",
         "MAPPO's noise is not learned.",
-        "RLlib and plain PPO learn from the environment's own reward and without a barrier, and so does SuperSuit's.",
+        "Plain PPO, SuperSuit's and RLlib's learn from the environment's own reward, without the barrier.",
         "Learning goes on from round to round, from the start of an episode; few worlds end meanwhile.",
     ]
 
