@@ -171,8 +171,8 @@ def text(records: list[Record], about: dict[str, Any]) -> str:
         "",
         "Every case has a process of its own with one thread: `torch.set_num_threads(1)`, and 1 in "
         + ", ".join(f"`{name}`" for name in THREADS)
-        + f". After a first iteration, which compiles and is not counted, all take one in turn, rounds: {about['rounds']}. "
-        "Medians over rounds [lowest, highest], ratios within a round.",
+        + ". After a first iteration, which compiles and is not counted, all take one in turn, "
+        f"rounds: {about['rounds']}. Medians over rounds [lowest, highest], ratios within a round.",
         "",
         "| case | agent-steps/s | to SB3's PPO, same rows | to SB3's PPO, plain |",
         "| --- | --- | --- | --- |",
