@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark reproduce paper test test-adapters test-benchmarl test-rllib check perf clean
+.PHONY: help benchmark reproduce paper test test-adapters test-benchmarl test-rllib check perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
@@ -15,6 +15,7 @@ help:
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
 	@echo "make check                          ruff, pyright and import-linter only"
 	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS and JaxMARL, about 15 minutes: docs/speed.md"
+	@echo "make perf-training                  training beside SuperSuit and RLlib, and its profile: perf/training.md"
 	@echo "make clean                          remove .venv and .venv-*"
 
 benchmark: .venv/base.stamp
@@ -49,16 +50,19 @@ perf: .venv/dev.stamp $(PEER_STAMPS)
 	$(BIN)/python perf/compare.py $(ARGS)
 	$(BIN)/python perf/report.py
 
+perf-training: .venv/dev.stamp .venv-perf-supersuit/perf-supersuit.stamp .venv-rllib/rllib.stamp
+	$(BIN)/python perf/training.py $(ARGS)
+
 # A stamp without its environment is worth nothing.
-STAMPS := .venv/base.stamp .venv/dev.stamp .venv-benchmarl/benchmarl.stamp .venv-rllib/rllib.stamp
+STAMPS := .venv/base.stamp .venv/dev.stamp .venv-benchmarl/benchmarl.stamp .venv-rllib/rllib.stamp .venv-perf-supersuit/perf-supersuit.stamp
 .PHONY: $(foreach stamp,$(STAMPS),$(if $(wildcard $(dir $(stamp))bin/uuv-marl),,$(stamp)))
 .PHONY: $(foreach stamp,$(PEER_STAMPS),$(if $(wildcard $(dir $(stamp))bin/python),,$(stamp)))
 
-$(STAMPS): pyproject.toml constraints.txt constraints-benchmarl.txt constraints-rllib.txt tools/setup_venv.py
+$(STAMPS): pyproject.toml constraints.txt constraints-benchmarl.txt constraints-rllib.txt constraints-perf-supersuit.txt tools/setup_venv.py
 $(PEER_STAMPS): $(PEERS:%=constraints-perf-%.txt) tools/setup_venv.py
 $(STAMPS) $(PEER_STAMPS):
 	@command -v "$(PYTHON)" >/dev/null || { echo "There is no '$(PYTHON)' here. Install Python 3.11 or later, or name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }
 	@"$(PYTHON)" tools/setup_venv.py $(basename $(notdir $@))
 
 clean:
-	rm -rf .venv .venv-benchmarl .venv-rllib $(PEERS:%=.venv-perf-%)
+	rm -rf .venv .venv-benchmarl .venv-rllib .venv-perf-supersuit $(PEERS:%=.venv-perf-%)

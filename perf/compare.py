@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -44,6 +44,8 @@ class Library(NamedTuple):
 
     venv: str
     script: str
+    environment: Mapping[str, str] = {}
+    """Variables beside those of this process."""
 
 
 LIBRARIES = {
@@ -84,7 +86,7 @@ class CannotRun(Exception):  # noqa: N818 - no fault, a result
 class Worker:
     """A library's process, started when it is first asked, and anew after it had to be stopped."""
 
-    def __init__(self, library: str) -> None:
+    def __init__(self, library: Library) -> None:
         self.library = library
         self.about: dict[str, Any] = {}
         self._process: subprocess.Popen[str] | None = None
@@ -105,13 +107,13 @@ class Worker:
         return answer
 
     def _start(self) -> subprocess.Popen[str]:
-        venv, script = LIBRARIES[self.library]
+        venv, script, environment = self.library
         python = ROOT / venv / "bin" / "python"
         if not python.exists():
             raise SystemExit(f"{venv} is missing; 'make perf' makes it")
         self._log = tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed by stop
         self._process = subprocess.Popen(  # noqa: S603
-            [python, HERE / script], cwd=ROOT, text=True, bufsize=1,
+            [python, HERE / script], cwd=ROOT, env={**os.environ, **environment}, text=True, bufsize=1,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log,
         )  # fmt: skip
         self._lines = queue.SimpleQueue[str]()
@@ -142,10 +144,14 @@ class Worker:
         self.stop()
         return words
 
-    def stop(self) -> None:
-        """End the process, if there is one."""
+    def stop(self, patience_s: float = 0.0) -> None:
+        """End the process, if there is one; with patience it may end by itself first."""
         if self._process:
             assert self._process.stdin  # noqa: S101
+            if patience_s:
+                with contextlib.suppress(BrokenPipeError, subprocess.TimeoutExpired):
+                    self._process.stdin.close()
+                    self._process.wait(patience_s)
             self._process.kill()
             self._process.wait()
             with contextlib.suppress(BrokenPipeError):
@@ -282,7 +288,7 @@ def main() -> None:
     results = {"machine": machine(), "libraries": {}, "cases": []} if fresh else earlier(arguments.output)
     results |= {"rounds": arguments.rounds, "seconds": arguments.seconds, "load": round(os.getloadavg()[0], 2)}
     cells = [cell for cell in (chosen(cell, arguments, results["cases"]) for cell in plan()) if cell.cases]
-    workers = {library: Worker(library) for library in LIBRARIES}
+    workers = {name: Worker(library) for name, library in LIBRARIES.items()}
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     console = Console(stderr=True)
     try:

@@ -20,7 +20,7 @@ class Case(NamedTuple):
     amount: float
     """What a unit holds: agent-steps, or pairs, sines, bytes."""
     facts: Mapping[str, object] = {}
-    """What else is worth knowing, for the results file."""
+    """What else is worth knowing, for the results file; a repeat may change it."""
 
 
 Maker = Callable[[int, int], Case]
@@ -63,7 +63,8 @@ def serve(makers: Mapping[str, Maker], libraries: Sequence[str]) -> None:
                 say(build_s=ready - start, first_s=first, first_rate=case.amount / first, facts=dict(case.facts))
             elif name := request.get("repeat"):
                 case, units = built[name]
-                say(rate=units * case.amount / seconds_of(case, units))
+                rate = units * case.amount / seconds_of(case, units)
+                say(rate=rate, facts=dict(case.facts))
             else:
                 built.clear()
                 say()

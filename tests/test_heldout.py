@@ -85,7 +85,7 @@ def test_episodes_come_back_from_their_file(tmp_path):
 
 @pytest.fixture
 def quick(monkeypatch):
-    held = HeldOut("quick", "random_field", 2, ("bio_inspired", "bio_inspired_plus", "mappo"), QUICK, "tiny")
+    held = HeldOut("quick", "random_field", 2, ("bio_inspired_plus", "mappo"), ("bio_inspired",), 1, QUICK, "tiny")
     for module in (job, page):
         monkeypatch.setattr(module, "SETS", (held,))
         monkeypatch.setattr(module, "ACROSS", (held,))
@@ -115,7 +115,7 @@ def test_the_command_runs_what_is_missing_and_tells_of_it(tmp_path, quick):
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     rows = read_episodes(tmp_path / "out" / "episodes.csv")
-    assert len(rows) == 2 * 5
+    assert len(rows) == 2 * 4 + 1
     assert {(e.policy, e.training_seed) for e in rows} == {
         ("bio_inspired", None), ("bio_inspired_plus", None), ("mappo", None), ("mappo", 0), ("ppo", 1)
     }  # fmt: skip
@@ -123,7 +123,7 @@ def test_the_command_runs_what_is_missing_and_tells_of_it(tmp_path, quick):
     assert shipped == [e._replace(training_seed=None) for e in rows if (e.policy, e.training_seed) == ("mappo", 0)]
     text = (tmp_path / "out" / "report.md").read_text()
     assert "### quick" in text
-    assert "`random_field`, tiny, seeds 0 to 1." in text
+    assert "`random_field`, tiny, seeds from 0, at most 2." in text
     assert "{" not in text
     data = json.loads((tmp_path / "out" / "marl_eval.json").read_text())
     run = data["uuv_marl"]["quick"]["ppo"]["seed_1"]

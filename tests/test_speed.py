@@ -170,11 +170,52 @@ def test_every_peer_has_an_environment_and_pins(perf):
     spec = importlib.util.spec_from_file_location("setup_venv", ROOT / "tools" / "setup_venv.py")
     setup = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(setup)
-    assert {f".venv-{name}" for name in setup.PEERS} == {compare.LIBRARIES[peer].venv for peer in compare.PEERS}
+    compared = {compare.LIBRARIES[peer].venv for peer in compare.PEERS}
+    assert {f".venv-{name}" for name in setup.PEERS} == {*compared, ".venv-perf-supersuit"}
     for name, wanted in setup.PEERS.items():
         pins = (ROOT / f"constraints-{name}.txt").read_text().lower().replace("_", "-").splitlines()
-        assert {pin.partition("==")[0] for pin in pins if "==" in pin} >= set(wanted)
+        assert {pin.partition("==")[0] for pin in pins if "==" in pin} >= {
+            name for name in wanted if name[0] not in "-."
+        }
         assert {pin for pin in pins if pin.startswith("torch=")} <= {"torch==2.13.0"}
+
+
+def trained(case, rates, **more):
+    built = {"rows": 41472, "inputs": "98"}
+    return {
+        "case": case,
+        "rates": rates,
+        "facts": [],
+        "built": built,
+        "python": "3",
+        "versions": {"torch": "2"},
+        **more,
+    }
+
+
+def test_the_page_on_training_shows_ratios_shares_and_what_is_missing(perf):
+    import training
+
+    parts = {"parts": {"water": 0.5, "actor": 1.5}, "learning": {"forward": 1.0, "adam": 0.5}}
+    records = [
+        trained("mappo", [300.0, 200.0]),
+        trained("ppo", [100.0, 100.0]),
+        trained("plain", [100.0, 50.0]),
+        {"case": "supersuit", "rates": [], "facts": [], "failed": ".venv-perf-supersuit is missing"},
+        trained("rllib", [10.0, 12.0], built={"rows": 41500, "inputs": "98"}),
+        trained("mappo_profile", [250.0, 250.0], facts=[parts, parts]),
+        {"case": "ppo_profile", "rates": [], "facts": [], "failed": "out of air"},
+    ]
+    machine = {"cpu": "Abacus", "cores": 2, "memory_gib": 1, "system": "Linux"}
+    page = training.text(records, {"machine": machine, "load": 0.25, "rounds": 2, "date": "2026-11-01"})
+    assert "| MAPPO | 250 [200, 300] | 2.50 [2.00, 3.00] | 3.50 [3.00, 4.00] |" in page
+    assert "not measured: .venv-perf-supersuit is missing" in page
+    assert "RLlib's PPO takes 41,500" in page
+    assert "| actor's updates | 1,500 (75.0%) |" in page
+    assert "SB3's PPO, same rows is not profiled: out of air." in page
+    assert "Abacus, 2 cores" in page
+    sys.modules.pop("training")
+    sys.modules.pop("footing")
 
 
 def test_a_worker_answers_and_says_why_it_cannot(perf, tmp_path, monkeypatch):
@@ -190,8 +231,7 @@ def test_a_worker_answers_and_says_why_it_cannot(perf, tmp_path, monkeypatch):
     )
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "python").symlink_to(sys.executable)
-    monkeypatch.setitem(compare.LIBRARIES, "toy", compare.Library(str(tmp_path), str(tmp_path / "toy.py")))
-    worker = compare.Worker("toy")
+    worker = compare.Worker(compare.Library(str(tmp_path), str(tmp_path / "toy.py")))
     size = {"agents": 2, "worlds": 3, "seconds": 0.01, "slow": 5.0}
     try:
         assert worker.ask(30.0, build="toy", **size)["facts"] == {"entries": 3}

@@ -16,11 +16,12 @@ ENVIRONMENTS = {
     "benchmarl": (".venv-benchmarl", "[benchmarl,test]", "constraints-benchmarl.txt"),
     "rllib": (".venv-rllib", "[distributed,render,test]", "constraints-rllib.txt"),
 }
-# What perf/compare.py measures beside uuv_marl, without it.
+# What perf/compare.py measures beside uuv_marl, without it, and perf/training.py with it.
 PEERS = {
     "perf-mpe2": ("mpe2", "stable-baselines3"),
     "perf-vmas": ("vmas", "stable-baselines3"),
     "perf-jaxmarl": ("jaxmarl",),
+    "perf-supersuit": ("-e", ".[train]", "supersuit"),
 }
 
 

@@ -37,11 +37,12 @@ def run(
             raise ResultsError(f"there is no set {name!r}; there are {', '.join(known)}")
     trained = [] if trainings is None else find_trainings(trainings)
     chosen = [held for held in SETS if not only or held.name in only]
-    jobs = [(held, held.policies, cut(held, seeds)) for held in chosen]
+    jobs = [(held, held.policies, cut(held.seeds, seeds)) for held in chosen]
+    jobs += [(held, held.others, cut(held.fewer, seeds)) for held in chosen if held.others]
     across = {held.name: held for held in ACROSS if held.name in [h.name for h in chosen]}
     if trained:
         names = tuple(str(one.policy) for one in trained)
-        jobs += [(held, names, cut(held, seeds)) for held in across.values()]
+        jobs += [(held, names, cut(held.seeds, seeds)) for held in across.values()]
     for _, policies, _ in jobs:
         for policy in policies:
             policy_class(policy)
@@ -70,9 +71,9 @@ def _overall(policies: Sequence[str], report: Report) -> Callable[[str, str, flo
     return note
 
 
-def cut(held: HeldOut, seeds: int | None) -> int:
-    """How many seeds of a set."""
-    return held.seeds if seeds is None else min(seeds, held.seeds)
+def cut(count: int, most: int | None) -> int:
+    """A number of seeds, bounded where that is asked for."""
+    return count if most is None else min(count, most)
 
 
 def _weight(held: HeldOut, policies: Sequence[str], count: int) -> float:

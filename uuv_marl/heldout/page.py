@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from uuv_marl.baselines import POLICIES
 from uuv_marl.benchmark.tables import Estimate, estimate
 from uuv_marl.heldout.across import SCORES, stratified
 from uuv_marl.heldout.episodes import Episode, read_episodes, write_episodes
@@ -69,14 +70,12 @@ def _targets(episodes: Sequence[Episode]) -> str:
 
 def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:
     rival = of(episodes, held.name, RIVAL)
-    rows: list[tuple[str, ...]] = []
-    for policy in held.policies:
-        mine = of(episodes, held.name, policy)
-        if mine:
-            rows.append((policy, *_cells(mine, None if policy == RIVAL else rival)))
-    count = max(len(of(episodes, held.name, policy)) for policy in held.policies)
+    here = {e.policy for e in episodes if e.set == held.name and e.training_seed is None}
+    order = [name for name in POLICIES if name in here]
+    rows = [(name, *_cells(of(episodes, held.name, name), None if name == RIVAL else rival)) for name in order]
     note = f", {held.note}" if held.note else ""
-    return f"### {held.name}\n\n`{held.scenario}`{note}, seeds 0 to {count - 1}.\n\n" + _table(_HEADERS, rows)
+    count = max(len(of(episodes, held.name, name)) for name in order)
+    return f"### {held.name}\n\n`{held.scenario}`{note}, seeds from 0, at most {count}.\n\n" + _table(_HEADERS, rows)
 
 
 def _cells(mine: Sequence[Episode], rival: Sequence[Episode] | None) -> tuple[str, ...]:

@@ -7,10 +7,9 @@ from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
 
-LEARNED = ("mappo", "ppo")
-"""The shipped checkpoints."""
-_FEW = ("bio_inspired", "bio_inspired_plus", "mappo")
-_ALL = (*DEFAULT_POLICIES, *LEARNED)
+_BEST = ("bio_inspired_plus", "mappo")
+_FEW = ("bio_inspired", *_BEST)
+_OTHERS = (*(name for name in DEFAULT_POLICIES if name not in _BEST), "ppo")
 
 
 class HeldOut(NamedTuple):
@@ -20,6 +19,9 @@ class HeldOut(NamedTuple):
     scenario: str
     seeds: int
     policies: tuple[str, ...] = _FEW
+    others: tuple[str, ...] = ()
+    """Policies that are run on the first ``fewer`` seeds."""
+    fewer: int = 0
     overrides: Mapping[str, object] = {}
     note: str = ""
     """What is different from the scenario as it is."""
@@ -42,23 +44,21 @@ def _period(period_s: float) -> HeldOut:
 _SURFACE: dict[str, object] = {"sonar.echo_reports": "surface"}
 
 SETS = (
-    HeldOut("tracking", "tracking", 100, _ALL),
-    HeldOut("single_obstacle", "single_obstacle", 100, _ALL),
-    HeldOut("multi_obstacle", "multi_obstacle", 100, _ALL),
-    HeldOut("lossy", "lossy", 100, _ALL),
-    HeldOut("random_field", "random_field", 500, _ALL),
-    *(_sized("random_field", n, seeds) for n, seeds in ((10, 500), (100, 200), (200, 100))),
-    *(_sized("single_obstacle", n, seeds) for n, seeds in ((10, 100), (100, 100), (200, 50))),
-    HeldOut("single_obstacle_surface", "single_obstacle", 100, overrides=_SURFACE, note="echoes report the surface"),
-    HeldOut("random_field_surface", "random_field", 200, overrides=_SURFACE, note="echoes report the surface"),
+    *(HeldOut(name, name, 100, _BEST, _OTHERS, 20) for name in ("tracking", "single_obstacle", "multi_obstacle")),
+    HeldOut("lossy", "lossy", 100, _BEST, _OTHERS, 20),
+    HeldOut("random_field", "random_field", 500, _BEST, _OTHERS, 100),
+    *(_sized("random_field", n, seeds) for n, seeds in ((10, 500), (100, 100), (200, 40))),
+    *(_sized("single_obstacle", n, seeds) for n, seeds in ((10, 100), (100, 40), (200, 20))),
+    HeldOut("single_obstacle_surface", "single_obstacle", 50, overrides=_SURFACE, note="echoes report the surface"),
+    HeldOut("random_field_surface", "random_field", 100, overrides=_SURFACE, note="echoes report the surface"),
     _period(0.2),
     _period(0.5),
 )
 """In the order of the page."""
 
 ACROSS = (
-    HeldOut("single_obstacle", "single_obstacle", 20),
-    HeldOut("random_field", "random_field", 50),
-    HeldOut("random_field_n10", "random_field", 50, overrides={"swarm.num_vehicles": 10}, note="10 vehicles"),
+    HeldOut("single_obstacle", "single_obstacle", 10),
+    HeldOut("random_field", "random_field", 40),
+    HeldOut("random_field_n10", "random_field", 40, overrides={"swarm.num_vehicles": 10}, note="10 vehicles"),
 )
 """For the policies of all training seeds: the first episodes of three sets, one per task of the comparison."""

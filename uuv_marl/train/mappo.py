@@ -189,9 +189,10 @@ class Learner:
     def _improve(self, batch: Batch, noise: float) -> float:
         """PPO's clipped objective; the last divergence measured."""
         by, kl = self.by, 0.0
+        features = batch.seen[:, : self._features].contiguous()
         for rows in self._minibatches(len(batch.seen), by.actor_epochs):
             old, action = batch.mean[rows], batch.action[rows]
-            new = self.actor(batch.seen[rows, : self._features])
+            new = self.actor(features.index_select(0, rows))
             log_ratio = ((action - old).square() - (action - new).square()).sum(-1) / (2.0 * noise * noise)
             kl = (new.detach() - old).square().sum(-1).mean().item() / (2.0 * noise * noise)
             if kl > by.kl_stop:
@@ -205,7 +206,7 @@ class Learner:
         mean, std = self._scale()
         target = (returns - mean) / std
         for rows in self._minibatches(len(seen), self.by.critic_epochs):
-            loss = (self.critic(seen[rows]).squeeze(-1) - target[rows]).square().mean()
+            loss = (self.critic(seen.index_select(0, rows)).squeeze(-1) - target[rows]).square().mean()
             self._descend(1, self.critic, loss)
 
     def _descend(self, k: int, net: nn.Sequential, loss: Tensor) -> None:
