@@ -12,8 +12,8 @@ from uuv_marl.benchmark.tables import CAPTION, markdown_table, rows_of
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import differences, scenario_names
 
-DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed")
-"""The paper's Table 2, then the stronger variants."""
+DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed", "mappo")
+"""The paper's Table 2, then the stronger variants, then the learned policy."""
 
 Report = Callable[[str, str, float], None]
 """Called with scenario, policy and the share of that pair's work that is done."""
