@@ -243,17 +243,6 @@ def test_moving_the_centre_is_paid_in_full():
     assert lead(swarm)[0].mean() == pytest.approx(0.0, abs=1e-9), "nobody is paid for a spread swarm"
 
 
-def test_the_centre_counts_more_once_the_reference_rests(place):
-    swarm = place("single_obstacle", [[0, 0, 0], [8.0, 0, 0]])
-    swarm.facts.reference[0, :2] = (60.0, 80.0)
-    only = Weights(distance_m=1e9, centre=2.0, rest=3.0, obstacle=0.0, spacing=0.0, effort=0.0)
-    per_step = swarm.scenario.timing.decision_period_s / 0.5
-    for late, times in ((-1.0, 1.0), (0.0, 3.0)):
-        swarm.facts.time_s[0] = swarm.duration_s[0] + late
-        np.testing.assert_allclose(shaped(swarm, only), times * 2.0 * per_step * lead(swarm), atol=1e-6)
-    assert lead(swarm)[0, 1] > 2.0
-
-
 def test_the_critics_view_does_not_depend_on_the_order_of_vehicles():
     swarm = Swarm(load_scenario("single_obstacle", num_vehicles=12))
     swarm.reset(1)
