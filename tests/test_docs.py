@@ -70,6 +70,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "benchmark.tuning.tune",
         "reproduce.job.make",
         "reproduce.identify.identify",
+        "heldout.job.run",
     ):
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.training.train", stop_at_once)

@@ -23,13 +23,13 @@ class Weights(NamedTuple):
 
     distance_m: float = 35.0
     """A vehicle pays its distance to l(t) over this."""
-    centre: float = 0.08
-    """Per metre of a vehicle's ``lead``. Little: the actor does not know where the centre is, so that more is noise."""
-    obstacle: float = 32.0
-    obstacle_m: float = 31.0
+    centre: float = 0.4
+    """Per metre of a vehicle's ``lead``."""
+    obstacle: float = 28.0
+    obstacle_m: float = 30.0
     """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
-    spacing: float = 32.0
-    spacing_m: float = 13.0
+    spacing: float = 28.0
+    spacing_m: float = 12.0
     """The same for the distance to the nearest vehicle: rare close approaches would hide in a mean of a linear term."""
     collision: float = 8.0
     """Per contact that begins."""
