@@ -58,7 +58,7 @@ SETS = (
 
 ACROSS = (
     HeldOut("single_obstacle", "single_obstacle", 10),
-    HeldOut("random_field", "random_field", 40),
+    HeldOut("random_field", "random_field", 20),
     HeldOut("random_field_n10", "random_field", 40, overrides={"swarm.num_vehicles": 10}, note="10 vehicles"),
 )
 """For the policies of all training seeds: the first episodes of three sets, one per task of the comparison."""
