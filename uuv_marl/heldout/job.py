@@ -50,13 +50,14 @@ def run(
     weights = [_weight(*job) for job in jobs]
     for k, (held, policies, count) in enumerate(jobs):
         scenario = held.load()
-        kept = results.setdefault(held.name, Results(output / held.name, [scenario]))
+        if held.name not in results:
+            results[held.name] = Results(output / held.name, [scenario])
         before, own = sum(weights[:k]) / sum(weights), weights[k] / sum(weights)
 
         def note(what: str, share: float, before: float = before, own: float = own) -> None:
             report(what, before + own * share)
 
-        run_missing(kept, [scenario], policies, range(count), _overall(policies, note))
+        run_missing(results[held.name], [scenario], policies, range(count), _overall(policies, note))
     return results, trained
 
 

@@ -119,20 +119,15 @@ class Crew(VecEnv):
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that later steps depend on, for ``restore``."""
-        kept: dict[str, NDArray[Any]] = {
-            "seen": self.seen.copy(),
-            "barrier": self._barrier.copy(),
-            "episodes": np.array(self.episodes, np.float64),
-        }
+        kept: dict[str, NDArray[Any]] = {"episodes": np.array(self.episodes, np.float64)}
         return kept | {f"{k}.{key}": v for k, env in enumerate(self._envs) for key, v in env.snapshot().items()}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot of a crew of the same sizes."""
         for k, env in enumerate(self._envs):
-            env.restore({name.split(".")[1]: array for name, array in snapshot.items() if name.startswith(f"{k}.")})
-        self.seen[...], self._barrier[...] = snapshot["seen"], snapshot["barrier"]
-        number, arrived, collisions, returns, decisions = snapshot["episodes"]
-        self.episodes = Episodes(int(number), int(arrived), int(collisions), float(returns), int(decisions))
+            own = {name.split(".")[1]: array for name, array in snapshot.items() if name.startswith(f"{k}.")}
+            self._look(k, env.restore(own))
+        self.episodes = Episodes.unpacked(snapshot["episodes"])
 
     def close(self) -> None:
         """Nothing is open."""

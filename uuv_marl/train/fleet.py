@@ -44,6 +44,12 @@ class Episodes(NamedTuple):
     """Of the mean over vehicles."""
     decisions: int = 0
 
+    @staticmethod
+    def unpacked(array: NDArray[Any]) -> "Episodes":
+        """From an array of all of it."""
+        number, arrived, collisions, returns, decisions = array
+        return Episodes(int(number), int(arrived), int(collisions), float(returns), int(decisions))
+
 
 class Fleet:
     """Vehicles of many worlds as rows; ``seen`` (row, ``size``) is what the critic sees of each now.
@@ -122,8 +128,7 @@ class Fleet:
             swarm.restore({name.split(".")[1]: array for name, array in snapshot.items() if name.startswith(f"{k}.")})
             self._sums[k][...] = snapshot[f"{k}.sums"]
             self._look(k)
-        number, arrived, collisions, returns, decisions = snapshot["episodes"]
-        self.episodes = Episodes(int(number), int(arrived), int(collisions), float(returns), int(decisions))
+        self.episodes = Episodes.unpacked(snapshot["episodes"])
 
     def _rows(self, k: int) -> slice:
         return slice(int(self._ends[k - 1]) if k else 0, int(self._ends[k]))

@@ -246,8 +246,7 @@ class Learner:
         arrays |= {f"average.{k}": value.numpy().copy() for k, value in enumerate(self._average)}
         for name, net, optimiser in self._parts():
             arrays |= {f"{name}.{key}": value.numpy().copy() for key, value in net.state_dict().items()}
-            for k, state in optimiser.state_dict()["state"].items():
-                arrays |= {f"{name}_adam.{k}.{key}": value.numpy().copy() for key, value in state.items()}
+            arrays |= adam_arrays(optimiser, f"{name}_adam")
         return arrays
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -257,11 +256,7 @@ class Learner:
         self._average = [tensors[f"average.{k}"] for k in range(len(self._average))]
         for name, net, optimiser in self._parts():
             net.load_state_dict({key: tensors[f"{name}.{key}"] for key in net.state_dict()})
-            state: dict[int, dict[str, Tensor]] = {}
-            for path in (path for path in tensors if path.startswith(f"{name}_adam.")):
-                _, k, key = path.split(".")
-                state.setdefault(int(k), {})[key] = tensors[path]
-            optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
+            restore_adam(optimiser, f"{name}_adam", tensors)
 
     def start_from(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Begin with what another learner of the same sizes had learned: its policy, the averaged actor."""
@@ -338,6 +333,21 @@ def network(sizes: Sequence[int], last_gain: float, rng: np.random.Generator) ->
         nn.init.zeros_(linear.bias)
         layers += [linear] if is_last else [linear, nn.Tanh()]
     return nn.Sequential(*layers)
+
+
+def adam_arrays(optimiser: torch.optim.Optimizer, name: str) -> dict[str, NDArray[Any]]:
+    """Moments and counters of an optimiser, as ``name.parameter.key``."""
+    states = optimiser.state_dict()["state"].items()
+    return {f"{name}.{k}.{key}": value.numpy().copy() for k, state in states for key, value in state.items()}
+
+
+def restore_adam(optimiser: torch.optim.Optimizer, name: str, tensors: Mapping[str, Tensor]) -> None:
+    """Go on with what ``adam_arrays`` gave."""
+    state: dict[int, dict[str, Tensor]] = {}
+    for path in (path for path in tensors if path.startswith(f"{name}.")):
+        _, k, key = path.split(".")
+        state.setdefault(int(k), {})[key] = tensors[path]
+    optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
 
 
 def annealed(ends: tuple[float, float], share: float) -> float:

@@ -23,7 +23,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
 from uuv_marl.train.crew import Crew
 from uuv_marl.train.fleet import PATIENCE_S, TRAINING_SEEDS, Episodes
-from uuv_marl.train.mappo import Update, annealed
+from uuv_marl.train.mappo import Update, adam_arrays, annealed, restore_adam
 from uuv_marl.train.shaping import Weights, shaped
 
 Arrays = dict[str, NDArray[Any]]
@@ -126,7 +126,7 @@ class Ppo:
         return [Layer(weight.T.copy(), bias.copy()) for weight, bias in weights]
 
     def take_episodes(self) -> Episodes:
-        """Sums over the episodes that ended since the last call; SB3 knows of no collisions."""
+        """Sums over the episodes that ended since the last call; collisions as they come."""
         taken, self._crew.episodes = self._crew.episodes, Episodes()
         return taken
 
@@ -138,20 +138,14 @@ class Ppo:
             "scale": np.array([scale.mean, scale.var, scale.count]),
         }
         arrays |= {f"policy.{key}": value.numpy().copy() for key, value in self.model.policy.state_dict().items()}
-        for k, state in self.model.policy.optimizer.state_dict()["state"].items():
-            arrays |= {f"adam.{k}.{key}": value.numpy().copy() for key, value in state.items()}
-        return arrays
+        return arrays | adam_arrays(self.model.policy.optimizer, "adam")
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go on with the ``arrays`` of a learner of the same sizes."""
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
         policy, scale = self.model.policy, self._env.ret_rms
         policy.load_state_dict({key: tensors[f"policy.{key}"] for key in policy.state_dict()})
-        state: dict[int, dict[str, torch.Tensor]] = {}
-        for path in (path for path in tensors if path.startswith("adam.")):
-            _, k, key = path.split(".")
-            state.setdefault(int(k), {})[key] = tensors[path]
-        policy.optimizer.load_state_dict({**policy.optimizer.state_dict(), "state": state})
+        restore_adam(policy.optimizer, "adam", tensors)
         self.model.num_timesteps, self.model._n_updates = map(int, arrays["counters"])
         scale.mean, scale.var, scale.count = arrays["scale"]
 
