@@ -18,12 +18,13 @@ MAX_RANGE_M = 4096.0
 NOMINAL_VEHICLES = 54
 """The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
 
+
 def within(low: float, high: float) -> AfterValidator:
     """The range in which a number is plausible, both ends included."""
 
     def check(value: float) -> float:
         if not low <= value <= high:
-            limits = {"low": f"{low:,}", "high": f"{high:,}"}
+            limits = {"low": f"{low:,.9g}", "high": f"{high:,.9g}"}
             raise PydanticCustomError("range", "must lie within {low} to {high}", limits)
         return value
 
@@ -348,6 +349,7 @@ class Scenario(Section):
         scenario_checks.check_start(self)
         scenario_checks.check_course(self)
         scenario_checks.check_losses(self)
+        scenario_checks.check_times(self)
         scenario_checks.check_vehicle(self)
         return self
 

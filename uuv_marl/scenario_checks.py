@@ -3,8 +3,9 @@
 Every message names the field, its value and the remedy.
 """
 
+import logging
 import math
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 Float64 = NDArray[np.float64]
 MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0
 """Widths of sub-sectors that the sonar's table of directions is made for."""
+MAX_STEPS = 10_000
+"""Most integration steps in a decision; compiled code can't be interrupted."""
 RK4_LIMIT = 2.78
 """Classical Runge-Kutta is stable on the negative real axis up to this product of rate and step."""
 TRIAL_STEPS, RUNS = 600, 128
@@ -118,6 +121,41 @@ def check_losses(scenario: "Scenario") -> None:
         )
 
 
+def check_times(scenario: "Scenario") -> None:
+    """Decisions that an episode has room for and that take no age to compute, and losses before its end."""
+    timing, limit, field = scenario.timing, scenario.time_limit, scenario.random_field
+    shortest = longest = scenario.trajectory.duration_s
+    if field is not None:
+        shortest, longest = (field.legs[k] * field.leg_length_m[k] / scenario.trajectory.speed_mps for k in (0, 1))
+    first, last = (limit.factor * duration + limit.extra_s for duration in (shortest, longest))
+    period, steps = timing.decision_period_s, timing.holds_per_decision * timing.steps_per_hold
+    if period > first:
+        raise ValueError(
+            f"timing.decision_period_s must be at most the shortest time limit = {first:g}, got {period:g}; "
+            "lower it, or raise time_limit.factor or time_limit.extra_s"
+        )
+    if steps > MAX_STEPS:
+        raise ValueError(
+            f"timing.decision_period_s = {period:g} takes {steps:,} steps of timing.integration_step_s = "
+            f"{timing.integration_step_s:g}; at most {MAX_STEPS:,} are possible: lower it or raise the step"
+        )
+    late = [time for time in scenario.disturbance.loss_times_s if time > last]
+    if late:
+        raise ValueError(
+            f"disturbance.loss_times_s must lie within the time limit of {last:g} s, got {late[0]:g}; "
+            "lower it, or raise time_limit.factor or time_limit.extra_s"
+        )
+
+
+@cache
+def warn_of_speed(speed_mps: float) -> None:
+    """Say once that no vehicle can follow l(t)."""
+    text = (
+        "trajectory.speed_mps = %g is more than a vehicle holds at full force (actuators.max_force_n): none can follow"
+    )
+    logging.getLogger("uuv_marl").warning(text, speed_mps)
+
+
 def check_vehicle(scenario: "Scenario") -> None:
     """Inertia positive, damping dissipative, and no motion too fast for its time step."""
     p, limits, timing = scenario.vehicle, scenario.actuators, scenario.timing
@@ -133,10 +171,12 @@ def check_vehicle(scenario: "Scenario") -> None:
             raise ValueError(
                 f"vehicle.{linear} and vehicle.{quadratic} must not both be 0: nothing would bound the speed; raise one"
             )
+    if scenario.trajectory.speed_mps > _terminal(p.X_u, p.X_uu, limits.max_force_n):
+        warn_of_speed(scenario.trajectory.speed_mps)
     top, rate = scenario.start.speed_max_mps, _damping_rate(p, limits, scenario.start.speed_max_mps)
 
     def fails(step_s: float) -> bool:
-        return not rate * step_s < RK4_LIMIT or diverges(p, limits, top, step_s)
+        return not rate * step_s < RK4_LIMIT or diverges(p, limits, top, step_s)  # pyright: ignore[reportArgumentType] - frozen models have a hash
 
     h = timing.integration_step_s
     if fails(h):
