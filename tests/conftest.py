@@ -15,6 +15,7 @@ settings.register_profile("laws", deadline=None, derandomize=True, max_examples=
 settings.load_profile("laws")
 
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
+"""Those that tests step through; ``starter`` is one of their kind, only shorter."""
 
 
 @pytest.fixture(params=SCENARIOS)

@@ -181,11 +181,11 @@ def check_vehicle(scenario: "Scenario") -> None:
     h = timing.integration_step_s
     if fails(h):
         shorter = (timing.control_hold_s / 2**k for k in range(1, 16))
-        remedy = next((f"use at most {step:.3g}, " for step in shorter if step < h and not fails(step)), "")
+        remedy = next((f"use at most {step:.3g}, or " for step in shorter if step < h and not fails(step)), "")
         raise ValueError(
             f"timing.integration_step_s = {h:g} is too long for this vehicle, so that Runge-Kutta diverges "
             f"under actuators.max_force_n = {limits.max_force_n:g} and max_torque_nm = {limits.max_torque_nm:g}; "
-            f"{remedy}or lower these limits, the vehicle's resistances or its added masses"
+            f"{remedy}lower these limits, the vehicle's resistances or its added masses"
         )
     yaw = limits.yaw_damping_nms / inertia[2, 2]
     if not yaw * timing.control_hold_s < SAMPLED_LIMIT:

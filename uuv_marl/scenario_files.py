@@ -1,7 +1,6 @@
 """Scenarios from names, TOML files and overrides, with errors that name the field, the value and the remedy."""
 
 import difflib
-import operator
 import os
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -70,8 +69,8 @@ def load_scenario(
         for field, value in (overrides or {}).items():
             _assign(data, str(field), value)
         if num_vehicles is not None:
-            n = operator.index(num_vehicles) if isinstance(num_vehicles, Integral) else num_vehicles
-            _assign(data, "swarm.num_vehicles", n)
+            whole = isinstance(num_vehicles, Integral) and not isinstance(num_vehicles, bool)
+            _assign(data, "swarm.num_vehicles", int(num_vehicles) if whole else num_vehicles)
         return Scenario.model_validate(_frozen(data))
     except ValidationError as error:
         raise ScenarioError("\n".join(_explain(dict(e), data) for e in error.errors()[:10])) from None
@@ -285,7 +284,7 @@ def _explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
             place = None
         name = cast(dict[str, Any], place).get("name") if isinstance(part, int) and isinstance(place, dict) else None
         names.append(str(name or part))
-    field = _short(".".join(names))
+    field = _short(".".join(names)) or "''"
     if kind == "missing":
         return f"{field} is missing; set it in the scenario's file or override it"
     if kind == "extra_forbidden":
@@ -319,7 +318,7 @@ def _shown(value: object) -> str:
     try:
         return _short(repr(value))
     except (ValueError, RecursionError):
-        return f"a {type(value).__name__} that is too large to show"
+        return f"{type(value).__name__} that is too large to show"
 
 
 def _short(text: str) -> str:
