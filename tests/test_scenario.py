@@ -152,7 +152,7 @@ BAD = [
         "timing.decision_period_s must be at most the shortest time limit = 298.649",
     ),
     ({"timing.decision_period_s": 10.0, "timing.integration_step_s": 0.0001}, "takes 100,000 steps .*at most 10,000"),
-    ({"disturbance.loss_times_s": [5.0, 1e5]}, "disturbance.loss_times_s must lie within the time limit of 298.649"),
+    ({"disturbance.loss_times_s": [5.0, 1e9]}, "disturbance.loss_times_s.1 must lie within 0 to 1,000,000"),
     ({"vehicle.X_udot_kg": -1000.0}, "timing.integration_step_s = 0.1 is too long .* use at most 0.05"),
     ({"actuators.max_force_n": 86797.0, "vehicle.Y_vv": 44.6}, "max_force_n = 86797 .* use at most"),
     ({"actuators.max_torque_nm": 43621.0, "vehicle.N_rr": 1.55}, "max_torque_nm = 43621; use at most"),
@@ -308,7 +308,7 @@ def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
     from uuv_marl.sim.vehicle import advance, plant
 
     rng, base, accepted = np.random.default_rng(5), load_scenario(BASE), 0
-    for _ in range(60):
+    for _ in range(30):
         scale = dict(zip(VEHICLE, np.exp(rng.uniform(-2.3, 2.3, len(VEHICLE))), strict=True))
         changes = {f"vehicle.{name}": getattr(base.vehicle, name) * float(k) for name, k in scale.items()}
         force, torque = 3000.0 * np.exp(rng.uniform(-3.4, 3.4, 2))
@@ -323,7 +323,7 @@ def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
             for angle in np.repeat(rng.uniform(0.0, 2 * np.pi, 600 // hold), hold):
                 state = advance(*state, force * np.cos(angle), torque * np.sin(angle), 0.1, p)
             assert np.isfinite(state).all(), changes
-    assert accepted > 10
+    assert accepted > 5
 
 
 def test_light_commands_import_nothing_heavy():

@@ -122,28 +122,22 @@ def check_losses(scenario: "Scenario") -> None:
 
 
 def check_times(scenario: "Scenario") -> None:
-    """Decisions that an episode has room for and that take no age to compute, and losses before its end."""
+    """Decisions that an episode has room for, and that are soon computed."""
     timing, limit, field = scenario.timing, scenario.time_limit, scenario.random_field
-    shortest = longest = scenario.trajectory.duration_s
+    duration = scenario.trajectory.duration_s
     if field is not None:
-        shortest, longest = (field.legs[k] * field.leg_length_m[k] / scenario.trajectory.speed_mps for k in (0, 1))
-    first, last = (limit.factor * duration + limit.extra_s for duration in (shortest, longest))
+        duration = field.legs[0] * field.leg_length_m[0] / scenario.trajectory.speed_mps
+    shortest = limit.factor * duration + limit.extra_s
     period, steps = timing.decision_period_s, timing.holds_per_decision * timing.steps_per_hold
-    if period > first:
+    if period > shortest:
         raise ValueError(
-            f"timing.decision_period_s must be at most the shortest time limit = {first:g}, got {period:g}; "
+            f"timing.decision_period_s must be at most the shortest time limit = {shortest:g}, got {period:g}; "
             "lower it, or raise time_limit.factor or time_limit.extra_s"
         )
     if steps > MAX_STEPS:
         raise ValueError(
             f"timing.decision_period_s = {period:g} takes {steps:,} steps of timing.integration_step_s = "
             f"{timing.integration_step_s:g}; at most {MAX_STEPS:,} are possible: lower it or raise the step"
-        )
-    late = [time for time in scenario.disturbance.loss_times_s if time > last]
-    if late:
-        raise ValueError(
-            f"disturbance.loss_times_s must lie within the time limit of {last:g} s, got {late[0]:g}; "
-            "lower it, or raise time_limit.factor or time_limit.extra_s"
         )
 
 
@@ -200,13 +194,8 @@ def _damping_rate(p: "Vehicle", limits: "Actuators", speed_mps: float) -> float:
     """How fast [1/s] damping acts at the largest speeds that full force and torque can hold, or at the start."""
     u = max(_terminal(p.X_u, p.X_uu, limits.max_force_n), speed_mps)
     r = _terminal(p.N_r, p.N_rr, limits.max_torque_nm)
-    slope = np.array(
-        [
-            [p.Y_v + 2 * p.Y_vv * u, -p.Y_r - 2 * p.Y_rr * r],
-            [-p.N_v - p.N_rv * r, p.N_r + 2 * p.N_rr * r],
-        ]
-    )
-    sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(_inertia(p)[1:, 1:], slope))).max())
+    sway, yaw = [p.Y_v + 2 * p.Y_vv * u, -p.Y_r - 2 * p.Y_rr * r], [-p.N_v - p.N_rv * r, p.N_r + 2 * p.N_rr * r]
+    sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(_inertia(p)[1:, 1:], [sway, yaw]))).max())
     return max(sway_yaw, (p.X_u + 2 * p.X_uu * u) / (p.m_kg - p.X_udot_kg))
 
 
