@@ -88,7 +88,7 @@ class _Cache(caching.FunctionCache):
         """What was compiled for these types, or None."""
         index = Path(self._cache_file._index_path)
         try:
-            found: Any = cast(Any, super()).load_overload(sig, target_context)
+            found: Any = super().load_overload(sig, target_context)
         except Exception:  # a file cut off by a power cut raises whatever unpickling meets
             found = None
             with contextlib.suppress(OSError):
@@ -102,7 +102,7 @@ class _Cache(caching.FunctionCache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
         try:
-            cast(Any, super()).save_overload(sig, data)
+            super().save_overload(sig, data)
         except OSError as error:
             _log.warning("%s can't be kept (%s), so the next start compiles anew.", self.cache_path, error.strerror)
             self.disable()
