@@ -12,7 +12,7 @@ import ray as _ray  # pyright: ignore[reportMissingImports]
 
 from uuv_marl.benchmark.evaluate import BATCH, Run, evaluate
 from uuv_marl.benchmark.results import source_fingerprint
-from uuv_marl.benchmark.runner import ClusterError
+from uuv_marl.errors import ClusterError
 from uuv_marl.scenario import Scenario
 
 ray: Any = _ray
