@@ -314,6 +314,7 @@ def test_names_of_parts_are_checked():
     assert "--only figure-6 is unknown; there are figure-7," in done.output
 
 
+@pytest.mark.docs
 def test_the_page_in_the_docs_is_made_of_the_files_beside_it():
     assert (SHIPPED / "report.md").read_text() == page(SHIPPED, job.PARTS)
     for part in job.PARTS:
