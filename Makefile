@@ -40,10 +40,11 @@ test: check
 docs-check: .venv/dev.stamp
 	$(BIN)/python -m pytest -m docs $(ARGS)
 
-# Numba's cache knows nothing of this switch, so what is compiled with it lives apart.
+# Numba's cache knows nothing of this switch, so what is compiled with it lives apart. On one thread, because an error on a
+# thread that Numba starts is lost.
 BOUNDED := baselines compiled env plain reward sonar swarm trajectory vector_env vehicle
 test-bounds: .venv/dev.stamp
-	NUMBA_BOUNDSCHECK=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds $(BIN)/python $(PYTEST) $(BOUNDED:%=tests/test_%.py) $(ARGS)
+	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds $(BIN)/python $(PYTEST) $(BOUNDED:%=tests/test_%.py) $(ARGS)
 
 test-adapters: test-benchmarl test-rllib
 
