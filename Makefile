@@ -50,6 +50,8 @@ test-adapters: test-benchmarl test-rllib
 
 test-lowest: .venv-lowest/lowest.stamp
 test-light: .venv-light/light.stamp
+# What is old is deprecated by newer libraries beneath it.
+test-lowest: PYTEST += -W default::DeprecationWarning
 test-lowest test-light: test-%:
 	.venv-$*/bin/python $(PYTEST) $(ARGS)
 
