@@ -3,7 +3,9 @@
 # make benchmark PYTHON=python3.12
 PYTHON ?= python3
 BIN := .venv/bin
-PYTEST := -m pytest -m "not docs" --durations=15
+PYTEST := -m pytest --durations=15
+# Two processes; a file's tests stay together, since they share what is costly to make.
+HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
 .PHONY: help benchmark reproduce paper test docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
@@ -35,16 +37,17 @@ paper: reproduce
 	$(BIN)/python tools/ship_paper.py results/reproduce
 
 test: check
-	$(BIN)/python $(PYTEST) $(ARGS)
+	$(BIN)/python $(PYTEST) $(HALVES) -m "not docs" $(ARGS)
 
 docs-check: .venv/dev.stamp
-	$(BIN)/python -m pytest -m docs $(ARGS)
+	$(BIN)/python $(PYTEST) $(HALVES) -m docs $(ARGS)
 
 # Numba's cache knows nothing of this switch, so what is compiled with it lives apart. On one thread, because an error on a
 # thread that Numba starts is lost.
-BOUNDED := baselines compiled env plain reward sonar swarm trajectory vector_env vehicle
+BOUNDED := baselines bounds env plain reward sonar swarm trajectory vector_env vehicle
 test-bounds: .venv/dev.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds $(BIN)/python $(PYTEST) $(BOUNDED:%=tests/test_%.py) $(ARGS)
+	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
+	$(BIN)/python $(PYTEST) $(HALVES) $(BOUNDED:%=tests/test_%.py) $(ARGS)
 
 test-adapters: test-benchmarl test-rllib
 
@@ -53,7 +56,7 @@ test-light: .venv-light/light.stamp
 # What is old is deprecated by newer libraries beneath it.
 test-lowest: PYTEST += -W default::DeprecationWarning
 test-lowest test-light: test-%:
-	.venv-$*/bin/python $(PYTEST) $(ARGS)
+	.venv-$*/bin/python $(PYTEST) $(HALVES) -m "not docs" $(ARGS)
 
 test-benchmarl: .venv-benchmarl/benchmarl.stamp
 test-rllib: .venv-rllib/rllib.stamp

@@ -4,6 +4,7 @@ import os
 from importlib.util import find_spec
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # threads that wait leave their core to the other half of the tests
 
 import numpy as np
 import pytest

@@ -163,6 +163,7 @@ def test_the_shipped_front_follows_from_the_shipped_trials(shipped):
         assert again == pytest.approx([table[name][row] for name in OBJECTIVES], abs=2e-5)
 
 
+@pytest.mark.docs
 def test_the_shipped_point_is_loaded_and_runs_as_recorded(shipped):
     found = identify.identified()
     assert found.values == shipped["chosen"]["values"]

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # What pip installs by name, with constraints-NAME.txt, or with constraints.txt where there is no such file. BenchMARL
@@ -61,6 +62,7 @@ def run(*command):
 
 def main(name):
     """Make the environment of this name: .venv for base and dev, else .venv-NAME."""
+    begin = time.time()
     check_python()
     folder = ".venv" if name in ("base", "dev") else ".venv-" + name
     pins = "constraints-%s.txt" % name
@@ -74,7 +76,7 @@ def main(name):
     pip = (os.path.join(folder, "bin", "python"), "-m", "pip")
     run(*(pip + ("install", "--quiet", "--disable-pip-version-check", "-c", pins) + WANTED[name]))
     with open(os.path.join(ROOT, folder, name + ".stamp"), "w"):
-        pass
+        print("Installed after %.0f s" % (time.time() - begin))
 
 
 if __name__ == "__main__":
