@@ -42,8 +42,7 @@ test: check
 docs-check: .venv/dev.stamp
 	$(BIN)/python $(PYTEST) $(HALVES) -m docs $(ARGS)
 
-# Numba's cache knows nothing of this switch, so what is compiled with it lives apart. On one thread, because an error on a
-# thread that Numba starts is lost.
+# On one thread, because an error on a thread that Numba starts is lost; what is compiled so stays out of the user's cache.
 BOUNDED := baselines bounds env plain reward sonar swarm trajectory vector_env vehicle
 test-bounds: .venv/dev.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
