@@ -275,8 +275,8 @@ def test_lists_and_help():
     assert "[random_field]" in shown
 
 
+@pytest.mark.needs("optuna")
 def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
-    pytest.importorskip("optuna")
     from uuv_marl.benchmark import tuning
 
     monkeypatch.setattr(tuning, "SEEDS", (10_000,))

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.cli import app
 
+pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 ELSEWHERE = {"benchmarl.md", "rllib.md"}
