@@ -122,8 +122,8 @@ def endings() -> str:
         ("the last vehicle is lost", "the world", "terminated"),
     ]
     collision = (
-        f"Two vehicles collide when their centres are nearer than {2 * hull:g} m; a vehicle collides with an obstacle when\n"
-        f"its centre is nearer than {hull:g} m to the surface."
+        f"Two vehicles collide when their centres are nearer than {2 * hull:g} m; a vehicle collides with an obstacle\n"
+        f"when its centre is nearer than {hull:g} m to the surface."
     )
     return f"{table(('what happens', 'whose episode ends', 'how'), ends)}\n\n{collision}"
 

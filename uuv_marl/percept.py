@@ -67,8 +67,8 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
         PerceptField("yaw_rate", (1,), "rad/s", 1.0, -MAX_SPEED, MAX_SPEED, "own yaw rate"),
         PerceptField("reference", (2,), *position, "vector to the reference point l(t); a longer one is cut to 4096 m"),
         PerceptField("reference_velocity", (2,), *speed, "velocity of the reference point"),
-        PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard in it, else 0"),
-        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: position of the nearest vehicle, else 0"),
+        PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
+        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: that vehicle's position, else 0"),
         PerceptField("echo", (num_active,), *flag, "per active sub-sector: 1 if an obstacle returns an echo, else 0"),
         PerceptField(
             "echo_range", (num_active,), "m", _POSITION_SCALE_M, 0.0, MAX_RANGE_M,
@@ -76,7 +76,7 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
         ),
         PerceptField(
             "echo_position", (num_active, 2), *position,
-            "per active sub-sector: position of the obstacle's centre, or of the surface point (sonar.echo_reports), else 0",
+            "per active sub-sector: position of its centre, or of that surface point (sonar.echo_reports), else 0",
         ),
     ]  # fmt: skip
     if "compass" in channels:

@@ -33,8 +33,8 @@ TERMS: Mapping[str, str] = {
     "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
     "effort": "-w · dt · a²; a²: mean squared length of the action, 1 at full force",
     "collision": "-w for every collision that begins",
-    "loss": "once, for a lost vehicle: -(w_collision + w_arrival + (w_tracking + w_obstacle + w_spacing + w_effort) · T); "
-    "T: time left until the limit",
+    "loss": "once, for a lost vehicle: -(w_collision + w_arrival + (w_tracking + w_obstacle + w_spacing + w_effort) · "
+    "T); T: time left until the limit",
     "arrival": "+w for every vehicle when the swarm arrives",
 }
 """The formula of each term; w is its weight in the scenario's ``reward``, dt the time between two decisions [s]."""
