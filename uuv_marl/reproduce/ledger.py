@@ -280,7 +280,7 @@ def _table(kind: str, entries: Sequence[Entry]) -> list[str]:
         head = ("section", "quantity", "unit", "paper", "ours", "worst", "difference", "verdict")
     else:
         rows = [
-            (f"{k}", e.section, e.quantity.rpartition(": ")[0], e.paper.removeprefix("holds "), *_cells(e)[:2], e.verdict)
+            (f"{k}", e.section, e.quantity.rpartition(": ")[0], e.paper[len("holds ") :], *_cells(e)[:2], e.verdict)
             for k, e in enumerate(entries, start=1)
         ]
         head = ("no.", "section", "the paper says", "holds", "ours", "worst", "verdict")
