@@ -43,31 +43,30 @@ def digest(*values: Any) -> str:
     return hashed.hexdigest()[:16]
 
 
-def episodes(held: Any, policy: str, first: int) -> list[str]:
-    """Two episodes of a held-out set, stepped together: a hash of each over states, facts, percepts and actions."""
-    scenario = granted(policy, held.load())
+def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEPS) -> str:
+    """Two episodes stepped together: a hash of each over states, facts, percepts and actions."""
+    scenario = granted(policy, scenario)
     swarm, actor = Swarm(scenario, 2), make(policy, scenario, 2)
     percept, active, hashed = swarm.reset(first), np.ones(2, np.bool_), [hashlib.sha256(), hashlib.sha256()]
     actor.reset(first)
-    for _ in range(MOST_AGENT_STEPS // swarm.num_vehicles):
+    for _ in range(most // swarm.num_vehicles):
         action = actor.act(percept)
         percept = swarm.step(action, active)
         arrays = [getattr(swarm.state, name) for name in STATE] + [getattr(swarm.facts, name) for name in FACTS]
-        arrays += [swarm.heard, percept.flat, action, actor.clamps]
         for w in np.flatnonzero(active):
-            for array in arrays:
+            for array in (*arrays, swarm.heard, percept.flat, action, actor.clamps):
                 hashed[w].update(array[w].tobytes())
         active &= ~(swarm.arrived | swarm.timed_out | ~swarm.state.alive.any(axis=1))
         actor.active[:] = active
         if not active.any():
             break
-    return [each.hexdigest()[:16] for each in hashed]
+    return " ".join(each.hexdigest()[:16] for each in hashed)
 
 
 def parallel(scenario: str, policy: str, reward: Any) -> str:
     """An episode, or its first thousand steps, through ``parallel_env``."""
-    env = uuv_marl.parallel_env(granted(policy, uuv_marl.load_scenario(scenario)), reward=reward)
-    actor, hashed = make(policy, env), []
+    env = uuv_marl.parallel_env(granted(policy, load_scenario(scenario)), reward=reward)
+    actor, hashed = make(policy, env), list[str]()
     (observations, _), _ = env.reset(SEED), actor.reset(SEED)
     while env.agents and len(hashed) < 1000:
         observations, *told, _ = env.step(actor(observations))
@@ -80,8 +79,7 @@ def vector(scenario: str) -> str:
     envs, rng = uuv_marl.vector_env(4, scenario, max_cycles=40), np.random.default_rng(SEED)
     hashed = [digest(envs.reset(seed=SEED)[0])]
     for _ in range(100):
-        actions = rng.uniform(-1.0, 1.0, envs.action_space.shape or ()).astype(np.float32)
-        *told, infos = envs.step(actions)
+        *told, infos = envs.step(rng.uniform(-1.0, 1.0, envs.action_space.shape or ()).astype(np.float32))
         hashed.append(digest(*told, infos["agent_reward"]))
     return digest(hashed)
 
@@ -104,7 +102,7 @@ def trained(algorithm: str) -> str:
 
 def exported() -> str:
     """Actions of an exported ONNX model; its file may hold versions."""
-    scenario = load_scenario("random_field")
+    scenario = granted("mappo", load_scenario("random_field"))
     with tempfile.TemporaryDirectory() as folder:
         write_onnx("mappo", scenario, Path(folder) / "policy.onnx")
         model = ReferenceEvaluator(str(Path(folder) / "policy.onnx"))
@@ -112,44 +110,33 @@ def exported() -> str:
     return digest(*map(np.asarray, model.run(None, {"observation": seen})))
 
 
-def checkpoint(path: Path) -> str:
-    """A hundred decisions of a checkpoint, which may be another version's."""
-    scenario = granted(str(path), load_scenario("random_field", num_vehicles=10))
-    swarm, actor = Swarm(scenario), make(str(path), scenario)
-    (percept, _), actions = (swarm.reset(SEED), actor.reset(SEED)), []
-    for _ in range(100):
-        actions.append(actor.act(percept).copy())
-        percept = swarm.step(actions[-1])
-    return digest(*actions)
-
-
-def cases(other: Path) -> Iterator[tuple[str, str, Callable[[], str | list[str]]]]:
-    """Kind, name and maker of every hash."""
+def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any, ...]]]:
+    """Kind, name, maker and its arguments of every hash."""
     for k, (held, policy) in enumerate((held, policy) for held in SETS for policy in POLICIES):
-        yield "episodes", f"{held.name} {policy}", lambda h=held, p=policy, k=k: episodes(h, p, SEED + 2 * k)
+        yield "episodes", f"{held.name} {policy}", episodes, (held.load(), policy, SEED + 2 * k)
     for name in SCENARIOS:
-        for policy, reward in (("bio_inspired", "individual"), ("random", "team")):
-            yield "parallel_env", f"{name} {policy}", lambda n=name, p=policy, r=reward: parallel(n, p, r)
-        yield "vector_env", name, lambda n=name: vector(n)
+        yield "parallel_env", f"{name} bio_inspired", parallel, (name, "bio_inspired", "individual")
+        yield "parallel_env", f"{name} random", parallel, (name, "random", "team")
+        yield "vector_env", name, vector, (name,)
     for policy in POLICIES:
-        yield "benchmark", policy, lambda p=policy: reported(p)
+        yield "benchmark", policy, reported, (policy,)
     for algorithm in ("mappo", "ppo"):
-        yield "5 updates", algorithm, lambda a=algorithm: trained(a)
-    yield "export", "mappo", exported
+        yield "5 updates", algorithm, trained, (algorithm,)
+    yield "export", "mappo", exported, ()
     for path in sorted(p for part in ("uuv_marl", "docs") for p in (other / part).rglob("*.safetensors")):
-        yield "checkpoints", str(path.relative_to(other)), lambda p=path: checkpoint(p)
+        small = load_scenario("random_field", num_vehicles=10)
+        yield "checkpoints", str(path.relative_to(other)), episodes, (small, str(path), SEED, 1000)
 
 
 def main(other: Path, only: list[str]) -> None:
     """Print a line for every hash: kind, name, hash or hashes."""
-    for kind, name, make_hash in cases(other):
-        if only and kind not in only:
-            continue
-        try:
-            hashes = make_hash()
-        except Exception as error:
-            hashes = f"failed: {type(error).__name__}: {error}"
-        print(json.dumps([kind, name, hashes]), flush=True)
+    for kind, name, make_hash, arguments in cases(other):
+        if not only or kind in only:
+            try:
+                found = make_hash(*arguments)
+            except Exception as error:  # a version that can't is a result
+                found = f"failed: {type(error).__name__}: {error}"
+            print(json.dumps([kind, name, found]), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""The case of perf/training.py for Stable-Baselines3 through SuperSuit."""
+"""Training of uuv_marl through SuperSuit and Stable-Baselines3, for perf/compare.py."""
 
 import supersuit
-from footing import DECISIONS, one_thread, sb3_ppo, scenario
+from footing import one_thread, sb3_ppo, scenario
 from worker import Case, serve
 
 import uuv_marl
@@ -11,13 +11,7 @@ def supersuit_ppo(agents: int, worlds: int) -> Case:
     """PPO over ``parallel_env``, a row per agent, worlds one after the other in this process."""
     world = supersuit.pettingzoo_env_to_vec_env_v1(uuv_marl.parallel_env(scenario(agents)))
     env = supersuit.concat_vec_envs_v1(world, worlds, num_cpus=1, base_class="stable_baselines3")
-    model, rows = sb3_ppo(env, None), DECISIONS * env.num_envs  # SuperSuit's rows can't be seeded
-
-    def run(units: int) -> None:
-        for _ in range(units):
-            model.learn(rows, reset_num_timesteps=False)
-
-    return Case(run, rows, {"rows": rows, "inputs": str(env.observation_space.shape[0])})
+    return sb3_ppo(env, None)  # SuperSuit's rows can't be seeded
 
 
 if __name__ == "__main__":
