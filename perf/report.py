@@ -29,8 +29,10 @@ STYLES = {
     "jaxmarl": ("#CC79A7", "X"),
 }  # fmt: skip
 PAGES = {
-    SPEED: (RESULTS, "rates"), HERE / "adapters.md": (RESULTS, "adapters"), HERE / "training.md": (TRAININGS, "trainings"),
-}  # fmt: skip
+    SPEED: (RESULTS, "rates"),
+    HERE / "adapters.md": (RESULTS, "adapters"),
+    HERE / "training.md": (TRAININGS, "trainings"),
+}
 """The file that a page is made of, and the kind of case without which it stays as it is."""
 PAIRS = (("vector_env", "jaxmarl"), ("vector_env", "vmas"), ("parallel_env", "mpe2"))
 GRID = [(agents, worlds) for agents in AGENTS for worlds in WORLDS]
