@@ -232,8 +232,8 @@ TABLES: dict[str, Callable[[Cases], str]] = {
 
 def filled(page: str, cases: Cases) -> str:
     """A page with its tables written anew."""
-    marked = re.compile(r"(<!-- (\w+) -->\n).*?(\n<!-- /\2 -->)", re.DOTALL)
-    return marked.sub(lambda found: found[1] + TABLES[found[2]](cases) + found[3], page)
+    marked = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
+    return marked.sub(lambda found: f"{found[1]}{TABLES[found[2]](cases)}\n{found[3]}", page)
 
 
 def draw(cases: Cases) -> Figure:
