@@ -73,8 +73,8 @@ def best_rates(loops, rounds, seconds):
         while (took := spent(run, count)) < seconds / 4:
             count *= 2
         times.append(max(1, round(count * seconds / took)))
-    turns = [[n * amount / spent(run, n) for n, (run, amount) in zip(times, loops)] for _ in range(rounds)]
-    return [max(column) for column in zip(*turns)]
+    turns = [[n * amount / spent(run, n) for n, (run, amount) in zip(times, loops, strict=True)] for _ in range(rounds)]
+    return [max(column) for column in zip(*turns, strict=True)]
 
 
 @pytest.mark.parametrize("name", LEAST_SHARE)
