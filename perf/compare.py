@@ -32,7 +32,7 @@ PARTS = ("part_moved", "part_sorted", "part_measured", "part_heard", "part_perce
 ADAPTERS = ("swarm_idle", "task_idle", "vector_env_idle", "sb3_idle", "torchrl_idle")
 TRAINED = ("mappo", "ppo", "plain")
 PEERS = ("mpe2", "vmas", "jaxmarl")
-ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("NUMBA", "OMP", "MKL", "OPENBLAS")}
 LIMIT_S, CASE_LIMIT_S, PATIENCE_S = 240.0, 10.0, 20.0
 """For a build or a repeat; for a case's repeats together; for a process to end by itself."""
 
@@ -52,9 +52,9 @@ LIBRARIES = {
     "uuv_marl": Library(".venv", "ours.py"),
     "parts": Library(".venv", "parts.py"),
     **{peer: Library(f".venv-perf-{peer}", f"peer_{peer}.py") for peer in PEERS},
-    "train": Library(".venv", "train_ours.py", ONE_THREAD),
-    "supersuit": Library(".venv-perf-supersuit", "peer_supersuit.py", ONE_THREAD),
-    "rllib": Library(".venv-rllib", "peer_rllib.py", ONE_THREAD),
+    "train": Library(".venv", "trainings.py", ONE_THREAD),
+    "supersuit": Library(".venv-perf-supersuit", "trainings.py", ONE_THREAD),
+    "rllib": Library(".venv-rllib", "trainings.py", ONE_THREAD),
 }
 
 
@@ -127,37 +127,32 @@ class Process:
         self._process.kill()
 
 
-def measure(cell: Cell, before: list[Record], rounds: int, seconds: float) -> tuple[list[Record], dict[str, Any]]:
+def measure(cell: Cell, rounds: int, seconds: float) -> tuple[list[Record], dict[str, Any]]:
     """The cell's records, and versions by library."""
     records: list[Record] = []
     running: list[tuple[Record, Process]] = []
     about: dict[str, Any] = {}
-    whole = cell.kind == "trainings"
+    length, most = (0.0, math.inf) if cell.kind == "trainings" else (seconds, CASE_LIMIT_S)
     try:
         for name, (library, worlds) in cell.cases.items():
-            now = datetime.now(UTC).isoformat(timespec="seconds")
-            about_it = {"kind": cell.kind, "case": name, "library": library, "agents": cell.agents, "worlds": worlds}
-            record: Record = {**about_it, "date": now, "rates": []}
+            record: Record = {
+                "kind": cell.kind, "case": name, "library": library, "agents": cell.agents, "worlds": worlds,
+                "date": datetime.now(UTC).isoformat(timespec="seconds"), "rates": [], "spent_s": 0.0,
+            }  # fmt: skip
             records.append(record)
             with noted(record):
-                refuse_where_fewer_failed(record, before)
-                length = 0.0 if whole else seconds
                 process = Process(LIBRARIES[library], name, cell.agents, worlds, length, LIMIT_S)
                 running.append((record, process))
                 about[library] = process.built.pop("about")
                 record |= process.built
-                if record["first_s"] > CASE_LIMIT_S and not whole:
-                    record["rates"] = [record["first_rate"]]
-        spent = dict.fromkeys(cell.cases, 0.0)
+                if record["first_s"] > most:  # its only repeat
+                    record |= {"rates": [record["first_rate"]], "spent_s": record["first_s"]}
         for record, process in running * rounds:
-            if "failed" in record or (spent[record["case"]] or record["first_s"]) > (
-                math.inf if whole else CASE_LIMIT_S
-            ):
-                continue
             start = time.monotonic()
-            with noted(record):
-                record["rates"].append(process.repeat()["rate"])
-            spent[record["case"]] += time.monotonic() - start
+            if "failed" not in record and record["spent_s"] <= most:
+                with noted(record):
+                    record["rates"].append(process.repeat()["rate"])
+                record["spent_s"] += time.monotonic() - start
     finally:
         for _, process in running:
             process.stop()
@@ -171,13 +166,6 @@ def noted(record: Record) -> Iterator[None]:
         yield
     except CannotRun as reason:
         record["failed"] = str(reason)
-
-
-def refuse_where_fewer_failed(record: Record, before: list[Record]) -> None:
-    """Raise CannotRun where the same case has failed with fewer worlds."""
-    for old in before:
-        if key(old)[:3] == key(record)[:3] and old["worlds"] < record["worlds"] and "failed" in old:
-            raise CannotRun(f"not tried: {old['failed'].removeprefix('not tried: ')}")
 
 
 def key(record: Record) -> tuple[object, ...]:
@@ -221,7 +209,7 @@ def main() -> None:
     results |= {"rounds": given.rounds, "seconds": given.seconds, "load": round(os.getloadavg()[0], 2)}
     for cell in plan(given.training):
         asked = {n: at for n, at in cell.cases.items() if not given.only or {n, at[0], cell.kind} & {*given.only}}
-        records, about = measure(cell._replace(cases=asked), results["cases"], given.rounds, given.seconds)
+        records, about = measure(cell._replace(cases=asked), given.rounds, given.seconds)
         new = {key(record) for record in records}
         results["cases"] = [old for old in results["cases"] if key(old) not in new] + records
         results["libraries"] |= about

@@ -37,8 +37,7 @@ def vector_env(agents: int, worlds: int) -> Case:
     """``vector_env``: observations, rewards, endings, resets in the same step."""
     envs, actions = uuv_marl.vector_env(worlds, num_vehicles=agents), random_actions(agents, worlds)
     envs.reset(seed=0)
-    entries = envs.single_observation_space.shape[-1]
-    return repeated(lambda k: envs.step(actions[k % SETS]), agents * worlds, entries=entries)
+    return repeated(lambda k: envs.step(actions[k % SETS]), agents * worlds, entries=envs.swarm.layout.size)
 
 
 def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
@@ -48,7 +47,8 @@ def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
         env = uuv_marl.parallel_env(num_vehicles=agents, info_terms=info_terms)
         env.reset(seed=len(envs))
         envs.append(env)
-    actions = [dict(zip(env.possible_agents, one, strict=True)) for one in random_actions(agents, 1)[:, 0]]
+    names = envs[0].possible_agents
+    actions = [dict(zip(names, one, strict=True)) for one in random_actions(agents, 1)[:, 0]]
 
     def step(k: int) -> None:
         env = envs[k % len(envs)]
@@ -56,7 +56,7 @@ def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
             env.reset()
         env.step(actions[k % SETS])
 
-    return repeated(step, agents, entries=env.observation_space(env.possible_agents[0]).shape[0], built=len(envs))
+    return repeated(step, agents, entries=envs[0].swarm.layout.size, built=len(envs))
 
 
 def parallel_env_terms(agents: int, worlds: int) -> Case:
@@ -88,7 +88,7 @@ def bio_inspired(agents: int, worlds: int) -> Case:
 
 def ppo(agents: int, worlds: int) -> Case:
     """PPO of Stable-Baselines3 through ``SwarmVecEnv``, sampling and learning."""
-    from ppo import training  # noqa: PLC0415 - torch takes a while to import
+    from ppo import training
 
     return training(SwarmVecEnv(worlds, num_vehicles=agents))
 
@@ -100,9 +100,9 @@ def adapter(name: str) -> Maker:
         how: Any = {"num_vehicles": agents, "overrides": {"time_limit.extra_s": 1e6}}
         action: Any = np.zeros((worlds, agents, 2), np.float32)
         if name == "torchrl_idle":
-            import torch  # noqa: PLC0415 - takes a while
+            import torch
 
-            from uuv_marl.envs.torchrl import SwarmEnv  # noqa: PLC0415
+            from uuv_marl.envs.torchrl import SwarmEnv
 
             env: Any = SwarmEnv(worlds, seed=0, **how)
             data = env.reset().set(("uuv", "action"), torch.from_numpy(action))
@@ -143,7 +143,4 @@ CASES |= {name: adapter(name) for name in ("swarm_idle", "task_idle", "vector_en
 CASES |= {kind: ceiling(kind) for kind in KERNELS}
 
 if __name__ == "__main__":
-    serve(
-        {name: compiled(case) for name, case in CASES.items()},
-        ("uuv_marl", "numpy", "numba", "gymnasium", "pettingzoo", "stable_baselines3", "torch"),
-    )
+    serve({name: compiled(case) for name, case in CASES.items()})

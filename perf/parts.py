@@ -24,11 +24,14 @@ PARTS = {
 every sub-sector; hearing, echoes, percepts."""
 
 
+compiled: Any = numba.njit(error_model="numpy", **{"_nrt": False})  # as the package compiles
+
+
 def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> Any:
     """These parts of ``world.step_world``, compiled, over many worlds."""
 
-    @numba.njit(error_model="numpy", _nrt=False)
-    def run(num, action, state, course, facts, senses, plant, rules, suite, at, desk):  # type: ignore[no-untyped-def]
+    @compiled
+    def run(num, action, state, course, facts, senses, plant, rules, suite, at, desk):
         for w in range(num):
             motion.load(w, state.eta, state.nu, desk[0])
             if move:
@@ -47,8 +50,8 @@ def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> A
     return run
 
 
-@numba.njit(error_model="numpy", _nrt=False)
-def stepped(num, action, state, course, facts, senses, plant, rules, suite, at, desk):  # type: ignore[no-untyped-def]
+@compiled
+def stepped(num, action, state, course, facts, senses, plant, rules, suite, at, desk):
     """The whole step."""
     for w in range(num):
         world.step_world(w, action, state, course, facts, senses, plant, rules, suite, at, desk[0], desk[1], desk[2])
@@ -75,4 +78,4 @@ def part(name: str) -> Maker:
 CASES = {name: part(name) for name in (*PARTS, "part_stepped")}
 
 if __name__ == "__main__":
-    serve(CASES, ("uuv_marl", "numpy", "numba"))
+    serve(CASES)

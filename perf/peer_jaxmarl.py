@@ -25,13 +25,8 @@ def simple_spread(agents: int, worlds: int) -> Case:
         observation, state = jax.vmap(env.reset)(keys)
     actions = jax.random.randint(key, (SETS, agents, worlds), 0, 5)
     zeros, no = jnp.zeros(worlds), jnp.zeros(worlds, bool)
-    start = (
-        keys,
-        observation,
-        state,
-        dict.fromkeys(env.agents, zeros),
-        dict.fromkeys([*env.agents, "__all__"], no),
-    )
+    rewards, dones = dict.fromkeys(env.agents, zeros), dict.fromkeys([*env.agents, "__all__"], no)
+    start = keys, observation, state, rewards, dones
 
     def one(k: int, carry: Pytree) -> Pytree:
         keys, _, state, _, _ = carry
@@ -53,4 +48,4 @@ def simple_spread(agents: int, worlds: int) -> Case:
 
 
 if __name__ == "__main__":
-    serve({"jaxmarl": simple_spread}, ("jaxmarl", "jax", "jaxlib", "numpy"))
+    serve({"jaxmarl": simple_spread})

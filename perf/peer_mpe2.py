@@ -49,7 +49,4 @@ def ppo(agents: int, worlds: int) -> Case:
 
 
 if __name__ == "__main__":
-    serve(
-        {"mpe2": parallel_env, "mpe2_ppo": ppo},
-        ("mpe2", "pettingzoo", "gymnasium", "numpy", "stable_baselines3", "torch"),
-    )
+    serve({"mpe2": parallel_env, "mpe2_ppo": ppo})

@@ -75,4 +75,4 @@ def ppo(agents: int, worlds: int) -> Case:
 
 
 if __name__ == "__main__":
-    serve({"vmas": step, "vmas_ppo": ppo}, ("vmas", "torch", "numpy", "stable_baselines3"))
+    serve({"vmas": step, "vmas_ppo": ppo})

@@ -11,12 +11,17 @@ import resource
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import NamedTuple
 
 MEMORY_SHARE = 0.7
 """Of the machine's memory; with more, a case fails."""
+TOLD = (
+    "uuv_marl", "numpy", "numba", "gymnasium", "pettingzoo", "stable_baselines3", "torch", "mpe2", "vmas", "jaxmarl",
+    "jax", "jaxlib", "supersuit", "ray",
+)  # fmt: skip
+"""Libraries whose versions a case tells if it has imported them."""
 
 
 class Case(NamedTuple):
@@ -60,7 +65,7 @@ def units_within(case: Case, seconds: float) -> int:
     return max(1, round(units * seconds / spent))
 
 
-def serve(makers: Mapping[str, Maker], libraries: Sequence[str]) -> None:
+def serve(makers: Mapping[str, Maker]) -> None:
     """Build and time; an answer is a JSON object on a line. A process that can't ends, the reason its last words."""
     name, (agents, worlds), (seconds, limit) = sys.argv[1], map(int, sys.argv[2:4]), map(float, sys.argv[4:])
     most = int(MEMORY_SHARE * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
@@ -70,7 +75,8 @@ def serve(makers: Mapping[str, Maker], libraries: Sequence[str]) -> None:
     case = makers[name](agents, worlds)
     build_s, first_s = time.perf_counter() - start, seconds_of(case, 1)
     units = units_within(case, seconds) if first_s < limit / 50 and seconds else 1
-    about = {"python": platform.python_version(), "versions": {library: version(library) for library in libraries}}
+    versions = {library: version(library) for library in TOLD if library in sys.modules}
+    about = {"python": platform.python_version(), "versions": versions}
     say(about=about, build_s=build_s, first_s=first_s, first_rate=case.amount / first_s, facts=dict(case.facts))
     for _ in sys.stdin:
         signal.setitimer(signal.ITIMER_REAL, limit)
