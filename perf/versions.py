@@ -41,20 +41,22 @@ def variables(checkout: Path, **more: str) -> dict[str, str]:
 def printed(variables: dict[str, str], *arguments: str) -> str:
     """What this interpreter prints."""
     command = [sys.executable, *arguments]
-    return subprocess.run(command, env={**os.environ, **variables}, stdout=-1, text=True, check=True).stdout  # noqa: S603
+    return subprocess.run(
+        command, env={**os.environ, **variables}, stdout=subprocess.PIPE, text=True, check=True
+    ).stdout  # noqa: S603
 
 
 def same_runs(other: Path, only: list[str]) -> bool:
-    """Print how many hashes of each kind differ; whether none does."""
+    """Print which hashes of the other version differ here; whether none does. What is new here doesn't count."""
     texts = (printed(variables(path), str(HERE / "runs.py"), str(other), *only) for path in (other, ROOT))
     before, now = ({(kind, name): found for kind, name, found in map(json.loads, text.splitlines())} for text in texts)
-    bad = [key for key in {**before, **now} if before.get(key) != now.get(key) or "failed" in now[key]]
+    bad = [key for key, found in before.items() if now.get(key) != found or "failed" in found]
     print("| runs | hashes | that differ |\n| --- | --- | --- |")
     for kind in dict.fromkeys(kind for kind, _ in before):
         count = sum(len(found.split()) for key, found in before.items() if key[0] == kind)
         print(f"| {kind} | {count} | {', '.join(name for k, name in bad if k == kind) or 'none'} |")
     for key in bad:
-        print(f"{' '.join(key)}: {before.get(key)} before, {now.get(key)} now", file=sys.stderr)
+        print(f"{' '.join(key)}: {before[key]} before, {now.get(key)} now", file=sys.stderr)
     return bool(before) and not bad
 
 
