@@ -40,10 +40,8 @@ def variables(checkout: Path, **more: str) -> dict[str, str]:
 
 def printed(variables: dict[str, str], *arguments: str) -> str:
     """What this interpreter prints."""
-    command = [sys.executable, *arguments]
-    return subprocess.run(
-        command, env={**os.environ, **variables}, stdout=subprocess.PIPE, text=True, check=True
-    ).stdout  # noqa: S603
+    command, environment = [sys.executable, *arguments], {**os.environ, **variables}
+    return subprocess.check_output(command, env=environment, text=True)  # noqa: S603
 
 
 def same_runs(other: Path, only: list[str]) -> bool:
