@@ -104,9 +104,12 @@ def test_the_floor_counts_what_a_step_must_do(perf):
     assert floor.least_seconds(5, 2, (10.0, 40.0, 80.0, 1e9)) == pytest.approx(2 * (10 / 10 + 20 / 40 + 40 / 80))
 
 
-def test_every_part_of_a_step_runs(perf):
-    for case in perf("parts").CASES.values():
-        case(3, 2).run(1)
+def test_the_parts_of_a_step_run(perf, monkeypatch):
+    parts = perf("parts")
+    assert {*parts.CASES} == {*perf("compare").PARTS}
+    monkeypatch.setitem(parts.PARTS, "all", (True,) * 5)  # compiled once
+    for name in ("all", "part_stepped"):
+        parts.part(name)(3, 2).run(1)
 
 
 def test_a_comparison_measures_what_it_can_and_says_why_the_rest_cannot_run(perf, tmp_path, monkeypatch):
