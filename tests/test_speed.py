@@ -133,7 +133,7 @@ def test_a_comparison_measures_what_it_can_and_says_why_the_rest_cannot_run(perf
     records, about = compare.measure(cell, 2, 0.01)
     found = {record["case"]: record for record in records}
     assert len(found["toy"]["rates"]) == 2
-    assert 600 < found["toy"]["rates"][0] < 6000
+    assert max(found["toy"]["rates"]) < 6000
     assert found["toy"]["facts"] == {"entries": 3}
     assert len(found["core"]["rates"]) == 2
     assert about["ours"]["versions"]["uuv_marl"]
