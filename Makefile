@@ -25,6 +25,7 @@ help:
 	@echo "make dist                           source distribution and wheel in dist/"
 	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS and JaxMARL, about 15 minutes: docs/speed.md"
 	@echo "make perf-training                  training beside SuperSuit and RLlib, and its profile: perf/training.md"
+	@echo "make versions OTHER=path            is another checkout the same, bit for bit, and as fast?"
 	@echo "make clean                          remove .venv and .venv-*"
 
 benchmark: .venv/base.stamp
@@ -78,7 +79,12 @@ perf: .venv/dev.stamp $(foreach name,$(PEERS),.venv-$(name)/$(name).stamp)
 	$(BIN)/python perf/report.py
 
 perf-training: .venv/dev.stamp .venv-perf-supersuit/perf-supersuit.stamp .venv-rllib/rllib.stamp
-	$(BIN)/python perf/training.py $(ARGS)
+	$(BIN)/python perf/compare.py --training $(ARGS)
+	$(BIN)/python perf/report.py
+
+.PHONY: versions
+versions: .venv/dev.stamp
+	$(BIN)/python perf/versions.py $(OTHER) $(ARGS)
 
 ENVIRONMENTS := light lowest benchmarl rllib perf-supersuit $(PEERS)
 STAMPS := .venv/base.stamp .venv/dev.stamp $(foreach name,$(ENVIRONMENTS),.venv-$(name)/$(name).stamp)
