@@ -210,8 +210,8 @@ def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
         ResultsError: the file is missing or broken.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultsError(f"{path} can't be read ({error}); delete it, and the same command makes it again") from error
 
