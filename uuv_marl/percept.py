@@ -57,6 +57,7 @@ class Offsets(NamedTuple):
     link_velocity: int
 
 
+@functools.cache
 def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = ()) -> tuple[PerceptField, ...]:
     """The fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
     position = ("m", _POSITION_SCALE_M, -MAX_RANGE_M, MAX_RANGE_M)

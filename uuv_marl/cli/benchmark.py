@@ -53,7 +53,6 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.atomic import locked
         from uuv_marl.baselines import PolicyError
         from uuv_marl.baselines.registry import policy_class
         from uuv_marl.benchmark import runner
@@ -75,17 +74,17 @@ def benchmark(
             policy_class(name)
         evaluator, cluster = _where(ray, policies)
         wanted = range(seeds)
-        with locked(output):
+        with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
-            with cluster, working(f"The finished runs are in {output}") as bar:
-                tasks: dict[tuple[str, str], TaskID] = {}
+            tasks: dict[tuple[str, str], TaskID] = {}
 
-                def report(name: str, policy_name: str, share: float) -> None:
-                    key = (name, policy_name)
-                    if key not in tasks:
-                        tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
-                    bar.update(tasks[key], completed=share)
+            def report(name: str, policy_name: str, share: float) -> None:
+                key = (name, policy_name)
+                if key not in tasks:
+                    tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
+                bar.update(tasks[key], completed=share)
 
+            with cluster:
                 runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
             shown = runner.policies_in(results, scenarios, wanted)
             tables = runner.make_tables(results, scenarios, shown, wanted)
@@ -124,7 +123,6 @@ def tune(
     none that you do not trust.
     """
     with explained():
-        from uuv_marl.atomic import locked
         from uuv_marl.baselines import PolicyError
         from uuv_marl.benchmark.tuning import SPACES
         from uuv_marl.benchmark.tuning import tune as search
@@ -132,7 +130,7 @@ def tune(
         for name in policy or SPACES:
             if name not in SPACES:
                 raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
-        with extra("tune", "tuning"), locked(output), working(f"The finished trials are in {output}") as bar:
+        with extra("tune", "tuning"), working(f"The finished trials are in {output}", alone=output) as bar:
             for name in policy or SPACES:
                 task = bar.add_task(name, total=trials)
                 path = search(

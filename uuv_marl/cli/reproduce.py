@@ -27,10 +27,9 @@ def reproduce(
     Example: uuv-marl reproduce --only figure-11 --only table-2 --seeds 5
     """
     with explained():
-        from uuv_marl.atomic import locked
         from uuv_marl.reproduce.job import reproduce as run
 
-        with locked(output), working(f"The finished runs are in {output}") as bar:
+        with working(f"The finished runs are in {output}", alone=output) as bar:
             task = bar.add_task("reproduce", total=1.0)
             written = run(
                 output, seeds, only or [],
@@ -52,9 +51,7 @@ def identify(
     you do not trust.
     """
     with explained():
-        from uuv_marl.atomic import locked
-
-        with extra("tune", "identification"), locked(output), working(f"The finished trials are in {output}") as bar:
+        with extra("tune", "identification"), working(f"The finished trials are in {output}", alone=output) as bar:
             from uuv_marl.reproduce.identify import identify as search
 
             task = bar.add_task("identify", total=trials)
