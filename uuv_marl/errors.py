@@ -9,9 +9,17 @@ class PolicyError(ValueError):
     """A policy that can't drive this scenario; the message names the remedy."""
 
 
+class DivergenceError(RuntimeError):
+    """The integration step is too long for the vehicle, so that its speed ran away."""
+
+
 class ResultsError(RuntimeError):
-    """A folder that can't take these results."""
+    """A file or folder that can't be written, or that can't take these results."""
 
 
 class ClusterError(RuntimeError):
     """A cluster that can't do the work; the message says what to do."""
+
+
+class MissingExtraError(ModuleNotFoundError):
+    """A library is missing that one of the package's extras would install; the message says how."""

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from uuv_marl.baselines.learned import Layer
 from uuv_marl.scenario import Scenario
-from uuv_marl.train.fleet import Fleet, Moment
+from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
 from uuv_marl.train.shaping import Weights
 
 Float32 = NDArray[np.float32]
@@ -291,7 +291,7 @@ class Mappo:
     ) -> None:
         self._by = by
         self._rng = np.random.default_rng(seed)
-        self.fleet = Fleet(scenario, sizes, weights, self._rng)
+        self.fleet = Fleet(scenario, sizes, weights, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
         self.learner = Learner(self.fleet.features, self.fleet.size, by, self._rng)
         self.agent_steps = by.horizon * self.fleet.rows
         """Of an iteration."""
