@@ -114,14 +114,15 @@ class SwarmVecEnv(TaskBased, VecEnv):
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that later steps depend on, random streams too, copied, for ``restore``."""
-        kept = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
-        return kept | self.swarm.snapshot()
+        own = {"returns": self._returns, "lengths": self._lengths, "episode_collisions": self._task.collisions}
+        return {name: array.copy() for name, array in own.items()} | self.swarm.snapshot()
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Float32:
         """Go on from a snapshot of an environment made alike; the observations of all rows."""
         self._task.reset()  # ready, and no world at its end: those are reset in the step in which they end
         self.swarm.restore(snapshot)
         self._returns[...], self._lengths[...] = snapshot["returns"], snapshot["lengths"]
+        self._task.collisions[...] = snapshot.get("episode_collisions", 0)  # version 0.1.0 kept none
         return self.swarm.percept.to_observation().reshape(self.num_envs, -1)
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
