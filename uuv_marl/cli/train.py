@@ -84,13 +84,11 @@ def train_ppo(
 
 def _train(output: Path, resume: bool, *, steps: int, start: Path | None, **settings: Any) -> None:
     """Train with these settings, and show how it goes."""
-    from uuv_marl.sim.compiled import announce_compilation
     from uuv_marl.train.training import Settings, train
 
     settings["start"] = None if start is None else str(start)
     records = train(output, Settings(steps=steps, **settings), resume=resume)
     last, validated = "no iteration was needed: --steps are done already", ""
-    announce_compilation()
     try:
         with progress_bar() as bar:
             task = bar.add_task("starting", total=steps)
@@ -136,12 +134,9 @@ def train_rllib(
         with extra("distributed", "training with RLlib"):
             from uuv_marl.train.rllib import Settings, train
 
-        from uuv_marl.sim.compiled import announce_compilation
-
         settings = Settings(scenario=scenario, num_vehicles=num_vehicles, seed=seed)
         records = train(output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume)
         last = "no iteration was needed: --steps are done already"
-        announce_compilation()
         console.print("Starting Ray takes about 15 s.")
         try:
             with progress_bar() as bar:

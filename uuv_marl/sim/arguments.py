@@ -69,5 +69,7 @@ def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArr
         raise ValueError(f"{whose} must hold real numbers, got {found}{reason}")
     if given.shape != shape:
         raise ValueError(f"{whose} must have shape {shape}, got {given.shape}")
+    if given.dtype == np.float32:
+        return given
     with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused as such
         return np.asarray(given, np.float32)

@@ -13,7 +13,6 @@ from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario, growth
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
-from uuv_marl.sim.compiled import announce_compilation
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.sonar import suite
@@ -60,7 +59,6 @@ class Swarm:
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.num_worlds = num_worlds = whole_number("num_worlds", num_worlds, 1)
-        announce_compilation()
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
