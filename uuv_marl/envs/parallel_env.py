@@ -33,7 +33,6 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
         "name": "uuv_swarm_v0",
         "render_modes": ["human", "rgb_array"],
         "is_parallelizable": True,
-        "render_fps": 10,
     }
 
     def __init__(self, task: Task, render_mode: str | None = None, info_terms: bool = False) -> None:
@@ -104,24 +103,17 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
             self.agents = [agent for agent, goes in zip(acted, going.tolist(), strict=True) if goes]
             self._rows = np.array([self._index[agent] for agent in self.agents], np.int64)
         self._view.update(self.swarm)
-        return (
-            dict(zip(acted, outcome.observation[0, rows], strict=True)),
-            dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True)),
-            dict(zip(acted, outcome.terminated[0, rows].tolist(), strict=True)),
-            dict(zip(acted, outcome.truncated[0, rows].tolist(), strict=True)),
-            infos,
-        )
+        observations = dict(zip(acted, outcome.observation[0, rows], strict=True))
+        rewards = dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True))
+        flags = (outcome.terminated, outcome.truncated)
+        terminated, truncated = (dict(zip(acted, flag[0, rows].tolist(), strict=True)) for flag in flags)
+        return observations, rewards, terminated, truncated, infos
 
     def _infos(self, outcome: Outcome, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
         if not self._info_terms:
             return {agent: {} for agent in agents}
-        if not outcome.terms:
-            return {agent: {"reward_terms": {}} for agent in agents}
-        terms = np.stack([term[0, rows] for term in outcome.terms.values()], axis=1).tolist()
-        return {
-            agent: {"reward_terms": dict(zip(outcome.terms, values, strict=True))}
-            for agent, values in zip(agents, terms, strict=True)
-        }
+        terms = {name: term[0, rows].tolist() for name, term in outcome.terms.items()}
+        return {agent: {"reward_terms": {name: of[k] for name, of in terms.items()}} for k, agent in enumerate(agents)}
 
     def _action_array(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
         array = np.zeros((1, len(self.possible_agents), 2), np.float32)
@@ -182,13 +174,9 @@ def parallel_env(
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
     """
     task = make_task(
-        scenario,
-        max_cycles=max_cycles,
-        reward=reward,
-        num_vehicles=num_vehicles,
-        decision_period=decision_period,
+        scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
         overrides=overrides,
-    )
+    )  # fmt: skip
     return SwarmParallelEnv(task, render_mode, info_terms)
 
 

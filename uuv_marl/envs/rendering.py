@@ -44,16 +44,14 @@ class Canvas:
         if not self._to_window:
             self._paint(swarm, world)
             return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))
-        if self._window is None:
-            return None
-        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+        if self._window is not None and any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
             warnings.warn("the window was closed; the run goes on without it", stacklevel=2)
-            return None
-        self._paint(swarm, world)
-        self._window.blit(self._surface, (0, 0))
-        pygame.display.flip()
-        self._clock.tick(self._fps)
+        if self._window is not None:
+            self._paint(swarm, world)
+            self._window.blit(self._surface, (0, 0))
+            pygame.display.flip()
+            self._clock.tick(self._fps)
         return None
 
     def close(self) -> None:
@@ -97,18 +95,17 @@ class Canvas:
 
 def _open_window() -> pygame.Surface:
     """A window. Raises RuntimeError where nobody could see it: SDL then draws into memory without a word."""
-    chosen = any(os.environ.get(name) for name in ("SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER"))
+    chosen = os.environ.get("SDL_VIDEODRIVER") or os.environ.get("SDL_VIDEO_DRIVER")
     try:
         pygame.display.init()
-        if chosen or pygame.display.get_driver() not in ("dummy", "offscreen"):
-            window = pygame.display.set_mode((SIZE_PX, SIZE_PX))
-            pygame.display.set_caption("uuv_marl")
-            return window
-        reason = ""
-    except pygame.error as error:
-        reason = f" ({error})"
-    pygame.display.quit()
-    raise RuntimeError(
-        f"render_mode='human' found no display for its window{reason}; use render_mode='rgb_array', which needs none, "
-        "or set the environment variable SDL_VIDEODRIVER=dummy to draw into nothing"
-    )
+        unseen = not chosen and pygame.display.get_driver() in ("dummy", "offscreen")
+    except pygame.error:
+        unseen = True
+    if unseen:
+        pygame.display.quit()
+        raise RuntimeError(
+            "render_mode='human' found no display for its window; use render_mode='rgb_array', which needs none, or "
+            "set the environment variable SDL_VIDEODRIVER=dummy to draw into nothing"
+        )
+    pygame.display.set_caption("uuv_marl")
+    return pygame.display.set_mode((SIZE_PX, SIZE_PX))

@@ -143,11 +143,7 @@ class SwarmVecEnv(TaskBased, VecEnv):
         raise NotImplementedError(f"rows are vehicles of shared worlds; set {attr_name!r} when you make SwarmVecEnv")
 
     def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: Indices = None,
-        **method_kwargs: Any,
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
     ) -> list[Any]:
         """Not possible: a row has no environment of its own."""
         raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of SwarmVecEnv's swarm")

@@ -1,6 +1,6 @@
 """``vector_env``: many worlds as a Gymnasium vector environment, a row per world."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Unpack
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, ScenarioLike, Task, TaskOptions, make_task
 from uuv_marl.envs.view import TaskBased
-from uuv_marl.sim.arguments import whole_number
+from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
 
 Infos = dict[str, Any]
 
@@ -39,7 +39,6 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         "name": "uuv_swarm_v0",
         "autoreset_mode": AutoresetMode.SAME_STEP,
         "render_modes": ["rgb_array"],
-        "render_fps": 10,
     }
 
     def __init__(
@@ -62,12 +61,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.state_space = Box(task.state_layout.low, task.state_layout.high)
 
-    def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
-    ) -> tuple[Float32, Infos]:
+    def reset(self, *, seed: SeedLike = None, options: dict[str, Any] | None = None) -> tuple[Float32, Infos]:
         """Start episodes.
 
         Args:
@@ -77,13 +71,10 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         """
         mask = self._mask(options)
         worlds = np.flatnonzero(mask).tolist()
-        if seed is None or isinstance(seed, int | np.integer):
-            observation = self._task.reset(seed, worlds)
-            super().reset(seed=None if seed is None else int(seed))
-        elif len(seed) != self.num_envs:
-            raise ValueError(f"seed must hold one seed for each of {self.num_envs} worlds, got {len(seed)}")
-        else:
-            observation = self._task.reset([seed[world] for world in worlds], worlds)
+        seeds = world_seeds(seed, range(self.num_envs))
+        observation = self._task.reset([seeds[world] for world in worlds], worlds)
+        if isinstance(seed, int | np.integer):
+            super().reset(seed=int(seed))
         self._due = self._due & ~mask
         return observation, _masked({"agent_mask": self.swarm.state.alive.copy()}, mask)
 
