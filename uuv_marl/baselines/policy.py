@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.swarm import Seeds, world_seeds
 from uuv_marl.sim.vehicle import project
 
 Float32 = NDArray[np.float32]
@@ -81,10 +81,10 @@ class Policy(abc.ABC):
         """Worlds whose actions count, shape (world,), all unless a caller says otherwise; ``act`` may leave the others'
         zero, to save time."""
 
-    def reset(self, seed: Seeds = 0, worlds: Sequence[int] | None = None) -> None:
+    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Forget the past of these worlds (default all); world w draws from ``seed + w``, or one seed for each."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
-        seeds = [0 if own is None else own for own in world_seeds(seed, chosen)]
+        seeds = [own or 0 for own in world_seeds(seed, chosen)]
         self.clamps[chosen] = 0
         self.forget(chosen, seeds)
 
