@@ -4,15 +4,15 @@ import abc
 import json
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import world_seeds
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.swarm import world_seeds
 from uuv_marl.sim.vehicle import project
 
 Float32 = NDArray[np.float32]
@@ -87,7 +87,7 @@ class Policy(abc.ABC):
     def reset(self, seed: int | Sequence[int] | NDArray[np.integer] = 0, worlds: Sequence[int] | None = None) -> None:
         """Forget the past of these worlds (default all); seeds as in ``Swarm.reset``."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
-        seeds = world_seeds(seed, chosen)
+        seeds = cast(list[int], world_seeds(seed, chosen))
         self.clamps[chosen] = 0
         self.forget(chosen, seeds)
 

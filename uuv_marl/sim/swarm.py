@@ -1,6 +1,5 @@
 """Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
 
-import operator
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
@@ -8,10 +7,11 @@ from typing import Any, cast
 import numpy as np
 from numba import config, get_num_threads
 from numba.np.ufunc.parallel import threading_layer
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario, growth
+from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
@@ -58,9 +58,7 @@ class Swarm:
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
-        self.num_worlds = operator.index(num_worlds)
-        if num_worlds < 1:
-            raise ValueError(f"num_worlds must be at least 1, got {num_worlds}")
+        self.num_worlds = num_worlds = whole_number("num_worlds", num_worlds, 1)
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
@@ -154,21 +152,18 @@ class Swarm:
         """Worlds at or past their time limit, shape (world,)."""
         return self.facts.time_s >= self.time_limit_s - 1e-9
 
-    def reset(
-        self, seed: int | Sequence[int] | NDArray[np.integer] | None = None, worlds: Sequence[int] | None = None
-    ) -> Percept:
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> Percept:
         """Start worlds anew.
 
         Args:
-            seed: world w starts from ``seed + w``; or one seed for each of ``worlds``; without a seed each world's
+            seed: world w starts from ``seed + w``; or a seed, or None, for each of ``worlds``; without a seed a world's
                 own stream goes on, from fresh entropy where it has none.
             worlds: which ones, default all.
         """
         chosen = range(self.num_worlds) if worlds is None else worlds
-        seeds = [] if seed is None else world_seeds(seed, chosen)
-        for k, w in enumerate(chosen):
-            if seed is not None:
-                self._rngs[w] = np.random.default_rng(seeds[k])
+        for w, start in zip(chosen, world_seeds(seed, chosen), strict=True):
+            if start is not None:
+                self._rngs[w] = np.random.default_rng(start)
             self._reset_world(w, self._rngs[w] or np.random.default_rng())
         return self.percept
 
@@ -222,17 +217,15 @@ class Swarm:
             **{k: array for group in groups for k, array in group._asdict().items()},
         }
 
-    def step(self, action: Float32, active: NDArray[np.bool_] | None = None) -> Percept:
+    def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:
         """Advance by one decision period.
 
         Args:
-            action: shares of full surge force and yaw torque, float32, shape (world, vehicle, 2); projected onto the
-                unit disc. Entries of lost vehicles are ignored.
+            action: shares of full surge force and yaw torque, shape (world, vehicle, 2), rounded to float32 and
+                projected onto the unit disc. Entries of lost vehicles are ignored.
             active: worlds to step, shape (world,); the others stay as they are. Default all.
         """
-        expected = (self.num_worlds, self.num_vehicles, 2)
-        if action.shape != expected or action.dtype != np.float32:
-            raise ValueError(f"action must be float32 of shape {expected}, got {action.dtype} of shape {action.shape}")
+        action = action_array(action, (self.num_worlds, self.num_vehicles, 2), "action")
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
             w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
@@ -254,16 +247,6 @@ class Swarm:
             running = np.ones(self.num_worlds, np.bool_) if active is None else active
             step_worlds(min(get_num_threads(), len(self._scratch.reals)), running, *arrays)
         return self.percept
-
-
-def world_seeds(seed: int | Sequence[int] | NDArray[np.integer], worlds: Sequence[int]) -> list[int]:
-    """A seed for each of these worlds: ``seed + w``, or the given ones."""
-    if np.ndim(seed) == 0:
-        return [int(cast(int, seed)) + w for w in worlds]
-    seeds = [int(value) for value in cast(Sequence[int], seed)]
-    if len(seeds) != len(worlds):
-        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
-    return seeds
 
 
 def _rules(scenario: Scenario) -> Rules:

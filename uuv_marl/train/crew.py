@@ -34,7 +34,7 @@ class Crew(VecEnv):
 
     def __init__(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], reward: RewardFunction) -> None:
         self._reward = reward
-        self._envs = [SwarmVecEnv(worlds, scenario, n, reward=self._pay) for n, worlds in sizes]
+        self._envs = [SwarmVecEnv(worlds, scenario, num_vehicles=n, reward=self._pay) for n, worlds in sizes]
         self._eyes = Eyes(scenario, BARRIER)
         self._ends = np.cumsum([env.num_envs for env in self._envs])
         rows = int(self._ends[-1])
