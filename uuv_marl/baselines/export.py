@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
-from uuv_marl.baselines.learned import MOST_BARRIER, Learned
+from uuv_marl.baselines.learned import MOST_BARRIER, Learned, Trained
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.registry import granted, policy_class
 from uuv_marl.percept import PerceptLayout
@@ -112,10 +112,10 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
         path: the file.
 
     Raises:
-        PolicyError: the policy is no network, or was trained on another percept than the scenario has.
+        PolicyError: the policy is no network, or was trained on another percept or vehicle than the scenario has.
     """
     kind = policy_class(policy)
-    if not issubclass(kind, Learned):
+    if not isinstance(kind, Trained):
         raise PolicyError(
             f"policy {policy!r} is no network, so ONNX has no form for it; give a learned policy, such as the folder "
             "best of a training (uuv-marl train mappo)"

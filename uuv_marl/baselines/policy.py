@@ -60,7 +60,7 @@ class Policy(abc.ABC):
     """Inner loop that the policy was designed with [N m s]."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
-        name = type(self).__name__
+        name = getattr(self, "name", type(self).__name__)
         missing = [channel for channel in self.channels if channel not in scenario.sonar.channels]
         needs: list[str] = []
         if missing:

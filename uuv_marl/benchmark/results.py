@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl import __version__
-from uuv_marl.baselines.learned import Learned
+from uuv_marl.baselines.learned import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
@@ -156,7 +156,7 @@ class Results:
 def knowledge(policy: str) -> dict[str, Any]:
     """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
     made = policy_class(policy)
-    if issubclass(made, Learned):
+    if isinstance(made, Trained):
         source = made.checkpoint.digest
     else:
         file = inspect.getsourcefile(made) if ":" in policy else None
