@@ -7,7 +7,6 @@ trained on. Loading it executes nothing.
 import functools
 import hashlib
 import json
-import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -237,9 +236,7 @@ class Trained:
 
     def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned:
         """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
-        return Learned(
-            scenario, num_worlds, checkpoint=self.checkpoint, name=self.name, any_vehicle=any_vehicle
-        )
+        return Learned(scenario, num_worlds, checkpoint=self.checkpoint, name=self.name, any_vehicle=any_vehicle)
 
 
 def shipped(name: str, doc: str) -> Trained:

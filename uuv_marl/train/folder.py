@@ -91,8 +91,8 @@ class TrainingFolder(Generic[R]):
             before, self._sessions = dict(config["settings"]), list(config["sessions"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultsError(
-                f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an empty "
-                "--output"
+                f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
+                "empty --output"
             ) from None
         other = _differences(before, self._settings)
         if other:
