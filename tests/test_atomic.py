@@ -8,8 +8,9 @@ import sys
 
 import pytest
 
-from uuv_marl.atomic import OutputError, locked, replacing, write_text
-from uuv_marl.extras import MissingExtraError, extra
+from uuv_marl.atomic import locked, replacing, write_text
+from uuv_marl.errors import MissingExtraError, ResultsError
+from uuv_marl.extras import extra
 
 
 def test_a_file_is_written_whole(tmp_path):
@@ -30,7 +31,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path, error):
             partial.write_text("half")
             raise error
 
-    with pytest.raises((KeyboardInterrupt, ValueError, OutputError)) as caught:
+    with pytest.raises((KeyboardInterrupt, ValueError, ResultsError)) as caught:
         fail()
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["results.json"]
@@ -43,7 +44,7 @@ def test_a_folder_belongs_to_one_block(tmp_path):
     folder = tmp_path / "new" / "folder"
     with locked(folder):
         message = rf"{folder} is in use by process {os.getpid()} on .* since "
-        with pytest.raises(OutputError, match=message), locked(folder):
+        with pytest.raises(ResultsError, match=message), locked(folder):
             pass
         with locked(tmp_path / "other"):
             pass
@@ -64,7 +65,7 @@ def test_a_dead_process_frees_its_folder(tmp_path):
     process.start()
     try:
         assert held.wait(60)
-        with pytest.raises(OutputError, match=f"process {process.pid} on"), locked(tmp_path):
+        with pytest.raises(ResultsError, match=f"process {process.pid} on"), locked(tmp_path):
             pass
     finally:
         process.kill()
@@ -76,7 +77,7 @@ def test_a_dead_process_frees_its_folder(tmp_path):
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
-        with pytest.raises(OutputError, match=rf"{folder} can't be written.*--output"), locked(folder):
+        with pytest.raises(ResultsError, match=rf"{folder} can't be written.*--output"), locked(folder):
             pass
 
 

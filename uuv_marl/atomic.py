@@ -9,20 +9,18 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from uuv_marl.errors import ResultsError
+
 _LOCK, _OWNER = ".lock", ".owner"
-
-
-class OutputError(RuntimeError):
-    """A file or folder that can't be written; the message names it and says what to do."""
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block (a full disk, missing rights) into an OutputError that names ``path``."""
+    """Turn an OSError of the block (a full disk, missing rights) into an ResultsError that names ``path``."""
     try:
         yield
     except OSError as error:
-        raise OutputError(
+        raise ResultsError(
             f"{path} can't be written ({error.strerror or error}). What was finished before is safe; make room there, "
             "permit writing or give another --output, and go on"
         ) from error
@@ -36,7 +34,7 @@ def replacing(path: Path) -> Iterator[Path]:
     folder, which must exist, and has the same suffix.
 
     Raises:
-        OutputError: it can't be written.
+        ResultsError: it can't be written.
     """
     partial = path.with_name(f"{path.stem}.partial{path.suffix}")
     with writing(path):
@@ -50,7 +48,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole or not at all; line ends stay as they are. Raises OutputError."""
+    """Write a text file in UTF-8, whole or not at all; line ends stay as they are. Raises ResultsError."""
     with replacing(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
 
@@ -67,7 +65,7 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
         wait_s: how long to wait for another's block to end [s].
 
     Raises:
-        OutputError: another block has the folder, in this process or another, or it can't be written.
+        ResultsError: another block has the folder, in this process or another, or it can't be written.
     """
     lock, owner = FileLock(folder / _LOCK), folder / _OWNER
     with writing(folder):
@@ -76,7 +74,7 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
             lock.acquire(timeout=wait_s)
         except Timeout:
             by = owner.read_text(encoding="utf-8") if owner.exists() else "another command"
-            raise OutputError(
+            raise ResultsError(
                 f"{folder} is in use by {by}; wait until it has ended, or give another --output"
             ) from None
     try:

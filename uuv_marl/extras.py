@@ -3,9 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-
-class MissingExtraError(ModuleNotFoundError):
-    """A library is missing that one of the package's extras would install; the message says how."""
+from uuv_marl.errors import MissingExtraError
 
 
 @contextmanager

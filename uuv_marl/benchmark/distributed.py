@@ -10,7 +10,7 @@ from typing import Any
 
 from uuv_marl.benchmark.evaluate import BATCH, Run, evaluate
 from uuv_marl.benchmark.results import source_fingerprint
-from uuv_marl.benchmark.runner import ClusterError
+from uuv_marl.errors import ClusterError
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 

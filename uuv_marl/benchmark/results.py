@@ -19,16 +19,13 @@ from uuv_marl.baselines.learned import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario
 
 SCHEMA = 1
 _PACKAGE = Path(__file__).resolve().parent.parent
 _SOURCES = ("percept.py", "scenario*.py", "sim/*.py", "baselines/*.py", "baselines/tuned/*.json", "benchmark/*.py")
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
-
-
-class ResultsError(RuntimeError):
-    """A folder that can't take these results."""
 
 
 class Row(NamedTuple):

@@ -22,10 +22,6 @@ Evaluate = Callable[[Scenario, str, Sequence[int]], Iterator[Run | Progress]]
 """Runs a policy on a scenario over seeds: here as ``evaluate``, or elsewhere with the same runs."""
 
 
-class ClusterError(RuntimeError):
-    """A cluster that can't do the work; the message says what to do."""
-
-
 def run_missing(
     results: Results,
     scenarios: Sequence[Scenario],

@@ -9,6 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from uuv_marl.errors import ClusterError, PolicyError, ResultsError, ScenarioError
+
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
 errors = Console(stderr=True)
@@ -17,11 +19,6 @@ errors = Console(stderr=True)
 @contextmanager
 def explained() -> Iterator[None]:
     """Turn what a user can mend into one message, without a traceback."""
-    from uuv_marl.baselines import PolicyError
-    from uuv_marl.benchmark.results import ResultsError
-    from uuv_marl.benchmark.runner import ClusterError
-    from uuv_marl.scenario_files import ScenarioError
-
     try:
         yield
     except (ScenarioError, PolicyError, ResultsError, ClusterError) as error:
@@ -32,8 +29,6 @@ def explained() -> Iterator[None]:
 @contextmanager
 def extra(name: str, what: str) -> Iterator[None]:
     """Say which extra to install where a library is missing."""
-    from uuv_marl.baselines import PolicyError
-
     try:
         yield
     except ModuleNotFoundError as error:

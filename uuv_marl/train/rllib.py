@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from uuv_marl.benchmark.distributed import connected
-from uuv_marl.benchmark.runner import ClusterError
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
