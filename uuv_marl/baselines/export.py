@@ -117,7 +117,7 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
 
     Raises:
         PolicyError: the policy is no network, or was trained on another percept or vehicle than the scenario has.
-        OutputError: the file can't be written.
+        ResultsError: the file can't be written.
     """
     kind = policy_class(policy)
     if not isinstance(kind, Trained):

@@ -10,7 +10,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
 import pydantic
@@ -55,10 +55,10 @@ def vehicle_of(scenario: Scenario) -> dict[str, float]:
     return {field: value for field, value in numbers.items() if field != "actuators.yaw_damping_nms"}
 
 
-def _all_gains(gains: object) -> object:
-    if isinstance(gains, list) and len(gains) != len(Gains._fields):  # pyright: ignore[reportUnknownArgumentType]
+def _all_gains(gains: Any) -> Any:
+    if isinstance(gains, list) and len(cast(list[Any], gains)) != len(Gains._fields):
         raise ValueError(f"must hold {', '.join(Gains._fields)}, got {gains}")
-    return gains
+    return cast(Any, gains)
 
 
 class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):

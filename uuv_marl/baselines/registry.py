@@ -3,7 +3,7 @@
 import difflib
 import importlib
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, overload
 
@@ -128,7 +128,7 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
     Raises:
         PolicyError: unknown name or parameter, or the target lacks what the policy declares (see ``granted``).
     """
-    constructor: Callable[..., Policy] = policy_class(name)
+    constructor: Any = policy_class(name)
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     unknown = [key for key in parameters if key not in known]
     if unknown:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 from typer.core import TyperCommand
 
@@ -38,16 +37,16 @@ def _swarms(text: str) -> tuple[tuple[int, int], ...]:
 class _Command(TyperCommand):
     """Says how an option of two values looks."""
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As a command does, with an example in the message."""
         try:
             return super().parse_args(ctx, args)
-        except click.BadOptionUsage as error:
-            if "2 arguments" in error.message:
-                error.message = f"{error.option_name} needs two numbers, at the start and at the end: {_PAIRS}."
-            raise
+        except Exception as error:
+            if "2 arguments" not in str(error):
+                raise
+            raise typer.BadParameter(f"{error} Give it at the start and at the end: --noise 0.4 0.08", ctx) from None
 
 
-_PAIRS = "--noise 0.4 0.08, --rate 0.0015 0.00015"
 Scenario = Annotated[str, typer.Option(help="Name or TOML file.")]
 Steps = Annotated[
     int,

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 
 from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
-from uuv_marl.benchmark.results import ResultsError
+from uuv_marl.errors import ResultsError
 
 _MADE_HERE = re.compile(r"\d{6,}(\.partial)?")
 """Names of checkpoints; everything else under ``checkpoints`` is the user's."""
@@ -76,7 +76,7 @@ class TrainingFolder(Generic[R]):
         self._settings: dict[str, Any] = json.loads(json.dumps(settings))
         self._sessions: list[dict[str, Any]] = []
         self._start = start
-        self.record = start
+        self.record: R = start
         """The last iteration that is kept; iteration 0 where there is none."""
         self.found = ""
         """What a resume goes on from, in words."""
@@ -155,7 +155,7 @@ class TrainingFolder(Generic[R]):
         """A checkpoint, which ``save`` writes into the folder it is given; older ones go, once it is whole.
 
         Raises:
-            OutputError: it can't be written; the one before is as it was.
+            ResultsError: it can't be written; the one before is as it was.
         """
         folder = self._checkpoints / f"{record.iteration:06d}"
         partial = folder.with_suffix(".partial")
@@ -195,8 +195,8 @@ def opened(
         say: told from where a resume goes on.
 
     Raises:
-        ResultsError: the folder is used, holds no training, or one of other settings.
-        OutputError: another process trains there, or the folder can't be written.
+        ResultsError: the folder is used, by another process too, holds no training, or one of other settings, or it
+            can't be written.
     """
     TrainingFolder(path, settings, resume, start)  # refuses before anything is written
     with locked(path):

@@ -12,6 +12,7 @@ import numpy as np
 
 from uuv_marl.benchmark.distributed import connected
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
+from uuv_marl.errors import ClusterError
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
@@ -137,8 +138,8 @@ def train(
         stop: asked after every iteration; where it says so, the training ends.
 
     Raises:
-        ResultsError: the folder is used, or holds no training of these settings.
-        OutputError: another process trains there, or the folder can't be written; the last checkpoint is whole.
+        ResultsError: the folder is used, by another process too, holds no training of these settings, or can't be
+            written; the last checkpoint is whole.
         ClusterError: the cluster can't be joined, has fewer cores than runners, or lost all of them.
     """
     settings = settings or Settings()

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint, vehicle_of
-from uuv_marl.benchmark.results import ResultsError
+from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario
@@ -254,8 +254,8 @@ def train(
         stop: asked after every iteration; where it says so, the training ends with a checkpoint.
 
     Raises:
-        ResultsError: the folder is used, or holds no training of these settings.
-        OutputError: another process trains there, or the folder can't be written; the last checkpoint is whole.
+        ResultsError: the folder is used, by another process too, holds no training of these settings, or can't be
+            written; the last checkpoint is whole.
     """
     settings = settings or Settings()
     scenario = settings.load()
