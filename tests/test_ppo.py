@@ -9,7 +9,7 @@ from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnv
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, learned_class
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, load_checkpoint
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import ppo as ppos
@@ -208,7 +208,7 @@ def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch):
         assert files(tmp_path / f"{stop}") == files(tmp_path / "whole")
     other = list(train(tmp_path / "other", settings(seed=1)))
     assert other[0].reward != records[0].reward
-    assert learned_class(str(tmp_path / "whole" / "best")).checkpoint.card.training["algorithm"]["name"] == "ppo"
+    assert load_checkpoint(tmp_path / "whole" / "best").card.training["algorithm"]["name"] == "ppo"
 
 
 def test_a_short_training_beats_random_by_far():

@@ -117,7 +117,10 @@ def train_mappo(
             from uuv_marl.train.mappo import Hyperparameters
 
         by = Hyperparameters()
-        algorithm = replace(by, noise=noise or by.noise, learning_rate=rate or by.learning_rate)
+        try:
+            algorithm = replace(by, noise=noise or by.noise, learning_rate=rate or by.learning_rate)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
         _train(output, resume, overrides, scenario=scenario, sizes=sizes, steps=steps, seed=seed, start=start,
                algorithm=algorithm)  # fmt: skip
 

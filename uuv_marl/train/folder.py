@@ -111,11 +111,14 @@ class TrainingFolder(Generic[R]):
         for path in sorted(self._made(), reverse=True):
             try:
                 text = (path / "record.json").read_text(encoding="utf-8")
-                self.record = TypeAdapter(type(self._start)).validate_json(text)
+                record = TypeAdapter(type(self._start)).validate_json(text)
+                if record.iteration != int(path.name):
+                    raise ValueError
             except (OSError, ValueError) as error:
                 broken = f"{path} is incomplete (record.json: {getattr(error, 'strerror', None) or 'damaged'}); "
             else:
-                done = f"iteration {self.record.iteration}, {self.record.agent_steps:,} agent-steps"
+                self.record = record
+                done = f"iteration {record.iteration}, {record.agent_steps:,} agent-steps"
                 self.found = f"{broken}going on from {done}"
                 return
         if broken:
@@ -224,6 +227,6 @@ def _csv(rows: Sequence[Sequence[object]]) -> str:
 def _differences(then: Any, now: Any, field: str = "") -> list[tuple[str, object, object]]:
     """Where settings are not what they were: field, before, now."""
     if isinstance(then, dict) and isinstance(now, dict):
-        names = ((name, f"{field}.{name}" if field else name) for name in now)
-        return [found for name, path in names for found in _differences(then.get(name), now[name], path)]
+        names = ((name, f"{field}.{name}" if field else name) for name in {**now, **then})
+        return [found for name, path in names for found in _differences(then.get(name), now.get(name), path)]
     return [] if then == now else [(field, then, now)]
