@@ -55,7 +55,6 @@ def benchmark(
         from uuv_marl.benchmark.runner import DEFAULT_POLICIES, make_tables, run_missing, write_report
         from uuv_marl.benchmark.tables import rich_table
         from uuv_marl.scenario_files import ScenarioError, load_scenario, parse_override
-        from uuv_marl.sim.compiled import announce_compilation
 
         changes = dict(parse_override(text) for text in overrides or [])
         for field in sorted({"sonar.channels", "actuators.yaw_damping_nms"} & set(changes)):
@@ -70,7 +69,6 @@ def benchmark(
             policy_class(name)
         evaluator, cluster = _where(ray, policies)
         results = Results(output, scenarios)
-        announce_compilation()
         wanted = list(range(seeds))
         try:
             with cluster, progress_bar() as bar:

@@ -33,9 +33,7 @@ def heldout(
         from uuv_marl.heldout.episodes import episodes_of
         from uuv_marl.heldout.job import run
         from uuv_marl.heldout.page import write_page
-        from uuv_marl.sim.compiled import announce_compilation
 
-        announce_compilation()
         try:
             with progress_bar() as bar:
                 task = bar.add_task("held out", total=1.0)

@@ -28,9 +28,7 @@ def reproduce(
     """
     with explained():
         from uuv_marl.reproduce.job import reproduce as run
-        from uuv_marl.sim.compiled import announce_compilation
 
-        announce_compilation()
         try:
             with progress_bar() as bar:
                 task = bar.add_task("reproduce", total=1.0)
@@ -56,9 +54,6 @@ def identify(
     shipped result is in uuv_marl/reproduce/identified.
     """
     with explained():
-        from uuv_marl.sim.compiled import announce_compilation
-
-        announce_compilation()
         try:
             with extra("tune", "identification"), progress_bar() as bar:
                 from uuv_marl.reproduce.identify import identify as search

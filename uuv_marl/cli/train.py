@@ -180,10 +180,7 @@ def _train(
 
 def _follow(records: Iterator[Any], steps: int, describe: Callable[[Any], str]) -> str:
     """Show a training in a bar; how it stood at last."""
-    from uuv_marl.sim.compiled import announce_compilation
-
     last = "no iteration was needed: --steps are done already"
-    announce_compilation()
     with progress_bar() as bar:
         task = bar.add_task("starting", total=steps)
         for record in records:

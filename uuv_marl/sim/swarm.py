@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario, growth
 from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
-from uuv_marl.sim.compiled import announce_compilation
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.sonar import suite
@@ -62,7 +61,6 @@ class Swarm:
         self.num_worlds = operator.index(num_worlds)
         if num_worlds < 1:
             raise ValueError(f"num_worlds must be at least 1, got {num_worlds}")
-        announce_compilation()
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
