@@ -558,7 +558,7 @@ def test_the_command(tmp_path, monkeypatch):
 
     monkeypatch.setattr(trainings, "train", fake)
     seed = 1
-    command = ["train", "mappo", "--steps=1e3", "--seed=3", "--sizes=20x3,5x7", "--set=trajectory.speed_mps=3"]
+    command = ["train", "mappo", "--steps=1e3", "--seed=3", "--num-vehicles=20"]
     command += [f"--output={tmp_path}", "--noise", "0.3", "0.1"]
     command += ["--rate", "0.0002", "0.00002"]
     done = CliRunner().invoke(app, command)
@@ -574,8 +574,7 @@ def test_the_command(tmp_path, monkeypatch):
         False,
     )
     assert settings.algorithm.learning_rate == (2e-4, 2e-5)
-    assert settings.sizes == ((20, 3), (5, 7))
-    assert settings.load().trajectory.speed_mps == 3.0
+    assert settings.sizes == ((20, 50),)
     stopped = CliRunner().invoke(app, [*command, "--resume"])
     assert stopped.exit_code == 130
     assert "Stopping after this iteration" in stopped.output
@@ -583,7 +582,7 @@ def test_the_command(tmp_path, monkeypatch):
     seed = 2
     at_once = CliRunner().invoke(app, [*command, "--resume"])
     assert at_once.exit_code == 130
-    assert "Stopped at once. No checkpoint was written yet" in " ".join(at_once.output.split())
+    assert "Stopped. There is no checkpoint yet, only settings" in " ".join(at_once.output.split())
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -597,9 +596,7 @@ def test_the_command(tmp_path, monkeypatch):
         (["--noise", "inf", "inf"], "inf is not in the range"),
         (["--noise", "nan", "0.1"], "noise must be positive and finite"),
         (["--rate", "inf", "1"], "inf is not in the range"),
-        (["--sizes=10"], "must be VEHICLESxWORLDS"),
-        (["--sizes=0x3"], "must be VEHICLESxWORLDS"),
-        (["--set=vehicle.m=3"], "vehicle.m is unknown"),
+        (["--num-vehicles=0"], "0 is not in the range"),
     ],
 )
 def test_options_that_cannot_work_are_explained(options, message, tmp_path):

@@ -124,12 +124,11 @@ class Learned(Policy):
         self.name, self.checkpoint = name, checkpoint
         self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds)
-        trained, here = card.percept, rows_of(self.layout)
-        if trained != here:
+        percept = _difference(*({row[0]: row[1:] for row in table} for table in (card.percept, rows_of(self.layout))))
+        if percept:
             raise PolicyError(
-                f"{name} was trained on another percept than scenario {scenario.name!r} has: "
-                f"{_difference(trained, here)}; use a scenario with the sonar suite of its training, or train on this "
-                "one (uuv-marl train mappo)"
+                f"{name} was trained on another percept than scenario {scenario.name!r} has: {percept}; use a scenario "
+                "with the sonar suite of its training, or train on this one (uuv-marl train mappo)"
             )
         shortest, longest = card.decision_period_s
         if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
@@ -137,13 +136,11 @@ class Learned(Policy):
                 f"{name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
                 f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
             )
-        vehicle = vehicle_of(scenario)
-        other = [field for field in sorted({*vehicle, *card.vehicle}) if vehicle.get(field) != card.vehicle.get(field)]
-        if other and not any_vehicle:
+        vehicle = _difference(card.vehicle, vehicle_of(scenario))
+        if vehicle and not any_vehicle:
             raise PolicyError(
-                f"{name} was trained on another vehicle than scenario {scenario.name!r} has: {other[0]} was "
-                f"{card.vehicle.get(other[0])} and is {vehicle.get(other[0])}; train on this one (uuv-marl train "
-                f"mappo --scenario), or run it all the same with make(..., any_vehicle=True)"
+                f"{name} was trained on another vehicle than scenario {scenario.name!r} has: {vehicle}; train on this "
+                "one (uuv-marl train mappo --scenario), or run it all the same with make(..., any_vehicle=True)"
             )
         self._eyes = Eyes(scenario, card.barrier)
 
@@ -302,13 +299,10 @@ def _check(card: Card, layers: Sequence[Layer]) -> None:
         width = outputs
 
 
-def _difference(trained: Sequence[Row], here: Sequence[Row]) -> str:
-    """The first row of the tables that differs, for a message."""
-    for k in range(max(len(trained), len(here))):
-        rows = [" ".join(map(str, table[k])) if k < len(table) else "nothing" for table in (trained, here)]
-        if rows[0] != rows[1]:
-            return f"{rows[0]!r} against {rows[1]!r}"
-    return "nothing"
+def _difference(trained: Mapping[str, object], here: Mapping[str, object]) -> str:
+    """The first entry that differs, for a message; nothing where none does."""
+    other = (name for name in {**trained, **here} if trained.get(name) != here.get(name))
+    return next((f"{name} was {trained.get(name)} and is {here.get(name)}" for name in other), "")
 
 
 @compiled

@@ -1,7 +1,8 @@
 """``uuv-marl train``: a command for each library."""
 
+import re
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,22 +17,9 @@ app = typer.Typer(help="Train a policy; each command is named after its library.
 
 
 def _whole(text: str) -> int:
-    """A number of agent-steps, also as 3e6."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not (1.0 <= number < 1e15 and number.is_integer()):
+    if not re.fullmatch(r"[1-9]\d{0,14}|[1-9](\.\d+)?e\d{1,2}", str(text)):
         raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give for instance 3000000 or 3e6")
-    return int(number)
-
-
-def _swarms(text: str) -> tuple[tuple[int, int], ...]:
-    """Vehicles and worlds of each swarm, from a text such as 10x20,54x5."""
-    sizes = [part.partition("x")[::2] for part in text.split(",")]
-    if not all(n.isdecimal() and worlds.isdecimal() and int(n) > 0 and int(worlds) > 0 for n, worlds in sizes):
-        raise typer.BadParameter(f"{text!r} must be VEHICLESxWORLDS, such as 20x50 or 10x20,54x5")
-    return tuple((int(n), int(worlds)) for n, worlds in sizes)
+    return int(float(text))
 
 
 class _Command(TyperCommand):
@@ -48,42 +36,26 @@ class _Command(TyperCommand):
 
 
 Scenario = Annotated[str, typer.Option(help="Name or TOML file.")]
+Vehicles = Annotated[
+    int | None,
+    typer.Option(min=1, help="Of every swarm. Default: the scenario's; 10 to 100 at once where that has 54."),
+]
 Steps = Annotated[
     int,
-    typer.Option(
-        parser=_whole,
-        metavar="INTEGER",
-        help="Agent-steps in all, decisions times vehicles, in whole iterations. Noise and rates anneal over them.",
-    ),
-]
-Sizes = Annotated[
-    Any,
-    typer.Option(
-        parser=_swarms,
-        metavar="NxWORLDS,...",
-        help="Swarms trained on at once, such as 10x20,54x5: 20 worlds of 10 vehicles and 5 of 54. Default: 10 to 100 "
-        "vehicles; the scenario's own number where it is not 54.",
-    ),
-]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="FIELD=VALUE", help="Override a field of the scenario, such as trajectory.speed_mps=3."
-    ),
+    typer.Option(parser=_whole, metavar="NUMBER", help="Agent-steps in all, such as 3e6: decisions times vehicles."),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
 Start = Annotated[
     Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
 ]
-Output = Annotated[Path, typer.Option(help="Folder of settings, progress, checkpoint and best.")]
+Output = Annotated[Path, typer.Option(help="Folder of settings, progress and checkpoint.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")]
 
 
 @app.command("mappo", cls=_Command)
 def train_mappo(
     scenario: Scenario = "random_field",
-    sizes: Sizes = None,
-    overrides: Set = None,
+    num_vehicles: Vehicles = None,
     steps: Steps = 30_000_000,
     seed: Seed = 0,
     start: Start = None,
@@ -104,11 +76,11 @@ def train_mappo(
 ) -> None:
     """Train one policy for all vehicles with MAPPO, on swarms of 10 to 100 at once, on one core.
 
-    Vehicles decide every 0.5 s, with yaw damping, whatever the scenario says; --set changes it. Needs the extra
-    "train". Writes config.json (settings, seeds, versions), progress.csv (a row per iteration), checkpoints/,
-    tensorboard/ and best/, the policy that did best on validation seeds: give it to uuv-marl benchmark as --policy.
-    Ctrl-C ends the training with a checkpoint after the iteration under way; the same command with --resume goes on
-    exactly. A kill leaves the last checkpoint, which is written every 20 iterations.
+    Vehicles decide every 0.5 s, with yaw damping, whatever the scenario says. Noise and rates anneal over --steps.
+    Needs the extra "train". Writes config.json (settings, seeds, versions), progress.csv (a row per iteration),
+    checkpoints/, tensorboard/ and best/, the policy that did best on validation seeds: give it to uuv-marl benchmark as
+    --policy. Ctrl-C ends the training with a checkpoint after the iteration under way; the same command with --resume
+    goes on exactly. A kill leaves the last checkpoint, which is written every 20 iterations.
 
     Example: uuv-marl train mappo --output runs/mappo
     """
@@ -116,20 +88,18 @@ def train_mappo(
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
 
-        by = Hyperparameters()
+        given = {name: pair for name, pair in (("noise", noise), ("learning_rate", rate)) if pair}
         try:
-            algorithm = replace(by, noise=noise or by.noise, learning_rate=rate or by.learning_rate)
+            algorithm = replace(Hyperparameters(), **given)
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
-        _train(output, resume, overrides, scenario=scenario, sizes=sizes, steps=steps, seed=seed, start=start,
-               algorithm=algorithm)  # fmt: skip
+        _train(output, resume, num_vehicles, start, scenario=scenario, steps=steps, seed=seed, algorithm=algorithm)
 
 
 @app.command("ppo", cls=_Command)
 def train_ppo(
     scenario: Scenario = "random_field",
-    sizes: Sizes = None,
-    overrides: Set = None,
+    num_vehicles: Vehicles = None,
     steps: Steps = 30_000_000,
     seed: Seed = 0,
     start: Start = None,
@@ -147,51 +117,42 @@ def train_ppo(
         with extra("train", "training with Stable-Baselines3"):
             from uuv_marl.train.ppo import Hyperparameters
 
-        _train(output, resume, overrides, scenario=scenario, sizes=sizes, steps=steps, seed=seed, start=start,
-               algorithm=Hyperparameters())  # fmt: skip
+        algorithm = Hyperparameters()
+        _train(output, resume, num_vehicles, start, scenario=scenario, steps=steps, seed=seed, algorithm=algorithm)
 
 
-def _train(
-    output: Path, resume: bool, overrides: Sequence[str] | None, *, sizes: Any, start: Path | None, **settings: Any
-) -> None:
+def _train(output: Path, resume: bool, num_vehicles: int | None, start: Path | None, **settings: Any) -> None:
     """Train with these settings, and show how it goes."""
-    from uuv_marl.scenario_files import parse_override
     from uuv_marl.train.training import OVERRIDES, Settings, train
 
-    changes = {**OVERRIDES, **dict(parse_override(text) for text in overrides or [])}
-    begin = None if start is None else str(start)
-    chosen = Settings(**settings, sizes=sizes or (), start=begin, overrides=changes)
-    validated = ""
-
-    def describe(record: Any) -> str:
-        nonlocal validated
-        if record.score is not None:
-            validated = (
-                f", validation: score {record.score:.3f} (best {record.best:.3f}), arrived {record.arrived:.0%}, "
-                f"collisions {record.collisions}"
-            )
-        return f"reward {record.reward:.3f}{validated}"
-
+    size = {} if num_vehicles is None else {"swarm.num_vehicles": num_vehicles}
+    chosen = Settings(**settings, overrides={**OVERRIDES, **size}, start=None if start is None else str(start))
+    texts = {
+        "reward": "reward {reward:.3f}",
+        "score": "validation: score {score:.3f} (best {best:.3f}), arrived {arrived:.0%}, collisions {collisions}",
+    }
     with _stoppable(output) as stop:
-        last = _follow(train(output, chosen, resume=resume, say=console.print, stop=stop), chosen.steps, describe)
-        _ended(output, stop())
+        records = train(output, chosen, resume=resume, say=console.print, stop=stop)
+        last = _follow(records, chosen.steps, texts)
     console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
 
 
-def _follow(records: Iterator[Any], steps: int, describe: Callable[[Any], str]) -> str:
-    """Show a training in a bar; how it stood at last."""
-    last = "no iteration was needed: --steps are done already"
+def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str:
+    """Show a training in a bar, with a text for each field that was known so far; how it stood at last."""
+    last, known = "no iteration was needed: --steps are done already", {}
     with progress_bar() as bar:
         task = bar.add_task("starting", total=steps)
         for record in records:
-            last = f"{record.agent_steps / record.seconds:,.0f} agent-steps/s, {describe(record)}"
+            known |= {name: value for name, value in record._asdict().items() if value is not None}
+            told = [text.format(**known) for name, text in texts.items() if name in known]
+            last = ", ".join([f"{record.agent_steps / record.seconds:,.0f} agent-steps/s", *told])
             bar.update(task, completed=record.agent_steps, description=last)
     return last
 
 
 @contextmanager
 def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
-    """The first Ctrl-C of the block is only noted, and the second ends it at once; whether there was one."""
+    """Gives whether the block is to stop: the first Ctrl-C is only noted, and the second ends the block at once."""
     noted: list[int] = []
 
     def note(number: int, frame: Any) -> None:
@@ -204,21 +165,17 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
     try:
         yield lambda: bool(noted)
     except KeyboardInterrupt:
-        kept = any((output / "checkpoints").glob("[0-9]*[0-9]"))
-        rest = "The last checkpoint is" if kept else "No checkpoint was written yet: settings alone are"
-        console.print(f"Stopped at once. {rest} in {output}; the same command with --resume goes on.")
-        raise typer.Exit(130) from None
+        pass
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _ended(output: Path, stopped: bool) -> None:
-    if stopped:
-        console.print(f"Stopped. The checkpoint is in {output}; the same command with --resume goes on.")
+    if noted:
+        kept = any((output / "checkpoints").glob("[0-9]*[0-9]"))
+        rest = "The last checkpoint is" if kept else "There is no checkpoint yet, only settings"
+        console.print(f"Stopped. {rest} in {output}; the same command with --resume goes on.")
         raise typer.Exit(130)
 
 
-@app.command("rllib")
+@app.command("rllib", cls=_Command)
 def train_rllib(
     scenario: Scenario = "single_obstacle",
     num_vehicles: Annotated[int | None, typer.Option(min=1, help="Replaces the scenario's.")] = None,
@@ -244,20 +201,16 @@ def train_rllib(
             from uuv_marl.train.rllib import Settings, train
 
         settings = Settings(scenario=scenario, num_vehicles=num_vehicles, seed=seed)
-        shown = "–"
-
-        def describe(record: Any) -> str:
-            nonlocal shown
-            if record.episode_return is not None:
-                shown = f"{record.episode_return:.1f}"
-            return f"{record.agent_steps:,} agent-steps, last return per vehicle {shown}"
-
+        texts = {
+            "agent_steps": "{agent_steps:,} agent-steps",
+            "episode_return": "last return per vehicle {episode_return:.1f}",
+        }
         console.print("Starting Ray takes about 15 s.")
         with _stoppable(output) as stop:
-            records = train(
-                output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume, say=console.print,
-                stop=stop,
+            last = _follow(
+                train(
+                    output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume,
+                    say=console.print, stop=stop,
+                ), steps, texts,
             )  # fmt: skip
-            last = _follow(records, steps, describe)
-            _ended(output, stop())
         console.print(f"Done: {last}. Progress: {output}/progress.csv   checkpoint: {output}/checkpoints")

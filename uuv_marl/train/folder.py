@@ -1,7 +1,5 @@
 """A training on disk: its settings, a row per iteration, and the last checkpoint, whole at any time."""
 
-import csv
-import io
 import json
 import re
 import shutil
@@ -9,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from pydantic import TypeAdapter
 
@@ -23,26 +21,8 @@ _HIDDEN = re.compile(r"\..*|config\.partial\.json")
 """What a first start may leave behind that was killed before it wrote its settings."""
 
 
-class Row(Protocol):
-    """A NamedTuple that is a row of ``progress.csv``."""
-
-    @property
-    def iteration(self) -> int:
-        """From 1; 0 before the first."""
-        ...
-
-    @property
-    def agent_steps(self) -> int:
-        """Sampled so far; one is one decision of one vehicle."""
-        ...
-
-    @property
-    def _fields(self) -> tuple[str, ...]: ...
-
-    def _asdict(self) -> dict[str, Any]: ...
-
-
-R = TypeVar("R", bound=Row)
+R = TypeVar("R", bound=Any)
+"""A NamedTuple with ``iteration`` and ``agent_steps``: a row of ``progress.csv``."""
 Say = Callable[[str], object]
 """Tells whoever started a training how it goes on."""
 
@@ -145,14 +125,16 @@ class TrainingFolder(Generic[R]):
         write_text(self.path / "config.json", json.dumps(config, indent=1) + "\n")
         with writing(self._checkpoints):
             self._checkpoints.mkdir(exist_ok=True)
+        lines = self._table.read_text(encoding="utf-8", errors="replace").splitlines() if self._table.exists() else []
+        rows = [line.split(",") for line in lines]
         # An iteration whose checkpoint was cut off will come again.
-        kept = [row for row in self._rows() if row[0].isdecimal() and int(row[0]) <= self.record.iteration]
-        write_text(self._table, _csv([self._start._fields, *kept]))
+        kept = [row for row in rows if row[0].isdecimal() and int(row[0]) <= self.record.iteration]
+        write_text(self._table, "".join(map(_line, [self._start._fields, *kept])))
 
     def note(self, record: R) -> None:
         """A row for an iteration."""
-        with writing(self._table), self._table.open("a", newline="", encoding="utf-8") as file:
-            file.write(_csv([tuple(record._asdict().values())]))
+        with writing(self._table), self._table.open("a", encoding="utf-8") as file:
+            file.write(_line(record))
 
     def keep(self, record: R, save: Callable[[Path], object]) -> None:
         """A checkpoint, which ``save`` writes into the folder it is given; older ones go, once it is whole.
@@ -176,12 +158,6 @@ class TrainingFolder(Generic[R]):
     @property
     def _table(self) -> Path:
         return self.path / "progress.csv"
-
-    def _rows(self) -> Sequence[Sequence[str]]:
-        if not self._table.exists():
-            return []
-        with writing(self._table), self._table.open(newline="", encoding="utf-8", errors="replace") as file:
-            return [row for row in csv.reader(file) if len(row) == len(self._start._fields)]
 
 
 @contextmanager
@@ -218,10 +194,8 @@ def _ours(path: Path) -> bool:
     return bool(_MADE_HERE.fullmatch(path.name)) and path.is_dir() and not path.is_symlink()
 
 
-def _csv(rows: Sequence[Sequence[object]]) -> str:
-    text = io.StringIO(newline="")
-    csv.writer(text).writerows(rows)
-    return text.getvalue()
+def _line(row: Sequence[object]) -> str:
+    return ",".join("" if value is None else str(value) for value in row) + "\n"
 
 
 def _differences(then: Any, now: Any, field: str = "") -> list[tuple[str, object, object]]:

@@ -7,19 +7,18 @@ the best validation; ``tensorboard/``. Needs ``train``.
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
 from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
@@ -27,7 +26,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
 from uuv_marl.train.fleet import Episodes
 from uuv_marl.train.folder import Say, opened, quiet, versions
-from uuv_marl.train.mappo import Hyperparameters, Update
+from uuv_marl.train.mappo import Hyperparameters, Mappo
 from uuv_marl.train.shaping import OVERRIDES, Weights
 from uuv_marl.train.validation import Verdict, validate
 
@@ -35,62 +34,13 @@ with extra("train", "training"):
     import torch
     from torch.utils.tensorboard.writer import SummaryWriter
 
+if TYPE_CHECKING:
+    from uuv_marl.train import ppo
+
 Sizes = tuple[tuple[int, int], ...]
 
 _LIBRARIES = ("torch", "stable-baselines3", "numpy", "numba", "safetensors")
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
-
-
-class Algorithm(Protocol):
-    """What a training repeats: ``uuv_marl.train.mappo.Mappo`` or ``uuv_marl.train.ppo.Ppo``."""
-
-    agent_steps: int
-    """Of an iteration."""
-    random: Any
-    """State of the random numbers, as JSON can hold it."""
-
-    def iterate(self, share: float) -> tuple[float, Update]:
-        """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
-        ...
-
-    @property
-    def layers(self) -> list[Layer]:
-        """The policy's, for a checkpoint."""
-        ...
-
-    def take_episodes(self) -> Episodes:
-        """Sums over the episodes that ended since the last call."""
-        ...
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """What was learned, and the optimisers, for ``restore``."""
-        ...
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go on with ``arrays``."""
-        ...
-
-    def start_from(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Begin with the policy in the ``arrays`` of another training."""
-        ...
-
-    def snapshot(self) -> dict[str, NDArray[Any]]:
-        """The worlds, for ``put_back``."""
-        ...
-
-    def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a ``snapshot``."""
-        ...
-
-
-class Recipe(Protocol):
-    """An algorithm's hyperparameters, a dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> Algorithm:
-        """A training that has not begun."""
-        ...
 
 
 MIXED: Sizes = ((10, 20), (25, 9), (54, 5), (100, 3))
@@ -122,7 +72,7 @@ class Settings:
     """A folder with a learner to start from: ``best`` or a checkpoint of another training."""
     weights: Weights = field(default_factory=Weights)
     """Of the training's reward."""
-    algorithm: Recipe = field(default_factory=Hyperparameters)
+    algorithm: "Hyperparameters | ppo.Hyperparameters" = field(default_factory=Hyperparameters)
     checkpoint_every: int = 20
     """Iterations."""
     validate_every: int = 20
@@ -181,11 +131,13 @@ class Training:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.scenario = settings.load()
-        self.algorithm = settings.algorithm.begin(self.scenario, settings.sizes, settings.weights, settings.seed)
+        self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
+            self.scenario, settings.sizes, settings.weights, settings.seed
+        )
         if settings.start is not None:
-            path = Path(settings.start) / _LEARNER_FILE
-            with _reading(path, "give a folder best or a checkpoint of the same algorithm and sizes of network"):
-                self.algorithm.start_from(_learned(path))
+            remedy = "give a folder best or a checkpoint of the same algorithm and sizes of network"
+            with _reading(Path(settings.start) / _LEARNER_FILE, remedy) as data:
+                self.algorithm.start_from(_learned(data))
 
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
@@ -225,12 +177,12 @@ class Training:
     def restore(self, folder: Path) -> None:
         """Go on from what ``save`` wrote, as if there had been no break. Raises ResultsError naming a damaged file."""
         remedy = "copy the checkpoint again as a whole, or give --start with a policy and another --output"
-        with _reading(folder / _LEARNER_FILE, remedy):
-            self.algorithm.restore(_learned(folder / _LEARNER_FILE))
-        with _reading(folder / _WORLDS_FILE, remedy):
-            self.algorithm.put_back(safetensors.numpy.load((folder / _WORLDS_FILE).read_bytes()))
-        with _reading(folder / _RANDOM_FILE, remedy):
-            self.algorithm.random = json.loads((folder / _RANDOM_FILE).read_text(encoding="utf-8"))
+        with _reading(folder / _LEARNER_FILE, remedy) as data:
+            self.algorithm.restore(_learned(data))
+        with _reading(folder / _WORLDS_FILE, remedy) as data:
+            self.algorithm.put_back(safetensors.numpy.load(data))
+        with _reading(folder / _RANDOM_FILE, remedy) as data:
+            self.algorithm.random = json.loads(data)
 
 
 def train(
@@ -324,21 +276,18 @@ def _show(board: SummaryWriter, record: Record, episodes: Episodes) -> None:
 
 
 @contextmanager
-def _reading(path: Path, remedy: str) -> Iterator[None]:
+def _reading(path: Path, remedy: str) -> Iterator[bytes]:
     """Turn whatever data from outside can cause into one message that names the file."""
     try:
-        yield
-    except (
-        OSError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, OverflowError,
-        safetensors.SafetensorError,
-    ) as error:  # fmt: skip
+        yield path.read_bytes()
+    except Exception as error:
         reason = " ".join(str(error).split())
         raise ResultsError(f"{path} can't be used ({type(error).__name__}: {reason}); {remedy}") from error
 
 
-def _learned(path: Path) -> Mapping[str, NDArray[Any]]:
-    arrays = safetensors.numpy.load(path.read_bytes())
-    for name, array in arrays.items():
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} must hold finite numbers")
+def _learned(data: bytes) -> Mapping[str, NDArray[Any]]:
+    arrays = safetensors.numpy.load(data)
+    spoilt = [name for name, array in arrays.items() if not np.isfinite(array).all()]
+    if spoilt:
+        raise ValueError(f"{spoilt[0]} must hold finite numbers")
     return arrays
