@@ -171,7 +171,8 @@ def test_a_short_training_beats_random_by_far():
         actions = (scale * rng.uniform(-1.0, 1.0, (60, fleet.rows, 2))).astype(np.float32)
         floors.append(np.mean([fleet.step(action).reward for action in actions]))
     fleet = open_water([(4, 8), (9, 4)], weights=weights)
-    _learner, rewards = learned(fleet, 60, Hyperparameters(hidden=(32, 32), horizon=32, minibatch=1024))
+    by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=1024)
+    _learner, rewards = learned(fleet, 60, by, noise=(0.5, 0.2))
     assert np.mean(rewards[-5:]) > 0.65 * max(floors), "rewards are negative; the last five are a whole episode"
 
 

@@ -103,8 +103,7 @@ class Learned(Policy):
     Args:
         scenario: gives the percept's layout and the vehicle's limits.
         num_worlds: first axis of the percepts.
-        checkpoint: the actor.
-        name: by which messages call it.
+        trained: the actor, and the name by which messages call it.
         any_vehicle: run it also on a vehicle that it was not trained on.
 
     Raises:
@@ -112,35 +111,27 @@ class Learned(Policy):
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        num_worlds: int = 1,
-        *,
-        checkpoint: Checkpoint,
-        name: str = "the policy",
-        any_vehicle: bool = False,
+        self, scenario: Scenario, num_worlds: int = 1, *, trained: "Trained", any_vehicle: bool = False
     ) -> None:
-        card = checkpoint.card
-        self.name, self.checkpoint = name, checkpoint
+        self.name, self.checkpoint, card = trained.name, trained.checkpoint, trained.checkpoint.card
         self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds)
-        percept = _difference(*({row[0]: row[1:] for row in table} for table in (card.percept, rows_of(self.layout))))
-        if percept:
-            raise PolicyError(
-                f"{name} was trained on another percept than scenario {scenario.name!r} has: {percept}; use a scenario "
-                "with the sonar suite of its training, or train on this one (uuv-marl train mappo)"
-            )
+        tables = ({row[0]: row[1:] for row in table} for table in (card.percept, rows_of(self.layout)))
+        vehicles = () if any_vehicle else (card.vehicle, vehicle_of(scenario))
+        for what, other, remedy in (
+            ("percept", _difference(*tables), "use a scenario with the sonar suite of its training"),
+            ("vehicle", vehicles and _difference(*vehicles), "run it all the same with make(..., any_vehicle=True)"),
+        ):
+            if other:
+                raise PolicyError(
+                    f"{self.name} was trained on another {what} than scenario {scenario.name!r} has: {other}; {remedy}"
+                    ", or train on this one (uuv-marl train mappo --scenario)"
+                )
         shortest, longest = card.decision_period_s
         if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
             raise PolicyError(
-                f"{name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
+                f"{self.name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
                 f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
-            )
-        vehicle = _difference(card.vehicle, vehicle_of(scenario))
-        if vehicle and not any_vehicle:
-            raise PolicyError(
-                f"{name} was trained on another vehicle than scenario {scenario.name!r} has: {vehicle}; train on this "
-                "one (uuv-marl train mappo --scenario), or run it all the same with make(..., any_vehicle=True)"
             )
         self._eyes = Eyes(scenario, card.barrier)
 
@@ -233,7 +224,7 @@ class Trained:
 
     def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned:
         """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
-        return Learned(scenario, num_worlds, checkpoint=self.checkpoint, name=self.name, any_vehicle=any_vehicle)
+        return Learned(scenario, num_worlds, trained=self, any_vehicle=any_vehicle)
 
 
 def shipped(name: str, doc: str) -> Trained:
@@ -299,10 +290,10 @@ def _check(card: Card, layers: Sequence[Layer]) -> None:
         width = outputs
 
 
-def _difference(trained: Mapping[str, object], here: Mapping[str, object]) -> str:
+def _difference(then: Mapping[str, object], now: Mapping[str, object]) -> str:
     """The first entry that differs, for a message; nothing where none does."""
-    other = (name for name in {**trained, **here} if trained.get(name) != here.get(name))
-    return next((f"{name} was {trained.get(name)} and is {here.get(name)}" for name in other), "")
+    other = (name for name in {**then, **now} if then.get(name) != now.get(name))
+    return next((f"{name} was {then.get(name)} and is {now.get(name)}" for name in other), "")
 
 
 @compiled

@@ -258,18 +258,12 @@ def _validated(training: Training, record: Record, output: Path) -> Record:
 
 
 def _show(board: SummaryWriter, record: Record, episodes: Episodes) -> None:
-    """Numbers for TensorBoard."""
-    names = {"reward": "train", "kl": "train", "explained": "train"}
-    numbers = {f"{names.get(name, 'validation')}/{name}": value for name, value in record._asdict().items()}
-    for name in ("iteration", "agent_steps", "seconds"):
-        del numbers[f"validation/{name}"]
+    """Numbers for TensorBoard; of episodes the means."""
+    numbers = {f"train/{name}": getattr(record, name) for name in ("reward", "kl", "explained")}
+    numbers |= {f"validation/{name}": getattr(record, name) for name in ("best", *Verdict._fields)}
     if episodes.number:
-        numbers |= {
-            "episodes/return": episodes.returns / episodes.number,
-            "episodes/arrived": episodes.arrived / episodes.number,
-            "episodes/collisions": episodes.collisions / episodes.number,
-            "episodes/decisions": episodes.decisions / episodes.number,
-        }
+        names = {"returns": "return", "arrived": "arrived", "collisions": "collisions", "decisions": "decisions"}
+        numbers |= {f"episodes/{tag}": getattr(episodes, name) / episodes.number for name, tag in names.items()}
     for name, value in numbers.items():
         if value is not None:
             board.add_scalar(name, value, record.agent_steps)
