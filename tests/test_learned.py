@@ -262,7 +262,7 @@ def changed(k=0, name="weight", value=None, at=None):
         (changed(value=np.zeros((123, 16, 2))), r"0.weight is float32 \(123, 16, 2\), expected"),
         (changed(value=np.zeros(123)), r"0.weight is float32 \(123,\), expected"),
         (changed(0, "bias", np.zeros((16, 1))), r"0.bias is float32 \(16, 1\), expected float32 \(16,\)"),
-        (changed(0, "bias", 0.0), r"0.bias is float32 \(\), expected"),
+        (changed(0, "bias", 0.0), r"0.bias is float32 \(1,\), expected"),
         (changed(1, value=np.zeros((16, 3))), r"1.weight is float32 \(16, 3\), expected float32 \(16, 2\)"),
         (changed(1, value=np.zeros((17, 2))), r"1.weight is float32 \(17, 2\), expected float32 \(16, 2\)"),
         ([], "0.weight is missing"),

@@ -271,7 +271,7 @@ def _reason(error: Exception) -> str:
         first = error.errors()[0]
         field = ".".join(map(str, first["loc"]))
         return f"its card's {field}: {first['msg']}" if field else "it has no card"
-    return f"{error} is missing" if isinstance(error, KeyError) else str(error)
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
 def _check(card: Card, layers: Sequence[Layer]) -> None:
