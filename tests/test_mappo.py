@@ -7,6 +7,8 @@ import json
 import os
 import shutil
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -163,6 +165,8 @@ def test_a_swarm_of_one_finds_the_force_that_follows():
 
 
 def test_a_short_training_beats_random_by_far():
+    """Idle vehicles are paid -2.57 and random ones -4.22. Seeds 0 to 6 reached -0.85 to -1.25 with AVX-512's kernels of
+    torch, and -0.88 to -1.20 with its default ones; at least -1.67 is asked for."""
     weights = Weights(distance_m=50.0, centre=0.0, spacing=8.0, spacing_m=10.0)
     fleet = open_water([(4, 8), (9, 4)], weights=weights)
     rng = np.random.default_rng(0)
@@ -348,7 +352,7 @@ def test_a_folder_of_other_settings_is_refused(tmp_path, no_validation):
         ({"sizes": ((2, 2),)}, "begun with sizes = "),
         (
             {"overrides": {**settings().overrides, "time_limit.extra_s": 1.0}},
-            "begun with overrides.time_limit.extra_s = None, and overrides.time_limit.extra_s is 1.0 now",
+            "begun with scenario.time_limit.extra_s = 60.0, and scenario.time_limit.extra_s is 1.0 now",
         ),
     ):
         with pytest.raises(ResultsError, match=message):
@@ -548,6 +552,22 @@ def test_another_vehicle_is_named_in_the_checkpoint(tmp_path, no_validation):
 def test_numbers_that_cannot_be_learned_with_are_refused(field, value):
     with pytest.raises(ValueError, match=f"{field} must be positive and finite"):
         Hyperparameters(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("module", "library", "name"),
+    [
+        ("train.mappo", "torch", "train"),
+        ("train.ppo", "stable_baselines3", "train"),
+        ("train.training", "torch.utils.tensorboard.writer", "train"),
+        ("train.rllib", "ray", "distributed"),
+        ("baselines.export", "onnx", "onnx"),
+    ],
+)
+def test_modules_of_optional_libraries_name_their_extra(module, library, name):
+    code = f"import sys; sys.modules[{library!r}] = None; import uuv_marl.{module}"
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert f"pip install 'uuv_marl[{name}]'" in done.stderr
 
 
 def test_the_command(tmp_path, monkeypatch):
