@@ -153,7 +153,7 @@ def test_endings_are_told_as_sb3_wants_them():
 def test_streams_go_on_from_a_snapshot():
     streams = [np.random.default_rng(3), None]
     streams[0].integers(2, dtype=np.uint32)  # leaves half a number behind
-    again = unpacked(packed(streams))
+    again = unpacked(packed(streams), len(streams))
     assert again[1] is None
     assert list(again[0].integers(9, size=5, dtype=np.uint32)) == list(streams[0].integers(9, size=5, dtype=np.uint32))
     swarm = Swarm(load_scenario("random_field", num_vehicles=3), 2)

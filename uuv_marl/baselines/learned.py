@@ -138,10 +138,11 @@ class Learned(Policy):
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         acting = np.flatnonzero(self.active)
-        worlds, n = len(acting), percept.flat.shape[1]
+        flat = self.flat(percept)
+        worlds, n = len(acting), flat.shape[1]
         features, barrier = np.empty((worlds, n, self._eyes.size), np.float32), np.empty((worlds, n, 2), np.float32)
         clamps = np.zeros(worlds, np.int64)
-        self._eyes.look(percept.flat[acting], features, barrier, clamps)
+        self._eyes.look(flat[acting], features, barrier, clamps)
         self.clamps[acting] += clamps
         wish = forward(self.checkpoint.layers, features.reshape(worlds * n, -1))
         action = np.empty((worlds * n, 2), np.float32)

@@ -1,7 +1,7 @@
 """``SwarmVecEnv``: worlds as a Stable-Baselines3 ``VecEnv``, a row per vehicle, for one policy that all share."""
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,37 @@ with extra("train", "SwarmVecEnv"):
 Indices = None | int | Iterable[int]
 
 
-class SwarmVecEnv(TaskBased, VecEnv):
+class SharedRows:
+    """What SB3 asks of a row's own environment, where rows share one."""
+
+    _get_indices: Callable[[Indices], Iterable[int]]
+
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+        """The attribute of this object, once per row: rows share it."""
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+        """Not possible: a row has no environment of its own."""
+        raise NotImplementedError(
+            f"rows are vehicles of shared worlds; set {attr_name!r} when you make the environment"
+        )
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: Indices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Not possible: a row has no environment of its own."""
+        raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of the whole environment")
+
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:  # noqa: ARG002
+        """False for every row."""
+        return [False for _ in self._get_indices(indices)]
+
+
+class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
     """``num_worlds`` x vehicles rows; row ``world * vehicles + i`` is vehicle i of a world.
 
     Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
@@ -117,18 +147,6 @@ class SwarmVecEnv(TaskBased, VecEnv):
     def _forget(self, worlds: NDArray[np.bool_]) -> None:
         self._returns[worlds], self._lengths[worlds], self._starts[worlds] = 0.0, 0, time.perf_counter()
 
-    def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All that later steps depend on, random streams too, copied, for ``restore``."""
-        kept = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
-        return kept | self.swarm.snapshot()
-
-    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Float32:
-        """Go on from a snapshot of an environment made alike; the observations of all rows."""
-        self._task.reset()  # ready, and no world at its end: those are reset in the step in which they end
-        self.swarm.restore(snapshot)
-        self._returns[...], self._lengths[...] = snapshot["returns"], snapshot["lengths"]
-        return self.swarm.percept.to_observation().reshape(self.num_envs, -1)
-
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of every world."""
         self._task.need_reset("render()")
@@ -137,25 +155,3 @@ class SwarmVecEnv(TaskBased, VecEnv):
     def close(self) -> None:
         """Free the canvas."""
         self._view.close()
-
-    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """The attribute of this object, once per row: rows share it."""
-        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
-        """Not possible: a row has no environment of its own."""
-        raise NotImplementedError(f"rows are vehicles of shared worlds; set {attr_name!r} when you make SwarmVecEnv")
-
-    def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: Indices = None,
-        **method_kwargs: Any,
-    ) -> list[Any]:
-        """Not possible: a row has no environment of its own."""
-        raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of SwarmVecEnv's swarm")
-
-    def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:  # noqa: ARG002
-        """False for every row."""
-        return [False for _ in self._get_indices(indices)]

@@ -1,7 +1,6 @@
 """What every environment API shares: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
 
 import math
-import operator
 import os
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
@@ -15,7 +14,7 @@ from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import ScenarioError, load_scenario
 from uuv_marl.sim.field import longest_duration
-from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.swarm import Seeds, Swarm
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -95,7 +94,7 @@ class Task:
         cycles = math.ceil(seconds / scenario.timing.decision_period_s)
         return min(cycles, self.max_cycles or cycles)
 
-    def reset(self, seed: int | Sequence[int | None] | None = None, worlds: Sequence[int] | None = None) -> Float32:
+    def reset(self, seed: Seeds = None, worlds: Sequence[int] | None = None) -> Float32:
         """Start worlds anew; the observations of all, shape (world, vehicle, entry).
 
         Args:
@@ -104,12 +103,7 @@ class Task:
             worlds: which ones, default all.
         """
         chosen = list(range(self.swarm.num_worlds)) if worlds is None else list(worlds)
-        seeds = _seeds(seed, chosen)
-        seeded = {world: value for world, value in zip(chosen, seeds, strict=True) if value is not None}
-        if seeded:
-            self.swarm.reset(list(seeded.values()), list(seeded))
-        if len(seeded) < len(chosen):
-            self.swarm.reset(None, [world for world in chosen if world not in seeded])
+        self.swarm.reset(seed, chosen)
         self._ready[chosen], self._over[chosen] = True, False
         return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
 
@@ -127,16 +121,15 @@ class Task:
         swarm = self.swarm
         before = swarm.state.alive.copy()
         swarm.step(np.asarray(action, np.float32), ~self._over)
-        alive, arrived = swarm.state.alive, swarm.arrived
+        alive = swarm.state.alive
         reward, world_reward, terms = self._rewards(before & ~self._over[:, None])
-        late = swarm.timed_out | (swarm.state.tick >= self._last_tick)
-        world_terminated = arrived | ~alive.any(axis=1)
-        world_truncated = late & ~world_terminated
+        world_terminated = swarm.terminated
+        world_truncated = (swarm.truncated | (swarm.state.tick >= self._last_tick)) & ~world_terminated
         self._over = world_terminated | world_truncated
         return Outcome(
             observation=observe(swarm),
             reward=reward,
-            terminated=before & (arrived[:, None] | ~alive),
+            terminated=before & (swarm.arrived[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
             acting=alive & ~self._over[:, None],
             world_reward=world_reward,
@@ -192,21 +185,6 @@ class TaskBased:
     def swarm(self) -> Swarm:
         """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
         return self._task.swarm
-
-
-def _seeds(seed: int | Sequence[int | None] | None, worlds: Sequence[int]) -> list[int | None]:
-    """A seed, or None, for each of these worlds."""
-    if seed is None:
-        return [None] * len(worlds)
-    if isinstance(seed, int | np.integer):
-        seeds: list[int | None] = [int(seed) + world for world in worlds]
-    else:
-        seeds = [None if value is None else operator.index(value) for value in seed]
-    if len(seeds) != len(worlds):
-        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
-    if any(value is not None and value < 0 for value in seeds):
-        raise ValueError(f"seed must not be negative, got {seed}")
-    return seeds
 
 
 def make_task(

@@ -93,6 +93,8 @@ class Facts(NamedTuple):
     """Share of actions at the actuators' limit, shape (world,)."""
     arrival_s: Float64
     """When the swarm arrived, by ``Rules.arrival_radii``; NaN before, shape (world, radius)."""
+    diverged: Int64
+    """The first vehicle whose speed the integration step let run away, -1 while there is none, shape (world,)."""
 
 
 class Rules(NamedTuple):

@@ -1,5 +1,6 @@
 """Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
 
+import logging
 import operator
 import os
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,7 @@ from uuv_marl.scenario import Scenario, growth
 from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
+from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
@@ -23,6 +25,7 @@ from uuv_marl.sim.vehicle import plant
 from uuv_marl.sim.world import observe_world, step_alone, step_worlds
 
 Float32 = NDArray[np.float32]
+Seeds = int | Sequence[int | None] | NDArray[np.integer] | None
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
 """Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
 ends on the scenario's own, so that the time within a smaller radius is often missing."""
@@ -30,6 +33,7 @@ ends on the scenario's own, so that the time within a smaller radius is often mi
 _CELL_SPACINGS = 1.25
 """Side of a cell, in spacings of the start, for swarms that are searched by cells (perf/, docs/speed.md)."""
 
+_log = logging.getLogger("uuv_marl")
 _threads_of_parent = False
 
 
@@ -44,6 +48,10 @@ def _note_fork() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
+
+
+class DivergenceError(RuntimeError):
+    """The integration step is too long for the vehicle, so that its speed ran away."""
 
 
 class Swarm:
@@ -68,8 +76,10 @@ class Swarm:
         self._suite = suite(scenario)
         self._rules = _rules(scenario)
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
-        self._ready = np.zeros(num_worlds, np.bool_)
+        self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
         self._duration_s = np.zeros(num_worlds)
+        self.keys = np.zeros(num_worlds, np.uint64)
+        """Of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
         self._allocate(num_worlds, self.num_vehicles, max(scenario.max_obstacles, 1))
         self._scratch = scratch(
             min(num_worlds, cast(Any, config).NUMBA_NUM_THREADS), self.num_vehicles, scenario.sonar.num_sectors
@@ -110,6 +120,7 @@ class Swarm:
             lost=np.zeros((worlds, n), np.bool_),
             effort=np.zeros((worlds, n)),
             saturated=np.zeros(worlds),
+            diverged=np.full(worlds, -1, np.int64),
             arrival_s=np.full((worlds, radii), np.nan),
         )
         self._senses = Senses(
@@ -150,30 +161,46 @@ class Swarm:
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
     @property
-    def timed_out(self) -> NDArray[np.bool_]:
-        """Worlds at or past their time limit, shape (world,)."""
-        return self.facts.time_s >= self.time_limit_s - 1e-9
+    def terminated(self) -> NDArray[np.bool_]:
+        """Worlds whose episode ended by what happened: the swarm arrived, or all of it is lost. Shape (world,)."""
+        return self.arrived | ~self.state.alive.any(axis=1)
 
-    def reset(
-        self, seed: int | Sequence[int] | NDArray[np.integer] | None = None, worlds: Sequence[int] | None = None
-    ) -> Percept:
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Worlds whose episode was cut off: by the time limit, or because it diverged. Shape (world,)."""
+        late = self.facts.time_s >= self.time_limit_s - 1e-9
+        return (late | (self.facts.diverged >= 0)) & ~self.terminated
+
+    @property
+    def ended(self) -> NDArray[np.bool_]:
+        """Worlds whose episode is over, shape (world,)."""
+        return self.terminated | self.truncated
+
+    def divergence(self, world: int) -> str:
+        """What went wrong in a world that diverged, and the remedy."""
+        timing = self.scenario.timing
+        return (
+            f"vehicle {self.facts.diverged[world]} of world {world} diverged before {self.facts.time_s[world]:g} s: "
+            f"its speed ran away, because timing.integration_step_s = {timing.integration_step_s:g} is too long for "
+            "this vehicle; use a smaller step, or weaker actuators"
+        )
+
+    def reset(self, seed: Seeds = None, worlds: Sequence[int] | None = None) -> Percept:
         """Start worlds anew.
 
         Args:
-            seed: world w starts from ``seed + w``; or one seed for each of ``worlds``; without a seed each world's
-                own stream goes on, from fresh entropy where it has none.
+            seed: world w starts from ``seed + w``; or a seed, or None, for each of ``worlds``; without a seed a
+                world's own stream goes on, from fresh entropy where it has none.
             worlds: which ones, default all.
         """
         chosen = range(self.num_worlds) if worlds is None else worlds
-        seeds = [] if seed is None else world_seeds(seed, chosen)
-        for k, w in enumerate(chosen):
-            if seed is not None:
-                self._rngs[w] = np.random.default_rng(seeds[k])
-            self._reset_world(w, self._rngs[w] or np.random.default_rng())
+        for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
+            stream = self._rngs[w] if own is None else np.random.default_rng(own)
+            self._reset_world(w, stream or np.random.default_rng())
         return self.percept
 
     def _reset_world(self, w: int, rng: np.random.Generator) -> None:
-        self._rngs[w] = rng
+        self._rngs[w], self.keys[w] = rng, episode_key(rng)
         field = draw_field(self.scenario, rng)
         state, course = self.state, self.course
         points, m = len(field.waypoints), len(field.obstacles)
@@ -188,11 +215,12 @@ class Swarm:
         state.before[w] = state.eta[w, :, :2]
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
-        self._ready[w] = True
+        self._ready[w], self._warned[w] = True, False
         self._observe(w)
 
     def observe(self) -> Percept:
         """Facts and percepts anew, as after a reset, where ``state`` or ``course`` was changed by hand."""
+        self._check_indices(self._arrays())
         for w in range(self.num_worlds):
             self._observe(w)
         return self.percept
@@ -208,17 +236,44 @@ class Swarm:
         return {name: array.copy() for name, array in self._arrays().items()} | {"streams": packed(self._rngs)}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Percept:
-        """Go on from a snapshot of a swarm of the same scenario and number of worlds."""
-        for name, array in self._arrays().items():
+        """Go on from a snapshot of a swarm of the same scenario and number of worlds.
+
+        Raises:
+            ValueError: an array is missing, has another shape or type, or holds an index beyond its array.
+        """
+        arrays = self._arrays()
+        for name, (shape, kind) in {name: (a.shape, a.dtype) for name, a in arrays.items()}.items():
+            given = snapshot.get(name)
+            if given is None or given.shape != shape or given.dtype != kind:
+                got = "nothing" if given is None else f"{given.dtype} of shape {given.shape}"
+                raise ValueError(f"the snapshot's {name} must be {kind} of shape {shape}, got {got}")
+        self._check_indices(snapshot)
+        self._rngs = unpacked(snapshot.get("streams", np.zeros(0)), self.num_worlds)
+        for name, array in arrays.items():
             array[...] = snapshot[name]
-        self._rngs = unpacked(snapshot["streams"])
         self._ready[:] = True
         return self.percept
+
+    def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
+        course, n = self.course, self.num_vehicles
+        bounds = {
+            "last": (1, course.waypoints.shape[1] - 1),
+            "num_obstacles": (0, course.obstacles.shape[1]),
+            "losses": (0, n - 1),
+            "heard": (-1, n - 1),
+            "diverged": (-1, n - 1),
+            "times": (0.0, np.finfo(np.float64).max),
+        }
+        for name, (low, high) in bounds.items():
+            if not ((arrays[name] >= low) & (arrays[name] <= high)).all():
+                raise ValueError(f"{name} must lie within {low} and {high}, got {np.unique(arrays[name])[[0, -1]]}")
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         groups = (self.state, self.course, self.facts, self._senses)
         return {
             "duration_s": self._duration_s,
+            "keys": self.keys,
             **{k: array for group in groups for k, array in group._asdict().items()},
         }
 
@@ -236,6 +291,10 @@ class Swarm:
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
             w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
+        if active is not None and (active.shape != (self.num_worlds,) or active.dtype != np.bool_):
+            raise ValueError(
+                f"active must be bool of shape ({self.num_worlds},), got {active.dtype} of shape {active.shape}"
+            )
         if not (self._ready if active is None else self._ready | ~active).all():
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
         arrays = (
@@ -243,8 +302,7 @@ class Swarm:
             self._suite, self.layout.offsets, self._scratch,
         )  # fmt: skip
         if self.num_worlds == 1:
-            if active is None or active[0]:
-                step_alone(*arrays)
+            diverged = (active is None or active[0]) and step_alone(*arrays)
         else:
             if _threads_of_parent:
                 raise RuntimeError(
@@ -252,17 +310,33 @@ class Swarm:
                     "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
                 )
             running = np.ones(self.num_worlds, np.bool_) if active is None else active
-            step_worlds(min(get_num_threads(), len(self._scratch.reals)), running, *arrays)
+            diverged = step_worlds(min(get_num_threads(), len(self._scratch.reals)), running, *arrays)
+        if diverged:
+            for w in np.flatnonzero((self.facts.diverged >= 0) & ~self._warned):
+                _log.warning(self.divergence(int(w)))
+                self._warned[w] = True
         return self.percept
 
 
-def world_seeds(seed: int | Sequence[int] | NDArray[np.integer], worlds: Sequence[int]) -> list[int]:
-    """A seed for each of these worlds: ``seed + w``, or the given ones."""
-    if np.ndim(seed) == 0:
-        return [int(cast(int, seed)) + w for w in worlds]
-    seeds = [int(value) for value in cast(Sequence[int], seed)]
+def world_seeds(seed: Seeds, worlds: Sequence[int]) -> list[int | None]:
+    """A seed, or None, for each of these worlds: ``seed + w``, or the given ones.
+
+    Raises:
+        TypeError: a seed is not a whole number.
+        ValueError: a seed is negative, or there is not one for each world.
+    """
+    try:
+        if seed is None or np.ndim(cast(Any, seed)) == 0:
+            first = None if seed is None else operator.index(cast(int, seed))
+            seeds = [None if first is None else first + w for w in worlds]
+        else:
+            seeds = [None if own is None else operator.index(own) for own in cast(Sequence[int | None], seed)]
+    except (TypeError, ValueError):
+        raise TypeError(f"seed must be a whole number, a list of them, or None, got {seed!r}") from None
     if len(seeds) != len(worlds):
         raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
+    if any(own is not None and own < 0 for own in seeds):
+        raise ValueError(f"seed must not be negative, got {seed}")
     return seeds
 
 

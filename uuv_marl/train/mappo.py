@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.learned import Layer
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.train.fleet import Fleet, Moment
+from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
 from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with MAPPO"):
@@ -306,7 +306,7 @@ class Mappo:
     ) -> None:
         self._by = by
         self._rng = np.random.default_rng(seed)
-        self.fleet = Fleet(scenario, sizes, weights, self._rng)
+        self.fleet = Fleet(scenario, sizes, weights, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
         self.learner = Learner(self.fleet.features, self.fleet.size, by, self._rng)
         self.agent_steps = by.horizon * self.fleet.rows
         """Of an iteration."""

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,10 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.learned import Layer
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
 from uuv_marl.train.crew import Crew
-from uuv_marl.train.fleet import PATIENCE_S, TRAINING_SEEDS, Episodes
+from uuv_marl.train.fleet import TRAINING_SEEDS, Episodes
 from uuv_marl.train.mappo import Proximal, Update, adam_arrays, annealed, restore_adam
-from uuv_marl.train.shaping import Weights, shaped
+from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with Stable-Baselines3"):
     import torch
@@ -69,9 +67,7 @@ class Ppo:
         seed: int,
     ) -> None:
         self._by, self._share = by, 0.0
-        patience = min(scenario.time_limit.extra_s, PATIENCE_S)
-        cut_off = load_scenario(scenario, overrides={"time_limit.factor": 1.0, "time_limit.extra_s": patience})
-        self._crew = Crew(cut_off, sizes, partial(shaped, by=weights))
+        self._crew = Crew(scenario, sizes, weights)
         self._env = VecNormalize(self._crew, norm_obs=False, gamma=by.gamma)
         first = int(np.random.default_rng(seed).integers(*TRAINING_SEEDS))
         self.agent_steps = by.horizon * self._crew.num_envs
@@ -117,9 +113,8 @@ class Ppo:
         return [Layer(weight.T.copy(), bias.copy()) for weight, bias in weights]
 
     def take_episodes(self) -> Episodes:
-        """Sums over the episodes that ended since the last call; collisions as they come."""
-        taken, self._crew.episodes = self._crew.episodes, Episodes()
-        return taken
+        """Sums over the episodes that ended since the last call."""
+        return self._crew.fleet.take_episodes()
 
     def arrays(self) -> Arrays:
         """Weights, optimiser and the scale of returns, for ``restore``."""
@@ -146,12 +141,12 @@ class Ppo:
         """The worlds, for ``put_back``."""
         starts = self.model._last_episode_starts
         assert starts is not None  # noqa: S101
-        return {**self._crew.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
+        return {**self._crew.fleet.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
 
     def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a ``snapshot``."""
         model: Any = self.model
-        self._crew.restore(snapshot)
+        self._crew.fleet.restore(snapshot)
         self._env.returns[...] = snapshot["discounted"]
         model._last_obs, model._last_episode_starts = self._crew.seen.copy(), snapshot["starts"] > 0
 
