@@ -205,7 +205,7 @@ def test_the_table_shows_the_paper_and_what_each_policy_knows(tmp_path, monkeypa
     policies = ["bio_inspired", "sdc", "idle"]
     runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
     rows = rows_of(results, scenario.name, policies, [0, 1])
-    text = markdown_table("x", rows)
+    text = markdown_table(HEADERS, rows)
     assert [len(row) for row in rows] == [len(HEADERS)] * 3
     assert "205 s, 10.48-12.63 m" in text
     assert "206 s, 4.2 m" in text

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines import make
 from uuv_marl.benchmark.metrics import Meter, Metrics
+from uuv_marl.errors import DivergenceError
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.swarm import DivergenceError, Swarm
+from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
 

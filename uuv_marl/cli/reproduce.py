@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import console, explained, extra, progress_bar
+from uuv_marl.cli.console import console, explained, extra, working
 
 
 def reproduce(
@@ -30,17 +30,13 @@ def reproduce(
     with explained():
         from uuv_marl.reproduce.job import reproduce as run
 
-        try:
-            with progress_bar() as bar:
-                task = bar.add_task("reproduce", total=1.0)
-                written = run(
-                    output, seeds, only or [],
-                    lambda what, share: bar.update(task, completed=share, description=what[:60]),
-                )  # fmt: skip
-                bar.update(task, completed=1.0, description="reproduce")
-        except KeyboardInterrupt:
-            console.print(f"Stopped. The finished runs are in {output}; the same command goes on.")
-            raise typer.Exit(130) from None
+        with working(f"The finished runs are in {output}", alone=output) as bar:
+            task = bar.add_task("reproduce", total=1.0)
+            written = run(
+                output, seeds, only or [],
+                lambda what, share: bar.update(task, completed=share, description=what[:60]),
+            )  # fmt: skip
+            bar.update(task, completed=1.0, description="reproduce")
         for path in written:
             console.print(f"  {path}", highlight=False)
 
@@ -53,18 +49,15 @@ def identify(
 
     Section 5.2.2 is not looked at and stays a prediction. This needs the extra "tune" and takes about an hour. Ctrl-C
     keeps the finished trials, and the same command continues. The shipped result is in uuv_marl/reproduce/identified.
+    The trials' journal may hold pickled data, so continue none that you do not trust.
     """
     with explained():
-        try:
-            with extra("tune", "identification"), progress_bar() as bar:
-                from uuv_marl.reproduce.identify import identify as search
+        with extra("tune", "identification"), working(f"The finished trials are in {output}", alone=output) as bar:
+            from uuv_marl.reproduce.identify import identify as search
 
-                task = bar.add_task("identify", total=trials)
-                path = search(
-                    output, trials,
-                    lambda done, best: bar.update(task, completed=done, description=f"largest error {best:.1%}"),
-                )  # fmt: skip
-        except KeyboardInterrupt:
-            console.print(f"Stopped. The finished trials are in {output}; the same command goes on.")
-            raise typer.Exit(130) from None
+            task = bar.add_task("identify", total=trials)
+            path = search(
+                output, trials,
+                lambda done, best: bar.update(task, completed=done, description=f"largest error {best:.1%}"),
+            )  # fmt: skip
         console.print(f"{path}", highlight=False)

@@ -110,7 +110,8 @@ class Study:
     def metric(self, case: Case, name: str, seeds: Sequence[int] | None = None) -> Float64:
         """A metric by seed; NaN where there is none."""
         rows = self._results(case).select(case.scenario, case.policy, self.seeds if seeds is None else seeds)
-        values = [row.metrics[name] for row in rows]
+        metrics: list[Mapping[str, object]] = [row.metrics for row in rows]
+        values = [each[name] for each in metrics]
         return np.array([value if isinstance(value, (int, float)) else np.nan for value in values], np.float64)
 
     def trace(self, case: Case, seed: int) -> Trace:

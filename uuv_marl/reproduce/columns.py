@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import replacing
+
 Columns = dict[str, NDArray[Any]]
 """A table by column, all of one length; numbers or texts. NaN stands for nothing measured."""
 _DIGITS = 6
@@ -16,13 +18,11 @@ _DIGITS = 6
 def write_columns(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
     """A table as CSV, whole or not at all: texts in quotes, numbers with six significant digits."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
     cells = [[_written(value) for value in values.tolist()] for values in columns.values()]
-    with partial.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC)
         writer.writerow(columns)
         writer.writerows(zip(*cells, strict=True))
-    partial.replace(path)
 
 
 def read_columns(path: Path) -> Columns:

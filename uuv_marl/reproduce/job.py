@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.results import ResultsError, source_fingerprint
 from uuv_marl.reproduce import (
     identification,
@@ -95,7 +96,7 @@ def make(part: Part, study: Study, folder: Path, report: Report) -> Path:
             write_columns(paths[-1], table)
         if not part.cases:
             kept = {"code": _code(), "tables": [path.stem for path in paths]}
-            stamp.write_text(json.dumps(kept), encoding="utf-8")
+            write_text(stamp, json.dumps(kept))
     figure = part.draw({path.stem: read_columns(path) for path in paths})
     return _save(figure, part, folder / "figures" / f"{part.name}.png")
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import write_text
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.tables import estimate
@@ -242,9 +243,9 @@ def write_ledger(folder: Path, entries: Sequence[Entry], seeds: int) -> list[Pat
     """``ledger.json`` and ``ledger.md``."""
     data, page = folder / "ledger.json", folder / "ledger.md"
     rows = [entry._asdict() for entry in entries]
-    data.write_text(json.dumps({"seeds": seeds, "entries": rows}, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(data, json.dumps({"seeds": seeds, "entries": rows}, indent=1, allow_nan=False) + "\n")
     lines = ["# Ledger", "", f"Wang et al. 2024, sections 5.1 to 5.3, and ours over {seeds} seeds.", ""]
-    page.write_text("\n".join([*lines, *markdown(entries)]), encoding="utf-8")
+    write_text(page, "\n".join([*lines, *markdown(entries)]))
     return [data, page]
 
 

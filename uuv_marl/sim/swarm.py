@@ -50,10 +50,6 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
 
 
-class DivergenceError(RuntimeError):
-    """The integration step is too long for the vehicle, so that its speed ran away."""
-
-
 class Swarm:
     """Worlds of one scenario, each with its own random stream.
 
