@@ -227,6 +227,14 @@ def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     assert make(name, other, any_vehicle=True).act(Swarm(other).reset(0)).shape == (1, 2, 2)
 
 
+def test_a_benchmark_on_another_vehicle_is_refused_before_its_first_run(tmp_path):
+    command = ["benchmark", "--policy=idle", "--policy=mappo", "--set=vehicle.m_kg=600.0", f"--output={tmp_path / 'a'}"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 2
+    assert "mappo was trained on another vehicle" in done.output
+    assert not (tmp_path / "a").exists()
+
+
 def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
     heavy = load_scenario("tracking", overrides={"vehicle.m_kg": 600.0})
     save_checkpoint(learned_file(best), card(vehicle=vehicle_of(heavy)), actor())

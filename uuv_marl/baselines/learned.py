@@ -120,7 +120,11 @@ class Learned(Policy):
         vehicles = () if any_vehicle else (card.vehicle, vehicle_of(scenario))
         for what, other, remedy in (
             ("percept", _difference(*tables), "use a scenario with the sonar suite of its training"),
-            ("vehicle", vehicles and _difference(*vehicles), "run it all the same with make(..., any_vehicle=True)"),
+            (
+                "vehicle",
+                vehicles and _difference(*vehicles),
+                "leave it out, run it all the same with make(..., any_vehicle=True)",
+            ),
         ):
             if other:
                 raise PolicyError(
