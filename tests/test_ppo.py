@@ -212,6 +212,7 @@ def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch):
 
 
 def test_a_short_training_beats_random_by_far():
+    """Random vehicles are paid -6.09, idle ones -3.67. Seeds 0 to 6 reached -1.46 to -1.80; at least -3.05 is asked."""
     sizes = [(4, 8), (9, 4)]
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=272, epochs=6, kl_stop=0.1, learning_rate=(3e-3, 3e-4))
     algorithm = Ppo(by, open_water(), sizes, Weights(), 0)

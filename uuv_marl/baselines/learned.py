@@ -18,6 +18,7 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import replacing
 from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits, Policy, PolicyError
 from uuv_marl.percept import Offsets, Percept, PerceptLayout
@@ -116,7 +117,7 @@ class Learned(Policy):
         self.name, self.checkpoint, card = trained.name, trained.checkpoint, trained.checkpoint.card
         self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds)
-        tables = ({row[0]: row[1:] for row in table} for table in (card.percept, rows_of(self.layout)))
+        tables = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, rows_of(self.layout)))
         vehicles = () if any_vehicle else (card.vehicle, vehicle_of(scenario))
         for what, other, remedy in (
             ("percept", _difference(*tables), "use a scenario with the sonar suite of its training"),
@@ -242,9 +243,8 @@ def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:
     tensors = {f"{k}.{name}": array for k, layer in enumerate(layers) for name, array in layer._asdict().items()}
     contiguous = {name: np.ascontiguousarray(array, np.float32) for name, array in tensors.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    partial.write_bytes(safetensors.numpy.save(contiguous, {_CARD: card.model_dump_json()}))
-    partial.replace(path)
+    with replacing(path) as partial:
+        partial.write_bytes(safetensors.numpy.save(contiguous, {_CARD: card.model_dump_json()}))
 
 
 def load_checkpoint(path: Path) -> Checkpoint:

@@ -20,7 +20,6 @@ _MADE_HERE = re.compile(r"\d{6,}(\.partial)?")
 _HIDDEN = re.compile(r"\..*|config\.partial\.json")
 """What a first start may leave behind that was killed before it wrote its settings."""
 
-
 R = TypeVar("R", bound=Any)
 """A NamedTuple with ``iteration`` and ``agent_steps``: a row of ``progress.csv``."""
 Say = Callable[[str], object]
@@ -88,7 +87,8 @@ class TrainingFolder(Generic[R]):
     def _find(self) -> None:
         """The last whole checkpoint."""
         broken = ""
-        for path in sorted(self._made(), reverse=True):
+        made = [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
+        for path in sorted(made, reverse=True):
             try:
                 text = (path / "record.json").read_text(encoding="utf-8")
                 record = TypeAdapter(type(self._start)).validate_json(text)
@@ -104,10 +104,6 @@ class TrainingFolder(Generic[R]):
         if broken:
             raise ResultsError(f"{broken}copy it again as a whole, or delete it to start at the beginning")
         self.found = f"{self.path} holds no checkpoint yet: starting at the beginning"
-
-    def _made(self) -> Sequence[Path]:
-        """Checkpoints in the folder, whole or not, but none that is still being written."""
-        return [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
 
     @property
     def _checkpoints(self) -> Path:
