@@ -317,7 +317,7 @@ def test_results_refuse_other_weights_of_the_same_path(best, tmp_path):
     assert results.trace("tracking", best, 0)["time_s"].size
     save_checkpoint(learned_file(best), card(), actor(seed=1))
     with pytest.raises(ResultsError, match="as it was before its file changed"):
-        Results(tmp_path / "out", [scenario])
+        Results(tmp_path / "out", [scenario]).use(best)
 
 
 def test_one_table_holds_names_and_checkpoints(best, tmp_path, monkeypatch):

@@ -145,7 +145,8 @@ def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
 
 def open_water(sizes, seed=0, weights=None, **overrides):
     scenario = load_scenario("tracking", overrides={**OPEN_WATER, **overrides})
-    return Fleet(scenario, sizes, weights or Weights(), np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    return Fleet(scenario, sizes, weights or Weights(), lambda num: rng.integers(*TRAINING_SEEDS, num))
 
 
 def test_a_swarm_of_one_finds_the_force_that_follows():
@@ -189,8 +190,8 @@ def test_a_short_training_beats_random_by_far():
 
 
 def test_a_fleet_ends_worlds_and_starts_them_anew(monkeypatch):
-    monkeypatch.setattr(fleets, "PATIENCE_S", -38.0)  # cut off 2 s after the start of 40 s
-    fleet = open_water([(1, 2), (3, 2)])
+    monkeypatch.setattr(fleets, "PATIENCE_S", 0.0)  # cut off when l(t) comes to rest, after 2 s
+    fleet = open_water([(1, 2), (3, 2)], **{"trajectory.waypoints_m": [[0.0, 0.0], [8.0, 0.0]]})
     assert fleet.seen.shape == (8, fleet.features + VIEW_SIZE)
     idle = np.zeros((8, 2), np.float32)
     for _ in range(3):
@@ -219,7 +220,7 @@ def test_arrival_terminates():
 
 
 def test_training_worlds_are_not_those_of_validation():
-    fleet = open_water([(1, 2)])
+    fleet = TINY.begin(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights(), 0).fleet
     seeds = []
     fleet._swarms[0].reset = lambda drawn, worlds: seeds.extend(drawn)
     for _ in range(500):
