@@ -52,6 +52,7 @@ def exported(policy, scenario, folder):
 def expect_the_same(model, policy, flat):
     """Actions of percepts (vehicle, size); returns them."""
     percept = Percept(np.asarray(flat, np.float32)[None], policy.layout)
+    policy = make(policy.name, load_scenario(policy.scenario, num_vehicles=len(flat)))
     (action,) = model.run(None, {"observation": percept.to_observation()[0]})
     assert action.dtype == np.float32
     np.testing.assert_allclose(action, policy.act(percept)[0], rtol=0, atol=1e-5)
