@@ -147,6 +147,7 @@ class Ppo:
         """Go on from a ``snapshot``."""
         model: Any = self.model
         self._crew.fleet.restore(snapshot)
+        self._crew.seed()  # or the next worlds that end would start from the seeds of a new training
         self._env.returns[...] = snapshot["discounted"]
         model._last_obs, model._last_episode_starts = self._crew.seen.copy(), snapshot["starts"] > 0
 
