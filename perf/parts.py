@@ -3,7 +3,7 @@
 A part that needs another's result repeats that too; perf/report.py takes the difference.
 """
 
-from typing import Any
+from typing import Any, cast
 from unittest.mock import patch
 
 import numba
@@ -24,7 +24,7 @@ PARTS = {
 every sub-sector; hearing, echoes, percepts."""
 
 
-compiled: Any = numba.njit(error_model="numpy", **{"_nrt": False})  # as the package compiles
+compiled = cast(Any, numba).njit(error_model="numpy", **{"_nrt": False})  # as the package compiles
 
 
 def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> Any:

@@ -58,7 +58,7 @@ def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEP
         for w in np.flatnonzero(active):
             for array in (*arrays, swarm.heard, percept.flat, action, actor.clamps):
                 hashed[w].update(array[w].tobytes())
-        active &= ~(swarm.arrived | swarm.timed_out | ~swarm.state.alive.any(axis=1))
+        active &= ~(swarm.arrived | (swarm.facts.time_s >= swarm.time_limit_s - 1e-9) | ~swarm.state.alive.any(axis=1))
         actor.active[:] = active
         if not active.any():
             break

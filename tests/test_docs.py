@@ -108,7 +108,7 @@ def test_generated_tables_are_those_of_the_code():
     tables = tool()
     for page in tables.PAGES:
         assert page.read_text() == tables.written(page), f"{page.name}: run python tools/write_tables.py"
-    marked = re.findall(r"^<!-- (\w+) -->$", "".join(page.read_text() for page in PAGES), flags=re.M)
+    marked = re.findall(r"^<!-- (\w+) -->$", "".join(page.read_text() for page in tables.PAGES), flags=re.M)
     assert sorted(marked) == sorted(tables.TABLES)
 
 

@@ -62,7 +62,7 @@ def test_no_number_of_an_observation_is_an_index(name):
 
 
 def test_a_ghost_is_nobody_to_the_lattice():
-    """A neighbour without identity moves a vehicle of sdc by its short repulsion alone, as one out of the swarm does."""
+    """A neighbour without identity moves a vehicle of sdc by its short repulsion alone."""
     _, policy, percept = made_for("sdc")
     policy.act(percept)
     percept["heard"][...] = 0.0
@@ -194,11 +194,9 @@ def test_divergence_truncates_an_episode_with_finite_numbers(runaway):
 
 
 def test_divergence_never_becomes_a_row_of_results(runaway):
-    found = []
+    events = evaluate(runaway, "bio_inspired", range(3))
     with pytest.raises(DivergenceError, match="seed 0: vehicle"):
-        for event in evaluate(runaway, "bio_inspired", range(3)):
-            found += [event] if isinstance(event, Run) else []
-    assert not found
+        assert not [event for event in events if isinstance(event, Run)]
 
 
 def test_training_refuses_scenarios_in_which_vehicles_are_lost():

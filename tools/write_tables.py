@@ -6,6 +6,7 @@ from pathlib import Path
 
 import uuv_marl
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v0
+from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import PerceptField, PerceptLayout
@@ -17,8 +18,7 @@ RESULTS = ROOT / "docs" / "results.md"
 
 def table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
     """A Markdown table."""
-    rows = [head, ("---",) * len(head), *lines]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
+    return markdown_table(head, lines).rstrip("\n")
 
 
 def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:

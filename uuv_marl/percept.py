@@ -5,6 +5,7 @@ dividing by them (the observation) and multiplying again loses nothing.
 """
 
 import dataclasses
+import difflib
 import functools
 import math
 from typing import NamedTuple
@@ -140,21 +141,34 @@ class PerceptLayout:
         return np.repeat(np.array(values, np.float32), [field.size for field in self.table])
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Percept:
     """What vehicles know: ``flat`` of shape (..., layout.size), float32, physical units; its fields as views.
 
     ``velocity`` (..., 2), ``yaw_rate`` (..., 1), ``reference`` (..., 2), ``reference_velocity`` (..., 2),
     ``heard`` (..., sector), ``neighbour`` (..., sector, 2), ``echo`` (..., active), ``echo_range`` (..., active),
     ``echo_position`` (..., active, 2), and where granted ``compass`` (..., 2), ``link_identity`` (..., sector),
-    ``link_velocity`` (..., sector, 2). Any of them by ``percept["name"]``.
+    ``link_velocity`` (..., sector, 2). Any of them by ``percept["name"]``; ``percept.names`` lists those there are.
     """
 
     flat: Float32
     layout: PerceptLayout
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The fields that ``percept["name"]`` gives, in the order of the flat vector."""
+        return tuple(self.layout.starts)
+
+    def __repr__(self) -> str:
+        fields = ", ".join(f"{name} {self[name].shape}" for name in self.names)
+        return f"Percept(flat {self.flat.shape}; {fields})"
+
     def __getitem__(self, name: str) -> Float32:
-        """A field by name, as a view. Raises KeyError where the channel is not granted."""
+        """A field by name, as a view. Raises KeyError where there is none, or where its channel is not granted."""
+        if name not in self.layout.starts:
+            near = difflib.get_close_matches(str(name), self.names, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise KeyError(f"percept has no field {name!r}; {hint}It has {', '.join(self.names)}")
         start = self.layout.starts[name]
         field = next(field for field in self.layout.table if field.name == name)
         return self.flat[..., start : start + field.size].reshape(*self.flat.shape[:-1], *field.shape)

@@ -20,7 +20,7 @@ from typing_extensions import TypedDict
 
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
-from uuv_marl.baselines.learned import Learned
+from uuv_marl.baselines.learned import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
@@ -219,7 +219,7 @@ def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
 def knowledge(policy: str) -> Knowledge:
     """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
     made = policy_class(policy)
-    if issubclass(made, Learned):
+    if isinstance(made, Trained):
         source = made.checkpoint.digest
     else:
         file = inspect.getsourcefile(made) if ":" in policy else None

@@ -1,5 +1,6 @@
 """``uuv-marl benchmark``, and ``tune``, which found the gains of what it compares."""
 
+import itertools
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -53,8 +54,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import PolicyError
-        from uuv_marl.baselines.registry import policy_class
+        from uuv_marl.baselines import PolicyError, granted, make
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import rich_table
@@ -70,8 +70,8 @@ def benchmark(
         policies = list(dict.fromkeys(policy or runner.DEFAULT_POLICIES))
         if any(":" in name for name in policies):
             sys.path.append("")  # last, so that no file of this folder takes the place of an installed module
-        for name in policies:
-            policy_class(name)
+        for name, loaded in itertools.product(policies, scenarios):
+            make(name, granted(name, loaded))  # refused now, not after hours of others' runs
         evaluator, cluster = _where(ray, policies)
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:

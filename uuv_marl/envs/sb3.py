@@ -1,16 +1,18 @@
 """``SwarmVecEnv``: worlds as a Stable-Baselines3 ``VecEnv``, a row per vehicle, for one policy that all share."""
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, TaskBased, make_task, refuse_losses
-from uuv_marl.envs.view import View
+from uuv_marl.envs.ending import ending
+from uuv_marl.envs.task import Float32, Outcome, ScenarioLike, TaskOptions, make_task, refuse_losses
+from uuv_marl.envs.view import TaskBased
 from uuv_marl.extras import extra
+from uuv_marl.sim.arguments import action_array, whole_number
 
 with extra("train", "SwarmVecEnv"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
@@ -53,48 +55,44 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
 
     Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
     reset in the same step, all its rows at once: ``infos[row]`` then holds ``terminal_observation``,
-    ``TimeLimit.truncated``, ``is_success`` (the swarm arrived) and ``episode`` (return ``r``, length ``l``, its own
-    seconds ``t``). Scenarios in which a vehicle can be lost are refused: SB3 has no row that ends and waits.
+    ``TimeLimit.truncated``, ``episode`` (return ``r``, length ``l``, its own seconds ``t``) and how it ended
+    (``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``: ``uuv_marl.envs.ending.ending``). Scenarios in
+    which a vehicle can be lost are refused: SB3 has no row that ends and waits.
 
     Args:
         num_worlds: worlds stepped together.
+        scenario: a name, a TOML file or a ``Scenario``.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
-        scenario, num_vehicles, max_cycles, reward, decision_period, overrides: as for ``uuv_marl.parallel_env``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as for
+            ``uuv_marl.parallel_env``.
     """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - SB3's own form
 
     def __init__(
         self,
         num_worlds: int = 1,
         scenario: ScenarioLike = "single_obstacle",
-        num_vehicles: int | None = None,
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
         *,
-        reward: Reward = "individual",
-        decision_period: float | None = None,
-        overrides: Mapping[str, object] | None = None,
+        render_mode: str | None = None,
+        **options: Unpack[TaskOptions],
     ) -> None:
-        self._task = make_task(
-            scenario, num_worlds, num_vehicles, max_cycles, reward=reward, decision_period=decision_period,
-            overrides=overrides,
-        )  # fmt: skip
+        self._show(make_task(scenario, num_worlds, **options), render_mode)
         refuse_losses(self.scenario, "SwarmVecEnv")
-        self._view = View(render_mode, ["rgb_array"], self.scenario)
-        self.render_mode = render_mode
         self._shape = (num_worlds, self.swarm.num_vehicles)
         layout = self.swarm.layout
         super().__init__(
             num_worlds * self.swarm.num_vehicles, Box(layout.low, layout.high), Box(-1.0, 1.0, (2,), np.float32)
         )
-        self.metadata: dict[str, Any] = {**self.metadata, "render_fps": self._view.fps}
         self._seed: int | None = None
+        self._actions: Float32 | None = None
         self._returns = np.zeros(self._shape)
         self._lengths = np.zeros(num_worlds, np.int64)
         self._starts = np.full(num_worlds, time.perf_counter())
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """For the next reset: world w starts from ``seed + w``. Returns the seed of every row's world."""
-        drawn = int(np.random.default_rng().integers(2**31)) if seed is None else int(seed)
+        drawn = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number("seed", seed, 0)
         self._seed = drawn
         return [drawn + world for world in range(self._shape[0]) for _ in range(self._shape[1])]
 
@@ -108,14 +106,14 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions, shape (row, 2), for ``step_wait``."""
-        rows = np.asarray(actions, np.float32)
-        if rows.shape != (self.num_envs, 2):
-            raise ValueError(f"actions must have shape {(self.num_envs, 2)}, a row per vehicle, got {rows.shape}")
+        rows = action_array(actions, (self.num_envs, 2), "actions, a row per vehicle,")
         self._actions = rows.reshape(*self._shape, 2)
 
     def step_wait(self) -> tuple[Float32, Float32, NDArray[np.bool_], list[dict[str, Any]]]:
         """Observations, rewards, dones and infos of every row."""
-        outcome = self._task.step(self._actions)
+        if self._actions is None:
+            raise RuntimeError("step_wait came before step_async; call step(actions)")
+        outcome, self._actions = self._task.step(self._actions), None
         self._returns += outcome.reward
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -136,11 +134,11 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
     def _end(self, world: int, outcome: Outcome, infos: list[dict[str, Any]]) -> None:
         """Write what SB3 wants to know of an ended world into the infos of its rows."""
         seconds = round(time.perf_counter() - self._starts[world], 6)
+        shared = {**ending(self._task, world), "TimeLimit.truncated": bool(outcome.world_truncated[world])}
         for i in range(self._shape[1]):
             infos[world * self._shape[1] + i] = {
                 "terminal_observation": outcome.observation[world, i],
-                "TimeLimit.truncated": bool(outcome.world_truncated[world]),
-                "is_success": bool(outcome.world_terminated[world]),
+                **shared,
                 "episode": {"r": float(self._returns[world, i]), "l": int(self._lengths[world]), "t": seconds},
             }
 

@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +13,9 @@ from uuv_marl.envs.reward import RewardFunction, pay, rates
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import ScenarioError, load_scenario
+from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.field import longest_duration
-from uuv_marl.sim.swarm import Seeds, Swarm
+from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -71,6 +72,8 @@ class Task:
         self._rates = rates(scenario)
         self._ready = np.zeros(num_worlds, np.bool_)
         self._over = np.zeros(num_worlds, np.bool_)
+        self.collisions = np.zeros(num_worlds, np.int64)
+        """Contact episodes that began since the reset, shape (world,)."""
         self.max_cycles = max_cycles
         self._reward: Reward = reward
 
@@ -81,9 +84,7 @@ class Task:
 
     @max_cycles.setter
     def max_cycles(self, value: int | None) -> None:
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1):
-            raise ValueError(f"max_cycles must be a whole number from 1, or None for the time limit, got {value!r}")
-        self._max_cycles = value
+        self._max_cycles = None if value is None else whole_number("max_cycles", value, 1)
 
     @property
     def longest_episode(self) -> int:
@@ -94,7 +95,7 @@ class Task:
         cycles = math.ceil(seconds / scenario.timing.decision_period_s)
         return min(cycles, self.max_cycles or cycles)
 
-    def reset(self, seed: Seeds = None, worlds: Sequence[int] | None = None) -> Float32:
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> Float32:
         """Start worlds anew; the observations of all, shape (world, vehicle, entry).
 
         Args:
@@ -104,7 +105,7 @@ class Task:
         """
         chosen = list(range(self.swarm.num_worlds)) if worlds is None else list(worlds)
         self.swarm.reset(seed, chosen)
-        self._ready[chosen], self._over[chosen] = True, False
+        self._ready[chosen], self._over[chosen], self.collisions[chosen] = True, False, 0
         return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
 
     def need_reset(self, what: str) -> None:
@@ -120,7 +121,8 @@ class Task:
         self.need_reset("step")
         swarm = self.swarm
         before = swarm.state.alive.copy()
-        swarm.step(np.asarray(action, np.float32), ~self._over)
+        swarm.step(action, ~self._over)
+        self.collisions += swarm.facts.collisions * ~self._over
         alive = swarm.state.alive
         reward, world_reward, terms = self._rewards(before & ~self._over[:, None])
         world_terminated = swarm.terminated
@@ -171,41 +173,42 @@ class Task:
         return np.inf if self.max_cycles is None else self.max_cycles * self.swarm.scenario.timing.holds_per_decision
 
 
-class TaskBased:
-    """What every API's object shows of the task below it."""
+class Changes(TypedDict, total=False):
+    """Arguments of every environment API that change the scenario, explained by ``uuv_marl.parallel_env``."""
 
-    _task: Task
+    num_vehicles: int | None
+    decision_period: float | None
+    overrides: Mapping[str, object] | None
 
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
 
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
-        return self._task.swarm
+class TaskOptions(Changes, total=False):
+    """Arguments of every environment API beyond the scenario, explained by ``uuv_marl.parallel_env``."""
+
+    max_cycles: int | None
+    reward: Reward
+
+
+def changed(
+    scenario: ScenarioLike,
+    num_vehicles: int | None = None,
+    decision_period: float | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> Scenario:
+    """The scenario with the ``Changes``."""
+    period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
+    return load_scenario(scenario, num_vehicles=num_vehicles, overrides={**(overrides or {}), **period})
 
 
 def make_task(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
-    num_vehicles: int | None = None,
-    max_cycles: int | None = None,
     *,
+    max_cycles: int | None = None,
     reward: Reward = "individual",
-    decision_period: float | None = None,
-    overrides: Mapping[str, object] | None = None,
+    **changes: Unpack[Changes],
 ) -> Task:
     """A task from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
-    changes = with_period(overrides, decision_period)
-    return Task(load_scenario(scenario, num_vehicles=num_vehicles, overrides=changes), num_worlds, reward, max_cycles)
-
-
-def with_period(overrides: Mapping[str, object] | None, decision_period: float | None) -> Mapping[str, object]:
-    """The overrides with the decision period [s] among them, where one is given."""
-    period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
-    return {**(overrides or {}), **period}
+    return Task(changed(scenario, **changes), num_worlds, reward, max_cycles)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

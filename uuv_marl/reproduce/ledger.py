@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import write_text
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.reproduce.assumptions import ALL, ASSUMPTIONS, SEARCHED
 from uuv_marl.reproduce.cases import (
     COMPARATORS,
@@ -265,11 +265,11 @@ def markdown(entries: Sequence[Entry], heading: str = "##") -> list[str]:
     lines: list[str] = []
     for kind, title in titles.items():
         chosen = [entry for entry in entries if entry.kind == kind]
-        lines += [f"{heading} {title}", "", *_table(kind, chosen), "", *_notes(kind, chosen)]
+        lines += [f"{heading} {title}", "", _table(kind, chosen), *_notes(kind, chosen)]
     return lines
 
 
-def _table(kind: str, entries: Sequence[Entry]) -> list[str]:
+def _table(kind: str, entries: Sequence[Entry]) -> str:
     if kind == "given":
         rows = [(e.section, e.quantity, e.unit, e.paper, str(e.ours), e.verdict) for e in entries]
         head = ("section", "quantity", "unit", "paper", "ours", "verdict")
@@ -285,7 +285,7 @@ def _table(kind: str, entries: Sequence[Entry]) -> list[str]:
             for k, e in enumerate(entries, start=1)
         ]
         head = ("no.", "section", "the paper says", "holds", "ours", "worst", "verdict")
-    return [f"| {' | '.join(cells)} |" for cells in [head, ("---",) * len(head), *rows]]
+    return markdown_table(head, rows)
 
 
 def _notes(kind: str, entries: Sequence[Entry]) -> list[str]:

@@ -67,7 +67,7 @@ UNKNOWNS: dict[str, Unknown] = {
     ),
     "obstacle_term": Unknown(default="per_echo", meaning="what Eq. 21 sums over", choices=("per_echo", "per_obstacle")),
 }
-"""The space. Not in it: both sonar sectors ahead, with which the swarm collides (docs/reproduction)."""
+"""The space. Not in it: both sonar sectors ahead, with which the swarm collides (docs/paper/report.md)."""
 
 DEFAULTS: dict[str, Value] = {name: unknown.default for name, unknown in UNKNOWNS.items()}
 

@@ -1,7 +1,6 @@
 """Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
 
 import logging
-import operator
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
@@ -9,10 +8,11 @@ from typing import Any, cast
 import numpy as np
 from numba import config, get_num_threads
 from numba.np.ufunc.parallel import threading_layer
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario, growth
+from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
@@ -25,7 +25,6 @@ from uuv_marl.sim.vehicle import plant
 from uuv_marl.sim.world import observe_world, step_alone, step_worlds
 
 Float32 = NDArray[np.float32]
-Seeds = int | Sequence[int | None] | NDArray[np.integer] | None
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
 """Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
 ends on the scenario's own, so that the time within a smaller radius is often missing."""
@@ -62,9 +61,7 @@ class Swarm:
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
-        self.num_worlds = operator.index(num_worlds)
-        if num_worlds < 1:
-            raise ValueError(f"num_worlds must be at least 1, got {num_worlds}")
+        self.num_worlds = num_worlds = whole_number("num_worlds", num_worlds, 1)
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
@@ -181,7 +178,7 @@ class Swarm:
             "this vehicle; use a smaller step, or weaker actuators"
         )
 
-    def reset(self, seed: Seeds = None, worlds: Sequence[int] | None = None) -> Percept:
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> Percept:
         """Start worlds anew.
 
         Args:
@@ -273,17 +270,15 @@ class Swarm:
             **{k: array for group in groups for k, array in group._asdict().items()},
         }
 
-    def step(self, action: Float32, active: NDArray[np.bool_] | None = None) -> Percept:
+    def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:
         """Advance by one decision period.
 
         Args:
-            action: shares of full surge force and yaw torque, float32, shape (world, vehicle, 2); projected onto the
-                unit disc. Entries of lost vehicles are ignored.
+            action: shares of full surge force and yaw torque, shape (world, vehicle, 2), rounded to float32 and
+                projected onto the unit disc. Entries of lost vehicles are ignored.
             active: worlds to step, shape (world,); the others stay as they are. Default all.
         """
-        expected = (self.num_worlds, self.num_vehicles, 2)
-        if action.shape != expected or action.dtype != np.float32:
-            raise ValueError(f"action must be float32 of shape {expected}, got {action.dtype} of shape {action.shape}")
+        action = action_array(action, (self.num_worlds, self.num_vehicles, 2), "action")
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
             w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
@@ -312,28 +307,6 @@ class Swarm:
                 _log.warning(self.divergence(int(w)))
                 self._warned[w] = True
         return self.percept
-
-
-def world_seeds(seed: Seeds, worlds: Sequence[int]) -> list[int | None]:
-    """A seed, or None, for each of these worlds: ``seed + w``, or the given ones.
-
-    Raises:
-        TypeError: a seed is not a whole number.
-        ValueError: a seed is negative, or there is not one for each world.
-    """
-    try:
-        if seed is None or np.ndim(cast(Any, seed)) == 0:
-            first = None if seed is None else operator.index(cast(int, seed))
-            seeds = [None if first is None else first + w for w in worlds]
-        else:
-            seeds = [None if own is None else operator.index(own) for own in cast(Sequence[int | None], seed)]
-    except (TypeError, ValueError):
-        raise TypeError(f"seed must be a whole number, a list of them, or None, got {seed!r}") from None
-    if len(seeds) != len(worlds):
-        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
-    if any(own is not None and own < 0 for own in seeds):
-        raise ValueError(f"seed must not be negative, got {seed}")
-    return seeds
 
 
 def _rules(scenario: Scenario) -> Rules:

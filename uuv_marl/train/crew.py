@@ -6,13 +6,16 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from uuv_marl.baselines.learned import MOST_BARRIER
 from uuv_marl.envs.sb3 import SharedRows
+from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.fleet import Fleet
 from uuv_marl.train.shaping import Weights
+
+with extra("train", "training with Stable-Baselines3"):
+    from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 Float32 = NDArray[np.float32]
 
