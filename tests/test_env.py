@@ -20,8 +20,6 @@ with warnings.catch_warnings():
     from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, render_test
     from pettingzoo.test.state_test import state_test
 
-pytest.importorskip("pygame")
-
 
 def module(scenario):
     """PettingZoo's tests take a module with these two functions."""

@@ -130,8 +130,8 @@ def test_options_reach_the_rows():
         env.step(actions.T)
 
 
+@pytest.mark.needs("pygame")
 def test_a_picture_tiles_the_worlds():
-    pytest.importorskip("pygame")
     env = swarm(render_mode="rgb_array")
     assert env.metadata["render_fps"] == 2
     with pytest.raises(RuntimeError, match="came before reset"):

@@ -18,7 +18,6 @@ import uuv_marl
 from uuv_marl import baselines
 from uuv_marl.envs.solo import SoloEnv
 
-pytest.importorskip("pygame")
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
 
 

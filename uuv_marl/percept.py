@@ -66,18 +66,18 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
     table = [
         PerceptField("velocity", (2,), *speed, "own surge and sway velocity"),
         PerceptField("yaw_rate", (1,), "rad/s", 1.0, -MAX_SPEED, MAX_SPEED, "own yaw rate"),
-        PerceptField("reference", (2,), *position, "from the vehicle to l(t); saturates, direction kept"),
+        PerceptField("reference", (2,), *position, "vector to the reference point l(t); a longer one is cut to 4096 m"),
         PerceptField("reference_velocity", (2,), *speed, "velocity of the reference point"),
-        PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard"),
-        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: nearest vehicle's position, else 0"),
-        PerceptField("echo", (num_active,), *flag, "per active sub-sector: 1 if an obstacle echoes"),
+        PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
+        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: that vehicle's position, else 0"),
+        PerceptField("echo", (num_active,), *flag, "per active sub-sector: 1 if an obstacle returns an echo, else 0"),
         PerceptField(
             "echo_range", (num_active,), "m", _POSITION_SCALE_M, 0.0, MAX_RANGE_M,
-            "per active sub-sector: range of the nearest obstacle's surface in the beam, else 0",
+            "per active sub-sector: range to the nearest obstacle's surface in it, else 0",
         ),
         PerceptField(
             "echo_position", (num_active, 2), *position,
-            "per active sub-sector: the obstacle's centre, or the surface point heard (sonar.echo_reports), else 0",
+            "per active sub-sector: position of its centre, or of that surface point (sonar.echo_reports), else 0",
         ),
     ]  # fmt: skip
     if "compass" in channels:
@@ -88,7 +88,7 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
                 "link_identity", (num_sectors,), "1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES,
                 "per sub-sector: 1 + index of the vehicle heard, else 0",
             ),
-            PerceptField("link_velocity", (num_sectors, 2), *speed, "per sub-sector: velocity of the vehicle heard"),
+            PerceptField("link_velocity", (num_sectors, 2), *speed, "per sub-sector: velocity of that vehicle, else 0"),
         ]  # fmt: skip
     return tuple(table)
 

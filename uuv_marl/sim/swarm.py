@@ -287,12 +287,12 @@ class Swarm:
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
             w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
-        if not (self._ready if active is None else self._ready | ~active).all():
-            raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
         if active is not None and (active.shape != (self.num_worlds,) or active.dtype != np.bool_):
             raise ValueError(
                 f"active must be bool of shape ({self.num_worlds},), got {active.dtype} of shape {active.shape}"
             )
+        if not (self._ready if active is None else self._ready | ~active).all():
+            raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
         arrays = (
             np.ascontiguousarray(action), self.state, self.course, self.facts, self._senses, self._plant, self._rules,
             self._suite, self.layout.offsets, self._scratch,
