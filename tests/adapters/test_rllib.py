@@ -424,7 +424,7 @@ def test_a_missing_ray_is_explained(arguments, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     done = CliRunner().invoke(app, [*arguments, f"--output={tmp_path / 'out'}"])
     assert done.exit_code == 2
-    assert "needs ray: install the extra, in the checkout: pip install -e '.[distributed]'" in " ".join(
+    assert "needs ray, which comes with the extra 'distributed': pip install 'uuv_marl[distributed]'" in " ".join(
         done.output.split()
     )
     assert not (tmp_path / "out").exists()

@@ -149,14 +149,13 @@ def _knows(known: Knowledge) -> str:
 def _paper_cell(paper: PaperFigure | None) -> str:
     if paper is None:
         return _NOTHING
-    parts: list[str] = []
-    if paper.task_time_s is not None:
-        parts.append(f"{paper.task_time_s:g} s")
-    if paper.min_obstacle_distance_m is not None:
-        parts.append("-".join(f"{distance:g}" for distance in paper.min_obstacle_distance_m) + " m")
-    if paper.min_spacing_m is not None:
-        parts.append(f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m")
-    return ", ".join(parts)
+    distances = "-".join(f"{distance:g}" for distance in paper.min_obstacle_distance_m or ())
+    parts = (
+        f"{paper.task_time_s:g} s" if paper.task_time_s else "",
+        f"{distances} m" if distances else "",
+        f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m" if paper.min_spacing_m else "",
+    )
+    return ", ".join(filter(None, parts))
 
 
 def rich_table(title: str, rows: Sequence[Cells], width: int) -> RichTable:

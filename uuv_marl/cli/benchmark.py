@@ -86,13 +86,11 @@ def benchmark(
 
             with cluster:
                 runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
-            shown = runner.policies_in(results, scenarios, wanted)
-            tables = runner.make_tables(results, scenarios, shown, wanted)
-            written = runner.write_report(results, tables, scenarios, shown, wanted)
+            tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
             console.print(rich_table(table.title, table.rows, console.width))
-        console.print(f"Every seed: {output}/results.json   table: {written[0]}   pictures:")
-        for path in written[1:]:
+        console.print(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
+        for path in pictures:
             console.print(f"  {path}", highlight=False)
         console.print(_NEXT.format(output=output), markup=False, highlight=False)
 
