@@ -362,6 +362,13 @@ def test_np_random_is_seeded_and_touches_nothing():
     np.testing.assert_array_equal(env.np_random.random(4), first)
 
 
+WIDE = {
+    "disturbance.loss_times_s": [1.0, 2.0],
+    "contact.hull_radius_m": 22.0,
+    "start.spacing_m": 45.0,
+    "start.gap_m": 45.0,
+}
+"""Vehicles so wide that they touch soon."""
 ENDINGS = {
     "arrival": {
         "trajectory.speed_mps": 40.0,
@@ -370,26 +377,26 @@ ENDINGS = {
         "arrival.dwell_s": 0.2,
         "disturbance.loss_times_s": [1.0],
     },
-    "time_limit": {**SHORT, "disturbance.loss_times_s": [1.0, 2.0], "contact.hull_radius_m": 6.0},
-    "lost": {**SHORT, "disturbance.loss_times_s": [1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0]},
+    "time_limit": {**WIDE, "time_limit.factor": 0.05, "time_limit.extra_s": 30.0},
+    "lost": {**WIDE, "contact.ends_vehicle": True},
 }
 
 
 @pytest.mark.parametrize("reason", ENDINGS)
 def test_the_last_info_tells_how_it_ended(reason):
-    scenario = load_scenario("lossy", num_vehicles=8, overrides={**ENDINGS[reason], "timing.decision_period_s": 0.5})
+    scenario = load_scenario("lossy", num_vehicles=4, overrides={**ENDINGS[reason], "timing.decision_period_s": 0.5})
     env, whole = uuv_marl.parallel_env(scenario), uuv_marl.vector_env(1, scenario)
-    solo = gymnasium.make("uuv_marl/Solo-v0", scenario=scenario, others="random").unwrapped
-    mixed = make("random", env)
-    env.reset(seed=4)
+    solo = gymnasium.make("uuv_marl/Solo-v0", scenario=scenario, others="bio_inspired").unwrapped
+    policy = make("bio_inspired", env)
+    observations, _ = env.reset(seed=4)
     whole.reset(seed=4)
     solo.reset(seed=4)
-    mixed.reset(4)
+    policy.reset(4)
     last, collisions, alone = {}, 0, {}
     while env.agents:
-        actions = mixed(dict.fromkeys(env.agents, np.zeros(98, np.float32)))
-        acted = list(env.agents)
-        *_, infos = env.step(actions)
+        acted, actions = list(env.agents), policy(observations)
+        observations, *_, infos = env.step(actions)
+        observations = {agent: observations[agent] for agent in env.agents}
         everyone = np.array([[actions.get(agent, np.zeros(2)) for agent in env.possible_agents]])
         final = whole.step(everyone)[-1]
         if not alone:

@@ -221,6 +221,44 @@ def test_gymnasium_wrappers_work():
     assert seen >= 6
 
 
+@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
+def test_wrappers_that_change_observations_work_where_gymnasium_lets_them(mode):
+    names = ["FlattenObservation", "DtypeObservation", "ReshapeObservation"]
+    names += ["NormalizeObservation"] if mode == "NextStep" else []
+    arguments = {"DtypeObservation": (np.float32,), "ReshapeObservation": ((5 * 98,),)}
+    for name in names:
+        env = getattr(wrappers, name)(short(autoreset_mode=mode, max_cycles=4), *arguments.get(name, ()))
+        env.reset(seed=0)
+        ended = 0
+        for action in random_actions(short(), 12):
+            _, _, terminated, truncated, _ = env.step(action.reshape(env.action_space.shape))
+            over = terminated | truncated
+            ended += int(over.sum())
+            if mode == "Disabled" and over.any():
+                env.reset(options={"reset_mask": over})
+        assert ended >= 6, name
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+def test_solo_in_gymnasiums_own_vectoriser_tells_how_it_ended(mode):
+    options = {"scenario": "random_field", "num_vehicles": 4, "decision_period": 0.5, "max_cycles": 3}
+    envs = gymnasium.make_vec(
+        "uuv_marl/Solo-v0",
+        2,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": AutoresetMode(mode)},
+        **options,
+    )
+    envs = wrappers.RecordEpisodeStatistics(envs)
+    envs.reset(seed=0)
+    *_, truncated, infos = [envs.step(np.zeros((2, 2), np.float32)) for _ in range(3)][-1]
+    assert truncated.all()
+    assert infos["episode"]["l"].tolist() == [3, 3]
+    told = infos["final_info"] if mode == "SameStep" else infos
+    assert told["ending"].tolist() == ["time_limit"] * 2
+    assert told["is_success"].tolist() == [False, False]
+
+
 def test_final_info_tells_how_a_world_ended():
     quick = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
     env = uuv_marl.vector_env(2, "single_obstacle", num_vehicles=4, decision_period=0.5, overrides=quick)

@@ -121,7 +121,7 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
             rows = [actions[agent] for agent in self.agents]
             masked = np.ma.MaskedArray in set(map(type, rows))  # an array of them would lose the masks
             given = None if masked else action_array(np.array(rows), (len(rows), 2), "actions")
-        except (KeyError, TypeError, ValueError, RuntimeError, OverflowError):
+        except (LookupError, TypeError, ValueError, RuntimeError, OverflowError):
             given = None
         if given is None or not np.isfinite(given).all():
             given = self._one_by_one(actions)
