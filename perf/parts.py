@@ -3,7 +3,7 @@
 A part that needs another's result repeats that too; perf/report.py takes the difference.
 """
 
-from typing import Any, cast
+from typing import Any
 from unittest.mock import patch
 
 import numba
@@ -24,7 +24,8 @@ PARTS = {
 every sub-sector; hearing, echoes, percepts."""
 
 
-compiled = cast(Any, numba).njit(error_model="numpy", **{"_nrt": False})  # as the package compiles
+_njit: Any = numba.njit
+compiled = _njit(error_model="numpy", _nrt=False)  # as the package compiles
 
 
 def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> Any:
@@ -67,7 +68,8 @@ def part(name: str) -> Maker:
             water.step(np.zeros((worlds, agents, 2), np.float32))
         *given, scratch = step_worlds.call_args.args[2:]
         python: Any = arrays.desk
-        desk, kernel = python.py_func(scratch, 0), loop(*PARTS[name]) if name in PARTS else stepped
+        desk = python.py_func(scratch, 0)
+        kernel = loop(*PARTS[name]) if name in PARTS else stepped
         case = repeated(lambda _: kernel(worlds, *given, desk), agents * worlds)
         case.run(1)
         return case

@@ -122,7 +122,10 @@ def campaign(share=1.0, seed=13):
                     process.kill()
                 return process
 
-            found = [stopped(program, Path(made) / f"{name} kill {k}", wanted, killed) for k in range(max(int(kills * share), 1))]
+            found = [
+                stopped(program, Path(made) / f"{name} kill {k}", wanted, killed)
+                for k in range(max(int(kills * share), 1))
+            ]
             rows.append((name, "SIGKILL", len(found), *map(sum, zip(*found, strict=True))))
             print(*rows[-2:], sep="\n", flush=True)
     return rows
