@@ -30,7 +30,8 @@ from uuv_marl.train.training import OVERRIDES, Settings, train
 shorter = {"time_limit.extra_s": 5.0, "time_limit.factor": 0.2}
 settings = Settings(
     scenario="starter", overrides={**OVERRIDES, **shorter}, sizes=((5, 2),), steps=480, checkpoint_every=1,
-    validate_every=2, validation=((5, 1),), algorithm=replace(Hyperparameters(), horizon=12, minibatch=60, hidden=(8, 8)),
+    validate_every=2, validation=((5, 1),),
+    algorithm=replace(Hyperparameters(), horizon=12, minibatch=60, hidden=(8, 8)),
 )
 for _ in train(folder, settings, resume=(folder / "config.json").exists()):
     pass
@@ -84,7 +85,7 @@ def content(program, folder):
 
 
 def stopped(program, folder, wanted, start):
-    """Stop a program as ``start`` does, run it again: was a finished result lost, could it not go on, does it differ?"""
+    """Stop a program as ``start`` does and run it again: 1 where something was lost, can't go on, or differs."""
     process = start(folder)
     process.communicate(timeout=300)
     before = len(json.loads((folder / "results.json").read_text())["runs"]) if (folder / "results.json").exists() else 0

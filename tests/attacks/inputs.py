@@ -1,4 +1,4 @@
-"""Hostile inputs, a function for each kind: it makes one from random numbers, hands it over, and says what became of it.
+"""Hostile inputs, a function for each kind: it makes one from random numbers and hands it over.
 
 A case ends in "accepted" or "refused" (a clear error). Everything else that can happen to it is told by ``judge``.
 """
@@ -161,9 +161,10 @@ def toml_bytes(rng, folder):
 def toml_by_hand(rng, folder):
     depth = int(rng.integers(2, 4000))
     texts = (
-        "[" * depth, "x = " + "[" * depth, "a" + ".a" * depth + " = 1", "x = " + "9" * depth, "x = '" + "\\u0000" * depth,
-        'extends = "a.toml"', 'extends = "../b/a.toml"', "extends = 5", 'extends = "/dev/null"', "extends = " + "'a'" * 3,
-        "[swarm]\nnum_vehicles = " + "1" * depth, "obstacles = [" + "{centre_m=[1,2],radius_m=1}," * min(depth, 300) + "]",
+        "[" * depth, "x = " + "[" * depth, "a" + ".a" * depth + " = 1", "x = " + "9" * depth, "\\u0000" * depth,
+        'extends = "a.toml"', 'extends = "../b/a.toml"', "extends = 5", 'extends = "/dev/null"', "extends = 'a''a'",
+        "[swarm]\nnum_vehicles = " + "1" * depth,
+        "obstacles = [" + "{centre_m=[1,2],radius_m=1}," * min(depth, 300) + "]",
         "[[obstacles]]\n" * min(depth, 300), "\ufeff", "[swarm]\n" * 2, "swarm = 1", "=", "#" * depth,
     )  # fmt: skip
     for name in "ab":
@@ -219,9 +220,10 @@ def hostile_action(rng, n):
     return pick(
         rng,
         (
-            good, spoilt, other, good[:-1], good[:, :1], good[None], good.astype(complex), np.ma.masked_array(good, good > 0),
-            good.astype(str), good.astype(np.float16), (good * 100).astype(np.int8), good > 0, good.tolist(), [], None, "ab",
-            {1, 2}, {}, good.T, np.asfortranarray(good), good[::-1], np.zeros((0, 2)), np.float64(1), object(), [[1], [2, 3]],
+            good, spoilt, other, good[:-1], good[:, :1], good[None], good.T, good[::-1], np.asfortranarray(good),
+            good.astype(complex), good.astype(str), good.astype(np.float16), (good * 100).astype(np.int8), good > 0,
+            np.ma.masked_array(good, good > 0), good.tolist(), [], None, "ab", {1, 2}, {}, np.zeros((0, 2)),
+            np.float64(1), object(), [[1], [2, 3]],
         ),
     )  # fmt: skip
 
@@ -275,11 +277,11 @@ def call_sequences(rng, folder):
         lambda: env.step(act()),
         lambda: env.step(act()),
         lambda: env.step(act()),
-        lambda: env.state(),
-        lambda: env.render(),
+        env.state,
+        env.render,
         lambda: copy.deepcopy(env),
-        lambda: env.close(),
-        lambda: getattr(env, "last", list)(),
+        env.close,
+        getattr(env, "last", list),
     )
     for _ in range(12):
         try:
@@ -449,10 +451,10 @@ def prepare(folder):
 
 def command_line(rng, folder):
     words = (
-        "benchmark", "train", "mappo", "ppo", "heldout", "reproduce", "scenarios", "policies", "export", "identify", "tune",
-        "--help", "-h", "--scenario", "starter", "nowhere", "./x.toml", "--policy", "idle", ":", "a:b", "/x/y", "--seeds", "0",
-        "-1", "1e3", "x", "--set", "a=b", "swarm.num_vehicles=0", "--output", "/dev/null", "/proc/x", "--only", "--show",
-        "--steps", "3e6", "--noise", "inf", "--resume", "--trials", "²", "",
+        "benchmark", "train", "mappo", "ppo", "heldout", "reproduce", "scenarios", "policies", "export", "identify",
+        "tune", "--help", "-h", "--scenario", "starter", "nowhere", "./x.toml", "--policy", "idle", ":", "a:b", "/x/y",
+        "--seeds", "0", "-1", "1e3", "x", "--set", "a=b", "swarm.num_vehicles=0", "--output", "/dev/null", "/proc/x",
+        "--only", "--show", "--steps", "3e6", "--noise", "inf", "--resume", "--trials", "²", "",
     )  # fmt: skip
     line = [pick(rng, words) for _ in range(int(rng.integers(1, 6)))]
     if line[0] in ("benchmark", "heldout", "reproduce", "identify", "tune", "train") and not any(
