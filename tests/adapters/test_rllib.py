@@ -226,7 +226,7 @@ def test_every_runner_starts_from_its_own_world(joined):
 def test_training_seeds_keep_their_range_and_differ():
     seeds = {rllib.world_seed(seed, steps) for seed in range(50) for steps in (0, 100, 200)}
     assert len(seeds) == 150
-    assert all(100_000 <= seed < 999_000 for seed in seeds)
+    assert all(100_000 <= seed < 899_000 for seed in seeds), "900,000 and more are for validation"
 
 
 def rows(folder):
@@ -280,7 +280,7 @@ def test_folders_that_are_used_or_empty_or_of_other_settings_are_refused(tmp_pat
     (tmp_path / "config.json").write_text('{"settings": {}, "sessions": []}')
     with pytest.raises(ResultsError, match="is not empty; give --resume"):
         next(train(tmp_path, 100, SMALL))
-    with pytest.raises(ResultsError, match="another scenario; give the same options"):
+    with pytest.raises(ResultsError, match="begun with .* give the same options"):
         next(train(tmp_path, 100, SMALL, resume=True))
     with pytest.raises(ResultsError, match="no training to resume"):
         next(train(tmp_path / "new", 100, SMALL, resume=True))
