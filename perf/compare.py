@@ -96,7 +96,7 @@ class Process:
         python = ROOT / library.venv / "bin" / "python"
         if not python.exists():
             raise CannotRun(f"{library.venv} is missing; 'make perf' and 'make perf-training' make theirs")
-        self._limit, self._log = limit, tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed with this object
+        self._limit, self._log = limit, tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed by stop
         self._process = subprocess.Popen(  # noqa: S603
             [python, HERE / library.script, case, *map(str, (agents, worlds, seconds, limit))],
             cwd=ROOT, env={**os.environ, **library.environment}, text=True, bufsize=1,
@@ -115,16 +115,20 @@ class Process:
         for line in self._process.stdout or ():
             if line.startswith("{"):  # libraries print too
                 return json.loads(line)
-        if self._process.wait() == -signal.SIGALRM:
-            raise CannotRun(f"not ready within {self._limit:.0f} s")
+        ended = self._process.wait()
         self._log.seek(0)
-        raise CannotRun((self._log.read().strip().splitlines() or ["ended without a word"])[-1])
+        words = (self._log.read().strip().splitlines() or ["ended without a word"])[-1]
+        self.stop()
+        raise CannotRun(f"not ready within {self._limit:.0f} s" if ended == -signal.SIGALRM else words)
 
     def stop(self) -> None:
         """End it; it may do so by itself first."""
-        with contextlib.suppress(subprocess.TimeoutExpired, BrokenPipeError):
-            self._process.communicate(timeout=PATIENCE_S)
-        self._process.kill()
+        with contextlib.suppress(BrokenPipeError), self._process:
+            if self._process.poll() is None:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self._process.communicate(timeout=PATIENCE_S)
+                self._process.kill()
+        self._log.close()
 
 
 def measure(cell: Cell, rounds: int, seconds: float) -> tuple[list[Record], dict[str, Any]]:
