@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ BLUE, ORANGE, GREEN, PINK, AMBER, SKY, BLACK, GREY = COLOURS
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
+def house_style() -> Generator[None]:
     """Whatever is drawn inside has the house style (``house.mplstyle``); Matplotlib's settings come back after it."""
     with matplotlib.style.context(["default", "uuv_marl.benchmark.house"]):
         yield
