@@ -9,7 +9,7 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.reproduce import identify, unknowns
-from uuv_marl.reproduce.columns import read_columns
+from uuv_marl.reproduce.study import read_columns
 from uuv_marl.reproduce.unknowns import DEFAULTS, OBJECTIVES, UNKNOWNS, Numbers
 
 HIT = Numbers(10.03, 12.29, 11.0, 205.0, 0.0)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from uuv_marl.reproduce.cases import NOTHING
+from uuv_marl.reproduce.study import NOTHING
 
 ALL = "5.1 both, 5.2.1, 5.2.2 both, Table 2"
 """The six numbers of the paper's own controller."""

@@ -2,17 +2,14 @@
 
 import hashlib
 import json
-import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-
 from uuv_marl.benchmark.results import ResultsError, source_fingerprint
+from uuv_marl.benchmark.style import house_style, save
 from uuv_marl.reproduce import (
-    identification,
+    identify,
     literal,
     obstacle_figures,
     rest,
@@ -21,11 +18,9 @@ from uuv_marl.reproduce import (
     tracking_figures,
     variations,
 )
-from uuv_marl.reproduce.cases import Report, Study
-from uuv_marl.reproduce.columns import read_columns, write_columns
 from uuv_marl.reproduce.ledger import CASES, ledger, write_ledger
 from uuv_marl.reproduce.page import write_page
-from uuv_marl.reproduce.parts import Part
+from uuv_marl.reproduce.study import Part, Report, Study, Tables, read_columns, write_columns
 
 Progress = Callable[[str, float], None]
 """Called with what is being done, and the share of the whole job that is done."""
@@ -35,7 +30,7 @@ PARTS: tuple[Part, ...] = (
     *obstacle_figures.PARTS,
     literal.PART,
     sensitivity.PART,
-    identification.PART,
+    identify.PART,
     stability.PART,
     rest.PART,
     *variations.PARTS,
@@ -96,8 +91,17 @@ def make(part: Part, study: Study, folder: Path, report: Report) -> Path:
         if not part.cases:
             kept = {"code": _code(), "tables": [path.stem for path in paths]}
             stamp.write_text(json.dumps(kept), encoding="utf-8")
-    figure = part.draw({path.stem: read_columns(path) for path in paths})
-    return _save(figure, part, folder / "figures" / f"{part.name}.png")
+    return draw(part, {path.stem: read_columns(path) for path in paths}, folder / "figures" / f"{part.name}.png")
+
+
+def draw(part: Part, tables: Tables, path: Path) -> Path:
+    """A part's picture with its title."""
+    kind, _, number = part.name.rpartition("-")
+    again = f"{kind.capitalize()} {number}: " if number.isdigit() else ""
+    with house_style():
+        figure = part.draw(tables)
+        figure.suptitle(again + part.title)  # pyright: ignore[reportUnknownMemberType]
+        return save(figure, path)
 
 
 def _kept(part: Part, stamp: Path, folder: Path) -> list[Path]:
@@ -115,15 +119,6 @@ def _code() -> str:
     for path in sorted([*_HERE.glob("*.py"), *_HERE.glob("identified/*")]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
-
-
-def _save(figure: Figure, part: Part, path: Path) -> Path:
-    width = round(14.0 * figure.get_figwidth())
-    words = [*textwrap.wrap(f"{part.name}: {part.title}", width), *textwrap.wrap(part.caption, width)]
-    figure.suptitle("\n".join(words), fontsize=9)  # pyright: ignore[reportUnknownMemberType]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    FigureCanvasAgg(figure).print_png(str(path))  # pyright: ignore[reportUnknownMemberType]
-    return path
 
 
 def _costs(parts: Sequence[Part], seeds: int) -> list[float]:

@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from uuv_marl.benchmark.style import panels
 from uuv_marl.reproduce.assumptions import ASSUMPTIONS, Alternative, Assumption
-from uuv_marl.reproduce.cases import MULTI, SINGLE, TRACKING, Case, Report, Study, folder_name
-from uuv_marl.reproduce.columns import Columns
 from uuv_marl.reproduce.ledger import CLOSE, Number, difference, numbers
-from uuv_marl.reproduce.parts import Part, Tables
+from uuv_marl.reproduce.study import MULTI, SINGLE, TRACKING, Case, Columns, Part, Report, Study, Tables, folder_name
 
 SEEDS = range(6)
 _NAMES = {"tracking": TRACKING, "single_obstacle": SINGLE, "multi_obstacle": MULTI}
@@ -77,25 +76,26 @@ def draw(made: Tables) -> Figure:
     table = made["sensitivity"]
     rows = list(dict.fromkeys(zip(table["assumption"].tolist(), table["alternative"].tolist(), strict=True)))
     heads = list(dict.fromkeys(zip(table["section"].tolist(), table["quantity"].tolist(), strict=True)))
-    figure = Figure(figsize=(11.5, 0.27 * len(rows) + 2.4), layout="constrained")
-    ax = figure.subplots()
+    figure, (ax,) = panels(1, size=(11.5, 0.27 * len(rows) + 2.4))
     change: NDArray[np.float64] = np.full((len(rows), len(heads)), np.nan)
     for k in range(len(table["value"])):
         i = rows.index((str(table["assumption"][k]), str(table["alternative"][k])))
         j = heads.index((str(table["section"][k]), str(table["quantity"][k])))
         change[i, j] = table["relative_change"][k]
         ax.text(j, i, _cell(table, k), ha="center", va="center", fontsize=8,
+                color="white" if abs(change[i, j]) > 0.35 else "black",
                 fontweight="bold" if abs(table["relative_difference"][k]) <= CLOSE else "normal")  # fmt: skip
-    image = ax.imshow(np.clip(change, -0.5, 0.5), cmap="PuOr", vmin=-0.5, vmax=0.5, aspect="auto", alpha=0.7)
+    image = ax.imshow(np.clip(change, -0.5, 0.5), cmap="PuOr", vmin=-0.5, vmax=0.5, aspect="auto")
     ax.set_facecolor("0.93")
+    ax.grid(visible=False)
     papers = [_paper(head) for head in heads]
     labels = [
         f"{section}\n{textwrap.fill(quantity, 15)}\npaper:\n{paper}"
         for (section, quantity), paper in zip(heads, papers, strict=True)
     ]
-    ax.set_xticks(range(len(heads)), labels, fontsize=8)
+    ax.set_xticks(range(len(heads)), labels)
     ax.xaxis.tick_top()
-    ax.set_yticks(range(len(rows)), [" = ".join(part for part in row if part) for row in rows], fontsize=8)
+    ax.set_yticks(range(len(rows)), [" = ".join(part for part in row if part) for row in rows])
     figure.colorbar(image, ax=ax, shrink=0.5, label="change against what we took (clipped at half)")
     return figure
 
@@ -119,11 +119,11 @@ def _stated(number: Number) -> str:
 
 PART = Part(
     name="sensitivity",
-    title="Sensitivity of the paper's numbers to what it leaves open, one assumption at a time",
+    title="How the paper's numbers change with what it leaves open, one assumption at a time",
     cases=cases(),
     tables=tables,
     draw=draw,
-    caption=f"bio_inspired, mean over seeds 0-{SEEDS[-1]}; bold: within 5 % of the paper; *: collisions; "
-    "never: no seed arrives",
+    caption=f"bio_inspired, mean over seeds 0 to {SEEDS[-1]}. Bold: within 5 % of the paper. *: with collisions. "
+    "Never: no seed arrives",
     seeds=SEEDS,
 )
