@@ -171,7 +171,7 @@ def test_the_shipped_point_is_loaded_and_runs_as_recorded(shipped):
 
 
 def test_the_picture_shows_the_papers_numbers_beside_the_trials():
-    figure = identify.draw(identify.trials())
+    figure = identify.draw({"identification-trials": identify.trials()})
     for ax, across, up in (
         (figure.axes[0], PAPER["tracking", "bio_inspired"].mean_min_spacing_m, 11.0),
         (figure.axes[1], PAPER["tracking", "bio_inspired"].min_spacing_m, 205.0),

@@ -126,6 +126,7 @@ def test_data_are_the_same_bytes_again_and_figures_come_from_them(made, tmp_path
         "figure-11b.csv",
         "figure-9a.csv",
         "figure-9b.csv",
+        "figure-9c.csv",
         "table-2.csv",
     ]
     for path in again:

@@ -48,11 +48,12 @@ def draw_routes(ax: Axes, table: Columns) -> None:
         ax.plot(x[0, own], y[0, own], "o", color=colour, mfc="none", ms=3, mew=0.6, label="" if side else "start")
         ax.plot(x[-1, own], y[-1, own], ".", color=colour, label="" if side else "end")
     end = float(time[-1, 0])
-    for moment in np.arange(60.0, end, 60.0 if end < 300.0 else 120.0):
+    for moment in np.arange(60.0, end - 30.0, 60.0 if end < 300.0 else 120.0):
         k = int(np.searchsorted(time[:, 0], moment))
         at = (float(x[k].mean()), float(y[k].mean()))
         ax.plot(*at, "P", color=BLACK, mec="white", mew=0.6, ms=6, ls="", zorder=6, label="swarm's centre at a time")
-        ax.annotate(f"{moment:g} s", at, xytext=(5, 3), textcoords="offset points", fontsize=7, zorder=6)
+        ax.annotate(f"{moment:g} s", at, xytext=(6, 4), textcoords="offset points", fontsize=7, zorder=6,
+                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5})  # fmt: skip
 
 
 def route_table(study: Study, case: Case, seed: int = 0) -> Columns:
