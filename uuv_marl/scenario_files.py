@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from tomlkit.container import Container
 from tomlkit.items import Array, Item, Table
 
+from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario import Scenario
 
 _FOLDER = Path(__file__).resolve().parent / "scenarios"
@@ -34,10 +35,6 @@ _EXPLANATIONS = {
     "too_short": "must have at least {min_length} entries",
     "too_long": "must have at most {max_length} entries",
 }
-
-
-class ScenarioError(ValueError):
-    """A scenario that can't be used; the message says which field, what it is and what to do."""
 
 
 def scenario_names() -> list[str]:

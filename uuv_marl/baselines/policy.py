@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -37,10 +38,6 @@ class Limits(NamedTuple):
         return Limits(
             actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, vehicle.X_u, vehicle.X_uu
         )  # fmt: skip
-
-
-class PolicyError(ValueError):
-    """A policy that can't drive this scenario; the message names the remedy."""
 
 
 class Policy(abc.ABC):

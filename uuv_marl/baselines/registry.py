@@ -78,7 +78,7 @@ def policy_class(name: str) -> type[Policy]:
         module, _, attribute = name.partition(":")
         try:
             made: object = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError) as error:
+        except (ImportError, AttributeError, ValueError) as error:
             raise PolicyError(f"policy {name!r} can't be imported: {error}") from None
         if not (isinstance(made, type) and issubclass(made, Policy)):
             raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {made!r}")

@@ -4,11 +4,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from uuv_marl.baselines import granted
+from uuv_marl.atomic import write_text, writing
+from uuv_marl.baselines import POLICIES, granted
 from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import Results
-from uuv_marl.benchmark.tables import CAPTION, markdown_table, rows_of
+from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
+from uuv_marl.errors import PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import differences, scenario_names
 
@@ -20,10 +22,6 @@ Report = Callable[[str, str, float], None]
 
 Evaluate = Callable[[Scenario, str, Sequence[int]], Iterator[Run | Progress]]
 """Runs a policy on a scenario over seeds: here as ``evaluate``, or elsewhere with the same runs."""
-
-
-class ClusterError(RuntimeError):
-    """A cluster that can't do the work; the message says what to do."""
 
 
 def run_missing(
@@ -41,12 +39,17 @@ def run_missing(
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
             done, fresh = len(seeds) - len(missing), 0
             report(scenario.name, policy, done / len(seeds))
-            for event in evaluator(granted(policy, scenario), policy, missing):
-                if isinstance(event, Run):
-                    results.add(scenario.name, policy, event)
-                    fresh += 1
-                share = event.share if isinstance(event, Progress) else fresh / len(missing)
-                report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
+            try:
+                for event in evaluator(granted(policy, scenario), policy, missing):
+                    if isinstance(event, Run):
+                        results.add(scenario.name, policy, event)
+                        fresh += 1
+                    share = event.share if isinstance(event, Progress) else fresh / len(missing)
+                    report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
+            except (TypeError, ValueError) as error:
+                if policy in POLICIES or isinstance(error, PolicyError):
+                    raise
+                raise PolicyError(f"policy {policy!r}: {error}") from error
             report(scenario.name, policy, 1.0)
 
 
@@ -56,7 +59,7 @@ def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     note = f"; CHANGED: {', '.join(changed)}" if changed else ""
     return (
         f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
-        f"{len(seeds)} seeds, echoes report the {scenario.sonar.echo_reports}{note}"
+        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}{note}"
     )
 
 
@@ -64,7 +67,7 @@ class Table(NamedTuple):
     """A scenario's table."""
 
     title: str
-    rows: list[tuple[str, ...]]
+    rows: list[Cells]
 
 
 def make_tables(
@@ -74,6 +77,12 @@ def make_tables(
     return [Table(title(s, seeds), rows_of(results, s.name, policies, seeds)) for s in scenarios]
 
 
+def policies_in(results: Results, scenarios: Sequence[Scenario], seeds: Sequence[int]) -> list[str]:
+    """Policies of which the results hold runs on these scenarios and seeds: default ones first, then by name."""
+    found = [p for p in results.policies if any(results.select(s.name, p, seeds) for s in scenarios)]
+    return [policy for policy in DEFAULT_POLICIES if policy in found] + sorted(set(found) - set(DEFAULT_POLICIES))
+
+
 def write_report(
     results: Results,
     tables: Sequence[Table],
@@ -81,9 +90,9 @@ def write_report(
     policies: Sequence[str],
     seeds: Sequence[int],
 ) -> list[Path]:
-    """``table.md`` and the pictures; the paths, the table first."""
+    """``table.md`` and the pictures; the paths, the table first. Raises ResultsError where they can't be written."""
     path = results.folder / "table.md"
-    texts = [markdown_table(table.title, table.rows) for table in tables]
-    path.write_text("\n".join([*texts, CAPTION + "\n"]), encoding="utf-8")
-    figures = [figure for scenario in scenarios for figure in draw_all(results, scenario.name, policies, seeds)]
-    return [path, *figures]
+    texts = [f"## {table.title}\n\n{markdown_table(HEADERS, table.rows)}" for table in tables]
+    write_text(path, "\n".join([*texts, CAPTION + "\n"]))
+    with writing(results.folder / "figures"):
+        return [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]

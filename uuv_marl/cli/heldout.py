@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import console, explained, progress_bar
+from uuv_marl.cli.console import console, explained, working
 
 
 def heldout(
@@ -30,22 +30,18 @@ def heldout(
     Example: uuv-marl heldout --only single_obstacle --seeds 5
     """
     with explained():
+        from uuv_marl.atomic import locked
         from uuv_marl.heldout.episodes import episodes_of
         from uuv_marl.heldout.job import run
         from uuv_marl.heldout.page import write_page
-        from uuv_marl.sim.compiled import announce_compilation
 
-        announce_compilation()
-        try:
-            with progress_bar() as bar:
-                task = bar.add_task("held out", total=1.0)
-                results, trained = run(
-                    output, trainings, only or [], seeds,
-                    lambda what, share: bar.update(task, completed=share, description=what[-60:]),
-                )  # fmt: skip
-                bar.update(task, completed=1.0, description="held out")
-        except KeyboardInterrupt:
-            console.print(f"Stopped. The finished episodes are in {output}; the same command goes on.")
-            raise typer.Exit(130) from None
-        for path in write_page(output, episodes_of(results, trained), trained):
-            console.print(f"  {path}", highlight=False)
+        with working(f"The finished episodes are in {output}") as bar:
+            task = bar.add_task("held out", total=1.0)
+            results, trained = run(
+                output, trainings, only or [], seeds,
+                lambda what, share: bar.update(task, completed=share, description=what[-60:]),
+            )  # fmt: skip
+            bar.update(task, completed=1.0, description="held out")
+        with locked(output, wait_s=60.0):
+            for path in write_page(output, episodes_of(results, trained), trained):
+                console.print(f"  {path}", highlight=False)

@@ -3,14 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.extras import extra
 from uuv_marl.scenario import growth
 from uuv_marl.sim.swarm import Swarm
 
-try:
+with extra("render", "rendering"):
     import pygame
-except ModuleNotFoundError as error:
-    message = "rendering needs pygame: install the extra, in the checkout: pip install -e '.[render]'"
-    raise ModuleNotFoundError(message) from error
 
 SIZE_PX = 800
 _MARGIN_M = 130.0

@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 from uuv_marl.envs.task import Float32, Outcome, Reward, ScenarioLike, TaskBased, make_task, refuse_losses
 from uuv_marl.envs.view import View
+from uuv_marl.extras import extra
+
+with extra("train", "SwarmVecEnv"):
+    from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 Indices = None | int | Iterable[int]
 

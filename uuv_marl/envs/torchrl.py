@@ -4,14 +4,17 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from tensordict import TensorDict, TensorDictBase
-from torchrl.data import Bounded, Categorical, Composite, Unbounded
-from torchrl.envs import EnvBase
 
 from uuv_marl.envs.task import Bool, Reward, ScenarioLike, TaskBased, make_task
+from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
+
+with extra("torchrl", "SwarmEnv"):
+    import torch
+    from tensordict import TensorDict, TensorDictBase
+    from torchrl.data import Bounded, Categorical, Composite, Unbounded
+    from torchrl.envs import EnvBase
 
 GROUP = "uuv"
 

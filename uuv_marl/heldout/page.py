@@ -8,7 +8,7 @@ import numpy as np
 
 from uuv_marl.baselines import POLICIES
 from uuv_marl.benchmark.style import house_style
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.heldout.across import SCORES, runs, tasks
 from uuv_marl.heldout.episodes import Episode, read_episodes, write_episodes
 from uuv_marl.heldout.figures import draw_fields, draw_trainings
@@ -58,16 +58,11 @@ def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     return story
 
 
-def _table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(headers) + " |", "|" + " --- |" * len(headers)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
-
-
 def _targets(episodes: Sequence[Episode]) -> str:
     found = targets(episodes, "mappo")
     rows = [(t.set, t.demand, t.measured, "met" if t.met else "**missed**") for t in found]
     met = sum(t.met for t in found)
-    return f"{met} of {len(found)} are met by `mappo`.\n\n" + _table(("set", "demand", "measured", ""), rows)
+    return f"{met} of {len(found)} are met by `mappo`.\n\n" + markdown_table(("set", "demand", "measured", ""), rows)
 
 
 def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:
@@ -77,7 +72,9 @@ def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:
     rows = [(name, *_cells(of(episodes, held.name, name), None if name == RIVAL else rival)) for name in order]
     note = f", {held.note}" if held.note else ""
     count = max(len(of(episodes, held.name, name)) for name in order)
-    return f"### {held.name}\n\n`{held.scenario}`{note}, seeds from 0, at most {count}.\n\n" + _table(_HEADERS, rows)
+    return f"### {held.name}\n\n`{held.scenario}`{note}, seeds from 0, at most {count}.\n\n" + markdown_table(
+        _HEADERS, rows
+    )
 
 
 def _cells(mine: Sequence[Episode], rival: Sequence[Episode] | None) -> tuple[str, ...]:
@@ -121,7 +118,7 @@ def _across(episodes: Sequence[Episode]) -> str:
         scores = [[[score(run) for run in found] for found in by_task] for score in SCORES.values()]
         each = [_interval(2, task) for tasks_of_score in scores for task in tasks_of_score]
         rows.append([policy, *each, *(_interval(2, *tasks_of_score) for tasks_of_score in scores)])
-    return _table([*headers, *(f"{name}, all" for name in SCORES)], rows)
+    return markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows)
 
 
 def _trainings(trained: Sequence[Trained]) -> str:
@@ -138,4 +135,4 @@ def _trainings(trained: Sequence[Trained]) -> str:
         "algorithm", "seed", "million agent-steps", "minutes", "best at [million]", "its score", "arrived",
         "last score",
     )  # fmt: skip
-    return _table(headers, rows) if rows else _NO_TRAININGS
+    return markdown_table(headers, rows) if rows else _NO_TRAININGS

@@ -20,6 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, legend, panels
 from uuv_marl.reproduce import unknowns
@@ -115,7 +116,7 @@ def identify(output: Path, trials: int, report: Callable[[int, float], None]) ->
     optimiser = f"Optuna {optuna.__version__}, multi-objective TPESampler(multivariate=True, "
     optimiser += f"n_startup_trials={STARTUP}), seeded by the number of trials before; the first trial is the defaults"
     path = output / "identified.json"
-    path.write_text(json.dumps(_summary(table, optimiser), indent=1) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(_summary(table, optimiser), indent=1) + "\n")
     return path
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.results import ResultsError, source_fingerprint
 from uuv_marl.benchmark.style import house_style, save
 from uuv_marl.reproduce import (
@@ -90,7 +91,7 @@ def make(part: Part, study: Study, folder: Path, report: Report) -> Path:
             write_columns(paths[-1], table)
         if not part.cases:
             kept = {"code": _code(), "tables": [path.stem for path in paths]}
-            stamp.write_text(json.dumps(kept), encoding="utf-8")
+            write_text(stamp, json.dumps(kept))
     return draw(part, {path.stem: read_columns(path) for path in paths}, folder / "figures" / f"{part.name}.png")
 
 

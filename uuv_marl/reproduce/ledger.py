@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import write_text
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.reproduce.assumptions import ALL, ASSUMPTIONS, SEARCHED
 from uuv_marl.reproduce.claims import CLAIMS, Claim
 from uuv_marl.reproduce.study import (
@@ -242,9 +243,9 @@ def write_ledger(folder: Path, entries: Sequence[Entry], seeds: int) -> list[Pat
     """``ledger.json`` and ``ledger.md``."""
     data, page = folder / "ledger.json", folder / "ledger.md"
     rows = [entry._asdict() for entry in entries]
-    data.write_text(json.dumps({"seeds": seeds, "entries": rows}, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(data, json.dumps({"seeds": seeds, "entries": rows}, indent=1, allow_nan=False) + "\n")
     lines = ["# Ledger", "", f"Wang et al. 2024, sections 5.1 to 5.3, and ours over {seeds} seeds.", ""]
-    page.write_text("\n".join([*lines, *markdown(entries)]), encoding="utf-8")
+    write_text(page, "\n".join([*lines, *markdown(entries)]))
     return [data, page]
 
 
@@ -263,11 +264,11 @@ def markdown(entries: Sequence[Entry]) -> list[str]:
     }
     lines: list[str] = []
     for kind, title in titles.items():
-        lines += [f"## {title}", "", *_table(kind, [entry for entry in entries if entry.kind == kind]), ""]
+        lines += [f"## {title}", "", _table(kind, [entry for entry in entries if entry.kind == kind])]
     return lines
 
 
-def _table(kind: str, entries: Sequence[Entry]) -> list[str]:
+def _table(kind: str, entries: Sequence[Entry]) -> str:
     if kind == "given":
         rows = [(e.section, e.quantity, e.unit, e.paper, str(e.ours), e.verdict) for e in entries]
         head = ("section", "quantity", "unit", "paper", "ours", "verdict")
@@ -277,7 +278,7 @@ def _table(kind: str, entries: Sequence[Entry]) -> list[str]:
     else:
         rows = [(e.section, e.quantity, e.unit, e.paper, *_cells(e), e.verdict, e.why) for e in entries]
         head = ("section", "quantity", "unit", "paper", "ours", "worst", "difference", "verdict", "why")
-    return [f"| {' | '.join(cells)} |" for cells in [head, ("---",) * len(head), *rows]]
+    return markdown_table(head, rows)
 
 
 def _cells(e: Entry) -> tuple[str, str, str]:

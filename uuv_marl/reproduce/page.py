@@ -8,7 +8,8 @@ from string import Template
 
 import numpy as np
 
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.atomic import write_text
+from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.reproduce import identify
 from uuv_marl.reproduce.ledger import Entry, markdown, read_ledger
 from uuv_marl.reproduce.study import Columns, Part, read_columns
@@ -21,7 +22,7 @@ NEEDED = ("identification", "margins", "rest", "critical")
 def write_page(folder: Path, parts: Sequence[Part]) -> Path:
     """``report.md`` in the folder of a reproduction, from what lies there."""
     path = folder / "report.md"
-    path.write_text(page(folder, parts), encoding="utf-8")
+    write_text(path, page(folder, parts))
     return path
 
 
@@ -81,13 +82,12 @@ def search_errors() -> dict[str, str]:
 def prediction(table: Columns) -> str:
     """Every set of parameters, scenario by scenario."""
     names = [name for name in table if name not in ("parameters", "scenario", "seed")]
-    lines = [f"| scenario | parameters | {' | '.join(names)} |", f"| {' | '.join(['---'] * (len(names) + 2))} |"]
+    rows: list[tuple[str, ...]] = []
     for scenario in dict.fromkeys(table["scenario"].tolist()):
         for parameters in dict.fromkeys(table["parameters"].tolist()):
             own = (table["scenario"] == scenario) & (table["parameters"] == parameters)
-            cells = [_estimate(table[name][own].tolist()) for name in names]
-            lines.append(f"| {scenario} | {parameters} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+            rows.append((scenario, parameters, *(_estimate(table[name][own].tolist()) for name in names)))
+    return markdown_table(("scenario", "parameters", *names), rows).rstrip("\n")
 
 
 def _estimate(values: Sequence[float]) -> str:
@@ -118,14 +118,14 @@ def growth_rates(margins: Columns, critical: Columns) -> dict[str, str]:
 
 def rest_table(rest: Columns) -> str:
     """What the swarm does once l(t) rests: means over seeds."""
-    lines = [
-        "| variant | t_r [s] | yaw damping [N m s] | yaw rate rms [rad/s] | speed rms [m/s] | exponents [1/s] |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
+    headers = (
+        "variant", "t_r [s]", "yaw damping [N m s]", "yaw rate rms [rad/s]", "speed rms [m/s]", "exponents [1/s]",
+    )  # fmt: skip
+    lines: list[tuple[str, ...]] = []
     rows = zip(rest["variant"].tolist(), rest["t_r_s"].tolist(), rest["yaw_damping_nms"].tolist(), strict=True)
     for variant, hold, damping in dict.fromkeys(rows):
         own = (rest["variant"] == variant) & (rest["t_r_s"] == hold) & (rest["yaw_damping_nms"] == damping)
         names = ("yaw_rate_rms_rad_per_s", "speed_rms_mps", "exponent_per_s", "small_exponent_per_s")
         yaw, speed, large, small = (f"{rest[name][own].mean():.2g}" for name in names)
-        lines.append(f"| {variant} | {hold:g} | {damping:g} | {yaw} | {speed} | {large}, {small} |")
-    return "\n".join(lines)
+        lines.append((variant, f"{hold:g}", f"{damping:g}", yaw, speed, f"{large}, {small}"))
+    return markdown_table(headers, lines).rstrip("\n")

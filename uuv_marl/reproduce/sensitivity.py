@@ -123,7 +123,7 @@ PART = Part(
     cases=cases(),
     tables=tables,
     draw=draw,
-    caption=f"bio_inspired, mean over seeds 0 to {SEEDS[-1]}. Bold: within 5 % of the paper. *: with collisions. "
+    caption=f"bio_inspired, mean over seeds 0 to {SEEDS[-1]}. Bold: within 5 % of the paper. Asterisk: with collisions. "
     "Never: no seed arrives",
     seeds=SEEDS,
 )

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import replacing
 from uuv_marl.baselines import granted
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -105,7 +106,8 @@ class Study:
     def metric(self, case: Case, name: str, seeds: Sequence[int] | None = None) -> Float64:
         """A metric by seed; NaN where there is none."""
         rows = self._results(case).select(case.scenario, case.policy, self.seeds if seeds is None else seeds)
-        values = [row.metrics[name] for row in rows]
+        metrics: list[Mapping[str, object]] = [row.metrics for row in rows]
+        values = [each[name] for each in metrics]
         return np.array([value if isinstance(value, (int, float)) else np.nan for value in values], np.float64)
 
     def trace(self, case: Case, seed: int) -> Trace:
@@ -135,13 +137,11 @@ _DIGITS = 6
 def write_columns(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
     """A table as CSV, whole or not at all: texts in quotes, numbers with six significant digits."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
     cells = [[_written(value) for value in values.tolist()] for values in columns.values()]
-    with partial.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC)
         writer.writerow(columns)
         writer.writerows(zip(*cells, strict=True))
-    partial.replace(path)
 
 
 def read_columns(path: Path) -> Columns:

@@ -196,7 +196,7 @@ def _fails(metrics: Metrics) -> bool:
     return bool(metrics["collisions"]) or metrics["task_time_s"] is None
 
 
-def _numbers(metrics: Mapping[str, Sequence[Metrics]], failed: float) -> Numbers:
+def _numbers(metrics: Mapping[str, Sequence[Mapping[str, object]]], failed: float) -> Numbers:
     def mean(scenario: str, name: str) -> float:
         found = [value for m in metrics.get(scenario, ()) if isinstance(value := m[name], float)]
         return sum(found) / len(found) if found else math.nan

@@ -16,8 +16,8 @@ from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig  # 
 
 from uuv_marl import __version__
 from uuv_marl.benchmark.distributed import connected
-from uuv_marl.benchmark.runner import ClusterError
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
+from uuv_marl.errors import ClusterError
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
 from uuv_marl.train.folder import Record, TrainingFolder
