@@ -264,12 +264,4 @@ def _member(table: Columns, row: int) -> dict[str, Any]:
     return {"trial": row, "values": part(list(UNKNOWNS)), "numbers": part(Numbers._fields), "errors": part(OBJECTIVES)}
 
 
-PART = Part(
-    name="identification",
-    title="Trials of the identification beside the paper's numbers",
-    cases=tuple(case for sets in SETS for case in sets.values()),
-    tables=tables,
-    draw=draw,
-    caption=f"bio_inspired, 54 vehicles; a point is a mean over {len(SEEDS)} tuning seeds. Trials with a collision or "
-    "without arrival are not shown",
-)
+PART = Part("identification", tuple(case for sets in SETS for case in sets.values()), tables, draw)

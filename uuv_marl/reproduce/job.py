@@ -38,8 +38,8 @@ PARTS: tuple[Part, ...] = (
 )
 """In the order of the page."""
 _HERE = Path(__file__).resolve().parent
-_OVERHEAD, _PER_VEHICLE_STEP = 3e-4, 1e-6
-"""Seconds that a step of a batch takes, and a step of a vehicle: for the progress bar only."""
+_PER_VEHICLE_STEP = 1.5e-6
+"""Seconds that a step of a vehicle takes: for the progress bar only."""
 
 
 def names() -> list[str]:
@@ -126,12 +126,8 @@ def _costs(parts: Sequence[Part], seeds: int) -> list[float]:
     """Seconds that each part takes, roughly; a case that an earlier part has run costs nothing."""
     costs, ran = list[float](), set[str]()
     for part in parts:
-        cost = part.seconds
-        for case in part.cases:
-            if case.name not in ran:
-                scenario, num = case.load(), seeds if part.seeds is None else len(part.seeds)
-                steps = 1.15 * scenario.trajectory.duration_s / scenario.timing.decision_period_s
-                cost += steps * (_OVERHEAD + _PER_VEHICLE_STEP * num * scenario.swarm.num_vehicles)
-                ran.add(case.name)
-        costs.append(cost)
+        fresh = [case.load() for case in part.cases if case.name not in ran]
+        ran |= {case.name for case in part.cases}
+        steps = [s.trajectory.duration_s / s.timing.decision_period_s * s.swarm.num_vehicles for s in fresh]
+        costs.append(part.seconds + _PER_VEHICLE_STEP * sum(steps) * (seeds if part.seeds is None else len(part.seeds)))
     return costs

@@ -89,8 +89,7 @@ def gains_part(name: str, symbol: str, small: Case, large: Case) -> Part:
         legend(figure, columns=4)
         return figure
 
-    caption = f"{SINGLE.label()}, seed 0. The paper names no values for the two gains: these are assumed"
-    return Part(name, f"Routes with {symbol} too small and too large", (small, large, SINGLE), tables, draw, caption)
+    return Part(name, (small, large, SINGLE), tables, draw)
 
 
 def _gain(case: Case, symbol: str) -> float:
@@ -167,12 +166,10 @@ def draw_comparison(made: Tables) -> Figure:
 
 
 PARTS = (
-    Part("figure-11", "The swarm passes one obstacle", (SINGLE,), single, draw_single, f"{SINGLE.label()}, seed 0"),
+    Part("figure-11", (SINGLE,), single, draw_single),
     gains_part("figure-12", "zeta_o", ZETA_SMALL, ZETA_LARGE),
     gains_part("figure-13", "delta_o", DELTA_SMALL, DELTA_LARGE),
-    Part("figure-14", "The swarm passes four obstacles", (MULTI,), multiple, draw_multiple, f"{MULTI.label()}, seed 0"),
-    Part("figure-15", "Distance from each of four obstacles", (MULTI,), each_obstacle, draw_each_obstacle,
-         f"{MULTI.label()}, seed 0; obstacles are numbered as in figure 14"),
-    Part("table-2", "Task time and smallest distance of the three methods", (*COMPARATORS.values(), SINGLE), comparison,
-         draw_comparison, "single_obstacle, 54 vehicles, all seeds; SFF and SDC are reconstructions"),
-)  # fmt: skip
+    Part("figure-14", (MULTI,), multiple, draw_multiple),
+    Part("figure-15", (MULTI,), each_obstacle, draw_each_obstacle),
+    Part("table-2", (*COMPARATORS.values(), SINGLE), comparison, draw_comparison),
+)

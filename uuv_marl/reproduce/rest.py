@@ -255,12 +255,4 @@ def draw(made: Tables) -> Figure:
     return figure
 
 
-PART = Part(
-    name="rest",
-    title="The swarm keeps moving long after the reference point has stopped",
-    cases=(),
-    tables=tables,
-    draw=draw,
-    caption="bio_inspired, 54 vehicles, Table 1 but for what is named; in the first row the reference point moves",
-    seconds=60.0,
-)
+PART = Part("rest", (), tables, draw, seconds=60.0)

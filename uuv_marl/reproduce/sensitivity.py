@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from uuv_marl.benchmark.style import panels
-from uuv_marl.reproduce.assumptions import ASSUMPTIONS, Alternative, Assumption
+from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
 from uuv_marl.reproduce.ledger import CLOSE, Number, difference, numbers
-from uuv_marl.reproduce.study import MULTI, SINGLE, TRACKING, Case, Columns, Part, Report, Study, Tables, folder_name
+from uuv_marl.reproduce.study import MULTI, SINGLE, TRACKING, Case, Columns, Part, Report, Study, Tables
 
 SEEDS = range(6)
 _NAMES = {"tracking": TRACKING, "single_obstacle": SINGLE, "multi_obstacle": MULTI}
@@ -24,17 +24,16 @@ OWN = tuple(
 """The six numbers that the paper states for its own controller, once each."""
 
 
-def case_of(assumption: Assumption, alternative: Alternative, scenario: str) -> Case:
-    """A scenario under one alternative."""
-    name = folder_name(f"{assumption.name} {alternative.label} {scenario}")
-    return Case(name, scenario, overrides=alternative.overrides, parameters=alternative.parameters)
-
-
 def cases() -> tuple[Case, ...]:
     """All of them, after the defaults."""
     return (
         *_NAMES.values(),
-        *(case_of(a, other, scenario) for a in ASSUMPTIONS for other in a.alternatives for scenario in other.scenarios),
+        *(
+            case_of(a.name, other, scenario)
+            for a in ASSUMPTIONS
+            for other in a.alternatives
+            for scenario in other.scenarios
+        ),
     )
 
 
@@ -48,7 +47,7 @@ def tables(study: Study, _report: Report) -> Tables:
         for other in assumption.alternatives:
             for number in OWN:
                 if number.case.scenario in other.scenarios:
-                    case = case_of(assumption, other, number.case.scenario)
+                    case = case_of(assumption.name, other, number.case.scenario)
                     row = _measured(study, case, number.case, number)
                     rows.append({"assumption": assumption.name, "alternative": other.label, **row})
     return {"sensitivity": {name: np.array([row[name] for row in rows]) for name in rows[0]}}
@@ -117,13 +116,4 @@ def _stated(number: Number) -> str:
     return "-".join(f"{value:g}" for value in number.paper)
 
 
-PART = Part(
-    name="sensitivity",
-    title="How the paper's numbers change with what it leaves open, one assumption at a time",
-    cases=cases(),
-    tables=tables,
-    draw=draw,
-    caption=f"bio_inspired, mean over seeds 0 to {SEEDS[-1]}. Bold: within 5 % of the paper. Asterisk: with collisions. "
-    "Never: no seed arrives",
-    seeds=SEEDS,
-)
+PART = Part("sensitivity", cases(), tables, draw, seeds=SEEDS)

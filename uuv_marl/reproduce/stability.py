@@ -267,12 +267,4 @@ def _draw_sweep(ax: Axes, table: Columns, parameter: str) -> None:
     ax.set_ylabel("growth rate [1/s]")
 
 
-PART = Part(
-    name="stability",
-    title="Growth of small disturbances in steady tracking; above 0 they grow",
-    cases=(),
-    tables=tables,
-    draw=draw,
-    caption="bio_inspired, linearised with frozen neighbour sets; Table 1 but for what varies; lines: means of seeds",
-    seconds=40.0,
-)
+PART = Part("stability", (), tables, draw, seconds=40.0)

@@ -2,10 +2,12 @@
 
 import csv
 import hashlib
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -43,14 +45,6 @@ class Case(NamedTuple):
     def load(self) -> Scenario:
         """The scenario as it is run."""
         return granted(self.policy, load_scenario(self.scenario, overrides=self.overrides))
-
-    def label(self) -> str:
-        """Policy, number of vehicles and the gains that are not Table 1's, for captions."""
-        gains, table_1 = self.parameters.get("gains", Gains()), Gains()._asdict()
-        changed = [
-            f"{name} = {value:g}" for name, value in cast(Gains, gains)._asdict().items() if value != table_1[name]
-        ]
-        return ", ".join([self.policy, f"{self.load().swarm.num_vehicles} vehicles", *changed])
 
 
 def folder_name(words: str) -> str:
@@ -165,22 +159,31 @@ def _written(value: Any) -> str | float | int:
 Tables = Mapping[str, Columns]
 
 
+_WORDS = tomllib.loads(resources.files("uuv_marl.reproduce").joinpath("parts.toml").read_text(encoding="utf-8"))
+
+
 class Part(NamedTuple):
     """A figure of the paper, or a study beyond it."""
 
     name: str
     """``figure-11``; names the picture, and the option ``--only``."""
-    title: str
-    """Stands above the picture: what it is about, in a few words."""
     cases: tuple[Case, ...]
     """What must have been run."""
     tables: Callable[[Study, Report], Tables]
     """From the runs, by name; each becomes ``data/NAME.csv``."""
     draw: Callable[[Tables], Figure]
     """From the tables alone."""
-    caption: str = ""
-    """Stands below the picture: whose runs, and how to read it; nothing that the title says."""
     seeds: Sequence[int] | None = None
     """What its cases are run on; None for all of the study's."""
     seconds: float = 1.0
     """What its tables take besides the cases, roughly."""
+
+    @property
+    def title(self) -> str:
+        """Stands above the picture, see ``parts.toml``."""
+        return _WORDS[self.name]["title"]
+
+    @property
+    def caption(self) -> str:
+        """Stands below the picture, see ``parts.toml``."""
+        return _WORDS[self.name]["caption"]

@@ -12,7 +12,6 @@ from uuv_marl.reproduce.drawing import against_time, draw_routes, mark_corners, 
 from uuv_marl.reproduce.measures import SPEED_MPS, corner_times, mean_heading, path_distance
 from uuv_marl.reproduce.study import TRACKING, Columns, Part, Report, Study, Tables
 
-WHOSE = f"{TRACKING.label()}, seed 0"
 LAW = PAPER["tracking", "bio_inspired"]
 
 
@@ -168,10 +167,8 @@ def draw_spacing(made: Tables) -> Figure:
 
 
 PARTS = (
-    Part("figure-7", "The swarm at the start and at the end of tracking", (TRACKING,), states, draw_states,
-         f"{WHOSE}; arrows are velocities, each panel with its own scale"),
-    Part("figure-8", "Routes of the swarm and of its centre", (TRACKING,), routes, draw_all_routes, WHOSE),
-    Part("figure-9", "Headings, and how far the centre is from the trajectory", (TRACKING,), headings, draw_headings,
-         f"{WHOSE}; (c) is not in the paper"),
-    Part("figure-10", "Largest and smallest distance between two vehicles", (TRACKING,), spacing, draw_spacing, WHOSE),
-)  # fmt: skip
+    Part("figure-7", (TRACKING,), states, draw_states),
+    Part("figure-8", (TRACKING,), routes, draw_all_routes),
+    Part("figure-9", (TRACKING,), headings, draw_headings),
+    Part("figure-10", (TRACKING,), spacing, draw_spacing),
+)

@@ -50,7 +50,7 @@ LOSSES = (
 )
 
 
-def variation(name: str, title: str, axis: str, variants: Sequence[Variant], quantities: Sequence[Quantity]) -> Part:
+def variation(name: str, axis: str, variants: Sequence[Variant], quantities: Sequence[Quantity]) -> Part:
     """A part that runs the paper's controller on every variant and shows every seed."""
     scenarios = list(dict.fromkeys(quantity.scenario for quantity in quantities))
 
@@ -78,15 +78,8 @@ def variation(name: str, title: str, axis: str, variants: Sequence[Variant], qua
         legend(figure)
         return figure
 
-    return Part(
-        name=name,
-        title=title,
-        cases=tuple(case(variant, scenario) for variant in variants for scenario in scenarios),
-        tables=tables,
-        draw=draw,
-        caption=f"bio_inspired, seeds 0 to {SEEDS[-1]}; in orange how many never arrive, and so have no value",
-        seeds=SEEDS,
-    )
+    cases = tuple(case(variant, scenario) for variant in variants for scenario in scenarios)
+    return Part(name, cases, tables, draw, seeds=SEEDS)
 
 
 def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) -> None:
@@ -132,26 +125,10 @@ def losses(num: int) -> Variant:
     return Variant(f"{num}", {"disturbance.loss_times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, num)]})
 
 
+CLOCKS = ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))
+SIZES = [Variant(f"{n}", {"swarm.num_vehicles": n}) for n in (10, 20, 54, 100, 200)]
 PARTS = (
-    variation(
-        "time-steps",
-        "Control hold and integration step, varied separately",
-        "control hold [s] over integration step [s]",
-        [clocks(*pair) for pair in ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))],
-        OWN,
-    ),
-    variation(
-        "swarm-size",
-        "The paper's numbers for other swarm sizes",
-        "vehicles",
-        [Variant(f"{n}", {"swarm.num_vehicles": n}) for n in (10, 20, 54, 100, 200)],
-        OWN,
-    ),
-    variation(
-        "losses",
-        "Vehicles are lost on the way past one obstacle",
-        "vehicles lost of 54",
-        [losses(n) for n in (0, 6, 12, 24, 36)],
-        LOSSES,
-    ),
+    variation("time-steps", "control hold [s] over integration step [s]", [clocks(*pair) for pair in CLOCKS], OWN),
+    variation("swarm-size", "vehicles", SIZES, OWN),
+    variation("losses", "vehicles lost of 54", [losses(n) for n in (0, 6, 12, 24, 36)], LOSSES),
 )
