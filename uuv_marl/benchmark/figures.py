@@ -120,7 +120,7 @@ def _contacts(trace: Trace, hull_m: float) -> Float32:
             else:
                 discs = trace["obstacles"]
                 gap = np.linalg.norm(place[:, None] - discs[:, :2], axis=-1) - discs[:, 2]
-            found.append(place[np.nanargmin(gap.min(axis=1))])
+            found.append(place[np.argmin(np.nan_to_num(gap, nan=np.inf).min(axis=1))])  # the lost are nowhere
     return np.array(found, np.float32).reshape(-1, 2)
 
 
