@@ -3,19 +3,29 @@
 # make benchmark PYTHON=python3.12
 PYTHON ?= python3
 BIN := .venv/bin
+PYTEST := -m pytest --durations=15
+# Two processes; a file's tests stay together, since they share what is costly to make.
+HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark reproduce paper test test-adapters test-benchmarl test-rllib check perf perf-training clean
+.PHONY: help benchmark reproduce paper test docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
+.PHONY: check dist perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
 	@echo "make reproduce [ARGS='--seeds 5']   the paper's figures, numbers and a ledger: about ten minutes"
 	@echo "make paper                          the same, then the page in docs/paper from it"
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
+	@echo "make docs-check                     pages, tables and pictures are those of the code and of the shipped data"
+	@echo "make test-bounds                    the simulation's tests, every index of compiled code checked"
+	@echo "make test-lowest                    tests with the oldest libraries that pyproject.toml allows, without torch"
+	@echo "make test-light PYTHON=python3.13   tests without torch, on another Python"
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
 	@echo "make check                          ruff, pyright and import-linter only"
+	@echo "make dist                           source distribution and wheel in dist/"
 	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS and JaxMARL, about 15 minutes: docs/speed.md"
 	@echo "make perf-training                  training beside SuperSuit and RLlib, and its profile: perf/training.md"
+	@echo "make versions OTHER=path            is another checkout the same, bit for bit, and as fast?"
 	@echo "make clean                          remove .venv and .venv-*"
 
 benchmark: .venv/base.stamp
@@ -28,14 +38,30 @@ paper: reproduce
 	$(BIN)/python tools/ship_paper.py results/reproduce
 
 test: check
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python $(PYTEST) $(HALVES) -m "not docs" $(ARGS)
+
+docs-check: .venv/dev.stamp
+	$(BIN)/python $(PYTEST) $(HALVES) -m docs $(ARGS)
+
+# On one thread, because an error on a thread that Numba starts is lost; what is compiled so stays out of the user's cache.
+BOUNDED := baselines bounds env plain reward sonar swarm trajectory vector_env vehicle
+test-bounds: .venv/dev.stamp
+	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
+	$(BIN)/python $(PYTEST) $(HALVES) $(BOUNDED:%=tests/test_%.py) $(ARGS)
 
 test-adapters: test-benchmarl test-rllib
+
+test-lowest: .venv-lowest/lowest.stamp
+test-light: .venv-light/light.stamp
+# What is old is deprecated by newer libraries beneath it.
+test-lowest: PYTEST += -W default::DeprecationWarning
+test-lowest test-light: test-%:
+	.venv-$*/bin/python $(PYTEST) $(HALVES) -m "not docs" $(ARGS)
 
 test-benchmarl: .venv-benchmarl/benchmarl.stamp
 test-rllib: .venv-rllib/rllib.stamp
 test-benchmarl test-rllib: test-%:
-	.venv-$*/bin/python -m pytest tests/adapters/test_$*.py $(ARGS)
+	.venv-$*/bin/python $(PYTEST) tests/adapters/test_$*.py $(ARGS)
 
 check: .venv/dev.stamp
 	$(BIN)/ruff check .
@@ -43,26 +69,28 @@ check: .venv/dev.stamp
 	$(BIN)/lint-imports
 	$(BIN)/pyright
 
-PEERS := mpe2 vmas jaxmarl
-PEER_STAMPS := $(foreach peer,$(PEERS),.venv-perf-$(peer)/perf-$(peer).stamp)
+dist: .venv/dev.stamp
+	$(BIN)/python -m build
 
-perf: .venv/dev.stamp $(PEER_STAMPS)
+PEERS := perf-mpe2 perf-vmas perf-jaxmarl
+
+perf: .venv/dev.stamp $(foreach name,$(PEERS),.venv-$(name)/$(name).stamp)
 	$(BIN)/python perf/compare.py $(ARGS)
 	$(BIN)/python perf/report.py
 
 perf-training: .venv/dev.stamp .venv-perf-supersuit/perf-supersuit.stamp .venv-rllib/rllib.stamp
-	$(BIN)/python perf/training.py $(ARGS)
+	$(BIN)/python perf/compare.py --training $(ARGS)
+	$(BIN)/python perf/report.py
 
-# A stamp without its environment is worth nothing.
-STAMPS := .venv/base.stamp .venv/dev.stamp .venv-benchmarl/benchmarl.stamp .venv-rllib/rllib.stamp .venv-perf-supersuit/perf-supersuit.stamp
-.PHONY: $(foreach stamp,$(STAMPS),$(if $(wildcard $(dir $(stamp))bin/uuv-marl),,$(stamp)))
-.PHONY: $(foreach stamp,$(PEER_STAMPS),$(if $(wildcard $(dir $(stamp))bin/python),,$(stamp)))
+.PHONY: versions
+versions: .venv/dev.stamp
+	$(BIN)/python perf/versions.py $(OTHER) $(ARGS)
 
-$(STAMPS): pyproject.toml constraints.txt constraints-benchmarl.txt constraints-rllib.txt constraints-perf-supersuit.txt tools/setup_venv.py
-$(PEER_STAMPS): $(PEERS:%=constraints-perf-%.txt) tools/setup_venv.py
-$(STAMPS) $(PEER_STAMPS):
+ENVIRONMENTS := light lowest benchmarl rllib perf-supersuit $(PEERS)
+STAMPS := .venv/base.stamp .venv/dev.stamp $(foreach name,$(ENVIRONMENTS),.venv-$(name)/$(name).stamp)
+$(STAMPS): pyproject.toml $(wildcard constraints*.txt) tools/setup_venv.py
 	@command -v "$(PYTHON)" >/dev/null || { echo "There is no '$(PYTHON)' here. Install Python 3.11 or later, or name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }
 	@"$(PYTHON)" tools/setup_venv.py $(basename $(notdir $@))
 
 clean:
-	rm -rf .venv .venv-benchmarl .venv-rllib .venv-perf-supersuit $(PEERS:%=.venv-perf-%)
+	rm -rf .venv $(ENVIRONMENTS:%=.venv-%)

@@ -1,8 +1,10 @@
 """Fixtures that several test files share."""
 
 import os
+from importlib.util import find_spec
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # threads that wait leave their core to the other half of the tests
 
 import numpy as np
 import pytest
@@ -11,10 +13,32 @@ from hypothesis import settings
 from uuv_marl import load_scenario
 from uuv_marl.sim.swarm import Swarm
 
+NEEDS = {
+    "test_env.py": "pygame",
+    "test_export.py": "onnx",
+    "test_mappo.py": "torch",
+    "test_ppo.py": "stable_baselines3",
+    "test_sb3.py": "stable_baselines3",
+    "test_torchrl.py": "torchrl",
+    "test_vector_env.py": "pygame",
+}
+"""Files that need an extra's library throughout; a test that does says so by the mark ``needs``."""
+collect_ignore = [file for file, library in NEEDS.items() if find_spec(library) is None]
+
 settings.register_profile("laws", deadline=None, derandomize=True, max_examples=60)
 settings.load_profile("laws")
 
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
+"""Those that tests step through; ``starter`` is one of their kind, only shorter."""
+
+
+def pytest_report_header():
+    return [f"left out, for want of {NEEDS[file]}: {file}" for file in collect_ignore]
+
+
+def pytest_runtest_setup(item):
+    for mark in item.iter_markers("needs"):
+        pytest.importorskip(*mark.args)
 
 
 @pytest.fixture(params=SCENARIOS)

@@ -33,11 +33,12 @@ def test_the_cases_show_every_ending(case):
         assert (run.over & run.terminated.any(axis=2) & ~run.truncated.any(axis=2)).any(), "the last are lost"
 
 
-@pytest.mark.parametrize("api", ["aec", "vector", "torchrl"])
+@pytest.mark.parametrize("api", ["aec", "vector", pytest.param("torchrl", marks=pytest.mark.needs("torchrl"))])
 def test_every_api_gives_the_same_run(case, api):
     getattr(contract, api)(case).equals(reference(case))
 
 
+@pytest.mark.needs("stable_baselines3")
 def test_sb3_gives_the_same_run_or_refuses_losses(case):
     if case.scenario == "lossy" or case.name == "sinks":
         with pytest.raises(ValueError, match="SwarmVecEnv can't show that a vehicle is lost"):
@@ -46,8 +47,8 @@ def test_sb3_gives_the_same_run_or_refuses_losses(case):
         contract.sb3(case).equals(reference(case))
 
 
-def test_the_comparison_can_fail(case):
-    run = reference(case)
+def test_the_comparison_can_fail():
+    run = reference(next(iter(EVERY.values())))
     for field in run._fields:
         values = getattr(run, field).copy()
         values.flat[-1] = not values.flat[-1] if values.dtype == bool else values.flat[-1] + 0.5

@@ -228,6 +228,7 @@ def test_what_is_not_there_is_explained(tmp_path):
     assert "no trainings with a best policy" in " ".join(done.output.split())
 
 
+@pytest.mark.docs
 def test_the_shipped_page_is_made_of_the_shipped_episodes():
     text = page.report(read_episodes(DOCS / "episodes.csv"), find_trainings(DOCS / "trainings"))
     assert (DOCS / "report.md").read_text() == text

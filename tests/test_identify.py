@@ -136,6 +136,7 @@ def shipped():
     return json.loads((identify.resources.files("uuv_marl.reproduce") / "identified" / "identified.json").read_text())
 
 
+@pytest.mark.docs
 def test_the_shipped_search_looked_at_two_scenarios_and_at_tuning_seeds_only(shipped):
     assert set(shipped["scenarios"]) == {"tracking", "single_obstacle"}
     assert all(10_000 <= seed < 100_000 for seed in shipped["seeds"])
@@ -143,6 +144,7 @@ def test_the_shipped_search_looked_at_two_scenarios_and_at_tuning_seeds_only(shi
     assert set(shipped["space"]) == set(UNKNOWNS)
 
 
+@pytest.mark.docs
 def test_the_shipped_front_follows_from_the_shipped_trials(shipped):
     table = identify.trials()
     members, chosen = identify.pareto(table)
@@ -161,6 +163,7 @@ def test_the_shipped_front_follows_from_the_shipped_trials(shipped):
         assert again == pytest.approx([table[name][row] for name in OBJECTIVES], abs=2e-5)
 
 
+@pytest.mark.docs
 def test_the_shipped_point_is_loaded_and_runs_as_recorded(shipped):
     found = identify.identified()
     assert found.values == shipped["chosen"]["values"]

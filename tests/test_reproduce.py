@@ -95,6 +95,7 @@ def test_a_ledger_of_nothing_claims_nothing():
     assert {row.verdict for row in rows if row.kind == "claim" and row.ours is None} == {"does not hold"}
 
 
+@pytest.mark.docs
 def test_our_numbers_are_those_of_the_runs(made):
     (file,) = (made / "runs").glob("multi_obstacle.*/results.json")
     data = json.loads(file.read_text())
@@ -117,6 +118,7 @@ def test_verdicts():
     assert verdict(difference(6.34 * 0.8, (6.34,))) == "differs"
 
 
+@pytest.mark.docs
 def test_data_are_the_same_bytes_again_and_figures_come_from_them(made, tmp_path):
     parts = ["figure-9", "figure-11", "table-2"]
     job.reproduce(tmp_path, 1, parts, lambda what, share: None)
@@ -135,12 +137,14 @@ def test_data_are_the_same_bytes_again_and_figures_come_from_them(made, tmp_path
         assert (tmp_path / "figures" / f"{part}.png").read_bytes() == (made / "figures" / f"{part}.png").read_bytes()
 
 
+@pytest.mark.docs
 def test_every_figure_of_the_paper_is_made(made):
     wanted = {*(f"figure-{k}" for k in range(7, 16)), "table-2"}
     assert wanted <= {path.stem for path in (made / "figures").glob("*.png")}
     assert wanted <= set(FROM_RUNS)
 
 
+@pytest.mark.docs
 def test_figures_label_their_axes(made):
     for part in job.PARTS:
         if part.name in FROM_RUNS:
@@ -212,11 +216,13 @@ def falsified(made):
     return found
 
 
+@pytest.mark.docs
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.says)
 def test_every_sentence_can_fail(claim, falsified):
     assert falsified[claim.says]
 
 
+@pytest.mark.docs
 def test_a_swarm_without_tau_o_does_not_avoid(falsified):
     assert "no tau_o" in falsified["near the obstacle the swarm disperses"]
     assert "the same gains" in falsified["zeta_o too small fails to avoid"]
@@ -316,6 +322,7 @@ def test_names_of_parts_are_checked():
     assert "--only figure-6 is unknown; there are figure-7," in done.output
 
 
+@pytest.mark.docs
 def test_the_page_in_the_docs_is_made_of_the_files_beside_it():
     assert (SHIPPED / "report.md").read_text() == page(SHIPPED, job.PARTS)
     for part in job.PARTS:

@@ -1,14 +1,22 @@
-"""What is missing on a machine is explained, not a traceback."""
+"""It installs anywhere: what is missing on a machine is explained, and distributions hold what they should."""
 
+import email
 import importlib.util
+import re
+import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.version import Version
 
 ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
 @pytest.fixture
@@ -23,13 +31,9 @@ def test_this_python_will_do(setup):
     setup.check_python()
 
 
-class Version(tuple):
-    """Stands in for sys.version_info."""
-
-
 @pytest.mark.parametrize("version", [(3, 10, 2), (3, 15, 0), (4, 0, 0)])
 def test_too_old_and_too_new_pythons_are_explained(setup, monkeypatch, capsys, version):
-    monkeypatch.setattr(setup.sys, "version_info", Version(version))
+    monkeypatch.setattr(setup.sys, "version_info", version)
     with pytest.raises(SystemExit):
         setup.check_python()
     assert "needs Python 3.11 or later, before 3.15" in capsys.readouterr().err
@@ -43,19 +47,79 @@ def test_a_missing_ensurepip_is_explained(setup, monkeypatch, capsys):
 
 
 def test_a_missing_interpreter_is_explained(tmp_path):
-    pins = [path.name for path in ROOT.glob("constraints*.txt")]
-    for name in ("Makefile", "pyproject.toml", "tools/setup_venv.py", *pins):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text((ROOT / name).read_text())
-    done = subprocess.run(
-        ["make", "benchmark", "PYTHON=python3.nowhere"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    (tmp_path / "tools").mkdir()
+    for name in ("Makefile", "pyproject.toml", "tools/setup_venv.py"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    command = ["make", "benchmark", "PYTHON=python3.nowhere"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "There is no 'python3.nowhere' here" in done.stdout
 
 
-def test_every_environment_has_its_extras_and_pins(setup):
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    for _, wanted, constraints in setup.ENVIRONMENTS.values():
-        assert set(wanted.strip("[]").split(",")) - {""} <= set(extras)
-        assert "torch==2.13.0" in (ROOT / constraints).read_text().splitlines()
+def pins(path):
+    lines = (line for line in path.read_text().splitlines() if not line.startswith("#"))
+    return {name.lower().replace("_", "-"): version for name, _, version in (line.partition("==") for line in lines)}
+
+
+def test_every_environment_has_its_extras_and_the_same_torch(setup):
+    for wanted in setup.WANTED.values():
+        for extras in re.findall(r"\[(.*)\]", " ".join(wanted)):
+            assert set(extras.split(",")) <= set(PROJECT["optional-dependencies"])
+    for path in ROOT.glob("constraints*.txt"):
+        assert pins(path).get("torch", "2.13.0") == "2.13.0"
+
+
+def test_the_oldest_libraries_that_are_tested_are_the_oldest_that_are_allowed():
+    """So that no bound is moved in pyproject.toml alone."""
+    tested = pins(ROOT / "constraints-lowest.txt")
+    extras = (PROJECT["optional-dependencies"][extra] for extra in ("onnx", "render", "test", "tune"))
+    for line in sum(extras, PROJECT["dependencies"]):
+        wanted = Requirement(line)
+        (low,) = (Version(one.version) for one in wanted.specifier if one.operator == ">=")
+        assert Version(tested[wanted.name.lower().replace("_", "-")]) == low, line
+
+
+@pytest.fixture(scope="module")
+def distributions(tmp_path_factory):
+    """Names in the source distribution and in the wheel, and the text that a package index shows."""
+    out = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(ROOT)]
+    subprocess.run(command, check=True, capture_output=True)
+    (sdist,), (wheel,) = out.glob("*.tar.gz"), out.glob("*.whl")
+    with tarfile.open(sdist) as file:
+        source = {name.partition("/")[2] for name in file.getnames()}
+    with zipfile.ZipFile(wheel) as file:
+        names = set(file.namelist())
+        (metadata,) = (file.read(name).decode() for name in names if name.endswith("/METADATA"))
+    return source, names, email.message_from_string(metadata)
+
+
+@pytest.mark.needs("build")
+def test_the_source_distribution_holds_what_its_tests_need(distributions):
+    source, _, _ = distributions
+    for folder in ("uuv_marl", "tests", "tools", "perf", "docs"):
+        files = (path for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+        assert {path.relative_to(ROOT).as_posix() for path in files} <= source
+    assert {path.name for path in ROOT.glob("constraints*.txt")} | {"Makefile", "README.md", ".ci/run"} <= source
+
+
+@pytest.mark.needs("build")
+def test_the_wheel_is_the_package_with_its_data_and_nothing_else(distributions):
+    _, wheel, _ = distributions
+    package = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "uuv_marl").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert {name for name in wheel if ".dist-info/" not in name} == package
+
+
+@pytest.mark.needs("build")
+def test_the_page_of_a_package_index_has_no_dead_links(distributions):
+    metadata = distributions[2]
+    page = metadata.get_payload()
+    assert page.startswith("# uuv_marl")
+    links = re.findall(r"\]\(([^)]*)\)", page)
+    assert links
+    assert all(link.startswith(("https:", "#")) for link in links)
+    assert "doi.org" in metadata["Project-URL"]

@@ -1,4 +1,4 @@
-"""Make a virtual environment and install uuv_marl into it: setup_venv.py NAME. Explains what is missing.
+"""Make a virtual environment and install into it what it is for: setup_venv.py NAME. Explains what is missing.
 
 Written for any Python 3, so that one that is too old hears why.
 """
@@ -7,17 +7,18 @@ import os
 import re
 import subprocess
 import sys
+import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-# Name: folder, extras, constraints. BenchMARL and RLlib pin what the others have newer, so they live apart.
-ENVIRONMENTS = {
-    "base": (".venv", "", "constraints.txt"),
-    "dev": (".venv", "[dev]", "constraints.txt"),
-    "benchmarl": (".venv-benchmarl", "[benchmarl,test]", "constraints-benchmarl.txt"),
-    "rllib": (".venv-rllib", "[distributed,render,test]", "constraints-rllib.txt"),
-}
-# What perf/compare.py measures beside uuv_marl, without it, and perf/training.py with it.
-PEERS = {
+# What pip installs by name, with constraints-NAME.txt, or with constraints.txt where there is no such file. BenchMARL
+# and RLlib pin what the others have newer, so they live apart; perf/ measures the last four beside uuv_marl.
+WANTED = {
+    "base": ("-e", "."),
+    "dev": ("-e", ".[dev]"),
+    "light": ("-e", ".[onnx,render,test,tune]"),
+    "lowest": ("-e", ".[onnx,render,test,tune]"),
+    "benchmarl": ("-e", ".[benchmarl,test]"),
+    "rllib": ("-e", ".[distributed,render,test]"),
     "perf-mpe2": ("mpe2", "stable-baselines3"),
     "perf-vmas": ("vmas", "stable-baselines3"),
     "perf-jaxmarl": ("jaxmarl",),
@@ -31,16 +32,11 @@ def stop(message):
     raise SystemExit(1)
 
 
-def supported():
-    """Lowest version and the first one too new, from pyproject.toml."""
-    with open(os.path.join(ROOT, "pyproject.toml")) as file:
-        low, high = re.search(r'requires-python = ">=(\d+\.\d+),<(\d+\.\d+)"', file.read()).groups()
-    return tuple(map(int, low.split("."))), tuple(map(int, high.split(".")))
-
-
 def check_python():
-    """Stop where this interpreter can't carry uuv_marl."""
-    low, high = supported()
+    """Stop where this interpreter can't carry uuv_marl: the versions that it may have stand in pyproject.toml."""
+    with open(os.path.join(ROOT, "pyproject.toml")) as file:
+        ends = re.search(r'requires-python = ">=(\d+)\.(\d+),<(\d+)\.(\d+)"', file.read()).groups()
+    low, high = tuple(map(int, ends[:2])), tuple(map(int, ends[2:]))
     if not low <= sys.version_info[:2] < high:
         stop(
             "uuv_marl needs Python %d.%d or later, before %d.%d (Numba and PettingZoo end there); this is %s at %s.\n"
@@ -65,30 +61,22 @@ def run(*command):
 
 
 def main(name):
-    """Make the environment of this name."""
+    """Make the environment of this name: .venv for base and dev, else .venv-NAME."""
+    begin = time.time()
     check_python()
-    if name in PEERS:
-        folder, wanted, constraints = ".venv-" + name, PEERS[name], "constraints-%s.txt" % name
-    else:
-        folder, extras, constraints = ENVIRONMENTS[name]
-        wanted = ("-e", "." + extras)
-    venv = os.path.join(ROOT, folder)
-    python = os.path.join(venv, "bin", "python")
-    if not os.path.exists(python):
-        print("Making %s with Python %s" % (folder, sys.version.split()[0]))
-        run(sys.executable, "-m", "venv", venv)
-    made_with = (
-        subprocess.check_output([python, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]).decode().strip()
-    )
-    if made_with != "%d.%d" % sys.version_info[:2]:
-        stop(
-            "The %s here is of Python %s, not of this %s; 'make clean' first."
-            % (folder, made_with, sys.version.split()[0])
-        )
-    print("Installing %s into %s; the first time takes a few minutes" % (" ".join(wanted), folder))
-    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", constraints, *wanted)
-    with open(os.path.join(venv, name + ".stamp"), "w"):
-        pass
+    folder = ".venv" if name in ("base", "dev") else ".venv-" + name
+    pins = "constraints-%s.txt" % name
+    pins = pins if os.path.exists(os.path.join(ROOT, pins)) else "constraints.txt"
+    version = "%d.%d" % sys.version_info[:2]
+    if not os.path.isdir(os.path.join(ROOT, folder)):
+        run(sys.executable, "-m", "venv", folder)
+    elif not os.path.isdir(os.path.join(ROOT, folder, "lib", "python" + version)):
+        stop("The %s here is of another Python than this %s; 'make clean' first." % (folder, version))
+    print("Installing %s into %s, Python %s; the first time takes a few minutes" % (name, folder, version))
+    pip = (os.path.join(folder, "bin", "python"), "-m", "pip")
+    run(*(pip + ("install", "--quiet", "--disable-pip-version-check", "-c", pins) + WANTED[name]))
+    with open(os.path.join(ROOT, folder, name + ".stamp"), "w"):
+        print("Installed after %.0f s" % (time.time() - begin))
 
 
 if __name__ == "__main__":

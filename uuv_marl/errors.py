@@ -9,6 +9,10 @@ class PolicyError(ValueError):
     """A policy that can't drive this scenario; the message names the remedy."""
 
 
+class DivergenceError(RuntimeError):
+    """The integration step is too long for the vehicle, so that its speed ran away."""
+
+
 class ResultsError(RuntimeError):
     """A file or folder that can't be written, or that can't take these results."""
 

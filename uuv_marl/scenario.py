@@ -24,29 +24,22 @@ def within(low: float, high: float) -> AfterValidator:
 
     def check(value: float) -> float:
         if not low <= value <= high:
-            raise PydanticCustomError(
-                "range", "must lie within {low} to {high}", {"low": f"{low:,}", "high": f"{high:,}"}
-            )
+            limits = {"low": f"{low:,.9g}", "high": f"{high:,.9g}"}
+            raise PydanticCustomError("range", "must lie within {low} to {high}", limits)
         return value
 
     return AfterValidator(check)
 
 
-Coordinate = Annotated[float, within(-1_000_000, 1_000_000)]
-Length = Annotated[float, within(0.001, 100_000)]
-Distance = Annotated[float, within(0, 100_000)]
-Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
+Signed = Annotated[float, within(-1_000_000, 1_000_000)]
+Positive = Annotated[float, within(0.001, 1_000_000)]
+NonNegative = Annotated[float, within(0, 1_000_000)]
+NonPositive = Annotated[float, within(-1_000_000, 0)]
 Speed = Annotated[float, within(0, 100)]
-Duration = Annotated[float, within(0, 1_000_000)]
-Inertia = Annotated[float, within(0.001, 1_000_000)]
-AddedMass = Annotated[float, within(-1_000_000, 0)]
-Resistance = Annotated[float, within(0, 1_000_000)]
-Coupling = Annotated[float, within(-1_000_000, 1_000_000)]
-Effort = Annotated[float, within(0.001, 1_000_000)]
+Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
 Clock = Annotated[float, within(0.0001, 3_600)]
 Legs = Annotated[int, within(1, 8)]
 Discs = Annotated[int, within(0, 64)]
-Weight = Annotated[float, within(0, 1_000_000)]
 Channel = Literal["compass", "link"]
 
 
@@ -66,13 +59,13 @@ class Swarm(Section):
 class Start(Section):
     """Two rectangles side by side behind the trajectory's first point, aligned with its first leg."""
 
-    length_m: Length
+    length_m: Positive
     """Side along the first leg, of each rectangle, for up to 54 vehicles."""
-    width_m: Length
+    width_m: Positive
     """Side across the first leg."""
-    gap_m: Distance
+    gap_m: NonNegative
     """Between the two."""
-    spacing_m: Length
+    spacing_m: Positive
     """Smallest distance between two vehicles at the start."""
     speed_min_mps: Speed
     """Lowest initial surge speed; uniform, with uniform heading."""
@@ -97,9 +90,7 @@ class Trajectory(Section):
 
     speed_mps: Annotated[float, within(0.01, 100)]
     """Speed along the polyline."""
-    waypoints_m: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(min_length=2, max_length=1024)] | None = (
-        None
-    )
+    waypoints_m: Annotated[tuple[tuple[Signed, Signed], ...], Field(min_length=2, max_length=1024)] | None = None
     """North and east of each corner; absent where ``random_field`` draws them."""
 
     @property
@@ -112,7 +103,7 @@ class Trajectory(Section):
 class Obstacle(Section):
     """A disc."""
 
-    centre_m: tuple[Coordinate, Coordinate]
+    centre_m: tuple[Signed, Signed]
     """North and east of the centre."""
     radius_m: Radius
     """Radius."""
@@ -123,7 +114,7 @@ class RandomField(Section):
 
     legs: tuple[Legs, Legs]
     """Fewest and most legs."""
-    leg_length_m: tuple[Length, Length]
+    leg_length_m: tuple[Positive, Positive]
     """Shortest and longest leg."""
     turn_max_deg: Annotated[float, within(0, 150)]
     """Sharpest turn between legs."""
@@ -131,9 +122,9 @@ class RandomField(Section):
     """Fewest and most obstacles wished for; where the field is full there are fewer."""
     radius_m: tuple[Radius, Radius]
     """Smallest and largest radius."""
-    offset_max_m: Distance
+    offset_max_m: NonNegative
     """Largest distance of an obstacle's centre from the trajectory."""
-    end_clear_m: Length
+    end_clear_m: Positive
     """Radius kept free around the end, for up to 54 vehicles."""
 
     @model_validator(mode="after")
@@ -148,35 +139,35 @@ class RandomField(Section):
 class Vehicle(Section):
     """Parameters of Eq. 3-4. Dimensions follow from the force or moment and the velocities they multiply."""
 
-    m_kg: Inertia
-    I_z_kgm2: Inertia
+    m_kg: Positive
+    I_z_kgm2: Positive
     x_G_m: Annotated[float, within(-100, 100)]
-    X_udot_kg: AddedMass
-    Y_vdot_kg: AddedMass
-    Y_rdot_kgm: Coupling
-    N_rdot_kgm2: AddedMass
-    X_u: Resistance
-    Y_v: Resistance
-    Y_r: Coupling
-    N_v: Coupling
-    N_r: Resistance
-    X_uu: Resistance
-    Y_vv: Resistance
-    Y_rr: Coupling
-    N_rv: Coupling
-    N_rr: Resistance
+    X_udot_kg: NonPositive
+    Y_vdot_kg: NonPositive
+    Y_rdot_kgm: Signed
+    N_rdot_kgm2: NonPositive
+    X_u: NonNegative
+    Y_v: NonNegative
+    Y_r: Signed
+    N_v: Signed
+    N_r: NonNegative
+    X_uu: NonNegative
+    Y_vv: NonNegative
+    Y_rr: Signed
+    N_rv: Signed
+    N_rr: NonNegative
 
 
 class Actuators(Section):
     """Limits of thrust and torque, the same for every policy."""
 
-    max_force_n: Effort
+    max_force_n: Positive
     """Surge force at full action, ahead or astern."""
-    max_torque_nm: Effort
+    max_torque_nm: Positive
     """Yaw torque at full action."""
     lever_arm_m: Annotated[float, within(0.001, 1_000)]
     """Turns the sideways component of a desired force into a torque (Eq. 22)."""
-    yaw_damping_nms: Resistance
+    yaw_damping_nms: NonNegative
     """Inner loop: torque -c r, added within the torque limit."""
 
 
@@ -266,18 +257,18 @@ class Timing(Section):
 class Constraints(Section):
     """The distances of Eq. 7."""
 
-    s_l_m: Length
+    s_l_m: Positive
     """Largest distance of a vehicle from l(t)."""
-    s_o_m: Length
+    s_o_m: Positive
     """Smallest distance from an obstacle's surface."""
-    s_u_m: Length
+    s_u_m: Positive
     """Smallest distance between vehicles."""
 
 
 class Contact(Section):
     """What counts as a collision: two hulls, or a hull and an obstacle, overlap."""
 
-    hull_radius_m: Length
+    hull_radius_m: Positive
     """Vehicles collide closer than twice this; with an obstacle at this surface distance."""
     ends_vehicle: bool
     """Whether a vehicle that collides is lost."""
@@ -286,11 +277,11 @@ class Contact(Section):
 class Arrival(Section):
     """When the task is done."""
 
-    radius_m: Length
+    radius_m: Positive
     """The swarm's centre this close to the end of the trajectory, with l(t) at rest there ..."""
     dwell_s: Annotated[float, within(0, 3_600)]
     """... for so long."""
-    spread_m: Length
+    spread_m: Positive
     """Every vehicle this close to the end, for up to 54 vehicles."""
 
 
@@ -299,26 +290,26 @@ class TimeLimit(Section):
 
     factor: Annotated[float, within(0.001, 1_000)]
     """Times the trajectory's duration ..."""
-    extra_s: Duration
+    extra_s: NonNegative
     """... plus this."""
 
 
 class Disturbance(Section):
     """What goes wrong."""
 
-    loss_times_s: Annotated[tuple[Duration, ...], Field(max_length=16384)]
+    loss_times_s: Annotated[tuple[NonNegative, ...], Field(max_length=16384)]
     """At each of these times a vehicle, drawn by the seed, is lost."""
 
 
 class Reward(Section):
     """Weights of the terms in ``envs/reward.py``."""
 
-    tracking: Weight
-    obstacle: Weight
-    spacing: Weight
-    effort: Weight
-    collision: Weight
-    arrival: Weight
+    tracking: NonNegative
+    obstacle: NonNegative
+    spacing: NonNegative
+    effort: NonNegative
+    collision: NonNegative
+    arrival: NonNegative
 
 
 class Scenario(Section):
@@ -358,6 +349,7 @@ class Scenario(Section):
         scenario_checks.check_start(self)
         scenario_checks.check_course(self)
         scenario_checks.check_losses(self)
+        scenario_checks.check_times(self)
         scenario_checks.check_vehicle(self)
         return self
 

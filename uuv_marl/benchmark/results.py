@@ -20,7 +20,7 @@ from typing_extensions import TypedDict
 
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
-from uuv_marl.baselines.learned import Learned
+from uuv_marl.baselines.learned import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
@@ -210,8 +210,8 @@ def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
         ResultsError: the file is missing or broken.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultsError(f"{path} can't be read ({error}); delete it, and the same command makes it again") from error
 
@@ -219,7 +219,7 @@ def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
 def knowledge(policy: str) -> Knowledge:
     """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
     made = policy_class(policy)
-    if issubclass(made, Learned):
+    if isinstance(made, Trained):
         source = made.checkpoint.digest
     else:
         file = inspect.getsourcefile(made) if ":" in policy else None

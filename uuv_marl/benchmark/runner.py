@@ -70,29 +70,23 @@ class Table(NamedTuple):
     rows: list[Cells]
 
 
-def make_tables(
-    results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]
-) -> list[Table]:
-    """A table for each scenario."""
-    return [Table(title(s, seeds), rows_of(results, s.name, policies, seeds)) for s in scenarios]
-
-
-def policies_in(results: Results, scenarios: Sequence[Scenario], seeds: Sequence[int]) -> list[str]:
-    """Policies of which the results hold runs on these scenarios and seeds: default ones first, then by name."""
-    found = [p for p in results.policies if any(results.select(s.name, p, seeds) for s in scenarios)]
-    return [policy for policy in DEFAULT_POLICIES if policy in found] + sorted(set(found) - set(DEFAULT_POLICIES))
-
-
 def write_report(
-    results: Results,
-    tables: Sequence[Table],
-    scenarios: Sequence[Scenario],
-    policies: Sequence[str],
-    seeds: Sequence[int],
-) -> list[Path]:
-    """``table.md`` and the pictures; the paths, the table first. Raises ResultsError where they can't be written."""
+    results: Results, scenarios: Sequence[Scenario], seeds: Sequence[int]
+) -> tuple[list[Table], list[Path]]:
+    """``table.md`` and the pictures, of every policy that the results hold runs of on these scenarios and seeds.
+
+    Returns:
+        A table for each scenario, its rows the default policies in their order, then others by name; and the paths
+        written, that of the table first.
+
+    Raises:
+        ResultsError: a file can't be written.
+    """
+    held = [name for name in sorted(results.policies) if any(results.select(s.name, name, seeds) for s in scenarios)]
+    policies = [name for name in dict.fromkeys([*DEFAULT_POLICIES, *held]) if name in held]
+    tables = [Table(title(s, seeds), rows_of(results, s.name, policies, seeds)) for s in scenarios]
     path = results.folder / "table.md"
     texts = [f"## {table.title}\n\n{markdown_table(HEADERS, table.rows)}" for table in tables]
     write_text(path, "\n".join([*texts, CAPTION + "\n"]))
     with writing(results.folder / "figures"):
-        return [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]
+        return tables, [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]

@@ -154,26 +154,31 @@ def _knows(known: Knowledge) -> str:
 def _paper_cell(paper: PaperFigure | None) -> str:
     if paper is None:
         return _NOTHING
-    parts: list[str] = []
-    if paper.task_time_s is not None:
-        parts.append(f"{paper.task_time_s:g} s")
-    if paper.min_obstacle_distance_m is not None:
-        parts.append("-".join(f"{distance:g}" for distance in paper.min_obstacle_distance_m) + " m")
-    if paper.min_spacing_m is not None:
-        parts.append(f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m")
-    return ", ".join(parts)
+    distances = "-".join(f"{distance:g}" for distance in paper.min_obstacle_distance_m or ())
+    parts = (
+        f"{paper.task_time_s:g} s" if paper.task_time_s else "",
+        f"{distances} m" if distances else "",
+        f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m" if paper.min_spacing_m else "",
+    )
+    return ", ".join(filter(None, parts))
 
 
 def rich_table(title: str, rows: Sequence[Cells], width: int) -> RichTable:
-    """For a terminal of so many columns: the same cells, stacked so that they fit; a narrow one gets no intervals."""
+    """For a terminal of so many columns: the same cells, stacked so that they fit.
+
+    A narrow one leaves out intervals, the spacing's time mean and the shares of Eq. 7, which table.md has.
+    """
     narrow = width < _NARROW
-    table = RichTable(title=title, title_justify="left", caption=CAPTION, caption_justify="left", show_lines=True)
-    # A policy's name is what tells rows from each other: it is never cut.
+    table = RichTable(
+        title=title, title_justify="left", caption=CAPTION, caption_justify="left", show_lines=True,
+        padding=0 if narrow else (0, 1),
+    )  # fmt: skip
+    # A policy's name is what tells rows from each other: it is folded where it must be, and never cut.
     longest = max((len(cells.policy) for cells in rows), default=0)
-    table.add_column("policy\n(beyond the percept)", overflow="fold", min_width=min(longest, width // 3))
+    table.add_column("policy", overflow="fold", width=min(max(longest, 0 if narrow else 23), width // 4))
     for header in ("arrived", "task time [s]", "obstacle distance [m]", "spacing [m]"):
         table.add_column(escape(header), justify="right", overflow="fold")
-    table.add_column("within Eq. 7, collisions", overflow="fold")
+    table.add_column("collisions" if narrow else "within Eq. 7, collisions", overflow="fold")
     table.add_column("paper", overflow="fold")
     for c in rows:
         time, distance, spacing = (
@@ -185,7 +190,7 @@ def rich_table(title: str, rows: Sequence[Cells], width: int) -> RichTable:
             f"{time}\nworst {c.slowest}",
             f"{distance}\nworst {c.nearest}",
             f"{spacing}\nworst {c.closest}" + ("" if narrow else f"\ntime mean {c.mean}"),
-            f"{c.within}\ncollisions: {c.collisions}",
+            c.collisions if narrow else f"{c.within}\ncollisions: {c.collisions}",
             c.paper,
         )
         table.add_row(*map(escape, cells))

@@ -1,5 +1,6 @@
 """``uuv-marl benchmark``, and ``tune``, which found the gains of what it compares."""
 
+import itertools
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -53,9 +54,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.atomic import locked
-        from uuv_marl.baselines import PolicyError
-        from uuv_marl.baselines.registry import policy_class
+        from uuv_marl.baselines import PolicyError, granted, make
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import rich_table
@@ -71,29 +70,27 @@ def benchmark(
         policies = list(dict.fromkeys(policy or runner.DEFAULT_POLICIES))
         if any(":" in name for name in policies):
             sys.path.append("")  # last, so that no file of this folder takes the place of an installed module
-        for name in policies:
-            policy_class(name)
+        for name, loaded in itertools.product(policies, scenarios):
+            make(name, granted(name, loaded))  # refused now, not after hours of others' runs
         evaluator, cluster = _where(ray, policies)
         wanted = range(seeds)
-        with locked(output):
+        with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
-            with cluster, working(f"The finished runs are in {output}") as bar:
-                tasks: dict[tuple[str, str], TaskID] = {}
+            tasks: dict[tuple[str, str], TaskID] = {}
 
-                def report(name: str, policy_name: str, share: float) -> None:
-                    key = (name, policy_name)
-                    if key not in tasks:
-                        tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
-                    bar.update(tasks[key], completed=share)
+            def report(name: str, policy_name: str, share: float) -> None:
+                key = (name, policy_name)
+                if key not in tasks:
+                    tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
+                bar.update(tasks[key], completed=share)
 
+            with cluster:
                 runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
-            shown = runner.policies_in(results, scenarios, wanted)
-            tables = runner.make_tables(results, scenarios, shown, wanted)
-            written = runner.write_report(results, tables, scenarios, shown, wanted)
+            tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
             console.print(rich_table(table.title, table.rows, console.width))
-        console.print(f"Every seed: {output}/results.json   table: {written[0]}   pictures:")
-        for path in written[1:]:
+        console.print(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
+        for path in pictures:
             console.print(f"  {path}", highlight=False)
         console.print(_NEXT.format(output=output), markup=False, highlight=False)
 
@@ -124,7 +121,6 @@ def tune(
     none that you do not trust.
     """
     with explained():
-        from uuv_marl.atomic import locked
         from uuv_marl.baselines import PolicyError
         from uuv_marl.benchmark.tuning import SPACES
         from uuv_marl.benchmark.tuning import tune as search
@@ -132,7 +128,7 @@ def tune(
         for name in policy or SPACES:
             if name not in SPACES:
                 raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
-        with extra("tune", "tuning"), locked(output), working(f"The finished trials are in {output}") as bar:
+        with extra("tune", "tuning"), working(f"The finished trials are in {output}", alone=output) as bar:
             for name in policy or SPACES:
                 task = bar.add_task(name, total=trials)
                 path = search(

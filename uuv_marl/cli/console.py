@@ -5,7 +5,7 @@ import sys
 import sysconfig
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import typer
@@ -13,14 +13,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from uuv_marl.errors import ClusterError, MissingExtraError, PolicyError, ResultsError, ScenarioError
+from uuv_marl.atomic import locked
+from uuv_marl.errors import ClusterError, DivergenceError, MissingExtraError, PolicyError, ResultsError, ScenarioError
 from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
 
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
 errors = Console(stderr=True)
 
-_MENDABLE = (ScenarioError, PolicyError, ResultsError, ClusterError, MissingExtraError)
+_MENDABLE = (ScenarioError, PolicyError, DivergenceError, ResultsError, ClusterError, MissingExtraError)
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 _NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")))
@@ -66,13 +67,15 @@ def progress_bar() -> Progress:
 
 
 @contextmanager
-def working(kept: str) -> Iterator[Progress]:
-    """The progress bar of a long work. Ctrl-C ends the command and says what is kept: "The trials are in x"."""
-    from uuv_marl.sim.compiled import announce_compilation
+def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
+    """The progress bar of a long work. Ctrl-C ends the command and says what is kept: "The trials are in x".
 
-    announce_compilation()
+    Args:
+        kept: a sentence without its end.
+        alone: the folder that no other command may write to meanwhile.
+    """
     try:
-        with progress_bar() as bar:
+        with nullcontext() if alone is None else locked(alone), progress_bar() as bar:
             yield bar
     except KeyboardInterrupt:
         console.print(f"Stopped. {kept}; the same command goes on.")

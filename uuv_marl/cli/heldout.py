@@ -1,4 +1,4 @@
-"""``uuv-marl heldout``: learned policies on what they were never trained on."""
+"""``uuv-marl heldout`` evaluates learned policies on what they were never trained on."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,22 +10,22 @@ from uuv_marl.cli.console import console, explained, working
 
 def heldout(
     only: Annotated[
-        list[str] | None, typer.Option(help="A set, such as random_field; repeat for several. Default: all.")
+        list[str] | None, typer.Option(help="Run only this set, such as random_field. Repeat it for several sets.")
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, max=10_000, help="At most so many of every set; 100 to 500 are usual.")
+        int | None, typer.Option(min=1, max=10_000, help="Most seeds of a set. Without it a set has 20 to 500.")
     ] = None,
     trainings: Annotated[
-        Path | None, typer.Option(help="Folder of outputs of uuv-marl train, one for each algorithm and seed.")
+        Path | None, typer.Option(help="Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of results, page and pictures.")] = Path("results/heldout"),
+    output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/heldout"),
 ) -> None:
     """Evaluate the shipped learned policies beside the hand-made ones, on what no training has seen.
 
-    500 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface, other decision
-    periods. Writes report.md, episodes.csv, pictures, and with --trainings the comparison over training seeds, also as
-    marl_eval.json. Took 40 minutes as two processes, each with its --only. Ctrl-C keeps the finished episodes; the same
-    command goes on.
+    The sets are 500 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface,
+    and other decision periods. It writes report.md, episodes.csv and pictures; with --trainings it also compares
+    algorithms over training seeds, and writes marl_eval.json. All sets took 40 minutes in two processes, each with its
+    own --only. Ctrl-C keeps the finished episodes, and the same command continues.
 
     Example: uuv-marl heldout --only single_obstacle --seeds 5
     """

@@ -254,17 +254,18 @@ def read_ledger(path: Path) -> list[Entry]:
     return [Entry(**row) for row in json.loads(path.read_text(encoding="utf-8"))["entries"]]
 
 
-def markdown(entries: Sequence[Entry]) -> list[str]:
-    """A table for each kind of row."""
+def markdown(entries: Sequence[Entry], heading: str = "##") -> list[str]:
+    """A table for each kind of row, under headings of this level; what is too long for a cell follows as a list."""
     titles = {
-        "number": "Numbers (interquartile mean over seeds [95 % bootstrap interval]; worst seed)",
-        "claim": "Sentences, each with what is measured in its stead",
+        "number": "Numbers",
+        "claim": "Sentences",
         "given": "What the paper sets",
-        "assumption": "What the paper leaves open",
+        "assumption": "What we assume where the paper is silent",
     }
     lines: list[str] = []
     for kind, title in titles.items():
-        lines += [f"## {title}", "", _table(kind, [entry for entry in entries if entry.kind == kind])]
+        chosen = [entry for entry in entries if entry.kind == kind]
+        lines += [f"{heading} {title}", "", _table(kind, chosen), *_notes(kind, chosen)]
     return lines
 
 
@@ -275,10 +276,29 @@ def _table(kind: str, entries: Sequence[Entry]) -> str:
     elif kind == "assumption":
         rows = [(e.quantity, str(e.ours), e.verdict.removeprefix("in view: ")) for e in entries]
         head = ("what", "taken", "the paper's numbers in view when it was chosen")
+    elif kind == "number":
+        rows = [(e.section, e.quantity, e.unit, e.paper, *_cells(e), e.verdict) for e in entries]
+        head = ("section", "quantity", "unit", "paper", "ours", "worst", "difference", "verdict")
     else:
-        rows = [(e.section, e.quantity, e.unit, e.paper, *_cells(e), e.verdict, e.why) for e in entries]
-        head = ("section", "quantity", "unit", "paper", "ours", "worst", "difference", "verdict", "why")
+        rows = [
+            (f"{k}", e.section, e.quantity.rpartition(": ")[0], e.paper[len("holds ") :], *_cells(e)[:2], e.verdict)
+            for k, e in enumerate(entries, start=1)
+        ]
+        head = ("no.", "section", "the paper says", "holds", "ours", "worst", "verdict")
     return markdown_table(head, rows)
+
+
+def _notes(kind: str, entries: Sequence[Entry]) -> list[str]:
+    """How each claim is measured, and why ours differs."""
+    if kind == "claim":
+        notes = [
+            f"{k}. Measured: {e.quantity.rpartition(': ')[2]} [{e.unit}]." + (f" *Reason*: {e.why}." if e.why else "")
+            for k, e in enumerate(entries, start=1)
+        ]
+    else:
+        whys = {e.why: [f"{o.section}, {o.quantity}" for o in entries if o.why == e.why] for e in entries if e.why}
+        notes = [f"- **{'; '.join(names)}**: {why}." for why, names in whys.items()]
+    return [*notes, ""] if notes else []
 
 
 def _cells(e: Entry) -> tuple[str, str, str]:

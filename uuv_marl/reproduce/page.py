@@ -39,7 +39,7 @@ def page(folder: Path, parts: Sequence[Part]) -> str:
         **search_errors(),
         prediction=prediction(tables["identification"]),
         rest_table=rest_table(tables["rest"]),
-        ledger="\n".join(markdown(entries)).strip(),
+        ledger="\n".join(markdown(entries, "###")).strip(),
         **growth_rates(tables["margins"], tables["critical"]),
     )
 
@@ -55,13 +55,13 @@ def summary(entries: Sequence[Entry]) -> str:
     claims = [entry for entry in entries if entry.kind == "claim"]
     lines = [
         f"- Of {len(numbers)} numbers, {_count(numbers, 'matches within 5 %')} match within 5 %, "
-        f"{_count(numbers, 'matches within 15 %')} more within 15 %, {_count(numbers, 'differs')} differ:",
+        f"{_count(numbers, 'matches within 15 %')} more match within 15 %, and {_count(numbers, 'differs')} differ:",
         *(
             f"  - {e.section}, {e.quantity}: paper {e.paper} {e.unit}, ours {e.ours:.4g} [{e.low:.4g}, {e.high:.4g}]"
             for e in numbers
             if e.verdict == "differs" and isinstance(e.ours, float)
         ),
-        f"- Of {len(claims)} sentences, {_count(claims, 'holds')} hold in every seed; these do not:",
+        f"- Of {len(claims)} sentences, {_count(claims, 'holds')} hold in every seed. These do not:",
         *(f"  - {e.section}, {e.quantity.partition(':')[0]}: {e.verdict}" for e in claims if e.verdict != "holds"),
     ]
     return "\n".join(lines)

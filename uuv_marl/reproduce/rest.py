@@ -10,7 +10,6 @@ amplitudes, and the largest Lyapunov exponent after Benettin, Galgani, Giorgilli
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -73,10 +72,10 @@ class Variant:
 
     def policy(self, scenario: Scenario, num_worlds: int) -> Policy:
         """The law for this scenario: the paper's own code where nothing is softened."""
-        base = BioInspired if self.softening == PAPER else Softened
-        declared = {"yaw_damping_nms": self.yaw_damping_nms, "softening": self.softening}
-        made = cast(type[BioInspired], type(base.__name__, (base,), declared))
-        return made(scenario, num_worlds, gains=self.gains)
+        undamped = load_scenario(scenario, overrides={"actuators.yaw_damping_nms": 0.0})  # as the law was made
+        if self.softening == PAPER:
+            return BioInspired(undamped, num_worlds, gains=self.gains)
+        return Softened(undamped, num_worlds, gains=self.gains, softening=self.softening)
 
 
 SMOOTH = Softening(near_m=14.0, far_m=20.0)
