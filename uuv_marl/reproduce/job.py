@@ -9,25 +9,17 @@ from typing import Any
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.results import ResultsError, source_fingerprint
 from uuv_marl.benchmark.style import house_style, save
-from uuv_marl.reproduce import (
-    identify,
-    literal,
-    obstacle_figures,
-    rest,
-    sensitivity,
-    stability,
-    tracking_figures,
-    variations,
-)
+from uuv_marl.reproduce import identify, literal, obstacle_figures, rest, sensitivity, stability, variations
 from uuv_marl.reproduce.ledger import CASES, ledger, write_ledger
 from uuv_marl.reproduce.page import write_page
 from uuv_marl.reproduce.study import Part, Report, Study, Tables, read_columns, write_columns
+from uuv_marl.reproduce.tracking_figures import PARTS as TRACKING_PARTS
 
 Progress = Callable[[str, float], None]
 """Called with what is being done, and the share of the whole job that is done."""
 LEDGER = "ledger"
 PARTS: tuple[Part, ...] = (
-    *tracking_figures.PARTS,
+    *TRACKING_PARTS,
     *obstacle_figures.PARTS,
     literal.PART,
     sensitivity.PART,
