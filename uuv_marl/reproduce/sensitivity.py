@@ -82,7 +82,7 @@ def draw(made: Tables) -> Figure:
         j = heads.index((str(table["section"][k]), str(table["quantity"][k])))
         change[i, j] = table["relative_change"][k]
         ax.text(j, i, _cell(table, k), ha="center", va="center", fontsize=8,
-                color="white" if abs(change[i, j]) > 0.35 else "black",
+                color="white" if abs(change[i, j]) > 0.28 else "black",
                 fontweight="bold" if abs(table["relative_difference"][k]) <= CLOSE else "normal")  # fmt: skip
     image = ax.imshow(np.clip(change, -0.5, 0.5), cmap="PuOr", vmin=-0.5, vmax=0.5, aspect="auto")
     ax.set_facecolor("0.93")
