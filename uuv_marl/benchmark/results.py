@@ -235,11 +235,6 @@ def source_fingerprint() -> str:
     )
 
 
-def scenario_hash(scenario: Scenario) -> str:
-    """Short name of a configuration, for captions."""
-    return _hash(json.dumps(scenario.model_dump(mode="json"), sort_keys=True).encode())[:8]
-
-
 def _hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 

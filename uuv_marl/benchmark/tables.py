@@ -1,7 +1,7 @@
 """The benchmark's table: interquartile means over seeds with bootstrap intervals, worst seeds, the paper's figures."""
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,13 +64,18 @@ class Estimate(NamedTuple):
     high: float
 
 
-def estimate(values: Sequence[float]) -> Estimate:
-    """Interquartile mean over seeds and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable."""
-    data = np.asarray(values, np.float64)
-    if len(data) < 2 or np.ptp(data) == 0.0:
-        return Estimate(float(_iqm(data)), float(data.min()), float(data.max()))
-    interval = bootstrap(
-        (data,),
+def estimate(*samples: Sequence[float]) -> Estimate:
+    """Interquartile mean and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable.
+
+    Of one sample, such as a value for each seed, or of several together: each is resampled by itself.
+    """
+    data = [np.asarray(sample, np.float64) for sample in samples]
+    whole = float(_iqm(*data))
+    if min(map(len, data)) < 2 or all(np.ptp(sample) == 0.0 for sample in data):
+        return Estimate(whole, whole, whole)
+    resample: Any = bootstrap
+    interval = resample(
+        tuple(data),
         _iqm,
         confidence_level=_CONFIDENCE,
         n_resamples=_RESAMPLES,
@@ -78,11 +83,11 @@ def estimate(values: Sequence[float]) -> Estimate:
         vectorized=True,
         rng=np.random.default_rng(0),
     ).confidence_interval
-    return Estimate(float(_iqm(data)), float(interval.low), float(interval.high))
+    return Estimate(whole, float(interval.low), float(interval.high))
 
 
-def _iqm(data: Float64, axis: int = -1) -> Float64:
-    return np.asarray(trim_mean(data, 0.25, axis=axis), np.float64)
+def _iqm(*data: Float64, axis: int = -1) -> Float64:
+    return np.asarray(trim_mean(np.concatenate(data, axis=axis), 0.25, axis=axis), np.float64)
 
 
 def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Cells]:

@@ -13,7 +13,8 @@ from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.reproduce.assumptions import ALL, ASSUMPTIONS, SEARCHED
-from uuv_marl.reproduce.cases import (
+from uuv_marl.reproduce.claims import CLAIMS, Claim
+from uuv_marl.reproduce.study import (
     COMPARATORS,
     DELTA_LARGE,
     DELTA_SMALL,
@@ -25,7 +26,6 @@ from uuv_marl.reproduce.cases import (
     Case,
     Study,
 )
-from uuv_marl.reproduce.claims import CLAIMS, Claim
 from uuv_marl.scenario_files import load_scenario
 
 Float64 = NDArray[np.float64]

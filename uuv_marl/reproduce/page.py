@@ -11,9 +11,8 @@ import numpy as np
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.reproduce import identify
-from uuv_marl.reproduce.columns import Columns, read_columns
 from uuv_marl.reproduce.ledger import Entry, markdown, read_ledger
-from uuv_marl.reproduce.parts import Part
+from uuv_marl.reproduce.study import Columns, Part, read_columns
 from uuv_marl.reproduce.unknowns import OBJECTIVES
 
 NEEDED = ("identification", "margins", "rest", "critical")
@@ -46,8 +45,8 @@ def page(folder: Path, parts: Sequence[Part]) -> str:
 
 
 def picture(part: Part) -> str:
-    """A part's picture with its caption."""
-    return f"![{part.title}](figures/{part.name}.png)\n\n*{part.name}. {part.title}. {part.caption}.*"
+    """A part's picture with its caption, which does not say again what the picture's title says."""
+    return f"![{part.title}](figures/{part.name}.png)\n\n*{part.caption}.*"
 
 
 def summary(entries: Sequence[Entry]) -> str:
