@@ -9,7 +9,7 @@ HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
 .PHONY: help benchmark reproduce paper test docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
-.PHONY: check dist perf perf-training clean
+.PHONY: check dist test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
@@ -18,6 +18,7 @@ help:
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make docs-check                     pages, tables and pictures are those of the code and of the shipped data"
 	@echo "make test-bounds                    the simulation's tests, every index of compiled code checked"
+	@echo "make test-attacks                   hostile inputs, kills and crash points: docs/reliability.md"
 	@echo "make test-lowest                    tests with the oldest libraries that pyproject.toml allows, without torch"
 	@echo "make test-light PYTHON=python3.13   tests without torch, on another Python"
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
@@ -48,6 +49,9 @@ BOUNDED := baselines bounds env plain reward sonar swarm trajectory vector_env v
 test-bounds: .venv/dev.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
 	$(BIN)/python $(PYTEST) $(HALVES) $(BOUNDED:%=tests/test_%.py) $(ARGS)
+
+test-attacks: .venv/dev.stamp
+	$(BIN)/python -m tests.attacks $(ARGS)
 
 test-adapters: test-benchmarl test-rllib
 
