@@ -9,9 +9,10 @@ import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, PolicyError, granted, make
 from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.errors import DivergenceError
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim import swarm as swarm_module
-from uuv_marl.sim.swarm import DivergenceError, Swarm
+from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import plant
 
 

@@ -84,6 +84,7 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
         super().__init__(
             num_worlds * self.swarm.num_vehicles, Box(layout.low, layout.high), Box(-1.0, 1.0, (2,), np.float32)
         )
+        self.metadata = {**self.metadata, "render_fps": self._view.fps}  # SB3 has just written its own
         self._seed: int | None = None
         self._actions: Float32 | None = None
         self._returns = np.zeros(self._shape)
