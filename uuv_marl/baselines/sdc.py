@@ -84,8 +84,8 @@ class Sdc(Policy):
         n = scenario.swarm.num_vehicles
         if n > _MOST_VEHICLES:
             raise PolicyError(
-                f"{self.name} assigns slots to at most {_MOST_VEHICLES} vehicles, since more would take minutes; scenario "
-                f"{scenario.name!r} has {n}; use fewer, or another policy"
+                f"{self.name} assigns slots to at most {_MOST_VEHICLES} vehicles, since more would take minutes; "
+                f"scenario {scenario.name!r} has {n}; use fewer, or another policy"
             )
         self._lattice = hexagonal_slots(n)
         self._slots = np.zeros((num_worlds, n, 2))
