@@ -33,6 +33,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         "render_modes": ["rgb_array"],
         "render_fps": 10,
     }
+    closed = True  # until it is complete: Gymnasium closes what is dropped
 
     def __init__(
         self,
@@ -56,6 +57,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.state_space = Box(task.state_layout.low, task.state_layout.high)
+        self.closed = False
 
     def reset(
         self,
