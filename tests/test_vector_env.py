@@ -13,6 +13,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector as wrappers
+from packaging.version import Version
 
 import uuv_marl
 from uuv_marl import baselines
@@ -202,6 +203,10 @@ def test_observations_handed_out_stay_as_they_are():
     np.testing.assert_array_equal(infos["agent_mask"], kept_mask)
 
 
+@pytest.mark.skipif(
+    Version(gymnasium.__version__) < Version("1.4"),
+    reason="before Gymnasium 1.4 RecordEpisodeStatistics counts as if every world were reset in the next step",
+)
 def test_gymnasium_wrappers_work():
     env = wrappers.DictInfoToList(wrappers.NormalizeReward(wrappers.RecordEpisodeStatistics(short(info_terms=True))))
     env.reset(seed=0)

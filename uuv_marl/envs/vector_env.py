@@ -40,6 +40,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         "autoreset_mode": AutoresetMode.SAME_STEP,
         "render_modes": ["rgb_array"],
     }
+    closed = True  # until it is complete: Gymnasium closes what is dropped
 
     def __init__(
         self,
@@ -60,6 +61,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.state_space = Box(task.state_layout.low, task.state_layout.high)
+        self.closed = False
 
     def reset(self, *, seed: SeedLike = None, options: dict[str, Any] | None = None) -> tuple[Float32, Infos]:
         """Start episodes.
