@@ -165,7 +165,7 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
     try:
         yield lambda: bool(noted)
     except KeyboardInterrupt:
-        pass
+        noted.append(signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, before)
     if noted:
