@@ -9,7 +9,7 @@ HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
 .PHONY: help benchmark reproduce paper test docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
-.PHONY: check dist perf perf-training clean
+.PHONY: check dist test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
@@ -18,13 +18,15 @@ help:
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make docs-check                     pages, tables and pictures are those of the code and of the shipped data"
 	@echo "make test-bounds                    the simulation's tests, every index of compiled code checked"
+	@echo "make test-attacks                   hostile inputs, kills and crash points: docs/reliability.md"
 	@echo "make test-lowest                    tests with the oldest libraries that pyproject.toml allows, without torch"
 	@echo "make test-light PYTHON=python3.13   tests without torch, on another Python"
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
 	@echo "make check                          ruff, pyright and import-linter only"
 	@echo "make dist                           source distribution and wheel in dist/"
 	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS and JaxMARL, about 15 minutes: docs/speed.md"
-	@echo "make perf-training                  training beside SuperSuit and RLlib, and its profile: perf/training.md"
+	@echo "make perf-training                  training beside SuperSuit and RLlib: perf/training.md"
+	@echo "make versions OTHER=path            is another checkout the same, bit for bit, and as fast?"
 	@echo "make clean                          remove .venv and .venv-*"
 
 benchmark: .venv/base.stamp
@@ -47,6 +49,9 @@ BOUNDED := baselines bounds env plain reward sonar swarm trajectory vector_env v
 test-bounds: .venv/dev.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
 	$(BIN)/python $(PYTEST) $(HALVES) $(BOUNDED:%=tests/test_%.py) $(ARGS)
+
+test-attacks: .venv/dev.stamp
+	$(BIN)/python -m tests.attacks $(ARGS)
 
 test-adapters: test-benchmarl test-rllib
 
@@ -78,7 +83,12 @@ perf: .venv/dev.stamp $(foreach name,$(PEERS),.venv-$(name)/$(name).stamp)
 	$(BIN)/python perf/report.py
 
 perf-training: .venv/dev.stamp .venv-perf-supersuit/perf-supersuit.stamp .venv-rllib/rllib.stamp
-	$(BIN)/python perf/training.py $(ARGS)
+	$(BIN)/python perf/compare.py --training $(ARGS)
+	$(BIN)/python perf/report.py
+
+.PHONY: versions
+versions: .venv/dev.stamp
+	$(BIN)/python perf/versions.py $(OTHER) $(ARGS)
 
 ENVIRONMENTS := light lowest benchmarl rllib perf-supersuit $(PEERS)
 STAMPS := .venv/base.stamp .venv/dev.stamp $(foreach name,$(ENVIRONMENTS),.venv-$(name)/$(name).stamp)

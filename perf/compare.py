@@ -1,42 +1,42 @@
 """Rates of uuv_marl and its peers, side by side in one run: python perf/compare.py, or make perf.
 
-Every library runs in its own process and its own virtual environment. A cell of the table (so many agents, so many
-worlds) is built by all of them, then measured in turn, round after round, so that a slow phase of the machine hits all
-alike. What cannot run is recorded with its reason. The results file is written after every cell.
+Every case runs in its own process and its library's virtual environment. All of a cell of the table (so many agents, so
+many worlds) are built, then measured in turn, round after round, so that a slow phase of the machine hits all alike.
+What cannot run is recorded with its reason. The file is written after every cell; perf/report.py writes the pages.
 """
 
 import argparse
 import contextlib
 import json
+import math
 import os
 import platform
-import queue
+import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any, NamedTuple
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from typing import Any, NamedTuple
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-RESULTS = HERE / "results.json"
+RESULTS, TRAININGS = HERE / "results.json", HERE / "training.json"
 AGENTS, WORLDS = (3, 54, 500), (1, 64, 1024)
-CURVE = (3, 10, 54, 200, 500, 1000, 2000, 5000, 10000)
-CEILINGS = ("pairs", "keeps", "sines", "exponentials", "copy")
-PARTS = ("part_moved", "part_sorted", "part_measured", "part_heard", "part_perceived", "part_stepped")
 FLOOR_CELLS = ((54, 1), (54, 64), (500, 1), (500, 64))
-BUILD_LIMIT_S, CASE_LIMIT_S, MEMORY_SHARE = 240.0, 10.0, 0.7
-
+CURVE = (3, 10, 54, 200, 500, 1000, 2000, 5000, 10000)
+CEILINGS = ("pairs", "keeps", "sines", "copy")
+PARTS = ("part_moved", "part_sorted", "part_measured", "part_heard", "part_perceived", "part_stepped")
+ADAPTERS = ("swarm_idle", "task_idle", "vector_env_idle", "sb3_idle", "torchrl_idle")
+TRAINED = ("mappo", "ppo", "plain")
+PEERS = ("mpe2", "vmas", "jaxmarl")
+ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("NUMBA", "OMP", "MKL", "OPENBLAS")}
+LIMIT_S, CASE_LIMIT_S, PATIENCE_S = 240.0, 10.0, 20.0
+"""For a build or a repeat; for a case's repeats together; for a process to end by itself."""
 
 Record = dict[str, Any]
-Records = list[Record]
 
 
 class Library(NamedTuple):
@@ -50,11 +50,12 @@ class Library(NamedTuple):
 
 LIBRARIES = {
     "uuv_marl": Library(".venv", "ours.py"),
-    "mpe2": Library(".venv-perf-mpe2", "peer_mpe2.py"),
-    "vmas": Library(".venv-perf-vmas", "peer_vmas.py"),
-    "jaxmarl": Library(".venv-perf-jaxmarl", "peer_jaxmarl.py"),
+    "parts": Library(".venv", "parts.py"),
+    **{peer: Library(f".venv-perf-{peer}", f"peer_{peer}.py") for peer in PEERS},
+    "train": Library(".venv", "trainings.py", ONE_THREAD),
+    "supersuit": Library(".venv-perf-supersuit", "trainings.py", ONE_THREAD),
+    "rllib": Library(".venv-rllib", "trainings.py", ONE_THREAD),
 }
-PEERS = ("mpe2", "vmas", "jaxmarl")
 
 
 class Cell(NamedTuple):
@@ -65,15 +66,20 @@ class Cell(NamedTuple):
     cases: dict[str, tuple[str, int]]
 
 
-def plan() -> Iterator[Cell]:
-    """All cells of the comparison."""
+def plan(training: bool) -> Iterator[Cell]:
+    """All cells of the comparison, or the one of whole trainings."""
+    if training:
+        ours = dict.fromkeys(TRAINED, ("train", 16))
+        yield Cell("trainings", 54, ours | {library: (library, 16) for library in ("supersuit", "rllib")})
+        return
     for agents in AGENTS:
         for worlds in WORLDS:
-            names = ["core", "vector_env", "parallel_env", *(CEILINGS if (agents, worlds) in FLOOR_CELLS else ())]
+            names = ("core", "vector_env", "parallel_env", *(CEILINGS if (agents, worlds) in FLOOR_CELLS else ()))
             ours = dict.fromkeys(names, ("uuv_marl", worlds))
             yield Cell("rates", agents, ours | {peer: (peer, worlds) for peer in PEERS})
     yield Cell("terms", 54, dict.fromkeys(("parallel_env", "parallel_env_terms"), ("uuv_marl", 1)))
-    yield Cell("profile", 54, dict.fromkeys(PARTS, ("uuv_marl", 64)))
+    yield Cell("profile", 54, dict.fromkeys(PARTS, ("parts", 64)))
+    yield Cell("adapters", 54, dict.fromkeys(ADAPTERS, ("uuv_marl", 64)))
     yield Cell("training", 54, {"ppo": ("uuv_marl", 64), "mpe2_ppo": ("mpe2", 4), "vmas_ppo": ("vmas", 64)})
     for agents in CURVE:
         yield Cell("curve", agents, dict.fromkeys(("idle", "bio_inspired"), ("uuv_marl", 1)))
@@ -83,161 +89,92 @@ class CannotRun(Exception):  # noqa: N818 - no fault, a result
     """Why a case has no rate."""
 
 
-class Worker:
-    """A library's process, started when it is first asked, and anew after it had to be stopped."""
+class Process:
+    """A case in its library's environment; ``built`` is what it said when it was ready. Raises CannotRun."""
 
-    def __init__(self, library: Library) -> None:
-        self.library = library
-        self.about: dict[str, Any] = {}
-        self._process: subprocess.Popen[str] | None = None
-        self._log: IO[str] | None = None
-
-    def ask(self, limit_s: float, **request: object) -> dict[str, Any]:
-        """The answer to a request, or CannotRun."""
-        process = self._process or self._start()
-        assert process.stdin  # noqa: S101
-        try:
-            process.stdin.write(json.dumps(request) + "\n")
-            process.stdin.flush()
-        except BrokenPipeError:
-            raise CannotRun(self._ended()) from None
-        answer = self._answer(process, limit_s)
-        if "failed" in answer:
-            raise CannotRun(answer["failed"])
-        return answer
-
-    def _start(self) -> subprocess.Popen[str]:
-        venv, script, environment = self.library
-        python = ROOT / venv / "bin" / "python"
+    def __init__(self, library: Library, case: str, agents: int, worlds: int, seconds: float, limit: float) -> None:
+        python = ROOT / library.venv / "bin" / "python"
         if not python.exists():
-            raise SystemExit(f"{venv} is missing; 'make perf' makes it")
-        self._log = tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed by stop
+            raise CannotRun(f"{library.venv} is missing; 'make perf' and 'make perf-training' make theirs")
+        self._limit, self._log = limit, tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed by stop
         self._process = subprocess.Popen(  # noqa: S603
-            [python, HERE / script], cwd=ROOT, env={**os.environ, **environment}, text=True, bufsize=1,
+            [python, HERE / library.script, case, *map(str, (agents, worlds, seconds, limit))],
+            cwd=ROOT, env={**os.environ, **library.environment}, text=True, bufsize=1,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log,
         )  # fmt: skip
-        self._lines = queue.SimpleQueue[str]()
-        threading.Thread(target=_listen, args=(self._process.stdout, self._lines), daemon=True).start()
-        self.about = self._answer(self._process, BUILD_LIMIT_S)
-        return self._process
+        self.built = self._answer()
 
-    def _answer(self, process: subprocess.Popen[str], limit_s: float) -> dict[str, Any]:
-        end = time.monotonic() + limit_s
-        while time.monotonic() < end:
-            if _memory_share(process.pid) > MEMORY_SHARE:
-                self.stop()
-                raise CannotRun(f"needed more than {MEMORY_SHARE:.0%} of the memory")
-            with contextlib.suppress(queue.Empty):
-                line = self._lines.get(timeout=0.05)
-                if not line:
-                    raise CannotRun(self._ended())
-                if line.startswith("{"):  # libraries print too
-                    return json.loads(line)
-        self.stop()
-        raise CannotRun(f"not ready within {limit_s:.0f} s")
+    def repeat(self) -> dict[str, Any]:
+        """Measure once more."""
+        assert self._process.stdin  # noqa: S101
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.write("\n")
+        return self._answer()
 
-    def _ended(self) -> str:
-        """The last line of what a process that is gone had to say."""
-        assert self._log  # noqa: S101
+    def _answer(self) -> dict[str, Any]:
+        for line in self._process.stdout or ():
+            if line.startswith("{"):  # libraries print too
+                return json.loads(line)
+        ended = self._process.wait()
         self._log.seek(0)
         words = (self._log.read().strip().splitlines() or ["ended without a word"])[-1]
         self.stop()
-        return words
+        raise CannotRun(f"not ready within {self._limit:.0f} s" if ended == -signal.SIGALRM else words)
 
-    def stop(self, patience_s: float = 0.0) -> None:
-        """End the process, if there is one; with patience it may end by itself first."""
-        if self._process:
-            assert self._process.stdin  # noqa: S101
-            if patience_s:
-                with contextlib.suppress(BrokenPipeError, subprocess.TimeoutExpired):
-                    self._process.stdin.close()
-                    self._process.wait(patience_s)
-            self._process.kill()
-            self._process.wait()
-            with contextlib.suppress(BrokenPipeError):
-                self._process.stdin.close()
-            self._process = None
-        if self._log:
-            self._log.close()
-            self._log = None
+    def stop(self) -> None:
+        """End it; it may do so by itself first."""
+        with contextlib.suppress(BrokenPipeError), self._process:
+            if self._process.poll() is None:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self._process.communicate(timeout=PATIENCE_S)
+                self._process.kill()
+        self._log.close()
 
 
-def _listen(stream: IO[str], lines: queue.SimpleQueue[str]) -> None:
-    """Pass on a stream's lines, and an empty one at its end."""
-    with stream:
-        for line in stream:
-            lines.put(line)
-    lines.put("")
-
-
-def _memory_share(pid: int) -> float:
-    """Resident share of the machine's memory; 0 where the system does not tell."""
+def measure(cell: Cell, rounds: int, seconds: float) -> tuple[list[Record], dict[str, Any]]:
+    """The cell's records, and versions by library."""
+    records: list[Record] = []
+    running: list[tuple[Record, Process]] = []
+    about: dict[str, Any] = {}
+    length, most = (0.0, math.inf) if cell.kind == "trainings" else (seconds, CASE_LIMIT_S)
     try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    except (OSError, IndexError):
-        return 0.0
-    return pages / os.sysconf("SC_PHYS_PAGES")
+        for name, (library, worlds) in cell.cases.items():
+            record: Record = {
+                "kind": cell.kind, "case": name, "library": library, "agents": cell.agents, "worlds": worlds,
+                "date": datetime.now(UTC).isoformat(timespec="seconds"), "rates": [], "spent_s": 0.0,
+            }  # fmt: skip
+            records.append(record)
+            with noted(record):
+                process = Process(LIBRARIES[library], name, cell.agents, worlds, length, LIMIT_S)
+                running.append((record, process))
+                about[library] = process.built.pop("about")
+                record |= process.built
+                if record["first_s"] > most:  # its only repeat
+                    record |= {"rates": [record["first_rate"]], "spent_s": record["first_s"]}
+        for record, process in running * rounds:
+            start = time.monotonic()
+            if "failed" not in record and record["spent_s"] <= most:
+                with noted(record):
+                    record["rates"].append(process.repeat()["rate"])
+                record["spent_s"] += time.monotonic() - start
+    finally:
+        for _, process in running:
+            process.stop()
+    return records, about
 
 
-def measure(cell: Cell, workers: dict[str, Worker], before: Records, arguments: argparse.Namespace) -> None:
-    """Add the cell's records to those ``before``."""
-    records = [
-        {
-            "kind": cell.kind, "case": name, "library": library, "agents": cell.agents, "worlds": worlds,
-            "date": datetime.now(UTC).isoformat(timespec="seconds"), "rates": [],
-        }
-        for name, (library, worlds) in cell.cases.items()
-    ]  # fmt: skip
-    for record in records:
-        build(record, workers[record["library"]], before, arguments.seconds)
-    for _ in range(arguments.rounds):
-        for record in records:
-            repeat(record, workers[record["library"]])
-    for library in {library for library, _ in cell.cases.values()}:
-        with contextlib.suppress(CannotRun):
-            workers[library].ask(BUILD_LIMIT_S, clear=True)
-    for record in records:
-        before[:] = [old for old in before if key(old) != key(record)] + [record]
-
-
-def build(record: Record, worker: Worker, before: Records, seconds: float) -> None:
-    """Have the worker build the case; a first step that takes long is its only repeat."""
-    record["spent_s"] = 0.0
-    if failed := failed_smaller(record, before):
-        reason = failed["failed"].removeprefix("not tried: ")
-        record["failed"] = f"not tried: {reason}"
-        return
-    size = {"agents": record["agents"], "worlds": record["worlds"]}
+@contextlib.contextmanager
+def noted(record: Record) -> Iterator[None]:
+    """Write down why a case can't run."""
     try:
-        record |= worker.ask(BUILD_LIMIT_S, build=record["case"], seconds=seconds, slow=CASE_LIMIT_S / 2, **size)
+        yield
     except CannotRun as reason:
         record["failed"] = str(reason)
-        return
-    if record["first_s"] > CASE_LIMIT_S:
-        record["rates"], record["spent_s"] = [record["first_rate"]], record["first_s"]
-
-
-def repeat(record: Record, worker: Worker) -> None:
-    """Measure a built case once more, unless it has had its time."""
-    if "failed" in record or record["spent_s"] > CASE_LIMIT_S:
-        return
-    start = time.monotonic()
-    try:
-        record["rates"].append(worker.ask(BUILD_LIMIT_S, repeat=record["case"])["rate"])
-    except CannotRun as reason:
-        record["failed"] = str(reason)
-    record["spent_s"] += time.monotonic() - start
 
 
 def key(record: Record) -> tuple[object, ...]:
     """What a record is about."""
     return record["kind"], record["case"], record["agents"], record["worlds"]
-
-
-def failed_smaller(record: Record, before: Records) -> Record | None:
-    """The record of the same case with fewer worlds that failed, if there is one."""
-    same = [old for old in before if key(old)[:3] == key(record)[:3] and old["worlds"] < record["worlds"]]
-    return next((old for old in same if "failed" in old), None)
 
 
 def machine() -> dict[str, Any]:
@@ -252,72 +189,38 @@ def machine() -> dict[str, Any]:
     }
 
 
-def earlier(path: Path) -> dict[str, Any]:
-    """What the file holds, or an empty record of this machine."""
-    here = machine()
-    if not path.exists():
-        return {"machine": here, "libraries": {}, "cases": []}
+def earlier(path: Path, only: list[str]) -> dict[str, Any]:
+    """What the file holds where only a part is measured anew, or an empty record of this machine."""
+    if not only or not path.exists():
+        return {"machine": machine(), "libraries": {}, "cases": []}
     found = json.loads(path.read_text(encoding="utf-8"))
-    if found["machine"] != here:
+    if found["machine"] != machine():
         raise SystemExit(f"{path} was measured on another machine ({found['machine']}); name another --output")
     return found
-
-
-def chosen(cell: Cell, arguments: argparse.Namespace, done: Records) -> Cell:
-    """The cell's cases that were asked for."""
-    there = {key(record) for record in done}
-    wanted = {
-        name: where
-        for name, where in cell.cases.items()
-        if (not arguments.only or {name, where[0], cell.kind} & set(arguments.only))
-        and not (arguments.resume and (cell.kind, name, cell.agents, where[1]) in there)
-    }
-    return cell._replace(cases=wanted)
 
 
 def main() -> None:
     """Measure, and write the results file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", help="cases, libraries, kinds (rates, terms, profile, training, curve)")
-    parser.add_argument("--resume", action="store_true", help="keep what the file has, measure the rest")
+    parser.add_argument("--training", action="store_true", help="whole trainings instead: make perf-training")
+    parser.add_argument("--only", nargs="+", default=[], help="cases, libraries, kinds (rates, terms, curve ...)")
     parser.add_argument("--rounds", type=int, default=5, help="repeats of each case (default 5)")
     parser.add_argument("--seconds", type=float, default=0.3, help="length of a repeat [s] (default 0.3)")
-    parser.add_argument("--output", type=Path, default=RESULTS, help="results file (default perf/results.json)")
-    arguments = parser.parse_args()
-    fresh = not (arguments.only or arguments.resume)
-    results = {"machine": machine(), "libraries": {}, "cases": []} if fresh else earlier(arguments.output)
-    results |= {"rounds": arguments.rounds, "seconds": arguments.seconds, "load": round(os.getloadavg()[0], 2)}
-    cells = [cell for cell in (chosen(cell, arguments, results["cases"]) for cell in plan()) if cell.cases]
-    workers = {name: Worker(library) for name, library in LIBRARIES.items()}
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    console = Console(stderr=True)
-    try:
-        with Progress(*columns, console=console) as progress:
-            task = progress.add_task("", total=len(cells))
-            for cell in cells:
-                worlds = sorted({worlds for _, worlds in cell.cases.values()})
-                progress.update(task, description=f"{cell.kind}: {cell.agents} agents, {worlds} worlds")
-                measure(cell, workers, results["cases"], arguments)
-                results["libraries"] |= {name: worker.about for name, worker in workers.items() if worker.about}
-                arguments.output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-                progress.advance(task)
-                for record in results["cases"][-len(cell.cases) :]:
-                    progress.console.print(line(record))
-    except KeyboardInterrupt:
-        console.print("Stopped; --resume goes on.")
-        sys.exit(130)
-    finally:
-        for worker in workers.values():
-            worker.stop()
-
-
-def line(record: Record) -> str:
-    """A record for the terminal."""
-    rates = sorted(record["rates"])
-    what = f"{record['case']:>14} {record['agents']:>6} x {record['worlds']:<5}"
-    if not rates:
-        return f"{what} {record['failed']}"
-    return f"{what} {rates[len(rates) // 2]:>16,.0f}/s [{rates[0]:,.0f}, {rates[-1]:,.0f}]"
+    parser.add_argument("--output", type=Path, help="results file (default perf/results.json or perf/training.json)")
+    given = parser.parse_args()
+    output = given.output or (TRAININGS if given.training else RESULTS)
+    results = earlier(output, given.only)
+    results |= {"rounds": given.rounds, "seconds": given.seconds, "load": round(os.getloadavg()[0], 2)}
+    for cell in plan(given.training):
+        asked = {n: at for n, at in cell.cases.items() if not given.only or {n, at[0], cell.kind} & {*given.only}}
+        records, about = measure(cell._replace(cases=asked), given.rounds, given.seconds)
+        new = {key(record) for record in records}
+        results["cases"] = [old for old in results["cases"] if key(old) not in new] + records
+        results["libraries"] |= about
+        output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+        for record in records:
+            rates = " ".join(f"{rate:,.0f}" for rate in sorted(record["rates"])) or record["failed"]
+            sys.stderr.write(f"{record['case']} {record['agents']} x {record['worlds']}: {rates}\n")
 
 
 if __name__ == "__main__":

@@ -4,9 +4,8 @@ Kernels without any of the package's code, the same for one world (one thread) a
 """
 
 import math
-import time
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -31,8 +30,6 @@ class Work(NamedTuple):
     sines: float
     """Sines and cosines: the Runge-Kutta method's three later stages and the new heading; the first stage's heading is
     the last step's."""
-    exponentials: float
-    """None: only controllers have them."""
     bytes: float
     """Action read, pose and velocity read and written as float64, percept written as float32."""
 
@@ -41,10 +38,10 @@ def work(vehicles: int) -> Work:
     """The work of a step of 0.1 s in one world."""
     per_vehicle = 2 * 4 + 2 * 6 * 8 + 4 * PERCEPT
     pairs = vehicles * (vehicles - 1) / 2
-    return Work(pairs, 2.0 * pairs, 8.0 * vehicles, 0.0, float(per_vehicle * vehicles))
+    return Work(pairs, 2.0 * pairs, 8.0 * vehicles, float(per_vehicle * vehicles))
 
 
-def least_seconds(vehicles: int, worlds: int, ceilings: Work) -> float:
+def least_seconds(vehicles: int, worlds: int, ceilings: Iterable[float]) -> float:
     """The least time of a step [s], from ceilings per second. Arithmetic adds up; memory may work meanwhile."""
     need = work(vehicles)
     *arithmetic, memory = (amount / rate for amount, rate in zip(need, ceilings, strict=True))
@@ -90,30 +87,27 @@ def all_sines(angle: Float64, y: Float64, out: Float64) -> None:
 
 
 @numba.njit
-def all_exponentials(value: Float64, y: Float64, out: Float64) -> None:
-    """The exponential of every value, by the C library."""
-    for k in range(value.size):
-        out[k] = math.exp(value[k])
-
-
-@numba.njit
 def all_copied(value: Float64, y: Float64, out: Float64) -> None:
     """A copy."""
     for k in range(value.size):
         out[k] = value[k]
 
 
-KERNELS = {
-    "pairs": all_pairs,
-    "keeps": all_keeps,
-    "sines": all_sines,
-    "exponentials": all_exponentials,
-    "copy": all_copied,
-}
+KERNELS = {"pairs": all_pairs, "keeps": all_keeps, "sines": all_sines, "copy": all_copied}
 
 
-def repeated(kernel: Callable[[Float64, Float64, Float64], None]) -> tuple[Any, Any]:
-    """A kernel so many times over one world, and over all of them spread over threads; arrays (world, entry)."""
+def loop(kind: str, vehicles: int, worlds: int) -> Loop:
+    """A loop of this kind; one time holds all worlds.
+
+    As much as a step of these worlds: pairs of so many vehicles, and for each of them 16 distances kept, 8 angles or 50
+    numbers copied. One world runs on one thread, several run on all, as the package does it.
+    """
+    kernel, length = KERNELS[kind], {"pairs": 2, "keeps": 16, "sines": 8, "copy": 50}[kind] * vehicles
+    x, y = np.random.default_rng(0).uniform(-3.0, 3.0, (2, worlds, length))
+    if kind == "keeps":
+        y = np.floor((y + 3.0) / 6.0 * SECTORS)
+    out = np.zeros((worlds, max(length, SECTORS)))
+    amount = {"pairs": vehicles * (vehicles - 1) / 2, "sines": 2 * length, "copy": 2 * 8 * length}.get(kind, length)
 
     @numba.njit
     def one(w: int, times: int, x: Float64, y: Float64, out: Float64) -> None:
@@ -126,55 +120,7 @@ def repeated(kernel: Callable[[Float64, Float64, Float64], None]) -> tuple[Any, 
         for w in numba.prange(x.shape[0]):
             one(w, times, x, y, out)
 
-    return one, every
-
-
-def loop(kind: str, vehicles: int, worlds: int) -> Loop:
-    """A loop of this kind; one time holds all worlds.
-
-    As much as a step of these worlds: pairs of so many vehicles, and for each of them 16 distances kept, 8 angles or 50
-    numbers copied. One world runs on one thread, several run on all, as the package does it.
-    """
-    length = {"pairs": 2, "keeps": 16, "sines": 8, "exponentials": 8, "copy": 50}[kind] * vehicles
-    x, y = np.random.default_rng(0).uniform(-3.0, 3.0, (2, worlds, length))
-    if kind == "keeps":
-        y = np.floor((y + 3.0) / 6.0 * SECTORS)
-    out = np.zeros((worlds, max(length, SECTORS)))
-    serial, parallel = repeated(KERNELS[kind])
-    amount = {"pairs": vehicles * (vehicles - 1) / 2, "sines": 2 * length, "copy": 2 * 8 * length}.get(kind, length)
-
     def run(times: int) -> None:
-        if worlds == 1:
-            serial(0, times, x, y, out)
-        else:
-            parallel(times, x, y, out)
+        one(0, times, x, y, out) if worlds == 1 else every(times, x, y, out)
 
     return run, worlds * amount
-
-
-def best_rates(
-    loops: dict[str, tuple[Callable[[int], object], float]], rounds: int, seconds: float
-) -> dict[str, float]:
-    """The best rate of each loop [1/s], all in turn so that a busy machine hits all alike.
-
-    ``seconds`` is a loop's share of a round.
-    """
-    times = {}
-    for name, (run, _) in loops.items():
-        run(1)
-        times[name], spent = 1, _seconds(run, 1)
-        while spent < seconds / 4:
-            times[name] *= 2
-            spent = _seconds(run, times[name])
-        times[name] = max(1, round(times[name] * seconds / spent))
-    best = dict.fromkeys(loops, 0.0)
-    for _ in range(rounds):
-        for name, (run, amount) in loops.items():
-            best[name] = max(best[name], times[name] * amount / _seconds(run, times[name]))
-    return best
-
-
-def _seconds(run: Callable[[int], object], times: int) -> float:
-    start = time.perf_counter()
-    run(times)
-    return time.perf_counter() - start

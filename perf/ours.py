@@ -1,72 +1,62 @@
 """Cases of uuv_marl for perf/compare.py: the batched core, its public environments, training, and the ceilings."""
 
 import time
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from floor import KERNELS, loop
 from numpy.typing import NDArray
-from parts import PARTS, part
-from ppo import training
-from worker import Case, Maker, serve
+from worker import Case, Maker, repeated, serve
 
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.envs.task import make_task
 from uuv_marl.sim.swarm import Swarm
 
-Actions = NDArray[np.float32]
 SETS, SETTLE_STEPS, SETTLE_S, BUILD_S = 8, 200, 10.0, 20.0
 
 
-def random_actions(agents: int, worlds: int) -> Actions:
+def random_actions(agents: int, worlds: int) -> NDArray[np.float32]:
     """Sets of random actions, drawn before the clock runs, shape (set, world, vehicle, 2)."""
     return np.random.default_rng(0).uniform(-1.0, 1.0, (SETS, worlds, agents, 2)).astype(np.float32)
 
 
-def repeated(step: Callable[[Actions], object], actions: Actions) -> Callable[[int], None]:
-    """Steps through the sets of actions, over and over."""
-
-    def run(units: int) -> None:
-        for k in range(units):
-            step(actions[k % SETS])
-
-    return run
-
-
 def core(agents: int, worlds: int) -> Case:
     """``Swarm.step``: motion, sonar, percepts."""
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=agents), worlds)
+    swarm, actions = (
+        Swarm(load_scenario("single_obstacle", num_vehicles=agents), worlds),
+        random_actions(agents, worlds),
+    )
     swarm.reset(0)
-    return Case(repeated(swarm.step, random_actions(agents, worlds)), agents * worlds, {"entries": swarm.layout.size})
+    return repeated(lambda k: swarm.step(actions[k % SETS]), agents * worlds, entries=swarm.layout.size)
 
 
 def vector_env(agents: int, worlds: int) -> Case:
     """``vector_env``: observations, rewards, endings, resets in the same step."""
-    envs = uuv_marl.vector_env(worlds, "single_obstacle", num_vehicles=agents)
+    envs, actions = uuv_marl.vector_env(worlds, num_vehicles=agents), random_actions(agents, worlds)
     envs.reset(seed=0)
-    entries = envs.single_observation_space.shape[-1]
-    return Case(repeated(envs.step, random_actions(agents, worlds)), agents * worlds, {"entries": entries})
+    return repeated(lambda k: envs.step(actions[k % SETS]), agents * worlds, entries=envs.swarm.layout.size)
 
 
 def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
     """``parallel_env``: dicts of agents, worlds one after the other, reset when over. A unit is a step of one world."""
     envs, start = [], time.perf_counter()
     while len(envs) < worlds and time.perf_counter() - start < BUILD_S:
-        env = uuv_marl.parallel_env("single_obstacle", num_vehicles=agents, info_terms=info_terms)
+        env = uuv_marl.parallel_env(num_vehicles=agents, info_terms=info_terms)
         env.reset(seed=len(envs))
         envs.append(env)
-    actions = [dict(zip(env.possible_agents, one, strict=True)) for one in random_actions(agents, 1)[:, 0]]
+    names = envs[0].possible_agents
+    actions = [dict(zip(names, one, strict=True)) for one in random_actions(agents, 1)[:, 0]]
 
-    def run(units: int) -> None:
-        for k in range(units):
-            env = envs[k % len(envs)]
-            if not env.agents:
-                env.reset()
-            env.step(actions[k % SETS])
+    def step(k: int) -> None:
+        env = envs[k % len(envs)]
+        if not env.agents:
+            env.reset()
+        env.step(actions[k % SETS])
 
-    return Case(run, agents, {"entries": env.observation_space(env.possible_agents[0]).shape[0], "built": len(envs)})
+    return repeated(step, agents, entries=envs[0].swarm.layout.size, built=len(envs))
 
 
 def parallel_env_terms(agents: int, worlds: int) -> Case:
@@ -78,7 +68,8 @@ def idle(agents: int, worlds: int) -> Case:
     """``Swarm.step`` of idle vehicles on ``tracking``: the start's two dense groups stay together."""
     swarm = Swarm(load_scenario("tracking", num_vehicles=agents), worlds)
     swarm.reset(0)
-    return Case(repeated(swarm.step, np.zeros((SETS, worlds, agents, 2), np.float32)), agents * worlds)
+    action = np.zeros((worlds, agents, 2), np.float32)
+    return repeated(lambda _: swarm.step(action), agents * worlds)
 
 
 def bio_inspired(agents: int, worlds: int) -> Case:
@@ -87,21 +78,46 @@ def bio_inspired(agents: int, worlds: int) -> Case:
     swarm, policy = Swarm(scenario, worlds), make("bio_inspired", scenario, worlds)
     swarm.reset(0)
     policy.reset(0)
-
-    def run(units: int) -> None:
-        for _ in range(units):
-            swarm.step(policy.act(swarm.percept))
-
+    case = repeated(lambda _: swarm.step(policy.act(swarm.percept)), agents * worlds)
     settled, start = 0, time.perf_counter()
     while settled < SETTLE_STEPS and (settled < 2 or time.perf_counter() - start < SETTLE_S):
-        run(1)
+        case.run(1)
         settled += 1
-    return Case(run, agents * worlds, {"settled": settled})
+    return case._replace(facts={"settled": settled})
 
 
 def ppo(agents: int, worlds: int) -> Case:
     """PPO of Stable-Baselines3 through ``SwarmVecEnv``, sampling and learning."""
-    return training(SwarmVecEnv(worlds, "single_obstacle", num_vehicles=agents))
+    from ppo import training
+
+    return training(SwarmVecEnv(worlds, num_vehicles=agents))
+
+
+def adapter(name: str) -> Maker:
+    """A step of one API, with idle vehicles on worlds that never end while they are measured."""
+
+    def made(agents: int, worlds: int) -> Case:
+        how: Any = {"num_vehicles": agents, "overrides": {"time_limit.extra_s": 1e6}}
+        action: Any = np.zeros((worlds, agents, 2), np.float32)
+        if name == "torchrl_idle":
+            import torch
+
+            from uuv_marl.envs.torchrl import SwarmEnv
+
+            env: Any = SwarmEnv(worlds, seed=0, **how)
+            data = env.reset().set(("uuv", "action"), torch.from_numpy(action))
+            return repeated(lambda _: env.step(data.copy()), agents * worlds)
+        if name in ("swarm_idle", "task_idle"):
+            env = make_task(num_worlds=worlds, **how)
+            env.reset(0)
+            env = env.swarm if name == "swarm_idle" else env
+        else:
+            env = (SwarmVecEnv if name == "sb3_idle" else uuv_marl.vector_env)(worlds, **how)
+            env.reset()
+            action = action.reshape(env.action_space.shape if name == "vector_env_idle" else (-1, 2))
+        return repeated(lambda _: env.step(action), agents * worlds)
+
+    return made
 
 
 def ceiling(kind: str) -> Maker:
@@ -120,12 +136,11 @@ def compiled(maker: Maker) -> Maker:
     return made
 
 
-CASES = (core, vector_env, parallel_env, parallel_env_terms, idle, bio_inspired, ppo)
+CASES: dict[str, Maker] = {
+    case.__name__: case for case in (core, vector_env, parallel_env, parallel_env_terms, idle, bio_inspired, ppo)
+}
+CASES |= {name: adapter(name) for name in ("swarm_idle", "task_idle", "vector_env_idle", "sb3_idle", "torchrl_idle")}
+CASES |= {kind: ceiling(kind) for kind in KERNELS}
 
 if __name__ == "__main__":
-    cases = {case.__name__: case for case in CASES}
-    cases |= {kind: ceiling(kind) for kind in KERNELS} | {name: part(name) for name in PARTS}
-    serve(
-        {name: compiled(case) for name, case in cases.items()},
-        ("uuv_marl", "numpy", "numba", "gymnasium", "pettingzoo", "stable_baselines3", "torch"),
-    )
+    serve({name: compiled(case) for name, case in CASES.items()})

@@ -6,11 +6,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import jaxmarl
-from worker import Case, serve
+from worker import MEMORY_SHARE, Case, serve
 
-SETS, MEMORY_SHARE = 8, 0.6
+SETS = 8
 Pytree = Any
-bytes_per_world: dict[int, float] = {}
 
 
 def simple_spread(agents: int, worlds: int) -> Case:
@@ -19,7 +18,6 @@ def simple_spread(agents: int, worlds: int) -> Case:
     The latest observations, rewards and dones leave the loop, so that none of them is optimised away. As many landmarks
     as agents, as in MPE2.
     """
-    refuse_too_large(agents, worlds)
     env = jaxmarl.make("MPE_simple_spread_v3", num_agents=agents, num_landmarks=agents)
     key = jax.random.key(0)
     keys = jax.random.split(key, worlds)
@@ -27,13 +25,8 @@ def simple_spread(agents: int, worlds: int) -> Case:
         observation, state = jax.vmap(env.reset)(keys)
     actions = jax.random.randint(key, (SETS, agents, worlds), 0, 5)
     zeros, no = jnp.zeros(worlds), jnp.zeros(worlds, bool)
-    start = (
-        keys,
-        observation,
-        state,
-        dict.fromkeys(env.agents, zeros),
-        dict.fromkeys([*env.agents, "__all__"], no),
-    )
+    rewards, dones = dict.fromkeys(env.agents, zeros), dict.fromkeys([*env.agents, "__all__"], no)
+    start = keys, observation, state, rewards, dones
 
     def one(k: int, carry: Pytree) -> Pytree:
         keys, _, state, _, _ = carry
@@ -42,8 +35,10 @@ def simple_spread(agents: int, worlds: int) -> Case:
         return keys[:, 0], *jax.vmap(env.step)(keys[:, 1], state, chosen)[:4]
 
     loop = jax.jit(lambda units, carry: jax.lax.fori_loop(0, units, one, carry)).lower(1, start).compile()
-    needed = loop.memory_analysis()
-    bytes_per_world[agents] = (needed.temp_size_in_bytes + 2 * needed.output_size_in_bytes) / worlds
+    memory = loop.memory_analysis()
+    needed = memory.temp_size_in_bytes + 2 * memory.output_size_in_bytes
+    if needed > MEMORY_SHARE * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
+        raise MemoryError(f"would need {needed / 2**30:.0f} GiB, by XLA's count")
     latest = [start]
 
     def run(units: int) -> None:
@@ -52,13 +47,5 @@ def simple_spread(agents: int, worlds: int) -> Case:
     return Case(run, agents * worlds, {"entries": observation[env.agents[0]].shape[-1]})
 
 
-def refuse_too_large(agents: int, worlds: int) -> None:
-    """Raise MemoryError where XLA's own count, taken with fewer worlds, goes beyond ``MEMORY_SHARE`` of the memory."""
-    needed = bytes_per_world.get(agents, 0.0) * worlds
-    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > MEMORY_SHARE * there:
-        raise MemoryError(f"would need {needed / 2**30:.0f} GiB, by XLA's count with fewer worlds")
-
-
 if __name__ == "__main__":
-    serve({"jaxmarl": simple_spread}, ("jaxmarl", "jax", "jaxlib", "numpy"))
+    serve({"jaxmarl": simple_spread})

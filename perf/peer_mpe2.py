@@ -7,7 +7,7 @@ import numpy as np
 from mpe2 import simple_spread_v3
 from numpy.typing import NDArray
 from ppo import Rows, training
-from worker import Case, serve
+from worker import Case, repeated, serve
 
 ENDLESS, SETS, BUILD_S = 10**9, 8, 20.0
 
@@ -25,15 +25,10 @@ def worlds_of(agents: int, worlds: int) -> list[Any]:
 def parallel_env(agents: int, worlds: int) -> Case:
     """Worlds one after the other: MPE2 has no other way in one process. A unit is a step of one world."""
     envs = worlds_of(agents, worlds)
-    env = envs[0]
     drawn = np.random.default_rng(0).integers(5, size=(SETS, agents)).tolist()
-    actions = [dict(zip(env.possible_agents, one, strict=True)) for one in drawn]
-
-    def run(units: int) -> None:
-        for k in range(units):
-            envs[k % len(envs)].step(actions[k % SETS])
-
-    return Case(run, agents, {"entries": env.observation_space("agent_0").shape[0], "built": len(envs)})
+    actions = [dict(zip(envs[0].possible_agents, one, strict=True)) for one in drawn]
+    entries = envs[0].observation_space("agent_0").shape[0]
+    return repeated(lambda k: envs[k % len(envs)].step(actions[k % SETS]), agents, entries=entries, built=len(envs))
 
 
 def ppo(agents: int, worlds: int) -> Case:
@@ -54,7 +49,4 @@ def ppo(agents: int, worlds: int) -> Case:
 
 
 if __name__ == "__main__":
-    serve(
-        {"mpe2": parallel_env, "mpe2_ppo": ppo},
-        ("mpe2", "pettingzoo", "gymnasium", "numpy", "stable_baselines3", "torch"),
-    )
+    serve({"mpe2": parallel_env, "mpe2_ppo": ppo})

@@ -1,7 +1,5 @@
 """Cases of VMAS's flocking for perf/compare.py: its batched step on the CPU, and PPO over its agents."""
 
-import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,7 +8,7 @@ import vmas
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from ppo import Rows, training
-from worker import Case, serve
+from worker import Case, repeated, seconds_of, serve
 
 DEFAULT_THREADS = torch.get_num_threads()
 SETS, CROWD, CROWD_SPACING, STEP_LIMIT_S = 8, 54, 0.02, 90.0
@@ -27,15 +25,10 @@ def flocking(agents: int, worlds: int, **settings: float) -> Any:
     return vmas.make_env("flocking", worlds, "cpu", seed=0, n_agents=agents, **settings)
 
 
-def steps(env: Any) -> Callable[[int], None]:
-    """So many steps of all worlds, with random actions drawn before."""
-    actions = [list(one) for one in torch.rand(SETS, env.n_agents, env.num_envs, 2) * 2 - 1]
-
-    def run(units: int) -> None:
-        for k in range(units):
-            env.step(actions[k % SETS])
-
-    return run
+def steps(env: Any, agents: int, worlds: int, **facts: object) -> Case:
+    """A unit is a step of all worlds, with random actions drawn before."""
+    actions = [list(one) for one in torch.rand(SETS, agents, worlds, 2) * 2 - 1]
+    return repeated(lambda k: env.step(actions[k % SETS]), agents * worlds, **facts)
 
 
 def choose_threads(agents: int, worlds: int) -> None:
@@ -44,14 +37,12 @@ def choose_threads(agents: int, worlds: int) -> None:
     Raises TimeoutError where a step of all agents would take too long; it grows with their square.
     """
     few = min(agents, CROWD)
-    run = steps(flocking(few, worlds, min_dist_between_entities=CROWD_SPACING))
+    case = steps(flocking(few, worlds, min_dist_between_entities=CROWD_SPACING), few, worlds)
     seconds = {}
     for threads in {1, DEFAULT_THREADS}:
         torch.set_num_threads(threads)
-        run(1)
-        start = time.perf_counter()
-        run(2)
-        seconds[threads] = (time.perf_counter() - start) / 2
+        case.run(1)
+        seconds[threads] = seconds_of(case, 2) / 2
     best = min(seconds, key=lambda threads: seconds[threads])
     expected = seconds[best] * (agents / few) ** 2
     if expected > STEP_LIMIT_S:
@@ -63,8 +54,8 @@ def step(agents: int, worlds: int) -> Case:
     """``step`` of all worlds."""
     choose_threads(agents, worlds)
     env = flocking(agents, worlds)
-    facts = {"entries": env.observation_space[0].shape[0], "threads": torch.get_num_threads()}
-    return Case(steps(env), agents * worlds, facts)
+    entries = env.observation_space[0].shape[0]
+    return steps(env, agents, worlds, entries=entries, threads=torch.get_num_threads())
 
 
 def ppo(agents: int, worlds: int) -> Case:
@@ -84,4 +75,4 @@ def ppo(agents: int, worlds: int) -> Case:
 
 
 if __name__ == "__main__":
-    serve({"vmas": step, "vmas_ppo": ppo}, ("vmas", "torch", "numpy", "stable_baselines3"))
+    serve({"vmas": step, "vmas_ppo": ppo})

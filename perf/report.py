@@ -1,472 +1,280 @@
-"""Write docs/speed.md and its picture from perf/results.json: python perf/report.py"""
+"""Fill the tables of docs/speed.md, perf/adapters.md and perf/training.md from the results files: python perf/report.py
+
+A table lies between two marks with its name, ``<!-- rates -->`` and ``<!-- /rates -->``; the words around it are
+written by hand. A page of which nothing was measured stays as it is.
+"""
 
 import hashlib
 import json
-import statistics
+import math
+import re
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
-from compare import AGENTS, CEILINGS, FLOOR_CELLS, PARTS, RESULTS, ROOT, WORLDS
-from floor import Work, least_seconds, work
+from compare import ADAPTERS, AGENTS, CEILINGS, FLOOR_CELLS, HERE, PARTS, RESULTS, ROOT, TRAININGS, WORLDS
+from floor import least_seconds, work
 from matplotlib.figure import Figure
 
-from uuv_marl.sim.cells import ONE_CELL_UP_TO
-
-PAGE, PICTURE = ROOT / "docs" / "speed.md", ROOT / "docs" / "figures" / "speed.png"
-Results = dict[str, Any]
-Record = dict[str, Any]
-
+SPEED, PICTURE = ROOT / "docs" / "speed.md", ROOT / "docs" / "figures" / "speed.png"
+# Names and styles; Okabe and Ito's colours are told apart by the colour-blind, markers without colour.
 COLUMNS = {
-    "core": "`Swarm.step`",
-    "vector_env": "`vector_env`",
-    "parallel_env": "`parallel_env`",
-    "mpe2": "MPE2",
-    "vmas": "VMAS",
-    "jaxmarl": "JaxMARL",
-}
-GOALS = (("vector_env", "jaxmarl", 10), ("vector_env", "vmas", 40), ("parallel_env", "mpe2", 200))
-# Okabe and Ito's colours, told apart by the colour-blind; markers tell them apart without colour.
+    "core": "`Swarm.step`", "vector_env": "`vector_env`", "parallel_env": "`parallel_env`", "mpe2": "MPE2",
+    "vmas": "VMAS", "jaxmarl": "JaxMARL",
+}  # fmt: skip
 STYLES = {
-    "core": ("#0072B2", "o"),
-    "idle": ("#0072B2", "o"),
-    "bio_inspired": ("#56B4E9", "s"),
-    "vector_env": ("#009E73", "^"),
-    "parallel_env": ("#000000", "v"),
-    "mpe2": ("#D55E00", "D"),
-    "vmas": ("#E69F00", "P"),
+    "core": ("#0072B2", "o"), "idle": ("#0072B2", "o"), "bio_inspired": ("#56B4E9", "s"), "mpe2": ("#D55E00", "D"),
+    "vector_env": ("#009E73", "^"), "parallel_env": ("#000000", "v"), "vmas": ("#E69F00", "P"),
     "jaxmarl": ("#CC79A7", "X"),
+}  # fmt: skip
+PAGES = {
+    SPEED: (RESULTS, "rates"),
+    HERE / "adapters.md": (RESULTS, "adapters"),
+    HERE / "training.md": (TRAININGS, "trainings"),
 }
-
-TEXT = """# Speed
-
-<!-- Written by perf/report.py from perf/results.json; a test fails where they differ. -->
-
-`make perf` measures this page anew and writes it. One machine: {machine}, load average {load:g} at the start. Every
-cell was built by all libraries, then measured in turn in {rounds} rounds of {seconds:g} s, so that a slow phase hits
-all alike; a case that takes longer than 10 s has fewer. Medians over rounds [lowest, highest]. Measured {when}.
-
-Versions: {versions}.
-
-## Agent-steps per second
-
-{rates}
-
-{failures}
-
-With 54 agents `parallel_env` makes {plain} agent-steps/s, and {terms} with `info_terms=True`.
-`parallel_env` and MPE2 have no batch: their worlds are stepped one after the other in one process. JaxMARL
-took {compiled} s to build and compile with {sizes} agents in 64 worlds, which is not counted.
-
-How much faster we are, medians over rounds [lowest, highest]:
-
-{ratios}
-
-With 54 agents, each at its best number of worlds: {best}.
-
-Read these with [what differs](#what-differs): they compare libraries on their own tasks, not one task.
-
-## Three rates
-
-A fast core is worth what reaches the learner. {three_agents} agents; worlds in brackets.
-
-{three}
-
-Training is Stable-Baselines3's PPO on rows of agents: two layers of 64, 16 steps a rollout, batches of 3456, 4 epochs.
-JaxMARL's training is compiled together with its environment and is no part of its package; it was not measured.
-
-## What differs
-
-{differs}
-
-Observation sizes with {sizes} agents: {entries}. Actions are random, drawn before the clock runs.
-
-## The floor
-
-What a step must do, whatever the code, and the time that this machine needs for just that: a pair loop that only sums
-squared distances, a loop that keeps the nearest of each sub-sector, a loop of sines and cosines, a copy, each as good
-as the compiler makes it, measured in the same rounds. One world runs on one thread, several on all. Arithmetic adds up,
-memory may work meanwhile: floor = max(pairs + nearest kept + sines, bytes). A step of 0.1 s has every pair
-(n (n - 1) / 2), each heard by two, {sines:g} sines and cosines and {bytes:g} bytes per vehicle; exponentials are the
-controllers' alone ({exponentials} per second here). Above {one_cell} vehicles a grid spares most pairs, and a step may
-take less than this floor.
-
-{floor}
-
-Where the time goes, 54 idle vehicles on `single_obstacle`, microseconds of a step of one world in a batch of 64, one
-thread, each part measured by itself:
-
-{profile}
-
-## From few vehicles to many
-
-One world on `tracking`: idle vehicles, whose start's two dense groups stay together, and vehicles under `bio_inspired`,
-the controller's own time included, after up to 200 steps. Microseconds per vehicle and step:
-
-{curve}
-
-![Time per vehicle and step over vehicles, and agent-steps per second over worlds](figures/speed.png)
-"""
-
-DIFFERS = (
-    ("", "uuv_marl", "MPE2", "VMAS", "JaxMARL"),
-    ("task", "`single_obstacle`", "`simple_spread_v3`", "`flocking`", "`MPE_simple_spread_v3`"),
-    (
-        "motion in a step of 0.1 s",
-        "3 degrees of freedom, Runge-Kutta: 4 evaluations of Eq. 1-4, float64",
-        "points, 1 Euler step, float64",
-        "points, 5 sub-steps, float32",
-        "points, 1 Euler step, float32",
-    ),
-    (
-        "pairs",
-        "hearing, spacing, contacts of all vehicles; no contact force",
-        "contact forces of agents and landmarks, collisions for the reward",
-        "contact forces in each sub-step, distances for the reward",
-        "as MPE2",
-    ),
-    (
-        "sensing",
-        "3 arrays of 7 sub-sectors, nearest vehicle in each; echoes of 1 obstacle",
-        "none: all positions",
-        "12 lidar rays against 5 obstacles; agents are not seen",
-        "none: all positions",
-    ),
-    (
-        "scenery",
-        "1 obstacle",
-        "as many landmarks as agents",
-        "5 obstacles, 1 target; more than 54 agents start closer than by default",
-        "as many landmarks as agents",
-    ),
-    (
-        "observation",
-        "as long for any n",
-        "grows with n",
-        "as long for any n",
-        "grows with n",
-    ),
-    (
-        "reset at an episode's end",
-        "`Swarm.step` none; `vector_env` in the same step; `parallel_env` by the caller; thousands of steps apart",
-        "none: episodes made endless",
-        "none: episodes endless",
-        "in every step, drawn whether needed or not",
-    ),
-    (
-        "many worlds",
-        "a loop over threads",
-        "one after the other",
-        "torch tensors on one thread or torch's own number of them, what is faster",
-        "`jit` of a loop over `vmap(step)`, XLA's own threads",
-    ),
-    ("reward and endings", "not in `Swarm.step`", "yes", "yes", "yes"),
-)
+"""The file that a page is made of, and the kind of case without which it stays as it is."""
+PAIRS = (("vector_env", "jaxmarl"), ("vector_env", "vmas"), ("parallel_env", "mpe2"))
+GRID = [(agents, worlds) for agents in AGENTS for worlds in WORLDS]
 
 
-def table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     """A Markdown table."""
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in (head, ("---",) * len(head), *lines))
+    head = tuple(head)
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (head, ("---",) * len(head), *rows))
 
 
 def short(value: float) -> str:
     """Three digits and a unit prefix."""
-    for size, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if value >= 0.9995 * size:
-            return f"{_digits(value / size)}{prefix}"
-    return _digits(value)
+    size, prefix = next((s for s in ((1e9, "G"), (1e6, "M"), (1e3, "k")) if value >= 0.9995 * s[0]), (1.0, ""))
+    return (f"{value / size:.0f}" if value / size >= 99.95 else f"{value / size:#.3g}") + prefix
 
 
-def _digits(value: float) -> str:
-    return f"{value:.0f}" if value >= 99.95 else f"{value:#.3g}"
-
-
-def spread(values: list[float]) -> str:
+def spread(values: Sequence[float]) -> str:
     """Median [lowest, highest]."""
-    if len(values) == 1:
-        return f"{short(values[0])} (once)"
-    return f"{short(statistics.median(values))} [{short(min(values))}, {short(max(values))}]"
+    if len(values) < 2:
+        return f"{short(values[0])} (once)" if values else "–"
+    return f"{short(median(values))} [{short(min(values))}, {short(max(values))}]"
 
 
 class Cases:
     """Records of a results file by what they are about."""
 
-    def __init__(self, results: Results) -> None:
-        self.records: list[Record] = results["cases"]
+    def __init__(self, path: Path) -> None:
+        self.results: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        self.records: list[dict[str, Any]] = self.results["cases"]
+        self._by = {(r["kind"], r["case"], r["agents"], r["worlds"]): r for r in self.records}
 
-    def find(self, kind: str, case: str, agents: int, worlds: int | None = None) -> Record | None:
-        """The record of a case, if it was measured or failed."""
-        for record in self.records:
-            if (record["kind"], record["case"], record["agents"]) == (kind, case, agents) and (
-                worlds in (None, record["worlds"])
-            ):
-                return record
-        return None
+    def find(self, case: str, agents: int, worlds: int, kind: str = "rates") -> dict[str, Any]:
+        """The record of a case, one without rates where there is none."""
+        return self._by.get((kind, case, agents, worlds), {"rates": []})
 
-    def rates(self, kind: str, case: str, agents: int, worlds: int | None = None) -> list[float]:
-        """Its rates, none where it has none."""
-        record = self.find(kind, case, agents, worlds)
-        return record["rates"] if record else []
+    def rates(self, case: str, agents: int, worlds: int, kind: str = "rates") -> list[float]:
+        """Its rates."""
+        return self.find(case, agents, worlds, kind)["rates"]
 
-    def cell(self, kind: str, case: str, agents: int, worlds: int | None = None) -> str:
-        """Its rates for a table."""
-        rates = self.rates(kind, case, agents, worlds)
-        return spread(rates) if rates else "–"
+    def ratios(self, ours: str, theirs: str, agents: int, worlds: int, kind: str = "rates") -> list[float]:
+        """Of two cases, round by round."""
+        both = zip(*(self.rates(case, agents, worlds, kind) for case in (ours, theirs)), strict=False)
+        return [mine / other for mine, other in both]
+
+
+def measured(cases: Cases) -> str:
+    """Machine, rounds, date and versions."""
+    results, dates = cases.results, sorted(record["date"][:10] for record in cases.records)
+    versions = {"Python": ", ".join(sorted({library["python"] for library in results["libraries"].values()}))}
+    for library in results["libraries"].values():
+        versions |= library["versions"]
+    return (
+        "{cpu}, {cores} cores, {memory_gib} GiB, {system}".format(**results["machine"])
+        + f", load average {results['load']:g} at the start. {results['rounds']} rounds of {results['seconds']:g} s. "
+        f"Measured {' to '.join(dict.fromkeys((dates[0], dates[-1])))}.\n\n"
+        f"Versions: {', '.join(f'{name} {number}' for name, number in versions.items())}."
+    )
+
+
+def headline(cases: Cases) -> str:
+    """Best against best at 54 agents, and where we do worst."""
+    rows: list[tuple[str, ...]] = []
+    for pair in PAIRS:
+        best = [max(median(cases.rates(case, 54, w) or [0.0]) for w in WORLDS) for case in pair]
+        ratios = {median(found): cell for cell in GRID if (found := cases.ratios(*pair, *cell))}
+        if ratios and all(best):
+            agents, worlds = ratios[min(ratios)]
+            lowest = f"{min(ratios):#.3g} ({agents} agents, {worlds} world{'s' * (worlds > 1)})"
+            names = (COLUMNS[case] for case in pair)
+            rows.append((" / ".join(names), *map(short, best), f"{best[0] / best[1]:.3g}", lowest))
+    return table(("54 agents, best number of worlds", "ours", "theirs", "ratio", "lowest ratio of all cells"), rows)
 
 
 def rates(cases: Cases) -> str:
     """Agent-steps per second of all libraries."""
-    lines = [
-        (str(agents), str(worlds), *(cases.cell("rates", case, agents, worlds) for case in COLUMNS))
-        for agents in AGENTS
-        for worlds in WORLDS
-    ]
-    return table(("agents", "worlds", *COLUMNS.values()), lines)
-
-
-def failures(cases: Cases) -> str:
-    """Why cells are empty, and which worlds were not all built."""
-    lines = [
-        f"- {COLUMNS.get(record['case'], record['case'])}, {record['agents']} agents x {record['worlds']} worlds: "
-        f"{record['failed']}."
-        for record in cases.records
-        if "failed" in record and not record["rates"]
-    ]
-    for record in cases.records:
-        built = record.get("facts", {}).get("built", record["worlds"])
-        if record["rates"] and built < record["worlds"]:
-            lines.append(
-                f"- {COLUMNS[record['case']]}, {record['agents']} agents x {record['worlds']} worlds: {built} of the "
-                "worlds, no more could be built within 20 s."
-            )
-    return "\n".join(["Without a figure, or with a reservation:", "", *lines]) if lines else "Every case ran."
+    rows = ((f"{a}", f"{w}", *(spread(cases.rates(case, a, w)) for case in COLUMNS)) for a, w in GRID)
+    return table(("agents", "worlds", *COLUMNS.values()), rows)
 
 
 def ratios(cases: Cases) -> str:
-    """Our rate over a peer's in the same rounds."""
-    lines: list[tuple[str, ...]] = []
-    for agents in AGENTS:
-        for worlds in WORLDS:
-            cells = []
-            for our, peer, _ in GOALS:
-                both = zip(
-                    cases.rates("rates", our, agents, worlds), cases.rates("rates", peer, agents, worlds), strict=False
-                )
-                values = [mine / theirs for mine, theirs in both]
-                cells.append(spread(values) if values else "–")
-            lines.append((str(agents), str(worlds), *cells))
-    head = (f"{COLUMNS[our]} / {COLUMNS[peer]} (goal: {goal})" for our, peer, goal in GOALS)
-    return table(("agents", "worlds", *head), lines)
+    """Our rates over the peers' in the same rounds."""
+    rows = ((f"{a}", f"{w}", *(spread(cases.ratios(*pair, a, w)) for pair in PAIRS)) for a, w in GRID)
+    return table(("agents", "worlds", *(f"{COLUMNS[our]} / {COLUMNS[peer]}" for our, peer in PAIRS)), rows)
 
 
-def best(cases: Cases) -> str:
-    """The best over the numbers of worlds, each library's own, at 54 agents."""
-    texts = []
-    for our, peer, _ in GOALS:
-        both = [
-            max((statistics.median(found) for w in WORLDS if (found := cases.rates("rates", case, 54, w))), default=0.0)
-            for case in (our, peer)
-        ]
-        if all(both):
-            texts.append(
-                f"{COLUMNS[our]} {short(both[0])}, {COLUMNS[peer]} {short(both[1])}: {both[0] / both[1]:.3g} times"
-            )
-    return "; ".join(texts) or "not measured"
+def notes(cases: Cases) -> str:
+    """Why cells are empty, which worlds were not all built, and other numbers of the cases."""
+    lines: list[str] = []
+    for record in cases.records:
+        agents, worlds, built = record["agents"], record["worlds"], record.get("facts", {}).get("built", math.inf)
+        where = f"{COLUMNS.get(record['case'], record['case'])}, {agents} agents x {worlds} worlds"
+        if "failed" in record and not record["rates"]:
+            lines.append(f"{where}: {record['failed']}.")
+        elif built < worlds:
+            lines.append(f"{where}: {built} of the worlds, no more could be built within 20 s.")
+    plain, terms = (spread(cases.rates(case, 54, 1, "terms")) for case in ("parallel_env", "parallel_env_terms"))
+    lines.append(f"`parallel_env`, 54 agents: {plain} agent-steps/s, and {terms} with `info_terms=True`.")
+    took = ", ".join(f"{cases.find('jaxmarl', agents, 64).get('build_s', math.nan):.0f}" for agents in AGENTS)
+    sizes = ", ".join(map(str, AGENTS))
+    lines.append(f"JaxMARL took {took} s to build and compile with {sizes} agents in 64 worlds, which is not counted.")
+    for case in ("vector_env", "mpe2", "vmas", "jaxmarl"):
+        seen = ", ".join(f"{cases.find(case, agents, 1).get('facts', {}).get('entries', '–')}" for agents in AGENTS)
+        lines.append(f"{COLUMNS[case]}: an agent observes {seen} numbers with {sizes} agents.")
+    return "\n".join(f"- {line}" for line in lines)
 
 
 def three(cases: Cases) -> str:
     """Core, API and training of each library."""
-    worlds = 64
 
-    def trained(case: str) -> str:
-        record = cases.find("training", case, 54)
-        return f"{cases.cell('training', case, 54)} ({record['worlds']})" if record else "–"
+    def rate(case: str, kind: str = "rates", worlds: int = 64) -> str:
+        return f"{spread(cases.rates(case, 54, worlds, kind))} ({worlds})"
 
-    def rate(case: str) -> str:
-        return f"{cases.cell('rates', case, 54, worlds)} ({worlds})"
-
-    lines = [
-        ("uuv_marl", rate("core"), f"`vector_env` {rate('vector_env')}", trained("ppo")),
-        ("MPE2", "no core apart", rate("mpe2"), trained("mpe2_ppo")),
-        ("VMAS", "no core apart", rate("vmas"), trained("vmas_ppo")),
+    rows = (
+        ("uuv_marl", rate("core"), f"`vector_env` {rate('vector_env')}", rate("ppo", "training")),
+        ("MPE2", "no core apart", rate("mpe2"), rate("mpe2_ppo", "training", 4)),
+        ("VMAS", "no core apart", rate("vmas"), rate("vmas_ppo", "training")),
         ("JaxMARL", rate("jaxmarl"), "the same: a compiled loop over its API", "not measured"),
-    ]
-    return table(("library", "raw core", "public API", "end-to-end training"), lines)
-
-
-def entries(cases: Cases) -> str:
-    """Numbers that an agent observes, for each library and number of agents."""
-    texts = []
-    for case, name in (("vector_env", "uuv_marl"), ("mpe2", "MPE2"), ("vmas", "VMAS"), ("jaxmarl", "JaxMARL")):
-        found = (cases.find("rates", case, agents, 1) or {} for agents in AGENTS)
-        texts.append(f"{name} " + ", ".join(str(record.get("facts", {}).get("entries", "–")) for record in found))
-    return "; ".join(texts)
+    )
+    return table(("library", "raw core", "public API", "end-to-end training"), rows)
 
 
 def floor(cases: Cases) -> str:
     """The step's time beside the least time."""
-    lines: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for agents, worlds in FLOOR_CELLS:
-        core = cases.rates("rates", "core", agents, worlds)
-        measured = [cases.rates("rates", kind, agents, worlds) for kind in CEILINGS]
-        if not core or not all(measured):
-            continue
-        ceilings = Work(*map(max, measured))
-        need, least = work(agents), least_seconds(agents, worlds, ceilings)
-        parts = (worlds * amount / rate for amount, rate in zip(need, ceilings, strict=True))
-        pairs, keeps, sines, _, copied = (f"{1e6 * part:,.1f}" for part in parts)
-        shares = [least * rate / (agents * worlds) for rate in core]
-        low, middle, high = min(shares), statistics.median(shares), max(shares)
-        lines.append(
-            (
-                f"{agents} x {worlds}",
-                f"{short(ceilings.pairs)}/s: {pairs}",
-                f"{short(ceilings.keeps)}/s: {keeps}",
-                f"{short(ceilings.sines)}/s: {sines}",
-                f"{short(ceilings.bytes)}B/s: {copied}",
-                f"{1e6 * least:,.1f}",
-                f"{1e6 * agents * worlds / statistics.median(core):,.1f}",
-                f"{middle:.2%} [{low:.2%}, {high:.2%}]",
-            )
-        )
-    head = (
-        "vehicles x worlds",
-        "pairs [µs]",
-        "nearest kept [µs]",
-        "sines, cosines [µs]",
-        "bytes [µs]",
-        "floor [µs]",
-        "step [µs]",
-    )
-    return table((*head, "floor / step"), lines)
+        core = cases.rates("core", agents, worlds)
+        best = [max(cases.rates(kind, agents, worlds), default=0.0) for kind in CEILINGS]
+        if core and all(best):
+            loops = zip(work(agents), best, ("", "", "", "B"), strict=True)
+            parts = [f"{short(rate)}{unit}/s: {1e6 * worlds * need / rate:,.1f}" for need, rate, unit in loops]
+            least, step = least_seconds(agents, worlds, best), agents * worlds / median(core)
+            low, middle, high = (f"{least * pick(core) / (agents * worlds):.2%}" for pick in (min, median, max))
+            times = f"{1e6 * least:,.1f}", f"{1e6 * step:,.1f}", f"{middle} [{low}, {high}]"
+            rows.append((f"{agents} x {worlds}", *parts, *times))
+    head = "vehicles x worlds", "pairs [µs]", "nearest kept [µs]", "sines, cosines [µs]", "bytes [µs]", "floor [µs]"
+    return table((*head, "step [µs]", "floor / step"), rows)
 
 
 def profile(cases: Cases) -> str:
     """Microseconds of a step of one world on one thread, by part."""
-    times = {name: 54e6 / statistics.median(rates) for name in PARTS if (rates := cases.rates("profile", name, 54, 64))}
-    if len(times) < len(PARTS):
-        return "Not measured."
-    moved, cells, measured, heard, perceived, whole = times.values()
-    lines = [
-        ("motion: actions, forces, Runge-Kutta, headings", moved),
-        ("the living copied and sorted into cells", cells),
-        ("spacing, clearance, contacts, extent", measured - cells),
-        ("hearing: the nearest vehicle of every sub-sector", heard - cells),
-        ("echoes and percepts", perceived - heard),
-        ("all parts", moved + measured + perceived - cells),
-        ("the whole step in one go", whole),
-    ]
-    return table(("part", "µs", "share"), [(name, f"{time:.1f}", f"{time / whole:.0%}") for name, time in lines])
+    moved, cells, measured, heard, perceived, whole = (
+        54e6 / median(cases.rates(name, 54, 64, "profile") or [math.nan]) for name in PARTS
+    )
+    parts = {
+        "motion: actions, forces, Runge-Kutta, headings": moved,
+        "the living copied and sorted into cells": cells,
+        "spacing, clearance, contacts, extent": measured - cells,
+        "hearing: the nearest vehicle of every sub-sector": heard - cells,
+        "echoes and percepts": perceived - heard,
+        "all parts": moved + measured + perceived - cells,
+        "the whole step in one go": whole,
+    }
+    return table(("part", "µs", "share"), ((name, f"{t:.1f}", f"{t / whole:.0%}") for name, t in parts.items()))
 
 
-def curve_points(cases: Cases, case: str) -> list[tuple[int, list[float]]]:
-    """Numbers of vehicles, and microseconds per vehicle and step of each repeat."""
-    found = [record for record in cases.records if record["kind"] == "curve" and record["case"] == case]
-    return [(record["agents"], [1e6 / rate for rate in record["rates"]]) for record in found if record["rates"]]
+def points(cases: Cases, case: str) -> dict[int, list[float]]:
+    """Microseconds per vehicle and step of each repeat, by number of vehicles."""
+    found = (record for record in cases.records if record["kind"] == "curve" and record["case"] == case)
+    return {record["agents"]: [1e6 / rate for rate in record["rates"]] for record in found if record["rates"]}
 
 
 def curve(cases: Cases) -> str:
     """Cost per vehicle and step over the number of vehicles."""
-    idle, guided = dict(curve_points(cases, "idle")), dict(curve_points(cases, "bio_inspired"))
-    lines = [
-        (f"{agents:,}", *(spread(values[agents]) if agents in values else "–" for values in (idle, guided)))
-        for agents in sorted({*idle, *guided})
-    ]
-    return table(("vehicles", "`Swarm.step`, idle", "`Swarm.step` and `bio_inspired`"), lines)
+    both = [points(cases, case) for case in ("idle", "bio_inspired")]
+    rows = ((f"{n:,}", *(spread(one.get(n, [])) for one in both)) for n in sorted({*both[0], *both[1]}))
+    return table(("vehicles", "`Swarm.step`, idle", "`Swarm.step` and `bio_inspired`"), rows)
 
 
-def text(results: Results) -> str:
-    """The whole page."""
-    cases, machine = Cases(results), results["machine"]
-    dates = sorted({record["date"][:10] for record in cases.records})
-    exponentials = [
-        max(found) for a, w in FLOOR_CELLS if w == 1 and (found := cases.rates("rates", "exponentials", a, w))
-    ]
-    libraries = results["libraries"].values()
-    versions = {"Python": ", ".join(sorted({library["python"] for library in libraries}))}
-    for library in libraries:
-        versions |= library["versions"]
-    built = [cases.find("rates", "jaxmarl", agents, 64) or {} for agents in AGENTS]
-    return TEXT.format(
-        machine="{cpu}, {cores} cores, {memory_gib} GiB, {system}".format(**machine),
-        load=results["load"],
-        rounds=results["rounds"],
-        seconds=results["seconds"],
-        when=" to ".join(dict.fromkeys((dates[0], dates[-1]))),
-        versions=", ".join(f"{name} {number}" for name, number in versions.items()),
-        rates=rates(cases),
-        failures=failures(cases),
-        ratios=ratios(cases),
-        three_agents=54,
-        three=three(cases),
-        best=best(cases),
-        plain=cases.cell("terms", "parallel_env", 54, 1),
-        terms=cases.cell("terms", "parallel_env_terms", 54, 1),
-        differs=table(DIFFERS[0], list(DIFFERS[1:])),
-        sizes=", ".join(map(str, AGENTS)),
-        compiled=", ".join(f"{record['build_s']:.0f}" if "build_s" in record else "–" for record in built),
-        entries=entries(cases),
-        sines=work(1).sines,
-        one_cell=ONE_CELL_UP_TO,
-        bytes=work(1).bytes,
-        exponentials=short(max(exponentials)) if exponentials else "–",
-        floor=floor(cases),
-        profile=profile(cases),
-        curve=curve(cases),
+def adapters(cases: Cases) -> str:
+    """Every API beside the batched step."""
+    return beside(cases, ADAPTERS, ("task_idle",), "adapters", 64)
+
+
+def trainings(cases: Cases) -> str:
+    """Whole trainings beside Stable-Baselines3's PPO."""
+    return beside(cases, ("mappo", "ppo", "plain", "supersuit", "rllib"), ("ppo", "plain"), "trainings", 16)
+
+
+def beside(cases: Cases, names: Sequence[str], bases: Sequence[str], kind: str, worlds: int) -> str:
+    """Rates, and their ratios to some of them in the same rounds."""
+    rows = (
+        (f"`{name}`", *map(spread, (cases.rates(name, 54, worlds, kind), *over)))
+        for name in names
+        for over in [[cases.ratios(name, base, 54, worlds, kind) for base in bases]]
     )
+    return table(("case", "agent-steps/s", *(f"to `{base}`" for base in bases)), rows)
 
 
-def draw(results: Results) -> Figure:
+TABLES: dict[str, Callable[[Cases], str]] = {
+    make.__name__: make
+    for make in (
+        measured, headline, rates, ratios, notes, three, floor, profile, curve, adapters, trainings,
+    )
+}  # fmt: skip
+
+
+def filled(page: str, cases: Cases) -> str:
+    """A page with its tables written anew."""
+    marked = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
+    return marked.sub(lambda found: f"{found[1]}{TABLES[found[2]](cases)}\n{found[3]}", page)
+
+
+def draw(cases: Cases) -> Figure:
     """Cost over vehicles, and rate over worlds."""
-    cases = Cases(results)
     figure = Figure((11.0, 5.2), dpi=120, layout="constrained")
     left, right = figure.subplots(1, 2)
     for case, name in (("idle", "Swarm.step, tracking"), ("bio_inspired", "Swarm.step and bio_inspired, tracking")):
-        _line(left, case, name, curve_points(cases, case))
-    for case in ("parallel_env", *(peer for _, peer, _ in GOALS)):
-        found = [(agents, cases.rates("rates", case, agents, 1)) for agents in AGENTS]
-        _line(left, case, COLUMNS[case].strip("`"), [(n, [1e6 / rate for rate in values]) for n, values in found], ":")
-    left.set(
-        xlabel="vehicles or agents in one world",
-        ylabel="time per vehicle and step [µs]",
-        title="One world; Swarm.step: idle",
-    )
+        _line(left, case, name, points(cases, case))
+    for case in ("parallel_env", *(peer for _, peer in PAIRS)):
+        found = {n: [1e6 / rate for rate in cases.rates(case, n, 1)] for n in AGENTS}
+        _line(left, case, COLUMNS[case].strip("`"), found, ":")
     for case, name in COLUMNS.items():
-        _line(right, case, name.strip("`"), [(w, cases.rates("rates", case, 54, w)) for w in WORLDS])
+        _line(right, case, name.strip("`"), {w: cases.rates(case, 54, w) for w in WORLDS})
+    left.set(xlabel="vehicles or agents in one world", ylabel="time per vehicle and step [µs]")
+    left.set(title="One world; Swarm.step: idle")
     right.set(xlabel="worlds", ylabel="agent-steps per second [1/s]", title="54 vehicles or agents per world")
+    once: dict[str, Any] = {}
     for axes in (left, right):
         axes.set(xscale="log", yscale="log")
         axes.grid(visible=True, which="major", alpha=0.3)
-    handles, names = (a + b for a, b in zip(*(axes.get_legend_handles_labels() for axes in (left, right)), strict=True))
-    once = dict(zip(names, handles, strict=True))
+        once |= {name: handle for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=4)
     return figure
 
 
-def _line(axes: Any, case: str, name: str, points: list[tuple[int, list[float]]], dashes: str = "-") -> None:
+def _line(axes: Any, case: str, name: str, values: dict[int, list[float]], dashes: str = "-") -> None:
     """Medians with their lowest and highest."""
-    points = [(at, values) for at, values in points if values]
-    if not points:
-        return
-    colour, marker = STYLES[case]
-    middle = [statistics.median(values) for _, values in points]
-    below = [median - min(values) for median, (_, values) in zip(middle, points, strict=True)]
-    above = [max(values) - median for median, (_, values) in zip(middle, points, strict=True)]
-    axes.errorbar(
-        [at for at, _ in points], middle, (below, above), color=colour, marker=marker, linestyle=dashes, capsize=2,
-        label=name,
-    )  # fmt: skip
-
-
-def source(path: Path) -> str:
-    """Hash of a results file, kept in the picture made of it."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    there = {at: (median(v), median(v) - min(v), max(v) - median(v)) for at, v in values.items() if v}
+    if there:
+        (colour, marker), (middle, below, above) = STYLES[case], zip(*there.values(), strict=True)
+        how = {"color": colour, "marker": marker, "linestyle": dashes, "capsize": 2, "label": name}
+        axes.errorbar(list(there), middle, (below, above), **how)
 
 
 def main() -> None:
-    """Write the page and the picture."""
-    results = json.loads(RESULTS.read_text(encoding="utf-8"))
-    PAGE.write_text(text(results), encoding="utf-8")
-    draw(results).savefig(PICTURE, metadata={"Source": source(RESULTS)})
+    """Fill the pages, and draw the picture."""
+    for page, (path, kind) in PAGES.items():
+        cases = Cases(path) if path.exists() else None
+        if cases and any(record["kind"] == kind for record in cases.records):
+            page.write_text(filled(page.read_text(encoding="utf-8"), cases), encoding="utf-8")
+    draw(Cases(RESULTS)).savefig(PICTURE, metadata={"Source": hashlib.sha256(RESULTS.read_bytes()).hexdigest()})
 
 
 if __name__ == "__main__":

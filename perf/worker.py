@@ -1,15 +1,27 @@
-"""The measured side of perf/compare.py: builds cases and times them as it is asked to, a JSON object per line.
+"""The measured side of perf/compare.py: one case in one process, built, then timed once for every line on the input.
 
-Runs in every library's own environment, so it needs Python's own library alone.
+Arguments: the case's name, agents, worlds, seconds of a repeat (0 for one unit), and after how many seconds a build or
+a repeat ends the process. Runs in every library's own environment, so it needs Python's own library alone.
 """
 
 import json
+import os
 import platform
+import resource
+import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import NamedTuple
+
+MEMORY_SHARE = 0.7
+"""Of the machine's memory; with more, a case fails."""
+TOLD = (
+    "uuv_marl", "numpy", "numba", "gymnasium", "pettingzoo", "stable_baselines3", "torch", "mpe2", "vmas", "jaxmarl",
+    "jax", "jaxlib", "supersuit", "ray",
+)  # fmt: skip
+"""Libraries whose versions a case tells if it has imported them."""
 
 
 class Case(NamedTuple):
@@ -20,11 +32,21 @@ class Case(NamedTuple):
     amount: float
     """What a unit holds: agent-steps, or pairs, sines, bytes."""
     facts: Mapping[str, object] = {}
-    """What else is worth knowing, for the results file; a repeat may change it."""
+    """What else is worth knowing, for the results file."""
 
 
 Maker = Callable[[int, int], Case]
 """Makes a case of so many agents in so many worlds."""
+
+
+def repeated(step: Callable[[int], object], amount: float, **facts: object) -> Case:
+    """A case whose unit is a call of ``step`` with the unit's number."""
+
+    def run(units: int) -> None:
+        for k in range(units):
+            step(k)
+
+    return Case(run, amount, facts)
 
 
 def seconds_of(case: Case, units: int) -> float:
@@ -43,37 +65,25 @@ def units_within(case: Case, seconds: float) -> int:
     return max(1, round(units * seconds / spent))
 
 
-def serve(makers: Mapping[str, Maker], libraries: Sequence[str]) -> None:
-    """Answer until the input ends.
-
-    Requests: ``build`` (a case's name) with ``agents``, ``worlds`` and ``seconds`` (of a repeat); ``repeat`` (a name
-    that was built) gives a rate per second; ``clear`` forgets all.
-    """
-    say(python=platform.python_version(), versions={name: version(name) for name in libraries})
-    built: dict[str, tuple[Case, int]] = {}
-    for line in sys.stdin:
-        request = json.loads(line)
-        try:
-            if name := request.get("build"):
-                start = time.perf_counter()
-                case = makers[name](request["agents"], request["worlds"])
-                ready = time.perf_counter()
-                first = seconds_of(case, 1)
-                built[name] = case, units_within(case, request["seconds"]) if first < request["slow"] else 1
-                say(build_s=ready - start, first_s=first, first_rate=case.amount / first, facts=dict(case.facts))
-            elif name := request.get("repeat"):
-                case, units = built[name]
-                rate = units * case.amount / seconds_of(case, units)
-                say(rate=rate, facts=dict(case.facts))
-            else:
-                built.clear()
-                say()
-        except (MemoryError, TimeoutError) as error:
-            say(failed=str(error))
-        except Exception as error:
-            say(failed=f"{type(error).__name__}: {error}")
+def serve(makers: Mapping[str, Maker]) -> None:
+    """Build and time; an answer is a JSON object on a line. A process that can't ends, the reason its last words."""
+    name, (agents, worlds), (seconds, limit) = sys.argv[1], map(int, sys.argv[2:4]), map(float, sys.argv[4:])
+    most = int(MEMORY_SHARE * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+    signal.setitimer(signal.ITIMER_REAL, limit)
+    start = time.perf_counter()
+    case = makers[name](agents, worlds)
+    build_s, first_s = time.perf_counter() - start, seconds_of(case, 1)
+    units = units_within(case, seconds) if first_s < limit / 50 and seconds else 1
+    versions = {library: version(library) for library in TOLD if library in sys.modules}
+    about = {"python": platform.python_version(), "versions": versions}
+    say(about=about, build_s=build_s, first_s=first_s, first_rate=case.amount / first_s, facts=dict(case.facts))
+    for _ in sys.stdin:
+        signal.setitimer(signal.ITIMER_REAL, limit)
+        say(rate=units * case.amount / seconds_of(case, units))
 
 
 def say(**answer: object) -> None:
-    """Answer with one line."""
+    """Answer with one line; time doesn't run until the next."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
     print(json.dumps(answer), flush=True)

@@ -29,6 +29,7 @@ settings.register_profile("laws", deadline=None, derandomize=True, max_examples=
 settings.load_profile("laws")
 
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
+"""Those that tests step through; ``starter`` is one of their kind, only shorter."""
 
 
 def pytest_report_header():

@@ -117,17 +117,16 @@ def test_forces_turn_with_the_world(name):
 
 
 def test_echoes_of_one_obstacle_count_once_where_asked():
-    layout = PerceptLayout.of(load_scenario("single_obstacle"))
+    lone = load_scenario("single_obstacle", num_vehicles=1)
+    layout = PerceptLayout.of(lone)
     flat = np.zeros((1, 1, layout.size), np.float32)
     percept = Percept(flat, layout)
     percept["echo"][0, 0] = [0, 1, 1, 1, 0, 1, 0]
     percept["echo_range"][0, 0] = [0, 40, 30, 35, 0, 20, 0]
     percept["echo_position"][0, 0, 1:4] = (55.0, -5.0)
     percept["echo_position"][0, 0, 5] = (30.0, 30.0)
-    each = make("bio_inspired", load_scenario("single_obstacle"), gains=GAINS._replace(zeta_o=0.1))
-    once = make(
-        "bio_inspired", load_scenario("single_obstacle"), gains=GAINS._replace(zeta_o=0.1), obstacle_term="per_obstacle"
-    )
+    each = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1))
+    once = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1), obstacle_term="per_obstacle")
     first, second = ((0.1 * np.exp(80 / np.hypot(*p)) * -np.array(p)) for p in ((55.0, -5.0), (30.0, 30.0)))
     np.testing.assert_allclose(each.act(percept)[0, 0], (3 * first + second) / 3000, rtol=1e-5)
     np.testing.assert_allclose(once.act(percept)[0, 0], (first + second) / 3000, rtol=1e-5)

@@ -205,7 +205,7 @@ def test_the_table_shows_the_paper_and_what_each_policy_knows(tmp_path, monkeypa
     policies = ["bio_inspired", "sdc", "idle"]
     runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
     rows = rows_of(results, scenario.name, policies, [0, 1])
-    text = markdown_table("x", rows)
+    text = markdown_table(HEADERS, rows)
     assert [len(row) for row in rows] == [len(HEADERS)] * 3
     assert "205 s, 10.48-12.63 m" in text
     assert "206 s, 4.2 m" in text
@@ -242,7 +242,7 @@ def test_the_command_line_from_end_to_end(tmp_path):
     [
         (["benchmark", "--scenario=singel_obstacle"], "did you mean"),
         (["benchmark", "--policy=bio"], "did you mean"),
-        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must be positive"),
+        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within 0.001 to 1,000,000"),
         (["benchmark", "--set=vehicle"], "must look like field=value"),
         (["scenarios", "--show=trackin"], "did you mean"),
         (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy brings its own"),

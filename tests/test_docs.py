@@ -9,11 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
+from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
 
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
+PAGES = [README, CONTRIBUTING, *sorted((ROOT / "docs").rglob("*.md"))]
 ELSEWHERE = {"benchmarl.md", "rllib.md"}
 """Pages whose Python runs in tests/adapters, where their libraries are."""
 
@@ -27,11 +29,12 @@ def blocks(language, pages=PAGES):
 
 
 @pytest.mark.parametrize("block", blocks("python", [page for page in PAGES if page.name not in ELSEWHERE]))
-def test_python_blocks_run(block, capsys, tmp_path, monkeypatch):
+def test_python_blocks_run_and_show_something(block, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module="torchrl|tensordict")
         exec(compile(block, "README.md", "exec"), {"__name__": "example"})
+    assert capsys.readouterr().out or block.startswith("# mine.py")
 
 
 def test_examples_are_short():
@@ -87,21 +90,108 @@ def test_toml_blocks_are_scenarios(block, tmp_path):
     assert load_scenario(tmp_path / "mine.toml").title
 
 
-def test_make_targets_named_in_the_readme_exist():
+@pytest.mark.parametrize("page", [README, CONTRIBUTING], ids=lambda page: page.name)
+def test_make_targets_exist(page):
     makefile = (ROOT / "Makefile").read_text()
-    for target in re.findall(r"^make (\w+)", (ROOT / "README.md").read_text(), flags=re.M):
-        assert re.search(rf"^{target}:", makefile, flags=re.M), target
+    for target in re.findall(r"^make ([\w-]+)", page.read_text(), flags=re.M):
+        assert re.search(rf"^(.* )?{target}( .*)?:", makefile, flags=re.M), target
+
+
+def tool():
+    spec = importlib.util.spec_from_file_location("write_tables", ROOT / "tools" / "write_tables.py")
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    return made
 
 
 def test_generated_tables_are_those_of_the_code():
-    spec = importlib.util.spec_from_file_location("write_tables", ROOT / "tools" / "write_tables.py")
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
-    assert tool.PAGE.read_text() == tool.text()
-    assert tool.README.read_text() == tool.readme()
+    tables = tool()
+    for page in tables.PAGES:
+        assert page.read_text() == tables.written(page), f"{page.name}: run python tools/write_tables.py"
+    marked = re.findall(r"^<!-- (\w+) -->$", "".join(page.read_text() for page in tables.PAGES), flags=re.M)
+    assert sorted(marked) == sorted(tables.TABLES)
 
 
-def test_links_to_files_lead_somewhere():
-    for page in PAGES:
-        for link in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text()):
-            assert (page.parent / link).exists(), f"{page.name}: {link}"
+def links(page):
+    """Targets of a page's links to files of the repository, and their anchors."""
+    found = re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", page.read_text())
+    return [((page.parent / link).resolve() if link else page, anchor) for link, anchor in found]
+
+
+def anchors(page):
+    """Anchors of a page's headings, as GitHub makes them."""
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    for target, anchor in links(page):
+        assert target.exists(), target
+        assert not anchor or anchor in anchors(target), f"{target.name}#{anchor}"
+
+
+def test_every_page_can_be_reached_from_the_index():
+    reached, new = set(), [INDEX]
+    while new:
+        page = new.pop()
+        reached.add(page)
+        new += [target for target, _ in links(page) if target.suffix == ".md" and target not in reached]
+    assert not set(PAGES) - {README} - reached
+    assert (INDEX, "") in links(README)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_a_page_has_one_title(page):
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
+    assert text.startswith("# ")
+    assert len(re.findall(r"^# ", text, flags=re.M)) == 1
+
+
+def test_the_readme_begins_with_what_a_stranger_needs():
+    text = README.read_text()
+    parts = (
+        "![",
+        "pip install .",
+        "make",
+        "```python",
+        "<!-- benchmark -->",
+        "| `bio_inspired` |",
+        "## Where to go next",
+    )
+    assert [text.index(part) for part in parts] == sorted(text.index(part) for part in parts)
+    assert len(text.splitlines()) <= 120
+    (example,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
+    assert len(example.splitlines()) <= 10
+    assert "print(" in example
+    table = text.partition("<!-- benchmark -->\n")[2].partition("\n<!-- /")[0].splitlines()
+    assert {line.count(" | ") for line in table} == {3}
+    for target in (
+        "mappo.md",
+        "results.md",
+        "paper/report.md",
+        "environment.md",
+        "README.md#your-library",
+        "glossary.md",
+    ):
+        assert f"(docs/{target})" in text
+
+
+def test_the_table_of_policies_is_right():
+    rows = re.findall(r"^\| (`.*?) \| .* \| (.*) \|$", (ROOT / "docs" / "policies.md").read_text(), flags=re.M)
+    needs = {name: need for names, need in rows for name in re.findall(r"`(\w+)`", names)}
+    assert set(needs) == set(POLICIES)
+    for name, policy in POLICIES.items():
+        parts = [*policy.channels, *(["yaw damping"] if policy.yaw_damping_nms else [])]
+        assert needs[name] == (", ".join(parts) or "nothing"), name
+
+
+def test_the_glossary_names_what_there_is():
+    text = (ROOT / "docs" / "glossary.md").read_text()
+    for path in re.findall(r"`(uuv_marl/[\w/.]+)`", text):
+        assert (ROOT / path).is_file(), path
+    scenario = load_scenario("single_obstacle")
+    for field in re.findall(r"`(\w+\.\w+)`", text):
+        section, _, name = field.partition(".")
+        assert hasattr(getattr(scenario, section), name), field

@@ -262,6 +262,178 @@ def test_bad_input_names_the_agent_and_the_remedy():
         short.step(good)
 
 
+def test_stepping_nobody_after_the_end_gives_nothing():
+    """As PettingZoo's own environments do, and SuperSuit's black_death needs; but never before the first reset."""
+    env = uuv_marl.parallel_env(num_vehicles=2, max_cycles=1)
+    with pytest.raises(RuntimeError, match="step came before reset; call reset"):
+        env.step({})
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="the action of uuv_0 is missing"):
+        env.step({})
+    env.step(dict.fromkeys(env.agents, (0.0, 0.0)))
+    eta = env.swarm.state.eta.copy()
+    for _ in range(2):
+        assert env.step({}) == ({}, {}, {}, {}, {})
+    np.testing.assert_array_equal(env.swarm.state.eta, eta)
+    assert len(env.reset()[0]) == 2
+
+
+class Tensor:
+    """As torch's with a gradient: NumPy can't read it."""
+
+    def __array__(self, dtype=None, copy=None):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
+
+
+UNUSABLE = [
+    ({}, "must hold real numbers, got {}"),
+    ({0.1, 0.2}, "must hold real numbers, got {0.1, 0.2}"),
+    ("ab", "must hold real numbers, got 'ab'"),
+    (["0.1", "0.2"], r"must hold real numbers, got \['0.1', '0.2'\]"),
+    ([[0.1], [0.2, 0.3]], r"must hold real numbers, got \[\[0.1\], \[0.2, 0.3\]\] \(setting an array element"),
+    ([10**400, 0], "must hold real numbers, got"),
+    (None, "must hold real numbers, got None"),
+    ([0.1, None], "must hold real numbers"),
+    (Tensor(), r"must hold real numbers, got .* \(Can't call numpy\(\) on Tensor .* Use tensor.detach"),
+    ([0.1 + 1j, 0.2], "must hold real numbers"),
+    (np.ma.masked_array([0.1, 0.2], [True, False]), "must hold real numbers, got a masked array"),
+    ([1e300, 0.0], r"must be finite, got \[inf, 0.0\]"),
+    ([[0.1, 0.2]], r"must have shape \(2,\), got \(1, 2\)"),
+    (0.1, r"must have shape \(2,\), got \(\)"),
+]
+
+
+@pytest.mark.parametrize(("action", "message"), UNUSABLE, ids=range(len(UNUSABLE)))
+def test_what_is_no_action_is_refused_by_name(action, message):
+    env = uuv_marl.parallel_env(num_vehicles=3)
+    env.reset(seed=0)
+    good = dict.fromkeys(env.agents, np.zeros(2, np.float32))
+    with pytest.raises(ValueError, match=f"the action of uuv_1 {message}"):
+        env.step({**good, "uuv_1": action})
+    assert env.swarm.facts.time_s[0] == 0.0
+    alone = gymnasium.make("uuv_marl/Solo-v0", num_vehicles=3).unwrapped
+    alone.reset(seed=0)
+    with pytest.raises(ValueError, match=f"the action {message}"):
+        alone.step(action)
+    with pytest.raises(TypeError, match="actions must be a dictionary"):
+        env.step(np.zeros((3, 2)))
+    with pytest.raises(ValueError, match="there is no agent 5"):
+        env.step({**good, 5: np.zeros(2)})
+
+
+def test_numbers_of_every_kind_are_rounded_alike():
+    runs = set()
+    for kind in (np.float32, np.float64, np.int8, bool, list, tuple):
+        env = uuv_marl.parallel_env(num_vehicles=2)
+        env.reset(seed=0)
+        action = kind((1.0, 0.0)) if kind in (list, tuple) else np.array((1, 0)).astype(kind)
+        runs.add(env.step(dict.fromkeys(env.agents, action))[0]["uuv_1"].tobytes())
+    assert len(runs) == 1
+
+
+@pytest.mark.parametrize("bad", [1.5, "1", True, {}, [1.5], ["a"], 2.0])
+def test_a_seed_is_a_whole_number_everywhere(bad):
+    scenario = load_scenario("single_obstacle", num_vehicles=2)
+    one = np.ndim(bad) == 0 or not bad
+    env = uuv_marl.parallel_env(scenario)
+    for reset in (env.reset, Swarm(scenario).reset, make("random", scenario).reset, uuv_marl.vector_env(1).reset):
+        with pytest.raises(TypeError, match="seed must be a whole number from 0, got"):
+            reset(seed=bad)
+    if one:
+        with pytest.raises(TypeError, match="num_envs must be a whole number from 1"):
+            uuv_marl.vector_env(bad)
+        with pytest.raises(TypeError, match="num_worlds must be a whole number from 1"):
+            Swarm(scenario, bad)
+    for reset in (env.reset, Swarm(scenario).reset, make("random", scenario).reset):
+        with pytest.raises(ValueError, match="seed must be a whole number from 0, got -1"):
+            reset(seed=-1)
+
+
+def test_np_random_is_seeded_and_touches_nothing():
+    env, twin = uuv_marl.parallel_env(num_vehicles=3), uuv_marl.parallel_env(num_vehicles=3)
+    env.np_random.random()
+    env.reset(seed=5)
+    first = env.np_random.random(4)
+    assert not np.isin(first, np.random.default_rng(5).random(200)).any(), "not the stream of the start"
+    twin.reset(seed=5)
+    np.testing.assert_array_equal(env.reset()[0]["uuv_0"], twin.reset()[0]["uuv_0"])
+    assert not np.array_equal(env.np_random.random(4), first), "goes on where no seed is given"
+    env.reset(seed=5)
+    np.testing.assert_array_equal(env.np_random.random(4), first)
+
+
+WIDE = {
+    "disturbance.loss_times_s": [1.0, 2.0],
+    "contact.hull_radius_m": 22.0,
+    "start.spacing_m": 45.0,
+    "start.gap_m": 45.0,
+}
+"""Vehicles so wide that they touch soon."""
+ENDINGS = {
+    "arrival": {
+        "trajectory.speed_mps": 40.0,
+        "arrival.radius_m": 5e3,
+        "arrival.spread_m": 2e4,
+        "arrival.dwell_s": 0.2,
+        "disturbance.loss_times_s": [1.0],
+    },
+    "time_limit": {**WIDE, "time_limit.factor": 0.05, "time_limit.extra_s": 30.0},
+    "lost": {**WIDE, "contact.ends_vehicle": True},
+}
+
+
+@pytest.mark.parametrize("reason", ENDINGS)
+def test_the_last_info_tells_how_it_ended(reason):
+    scenario = load_scenario("lossy", num_vehicles=4, overrides={**ENDINGS[reason], "timing.decision_period_s": 0.5})
+    env, whole = uuv_marl.parallel_env(scenario), uuv_marl.vector_env(1, scenario)
+    solo = gymnasium.make("uuv_marl/Solo-v0", scenario=scenario, others="bio_inspired").unwrapped
+    policy = make("bio_inspired", env)
+    observations, _ = env.reset(seed=4)
+    whole.reset(seed=4)
+    solo.reset(seed=4)
+    policy.reset(4)
+    last, collisions, alone = {}, 0, {}
+    while env.agents:
+        acted, actions = list(env.agents), policy(observations)
+        observations, *_, infos = env.step(actions)
+        observations = {agent: observations[agent] for agent in env.agents}
+        everyone = np.array([[actions.get(agent, np.zeros(2)) for agent in env.possible_agents]])
+        final = whole.step(everyone)[-1]
+        if not alone:
+            alone = solo.step(actions["uuv_0"])[-1]
+            assert alone == infos["uuv_0"]
+        collisions += int(env.swarm.facts.collisions[0])
+        for agent in acted:
+            assert bool(infos[agent]) == (agent not in env.agents), "only the last info tells"
+        last |= {agent: info for agent, info in infos.items() if info}
+    assert set(last) == set(env.possible_agents)
+    assert {info["ending"] for info in last.values()} == {"lost", reason}
+    world = max(last.values(), key=lambda info: (info["time_s"], info["ending"] == reason))
+    assert world == {
+        "is_success": reason == "arrival",
+        "ending": reason,
+        "arrived": reason == "arrival",
+        "time_s": pytest.approx(env.swarm.facts.time_s[0]),
+        "collisions": collisions,
+    }
+    assert all(info["is_success"] == (info["ending"] == "arrival") for info in last.values())
+    assert {key: final["final_info"][key][0] for key in world} == world
+    assert alone["ending"] == last["uuv_0"]["ending"]
+    if reason == "time_limit":
+        assert collisions > 0, "else the test shows nothing"
+
+
+def test_the_turn_based_api_tells_it_too():
+    env = uuv_marl.env(num_vehicles=2, max_cycles=2)
+    env.reset(seed=0)
+    last = {}
+    for agent in env.agent_iter():
+        _, _, terminated, truncated, info = env.last()
+        last[agent] = info
+        env.step(None if terminated or truncated else np.zeros(2, np.float32))
+    assert [info["ending"] for info in last.values()] == ["time_limit"] * 2
+
+
 def test_actions_are_projected_onto_the_disc():
     a, b = uuv_marl.parallel_env(num_vehicles=1), uuv_marl.parallel_env(num_vehicles=1)
     a.reset(seed=0)
@@ -321,3 +493,62 @@ def test_gymnasium_workers_give_the_same_run(context):
         runs.append(record)
         envs.close()
     assert runs[0] == runs[1]
+
+
+def test_without_a_display_a_window_is_refused_with_the_remedy(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    pygame.display.quit()
+    env = uuv_marl.parallel_env(num_vehicles=2, render_mode="human")
+    for driver in ("offscreen", "dummy"):
+        with monkeypatch.context() as patch:
+            for name in ("SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
+                patch.delenv(name, raising=False)
+            patch.setattr(pygame.display, "get_driver", lambda driver=driver: driver)
+            with pytest.raises(RuntimeError, match="found no display for its window; use render_mode='rgb_array'"):
+                env.reset(seed=0)
+            assert not pygame.display.get_init()
+    with monkeypatch.context() as patch:
+        patch.setenv("SDL_VIDEODRIVER", "nonsense")
+        with pytest.raises(RuntimeError, match="found no display for its window; use render_mode"):
+            env.reset(seed=0)
+    env.reset(seed=0)  # SDL_VIDEODRIVER=dummy, chosen on purpose
+    assert env.render() is None
+    env.close()
+
+
+def test_closing_the_window_ends_no_run():
+    pygame = pytest.importorskip("pygame")
+    env = uuv_marl.parallel_env(num_vehicles=2, render_mode="human", max_cycles=3, decision_period=0.1)
+    env.reset(seed=0)
+    actions = dict.fromkeys(env.agents, np.zeros(2))
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    with pytest.warns(UserWarning, match="the window was closed; the run goes on without it"):
+        env.step(actions)
+    assert not pygame.display.get_init()
+    env.step(actions)
+    assert env.render() is None
+    *_, infos = env.step(actions)
+    assert infos["uuv_0"]["ending"] == "time_limit"
+    env.close()
+
+
+def test_tab_completion_shows_the_public_names():
+    assert dir(uuv_marl) == sorted(uuv_marl.__all__)
+    assert {"parallel_env", "vector_env", "env", "baselines", "load_scenario"} <= set(dir(uuv_marl))
+    assert all(getattr(uuv_marl, name) is not None for name in dir(uuv_marl))
+
+
+def test_a_percept_tells_its_fields():
+    percept = Swarm(load_scenario("single_obstacle", num_vehicles=3)).reset(seed=0)
+    assert percept.names[:3] == ("velocity", "yaw_rate", "reference")
+    assert repr(percept).startswith("Percept(flat (1, 3, 98); velocity (1, 3, 2), yaw_rate (1, 3, 1)")
+    with pytest.raises(KeyError, match="percept has no field 'refrence'; did you mean 'reference'"):
+        percept["refrence"]
+    with pytest.raises(KeyError, match="percept has no field 'compass'; It has velocity, "):
+        percept["compass"]
+
+
+def test_the_facts_explain_themselves():
+    from uuv_marl.sim.arrays import Facts
+
+    assert all(f"\n        {name}: " in Facts.__doc__ for name in Facts._fields)

@@ -52,6 +52,7 @@ def exported(policy, scenario, folder):
 def expect_the_same(model, policy, flat):
     """Actions of percepts (vehicle, size); returns them."""
     percept = Percept(np.asarray(flat, np.float32)[None], policy.layout)
+    policy = make(policy.name, load_scenario(policy.scenario, num_vehicles=len(flat)))
     (action,) = model.run(None, {"observation": percept.to_observation()[0]})
     assert action.dtype == np.float32
     np.testing.assert_allclose(action, policy.act(percept)[0], rtol=0, atol=1e-5)
@@ -156,6 +157,12 @@ def test_what_is_no_network_is_refused_with_the_remedy(tmp_path):
     other = load_scenario("tracking", overrides={"sonar.arrays.bow.sub_sectors": 5})
     with pytest.raises(PolicyError, match="trained on another percept"):
         write_onnx(best, other, tmp_path / "policy.onnx")
+    heavy = load_scenario("tracking", overrides={"vehicle.m_kg": 600.0})
+    with pytest.raises(PolicyError, match=r"another vehicle.*vehicle.m_kg was 185.0 and is 600.0"):
+        write_onnx(best, heavy, tmp_path / "policy.onnx")
+    saved(tmp_path, load_scenario("tracking"), np.nan)
+    with pytest.raises(PolicyError, match="0.weight must hold finite numbers"):
+        write_onnx(best, load_scenario("tracking"), tmp_path / "policy.onnx")
     assert not (tmp_path / "policy.onnx").exists()
 
 
@@ -164,6 +171,10 @@ def test_the_command(tmp_path):
     done = CliRunner().invoke(app, ["export", best, str(output), "--scenario=single_obstacle"])
     assert done.exit_code == 0, done.output
     assert ReferenceEvaluator(str(output)).input_names == ["observation"]
+    assert CliRunner().invoke(app, ["export", "mappo", str(tmp_path / "mappo.onnx")]).exit_code == 0
+    unwritable = CliRunner().invoke(app, ["export", best, "/dev/null/policy.onnx"])
+    assert unwritable.exit_code == 2
+    assert "can't be written" in unwritable.output
     done = CliRunner().invoke(app, ["export", "idle", str(output)])
     assert done.exit_code == 2
     assert "no network" in done.output

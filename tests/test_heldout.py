@@ -11,10 +11,12 @@ from scipy.stats import trim_mean
 from typer.testing import CliRunner
 
 from uuv_marl.baselines.learned import WEIGHTS_FILE
+from uuv_marl.benchmark.tables import estimate
 from uuv_marl.cli import app
-from uuv_marl.heldout import job, page
-from uuv_marl.heldout.across import efficiency, stratified, success
+from uuv_marl.heldout import across, figures, job, page
+from uuv_marl.heldout.across import efficiency, success
 from uuv_marl.heldout.episodes import Episode, read_episodes, write_episodes
+from uuv_marl.heldout.marl_eval import write_marl_eval
 from uuv_marl.heldout.sets import ACROSS, SETS, HeldOut
 from uuv_marl.heldout.targets import paired, targets
 from uuv_marl.heldout.trainings import find_trainings
@@ -48,12 +50,12 @@ def test_scores_by_hand():
 def test_runs_are_resampled_within_their_tasks():
     """Two tasks whose scores are far apart: tasks that were resampled too would make a wide interval."""
     easy, hard = [0.90, 0.91, 0.92, 0.93, 0.94], [0.10, 0.11, 0.12, 0.13, 0.14]
-    e = stratified([easy, hard])
+    e = estimate(easy, hard)
     assert e.iqm == pytest.approx(trim_mean(easy + hard, 0.25))
     assert e.low < e.iqm < e.high
     assert e.high - e.low < 0.05
-    assert stratified([easy]).iqm == pytest.approx(np.mean(easy[1:4]))
-    assert stratified([[0.5], [0.7]]) == (0.6, 0.6, 0.6)
+    assert estimate(easy).iqm == pytest.approx(np.mean(easy[1:4]))
+    assert estimate([0.5], [0.7]) == (0.6, 0.6, 0.6)
 
 
 def test_targets_by_hand():
@@ -86,9 +88,9 @@ def test_episodes_come_back_from_their_file(tmp_path):
 @pytest.fixture
 def quick(monkeypatch):
     held = HeldOut("quick", "random_field", 2, ("bio_inspired_plus", "mappo"), ("bio_inspired",), 1, QUICK, "tiny")
-    for module in (job, page):
-        monkeypatch.setattr(module, "SETS", (held,))
-        monkeypatch.setattr(module, "ACROSS", (held,))
+    for module, names in ((job, ("SETS", "ACROSS")), (page, ("SETS",)), (across, ("ACROSS",))):
+        for name in names:
+            monkeypatch.setattr(module, name, (held,))
 
 
 def trainings(folder, weights):
@@ -126,10 +128,95 @@ def test_the_command_runs_what_is_missing_and_tells_of_it(tmp_path, quick):
     assert "`random_field`, tiny, seeds from 0, at most 2." in text
     assert "{" not in text
     data = json.loads((tmp_path / "out" / "marl_eval.json").read_text())
-    run = data["uuv_marl"]["quick"]["ppo"]["seed_1"]
-    assert run["step_1"]["step_count"] == 2000
+    run = data["uuv_marl"]["quick"]["ppo"]["run_1"]
+    assert run["step_1"] == {"step_count": 2000, "success": [0.0], "efficiency": [0.0], "collisions": [0.0]}
     assert run["absolute_metrics"]["success"] == [0.0, 0.0]
+    assert data["uuv_marl_validation"]["validation"]["ppo"]["run_1"]["step_2"]["step_count"] == 2000
+    check_marl_eval(data)
     assert (tmp_path / "out" / "figures" / "training.png").stat().st_size > 5000
+
+
+def check_marl_eval(data):
+    """What marl-eval's reader needs: it takes names of tasks, runs and steps from the first entry for all others."""
+    for tasks in data.values():
+        names = {tuple(algorithms) for algorithms in tasks.values()}
+        assert len(names) == 1
+        assert not any("," in name for name in names.pop())
+        runs = [found for algorithms in tasks.values() for found in algorithms.values()]
+        assert len({tuple(found) for found in runs}) == 1
+        steps = [run for found in runs for run in found.values()]
+        assert len({tuple(run) for run in steps}) == 1
+        assert [*steps[0]][:-1] == [f"step_{k + 1}" for k in range(len(steps[0]) - 1)]
+        assert len(steps[0]) > 1
+        for run in steps:
+            metrics = set(run["absolute_metrics"])
+            assert [*run][-1] == "absolute_metrics"
+            for name, step in run.items():
+                assert set(step) == metrics | ({"step_count"} if name != "absolute_metrics" else set())
+                for metric in metrics:
+                    assert step[metric]
+                    assert np.isfinite(step[metric]).all()
+            counts = [run[name]["step_count"] for name in run if name != "absolute_metrics"]
+            assert counts == sorted(counts)
+
+
+def test_without_trainings_the_command_ends_with_its_report(tmp_path, quick):
+    done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", "--seeds=1"])
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "out" / "report.md").read_text()
+    assert text.count("No trainings were given.") == 2
+    assert not (tmp_path / "out" / "marl_eval.json").exists()
+
+
+def test_trainings_without_a_set_of_the_comparison_make_no_table(tmp_path, quick, monkeypatch):
+    import uuv_marl.baselines
+
+    monkeypatch.setattr(across, "ACROSS", ())
+    monkeypatch.setattr(job, "ACROSS", ())
+    weights = Path(uuv_marl.baselines.__file__).parent / "trained" / "mappo.safetensors"
+    where = trainings(tmp_path / "trainings", weights)
+    done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", "--seeds=1", f"--trainings={where}"])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "out" / "figures" / "training.png").exists()
+
+
+def test_uneven_trainings_are_cut_to_what_marl_eval_can_read(tmp_path):
+    shipped = find_trainings(DOCS / "trainings")
+    uneven = [shipped[0]._replace(validations=shipped[0].validations[:2]), *shipped[1:-1]]
+    write_marl_eval(read_episodes(DOCS / "episodes.csv"), uneven, tmp_path / "marl_eval.json")
+    data = json.loads((tmp_path / "marl_eval.json").read_text())
+    check_marl_eval(data)
+    runs = data["uuv_marl_validation"]["validation"]
+    assert {name: len(found) for name, found in runs.items()} == {"mappo": 4, "ppo": 4}
+
+
+def test_the_shipped_raw_results_can_be_read_by_marl_eval_and_are_those_of_the_episodes(tmp_path):
+    episodes, found = read_episodes(DOCS / "episodes.csv"), find_trainings(DOCS / "trainings")
+    write_marl_eval(episodes, found, tmp_path / "marl_eval.json")
+    assert (DOCS / "marl_eval.json").read_text() == (tmp_path / "marl_eval.json").read_text()
+    data = json.loads((DOCS / "marl_eval.json").read_text())
+    check_marl_eval(data)
+    run = data["uuv_marl"]["random_field"]["ppo"]["run_3"]
+    mine = [e for e in episodes if (e.set, e.policy, e.training_seed) == ("random_field", "ppo", 2)]
+    assert run["absolute_metrics"]["success"] == [float(e.succeeded) for e in mine]
+    assert run["step_1"]["success"] == pytest.approx([success(mine)])
+
+
+def test_the_picture_of_fields_hides_no_collision(tmp_path, monkeypatch):
+    """Four ways to end, each with its own share; the best policy on top; how many episodes stands beside the name."""
+    drawn = []
+    monkeypatch.setattr(figures, "save", lambda figure, path: drawn.append(figure) or path)
+    worse = [episode(seed=k, policy="sdc", collisions=k % 2, task_time_s=None if k < 2 else 120.0) for k in range(8)]
+    rows = [*worse, *(episode(seed=k, collisions=int(k == 0)) for k in range(4))]
+    figures.draw_fields(rows, "random_field", tmp_path / "x.png")
+    ax = drawn[0].axes[0]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["mappo (n = 4)", "sdc (n = 8)"]
+    shares = [bar.get_width() for bar in ax.patches]
+    assert shares == pytest.approx([3 / 4, 1 / 4, 0, 0, 3 / 8, 3 / 8, 1 / 8, 1 / 8])
+    assert ax.patches[6].get_hatch()
+    assert len({bar.get_facecolor() for bar in ax.patches[4:]}) == 4
+    labels = [text.get_text() for text in drawn[0].legends[0].get_texts()]
+    assert labels[:4] == list(figures.ENDS)
 
 
 def test_what_is_not_there_is_explained(tmp_path):

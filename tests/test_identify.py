@@ -9,7 +9,7 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.reproduce import identify, unknowns
-from uuv_marl.reproduce.columns import read_columns
+from uuv_marl.reproduce.study import read_columns
 from uuv_marl.reproduce.unknowns import DEFAULTS, OBJECTIVES, UNKNOWNS, Numbers
 
 HIT = Numbers(10.03, 12.29, 11.0, 205.0, 0.0)
@@ -174,7 +174,7 @@ def test_the_shipped_point_is_loaded_and_runs_as_recorded(shipped):
 
 
 def test_the_picture_shows_the_papers_numbers_beside_the_trials():
-    figure = identify.draw(identify.trials())
+    figure = identify.draw({"identification-trials": identify.trials()})
     for ax, across, up in (
         (figure.axes[0], PAPER["tracking", "bio_inspired"].mean_min_spacing_m, 11.0),
         (figure.axes[1], PAPER["tracking", "bio_inspired"].min_spacing_m, 205.0),

@@ -1,9 +1,13 @@
 """Learned policies from checkpoints: what they see, what they refuse, and that every path gives one run."""
 
+import copy
 import itertools
 import json
 import math
+import pickle
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +16,7 @@ import safetensors.numpy
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines import POLICIES, PolicyError, granted, make
 from uuv_marl.baselines.learned import (
     BARRIER,
     WEIGHTS_FILE,
@@ -20,15 +24,17 @@ from uuv_marl.baselines.learned import (
     Eyes,
     Layer,
     forward,
-    learned_class,
     load_checkpoint,
     rows_of,
     save_checkpoint,
+    vehicle_of,
 )
+from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, ResultsError, knowledge
 from uuv_marl.cli import app
 from uuv_marl.percept import PerceptLayout
+from uuv_marl.scenario_files import scenario_names
 from uuv_marl.sim.swarm import Swarm
 
 SHORT = {"trajectory.waypoints_m": [[0.0, 0.0], [40.0, 0.0]], "time_limit.extra_s": 1.0, "time_limit.factor": 1.0}
@@ -151,7 +157,9 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
 
 def test_another_percept_or_period_is_refused_with_the_remedy(best):
     other = granted(best, load_scenario("tracking", overrides={"sonar.arrays.bow.sub_sectors": 5}))
-    with pytest.raises(PolicyError, match="another percept.*'heard 21 1 1.0' against 'heard 19 1 1.0'; use"):
+    with pytest.raises(
+        PolicyError, match=r"another percept.*was .'heard', 21, '1', 1.0. and is .'heard', 19, '1', 1.0.; use"
+    ):
         make(best, other)
     slow = granted(best, load_scenario("tracking", overrides={"timing.decision_period_s": 1.0}))
     with pytest.raises(PolicyError, match="every 0.1 to 0.5 s.*override timing.decision_period_s"):
@@ -167,18 +175,136 @@ def test_what_is_no_checkpoint_is_explained(best, tmp_path):
     (tmp_path / "other").write_bytes(safetensors.numpy.save({"x": np.zeros(2, np.float32)}))
     with pytest.raises(PolicyError, match="holds no policy of uuv_marl"):
         make(str(tmp_path / "other"), load_scenario("tracking"))
-    save_checkpoint(tmp_path / "narrow", card(), actor(features=100))
-    with pytest.raises(PolicyError, match=r"expected float32 \(123"):
-        make(str(tmp_path / "narrow"), load_scenario("tracking"))
     with pytest.raises(PolicyError, match="did you mean 'bio_inspired'.*paths of checkpoints"):
         make("bio_inspred", load_scenario("tracking"))
 
 
 def test_a_rewritten_checkpoint_is_loaded_anew(best):
-    before = learned_class(best)
-    assert learned_class(best) is before
+    assert policy_class(best).yaw_damping_nms == 600.0
     save_checkpoint(learned_file(best), card(yaw_damping_nms=100.0), actor())
-    assert learned_class(best).yaw_damping_nms == 100.0
+    assert policy_class(best).yaw_damping_nms == 100.0
+
+
+@pytest.mark.parametrize("name", [*POLICIES, "checkpoint"])
+def test_policies_can_be_pickled_and_copied(name, best):
+    """A copy acts as the policy itself from then on, its memory and its random numbers included."""
+    name = best if name == "checkpoint" else name
+    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=6))
+    swarm, policy = Swarm(scenario, 2), make(name, scenario, 2)
+    percept = swarm.reset(3)
+    policy.reset(3)
+    for _ in range(3):
+        percept = swarm.step(policy.act(percept))
+    for same in (pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy)):
+        mine = copy.deepcopy(policy)
+        np.testing.assert_array_equal(same.act(percept), mine.act(percept))
+        np.testing.assert_array_equal(same.act(percept), mine.act(percept))
+
+
+def test_importing_policies_reads_no_weights():
+    code = "import uuv_marl.baselines as b; print([n for n, p in b.POLICIES.items() if 'checkpoint' in vars(p)])"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout == "[]\n"
+    assert POLICIES["mappo"].checkpoint is POLICIES["mappo"].checkpoint
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("vehicle.m_kg", 600.0),
+        ("vehicle.N_rr", 90.0),
+        ("actuators.max_force_n", 1500.0),
+        ("actuators.lever_arm_m", 2.0),
+    ],
+)
+@pytest.mark.parametrize("name", ["mappo", "best"])
+def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
+    """Also by checkpoints of version 0.1.0, which do not name theirs: the shipped one."""
+    name = best if name == "best" else name
+    other = granted(name, load_scenario("tracking", num_vehicles=2, overrides={field: value}))
+    was = {**vehicle_of(load_scenario("tracking"))}[field]
+    message = f"another vehicle than scenario 'tracking' has: {field} was {was} and is {value}.*any_vehicle=True"
+    with pytest.raises(PolicyError, match=message):
+        make(name, other)
+    assert make(name, other, any_vehicle=True).act(Swarm(other).reset(0)).shape == (1, 2, 2)
+
+
+def test_a_benchmark_on_another_vehicle_is_refused_before_its_first_run(tmp_path):
+    command = ["benchmark", "--policy=idle", "--policy=mappo", "--set=vehicle.m_kg=600.0", f"--output={tmp_path / 'a'}"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 2
+    assert "mappo was trained on another vehicle" in done.output
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
+    heavy = load_scenario("tracking", overrides={"vehicle.m_kg": 600.0})
+    save_checkpoint(learned_file(best), card(vehicle=vehicle_of(heavy)), actor())
+    make(best, granted(best, heavy))
+    with pytest.raises(PolicyError, match=r"vehicle.m_kg was 600.0 and is 185.0"):
+        make(best, granted(best, load_scenario("tracking")))
+
+
+@pytest.mark.parametrize("name", ["mappo", "ppo"])
+def test_weights_of_the_first_version_run_on_every_shipped_scenario(name):
+    for scenario in scenario_names():
+        make(name, granted(name, load_scenario(scenario)))
+
+
+def changed(k=0, name="weight", value=None, at=None):
+    """The actor with one array replaced, or one entry of it."""
+    layers = actor()
+    array = layers[k]._asdict()[name] if value is None or at is not None else np.asarray(value, np.float32)
+    if at is not None:
+        array[at] = value
+    layers[k] = layers[k]._replace(**{name: array})
+    return layers
+
+
+@pytest.mark.parametrize(
+    ("layers", "message"),
+    [
+        (actor(features=100), r"0.weight is float32 \(100, 16\), expected float32 \(123, 16\)"),
+        (changed(at=(0, 0), value=np.nan), "0.weight must hold finite numbers"),
+        (changed(at=(3, 1), value=-np.inf), "0.weight must hold finite numbers"),
+        (changed(at=(3, 1), value=1e38), "0.weight must hold finite numbers of at most 1e"),
+        (changed(1, "bias", at=0, value=np.nan), "1.bias must hold finite numbers"),
+        (changed(value=np.zeros((123, 16, 2))), r"0.weight is float32 \(123, 16, 2\), expected"),
+        (changed(value=np.zeros(123)), r"0.weight is float32 \(123,\), expected"),
+        (changed(0, "bias", np.zeros((16, 1))), r"0.bias is float32 \(16, 1\), expected float32 \(16,\)"),
+        (changed(0, "bias", 0.0), r"0.bias is float32 \(1,\), expected"),
+        (changed(1, value=np.zeros((16, 3))), r"1.weight is float32 \(16, 3\), expected float32 \(16, 2\)"),
+        (changed(1, value=np.zeros((17, 2))), r"1.weight is float32 \(17, 2\), expected float32 \(16, 2\)"),
+        ([], "0.weight is missing"),
+    ],
+)
+def test_weights_that_cannot_run_are_refused(layers, message, tmp_path):
+    save_checkpoint(tmp_path / "bad", card(), layers)
+    with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .{message}"):
+        make(str(tmp_path / "bad"), load_scenario("tracking"))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("barrier", [1.0]),
+        ("barrier", [0.0, 0.8, float("nan"), 0.3, 140.0, 0.0]),
+        ("decision_period_s", [0.1, float("inf")]),
+        ("decision_period_s", [0.5, 0.1]),
+        ("decision_period_s", [0.0, 0.1]),
+        ("yaw_damping_nms", float("nan")),
+        ("vehicle", {"vehicle.m_kg": float("inf")}),
+        ("percept", "none"),
+        ("format", 2),
+        ("wings", 2),
+    ],
+)
+def test_cards_that_say_nothing_sensible_are_refused(field, value, tmp_path):
+    tensors = {f"{k}.{name}": a for k, layer in enumerate(actor()) for name, a in layer._asdict().items()}
+    said = json.dumps({**card().model_dump(mode="json"), field: value})
+    (tmp_path / "bad").write_bytes(safetensors.numpy.save(tensors, {"uuv_marl": said}))
+    with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .its card's {field}"):
+        make(str(tmp_path / "bad"), load_scenario("tracking"))
 
 
 def test_results_refuse_other_weights_of_the_same_path(best, tmp_path):
@@ -191,7 +317,7 @@ def test_results_refuse_other_weights_of_the_same_path(best, tmp_path):
     assert results.trace("tracking", best, 0)["time_s"].size
     save_checkpoint(learned_file(best), card(), actor(seed=1))
     with pytest.raises(ResultsError, match="as it was before its file changed"):
-        Results(tmp_path / "out", [scenario])
+        Results(tmp_path / "out", [scenario]).use(best)
 
 
 def test_one_table_holds_names_and_checkpoints(best, tmp_path, monkeypatch):

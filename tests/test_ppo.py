@@ -9,7 +9,7 @@ from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnv
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, learned_class
+from uuv_marl.baselines.learned import WEIGHTS_FILE, forward, load_checkpoint
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import ppo as ppos
@@ -17,7 +17,7 @@ from uuv_marl.train import training as trainings
 from uuv_marl.train.crew import Crew
 from uuv_marl.train.fleet import Fleet
 from uuv_marl.train.ppo import Hyperparameters, Ppo
-from uuv_marl.train.shaping import Weights, shaped
+from uuv_marl.train.shaping import Weights
 from uuv_marl.train.training import Settings, train
 from uuv_marl.train.validation import judge
 
@@ -69,6 +69,7 @@ class OneStep(VecEnv):
 
 
 def test_a_one_step_task_is_solved(monkeypatch):
+    """Seeds 0 to 4 miss by 0.007 to 0.011, the same with AVX-512 and with torch's default kernels."""
     monkeypatch.setattr(ppos, "Crew", OneStep)
     by = Hyperparameters(hidden=(32,), horizon=8, minibatch=128, kl_stop=0.05, learning_rate=(3e-3, 5e-4))
     algorithm = Ppo(by, open_water(), SIZES, Weights(), 0)
@@ -79,81 +80,48 @@ def test_a_one_step_task_is_solved(monkeypatch):
     assert np.sqrt(np.mean(error**2)) < 0.1
 
 
-def test_a_swarm_of_one_finds_the_force_that_follows():
-    """The known optimum: on l(t) at its speed, at the force that its drag takes, (70 + 400) x 4 = 1880 of 3000 N."""
-    scenario = open_water(**{"trajectory.waypoints_m": [[0.0, 0.0], [320.0, 0.0]]})
-    by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=256, epochs=6, kl_stop=0.1, learning_rate=(3e-3, 3e-4))
-    algorithm = Ppo(by, scenario, [(1, 64)], Weights(), 0)
-    for k in range(60):
-        algorithm.iterate(k / 60)
-    scenario = load_scenario(
-        "tracking", num_vehicles=1, overrides={**OPEN_WATER, "trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
-    )
-    swarm, eyes = Swarm(scenario), Eyes(scenario, BARRIER)
-    swarm.reset(3)
-    features, barrier = np.empty((1, 1, eyes.size), np.float32), np.empty((1, 1, 2), np.float32)
-    actions = []
-    for _ in range(400):
-        eyes.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
-        actions.append(forward(algorithm.layers, features[0]))
-        swarm.step((actions[-1] + barrier[0])[None])
-    assert np.hypot(*(swarm.state.eta[0, 0, :2] - swarm.facts.reference[0, :2])) < 10.0
-    assert np.mean(actions[-100:], axis=0)[0] == pytest.approx([1880 / 3000, 0.0], abs=0.03)
-
-
-def test_the_crew_lives_through_what_the_fleet_lives_through():
-    """Same worlds and actions: the same features and rewards, until the first reset draws other worlds."""
-    scenario, weights = load_scenario("random_field", overrides={"timing.decision_period_s": 0.5}), Weights()
-    crew = Crew(scenario, SIZES, lambda swarm: shaped(swarm, weights))
-    crew.seed(7)
-    crew.reset()
-    fleet = Fleet(scenario, SIZES, weights, np.random.default_rng(0))
-    for k, (swarm, first) in enumerate(zip(fleet._swarms, (7, 10), strict=True)):
-        swarm.reset(first)
-        fleet._look(k)
-    rng = np.random.default_rng(3)
-    for _ in range(40):
-        np.testing.assert_allclose(crew.seen, fleet.seen[:, : fleet.features], atol=1e-5)
-        action = rng.uniform(-1, 1, (21, 2)).astype(np.float32)
-        _, reward, dones, _ = crew.step(action)
-        np.testing.assert_allclose(reward, fleet.step(action).reward, rtol=1e-3, atol=1e-3)
-        assert not dones.any()
+def test_a_checkpoint_acts_as_the_model_does():
+    """Whatever was learned: the layers that are kept give the mean of Stable-Baselines3's own distribution."""
+    algorithm = Ppo(TINY, open_water(), SIZES, Weights(), 0)
+    algorithm.iterate(0.0)
+    x = np.random.default_rng(5).standard_normal((50, algorithm.model.observation_space.shape[0]), np.float32)
+    with torch.no_grad():
+        mean = algorithm.model.policy.get_distribution(torch.from_numpy(x)).distribution.mean.numpy()
+    np.testing.assert_allclose(forward(algorithm.layers, x), mean, atol=1e-5)
+    assert np.abs(mean).max() > 1e-3
 
 
 def test_endings_are_told_as_sb3_wants_them():
+    """A cut-off row tells what it would have seen next, an arrived one that nothing comes after."""
     arrives = {
         "trajectory.waypoints_m": [[0.0, 0.0], [4.0, 0.0]],
         "arrival.radius_m": 500.0,
         "arrival.spread_m": 500.0,
     }
     for overrides, arrived in (
-        (arrives, 1),
-        ({**arrives, "arrival.radius_m": 1e-3, "time_limit.factor": 0.5, "time_limit.extra_s": 5.5}, 0),
+        (arrives, True),
+        ({**arrives, "arrival.radius_m": 1e-3, "time_limit.extra_s": 5.0}, False),
     ):
-        crew = Crew(open_water(**overrides), [(1, 1), (3, 1)], lambda swarm: np.ones((1, swarm.num_vehicles)))
+        crew = Crew(open_water(**overrides), [(1, 1), (3, 1)], Weights())
         crew.seed(0)
         start = crew.reset()
         for _ in range(12):
             seen, _, dones, infos = crew.step(np.zeros((4, 2), np.float32))
         assert dones.all()
         for row in range(4):
-            last = infos[row]["terminal_observation"]
-            assert last.shape == start[row].shape
-            assert np.abs(last - seen[row]).max() > 0.01, "what comes next is another episode's start"
-            assert infos[row]["TimeLimit.truncated"] is not bool(arrived)
-        assert crew.episodes._asdict() == {
-            "number": 2,
-            "arrived": 2 * arrived,
-            "collisions": 0,
-            "returns": 24.0,
-            "decisions": 24,
-        }
+            assert infos[row].get("TimeLimit.truncated", False) is not arrived
+            if not arrived:
+                last = infos[row]["terminal_observation"]
+                assert last.shape == start[row].shape
+                assert np.abs(last - seen[row]).max() > 0.01, "what comes next is another episode's start"
+        episodes = crew.fleet.take_episodes()
+        assert (episodes.number, episodes.arrived, episodes.decisions) == (2, 2 * arrived, 24)
 
 
 def test_streams_go_on_from_a_snapshot():
     streams = [np.random.default_rng(3), None]
     streams[0].integers(2, dtype=np.uint32)  # leaves half a number behind
-    again = unpacked(packed(streams))
+    again = unpacked(packed(streams), len(streams))
     assert again[1] is None
     assert list(again[0].integers(9, size=5, dtype=np.uint32)) == list(streams[0].integers(9, size=5, dtype=np.uint32))
     swarm = Swarm(load_scenario("random_field", num_vehicles=3), 2)
@@ -208,15 +176,17 @@ def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch):
         assert files(tmp_path / f"{stop}") == files(tmp_path / "whole")
     other = list(train(tmp_path / "other", settings(seed=1)))
     assert other[0].reward != records[0].reward
-    assert learned_class(str(tmp_path / "whole" / "best")).checkpoint.card.training["algorithm"]["name"] == "ppo"
+    assert load_checkpoint(tmp_path / "whole" / "best").card.training["algorithm"]["name"] == "ppo"
 
 
 def test_a_short_training_beats_random_by_far():
+    """Random vehicles are paid -6.09, idle ones -3.67. Seeds 0 to 6 reached -1.46 to -1.80; at least -3.05 is asked.
+    Torch's default kernels gave -1.43 to -2.03 for seeds 0 to 4."""
     sizes = [(4, 8), (9, 4)]
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=272, epochs=6, kl_stop=0.1, learning_rate=(3e-3, 3e-4))
     algorithm = Ppo(by, open_water(), sizes, Weights(), 0)
     rewards = [algorithm.iterate(k / 60)[0] for k in range(60)]
-    fleet = Fleet(open_water(), sizes, Weights(), np.random.default_rng(0))
+    fleet = Fleet(open_water(), sizes, Weights(), lambda num: range(100_000, 100_000 + num))
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (60, fleet.rows, 2)).astype(np.float32)
     floor = np.mean([fleet.step(action).reward for action in actions])

@@ -12,9 +12,12 @@ from typer.testing import CliRunner
 
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.cli import app
-from uuv_marl.reproduce import job, literal, measures, motion, sensitivity
-from uuv_marl.reproduce.assumptions import ASSUMPTIONS
-from uuv_marl.reproduce.cases import (
+from uuv_marl.reproduce import job, literal, measures, sensitivity
+from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
+from uuv_marl.reproduce.claims import CLAIMS
+from uuv_marl.reproduce.ledger import CASES, assumption_entries, difference, given_entries, ledger, read_ledger, verdict
+from uuv_marl.reproduce.page import page
+from uuv_marl.reproduce.study import (
     COMPARATORS,
     DELTA_LARGE,
     DELTA_SMALL,
@@ -25,11 +28,9 @@ from uuv_marl.reproduce.cases import (
     ZETA_SMALL,
     Case,
     Study,
+    read_columns,
+    write_columns,
 )
-from uuv_marl.reproduce.claims import CLAIMS
-from uuv_marl.reproduce.columns import read_columns, write_columns
-from uuv_marl.reproduce.ledger import CASES, assumption_entries, difference, given_entries, ledger, read_ledger, verdict
-from uuv_marl.reproduce.page import page
 
 ROOT = Path(__file__).resolve().parent.parent
 SHIPPED = ROOT / "docs" / "paper"
@@ -127,6 +128,7 @@ def test_data_are_the_same_bytes_again_and_figures_come_from_them(made, tmp_path
         "figure-11b.csv",
         "figure-9a.csv",
         "figure-9b.csv",
+        "figure-9c.csv",
         "table-2.csv",
     ]
     for path in again:
@@ -230,35 +232,35 @@ def test_a_swarm_without_tau_o_does_not_avoid(falsified):
 def test_distance_from_a_path():
     path = np.array([[0, 0], [10, 0], [10, 10]], np.float32)
     points = np.array([[5, 2], [12, 5], [-3, -4], [10, 0]], np.float32)
-    np.testing.assert_allclose(motion.path_distance(points, path), [2, 2, 5, 0])
-    np.testing.assert_allclose(motion.corner_times(path, 4.0), [2.5, 5.0])
+    np.testing.assert_allclose(measures.path_distance(points, path), [2, 2, 5, 0])
+    np.testing.assert_allclose(measures.corner_times(path, 4.0), [2.5, 5.0])
 
 
 def test_groups_are_linked_by_short_distances():
     position = np.array([[0, 0], [15, 0], [30, 0], [60, 0], [60, 15]], np.float32)
-    assert [motion.num_groups(position, link) for link in (10.0, 20.0, 40.0)] == [5, 2, 1]
+    assert [measures.num_groups(position, link) for link in (10.0, 20.0, 40.0)] == [5, 2, 1]
 
 
 def test_sides_are_those_of_the_motion():
     along = np.linspace(-50, 50, 101, dtype=np.float32)
     lanes = np.array([-20, -10, 5, 30, 40], np.float32)
     position = np.stack(np.broadcast_arrays(along[:, None], lanes[None]), axis=2)
-    assert motion.smaller_side(position, np.array([0, 0, 4], np.float32)) == pytest.approx(2 / 5)
-    assert motion.smaller_side(position[..., ::-1], np.array([0, 0, 4], np.float32)) == pytest.approx(2 / 5)
-    assert motion.smaller_side(position, np.array([0, 60, 4], np.float32)) == 0.0
+    assert measures.smaller_side(position, np.array([0, 0, 4], np.float32)) == pytest.approx(2 / 5)
+    assert measures.smaller_side(position[..., ::-1], np.array([0, 0, 4], np.float32)) == pytest.approx(2 / 5)
+    assert measures.smaller_side(position, np.array([0, 60, 4], np.float32)) == 0.0
 
 
 def test_unrest_does_not_see_a_common_motion():
     time = np.linspace(0, 5, 50)[:, None, None]
     places = np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]])
-    assert motion.pair_unrest(np.float32(places + time * [3.0, 1.0])) == pytest.approx(0.0, abs=1e-5)
-    assert motion.pair_unrest(np.float32(places * (1 + 0.1 * np.sin(time)))) > 0.1
+    assert measures.pair_unrest(np.float32(places + time * [3.0, 1.0])) == pytest.approx(0.0, abs=1e-5)
+    assert measures.pair_unrest(np.float32(places * (1 + 0.1 * np.sin(time)))) > 0.1
 
 
 def test_a_heading_across_the_wrap_is_continuous():
     heading = np.float32(np.linspace(3.0, 3.5, 20)[:, None] + [[-0.1, 0.1]])
     wrapped = (heading + np.pi) % (2 * np.pi) - np.pi
-    np.testing.assert_allclose(np.ptp(motion.mean_heading(wrapped)), 0.5, atol=1e-5)
+    np.testing.assert_allclose(np.ptp(measures.mean_heading(wrapped)), 0.5, atol=1e-5)
 
 
 def test_windows_are_taken_by_each_series_own_clock():
@@ -283,7 +285,7 @@ def test_eq_24_as_printed_is_of_first_order_and_ours_of_fourth():
 def test_every_alternative_changes_something():
     for assumption, other in ((a, b) for a in ASSUMPTIONS for b in a.alternatives):
         for scenario in other.scenarios:
-            case = sensitivity.case_of(assumption, other, scenario)
+            case = case_of(assumption.name, other, scenario)
             default = Case("default", scenario)
             assert case.load() != default.load() or case.parameters, other.label
     names = [case.name for case in sensitivity.cases()]

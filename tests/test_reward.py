@@ -20,7 +20,7 @@ def mean_return(name, scenario):
     while active.any():
         outcome = task.step(policy.act(task.swarm.percept))
         total += np.where(active, outcome.reward.mean(axis=1), 0.0)
-        active &= ~(task.swarm.arrived | task.swarm.timed_out)
+        active &= ~task.swarm.ended
     return total
 
 
@@ -105,7 +105,7 @@ def test_a_lost_vehicle_is_charged_more_than_staying_could_cost():
         task = Task(scenario)
         task.reset(0)
         total[scenario] = np.zeros(6)
-        while not task.swarm.timed_out[0]:
+        while not task.swarm.ended[0]:
             total[scenario] += task.step(idle).reward[0]
         victim = task.swarm.course.losses[0]
         if len(victim):
@@ -123,7 +123,7 @@ def test_dying_never_pays_the_one_who_dies(reward):
         task.reset(3)
         lost += task.swarm.course.losses[0].tolist()
         total = np.zeros(12)
-        while not task.swarm.timed_out[0]:
+        while not task.swarm.ended[0]:
             outcome = task.step(np.zeros((1, 12, 2), np.float32))
             total += outcome.reward[0] * (outcome.terminated[0] | task.swarm.state.alive[0])
         totals.append(total)

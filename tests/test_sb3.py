@@ -126,8 +126,13 @@ def test_options_reach_the_rows():
     assert [done.all() for _, _, done, _ in outcomes] == [False, False, True]
     assert all(0.0 <= info["episode"]["t"] < 60.0 for info in outcomes[-1][3])
     assert outcomes[-1][3][0]["episode"]["r"] == 7.5
-    with pytest.raises(ValueError, match=r"must have shape \(8, 2\), a row per vehicle, got \(2, 8\)"):
+    with pytest.raises(ValueError, match=r"actions, a row per vehicle, must have shape \(8, 2\), got \(2, 8\)"):
         env.step(actions.T)
+    assert outcomes[-1][3][0]["ending"] == "time_limit"
+    with pytest.raises(RuntimeError, match="step_wait came before step_async"):
+        env.step_wait()
+    with pytest.raises(TypeError, match="seed must be a whole number from 0, got 1.5"):
+        env.seed(1.5)
 
 
 @pytest.mark.needs("pygame")

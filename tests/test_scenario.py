@@ -1,17 +1,22 @@
 """Scenarios: sources, overrides, and errors that name the field, the value and the remedy."""
 
 import re
+import subprocess
+import sys
 import tomllib
 from importlib import resources
 
+import numpy as np
 import pytest
 
-from tests.conftest import SCENARIOS
+from tests.conftest import SCENARIOS as LARGE
 from uuv_marl import load_scenario, scenario_names
+from uuv_marl.scenario_checks import warn_of_speed
 from uuv_marl.scenario_files import ScenarioError, parse_override, show, to_toml
 
 FOLDER = resources.files("uuv_marl") / "scenarios"
 BASE = "single_obstacle"
+SCENARIOS = (*LARGE, "starter")
 
 
 def test_the_shipped_scenarios():
@@ -38,7 +43,7 @@ def test_the_papers_scenarios_differ_only_in_what_the_paper_says(name):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_toml_out_and_in_again(name, tmp_path):
-    scenario = load_scenario(name, num_vehicles=20)
+    scenario = load_scenario(name, num_vehicles=8)
     path = tmp_path / f"{name}.toml"
     path.write_text(to_toml(scenario))
     assert load_scenario(path) == scenario
@@ -90,12 +95,14 @@ def test_overrides_from_the_command_line(text, expected):
     assert parse_override(text) == expected
 
 
+CYCLE = {}
+CYCLE["again"] = CYCLE
 BAD = [
-    ({"sonar.arrays.bow.range_m": -3}, "sonar.arrays.bow.range_m must be positive, got -3"),
-    ({"vehicle.m_kg": float("nan")}, "vehicle.m_kg must be .*got nan"),
-    ({"trajectory.speed_mps": float("inf")}, "trajectory.speed_mps must be a finite number"),
+    ({"sonar.arrays.bow.range_m": -3}, r"sonar.arrays.bow.range_m must lie within 0.001 to 4,096, got -3"),
+    ({"vehicle.m_kg": float("nan")}, "vehicle.m_kg must lie within 0.001 to 1,000,000, got nan"),
+    ({"trajectory.speed_mps": float("inf")}, "trajectory.speed_mps must lie within 0.01 to 100, got inf"),
     ({"swarm.num_vehicles": 2.5}, "swarm.num_vehicles must be a whole number, got 2.5"),
-    ({"swarm.num_vehicles": 0}, "swarm.num_vehicles must be positive, got 0"),
+    ({"swarm.num_vehicles": 0}, "swarm.num_vehicles must lie within 1 to 16,384, got 0"),
     ({"vehicle.m_kgg": 3.0}, "vehicle.m_kgg is unknown; did you mean 'm_kg'"),
     ({"sonar.arrays.stern.range_m": 3.0}, "no entry 'stern'; use one of bow, port, starboard"),
     ({"sonar.echo_reports": "nothing"}, "sonar.echo_reports must be 'centre' or 'surface', got 'nothing'"),
@@ -107,7 +114,7 @@ BAD = [
     ({"start.speed_min_mps": 5.0}, "start.speed_min_mps must not exceed"),
     ({"obstacles.0.centre_m": [130.0, 130.0]}, "obstacles.0 at .* lies on the start"),
     ({"obstacles.0.centre_m": [610.0, 600.0]}, "obstacles.0 at .* lies on the trajectory's end"),
-    ({"obstacles.0.radius_m": 0.0}, "obstacles.0.radius_m must be positive, got 0"),
+    ({"obstacles.0.radius_m": 0.0}, "obstacles.0.radius_m must lie within 0.001 to 4,096, got 0"),
     ({"vehicle.N_r": 500.0, "vehicle.N_rr": 1000.0}, "timing.integration_step_s = 0.1 is too long .* use at most"),
     ({"vehicle.N_r": 2500.0}, "timing.integration_step_s = 0.1 is too long"),
     ({"actuators.yaw_damping_nms": 2000.0}, "actuators.yaw_damping_nms = 2000 is unstable .* use less than 1600"),
@@ -123,6 +130,32 @@ BAD = [
     ({"sonar.arrays.bow.sub_sectors": 1, "sonar.arrays.bow.aperture_deg": 200.0}, "use at least 2"),
     ({"sonar.channels": ["link", "link"]}, "sonar.channels must name each channel once"),
     ({"nonsense": 1}, "nonsense is unknown"),
+    ({"num_vehicles": 20}, "num_vehicles is unknown; did you mean 'swarm.num_vehicles'"),
+    ({"speed": 3.0}, "speed is unknown; did you mean 'trajectory.speed_mps'"),
+    ({"arrival.radius": 3.0}, "arrival.radius is unknown; did you mean 'radius_m'"),
+    ({5: 1}, "5 is unknown"),
+    ({"": 1}, "'' is unknown"),
+    ({"vehicle": CYCLE}, "nested too deeply"),
+    ({".".join("a" * 3000): 1}, "nested too deeply"),
+    ({"sonar.arrays.².range_m": 5.0}, "there is no entry '²'"),
+    ({"sonar.arrays.0.name": ""}, "sonar.arrays.0.name must not be empty"),
+    ({"vehicle.X_u": 1e308}, "vehicle.X_u must lie within 0 to 1,000,000"),
+    ({"vehicle.Y_r": -1e308}, "vehicle.Y_r must lie within -1,000,000 to 1,000,000"),
+    ({"vehicle.m_kg": 10**5000}, "vehicle.m_kg must be a number, got int that is too large to show"),
+    ({"actuators.max_torque_nm": 1e308}, "actuators.max_torque_nm must lie within 0.001 to 1,000,000"),
+    ({"arrival.dwell_s": 1e9}, "arrival.dwell_s must lie within 0 to 3,600"),
+    ({"trajectory.speed_mps": 1e6}, "trajectory.speed_mps must lie within 0.01 to 100"),
+    ({"trajectory.waypoints_m": [[0.0, 0.0], [1e17, 0.0]]}, "trajectory.waypoints_m.1.0 must lie within"),
+    ({"obstacles": [{"centre_m": [1e5, 1e5], "radius_m": 1.0}] * 2000}, "obstacles must have at most 1024 entries"),
+    (
+        {"timing.decision_period_s": 1000.0},
+        "timing.decision_period_s must be at most the shortest time limit = 298.649",
+    ),
+    ({"timing.decision_period_s": 10.0, "timing.integration_step_s": 0.0001}, "takes 100,000 steps .*at most 10,000"),
+    ({"disturbance.loss_times_s": [5.0, 1e9]}, "disturbance.loss_times_s.1 must lie within 0 to 1,000,000"),
+    ({"vehicle.X_udot_kg": -1000.0}, "timing.integration_step_s = 0.1 is too long .* use at most 0.05"),
+    ({"actuators.max_force_n": 86797.0, "vehicle.Y_vv": 44.6}, "max_force_n = 86797 .* use at most"),
+    ({"actuators.max_torque_nm": 43621.0, "vehicle.N_rr": 1.55}, "max_torque_nm = 43621; use at most"),
     ({"swarm.num_vehicles.deep": 1}, "swarm.num_vehicles.deep is unknown"),
 ]
 
@@ -178,8 +211,6 @@ def test_broken_files_are_named(tmp_path):
     ("n_r", "n_rr", "diverges"), [(500.0, 1000.0, True), (2500.0, 100.0, True), (50.0, 100.0, False)]
 )
 def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
-    import numpy as np
-
     from uuv_marl.sim.vehicle import advance, plant
 
     p = plant(load_scenario(BASE))._replace(N_r=n_r, N_rr=n_rr)
@@ -188,3 +219,117 @@ def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
         angle = rng.uniform(0, 2 * np.pi)
         state = advance(*state, 3000 * np.cos(angle), 3000 * np.sin(angle), 0.1, p)
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
+        ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of lossy, .* or a path ending in .toml"),
+        ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
+        ({"num_vehicles": True}, "swarm.num_vehicles must be a whole number, got True"),
+        ({"num_vehicles": 2.5}, "swarm.num_vehicles must be a whole number, got 2.5"),
+        ({"overrides": "x"}, "overrides must be a dictionary of fields and values, got 'x'"),
+    ],
+)
+def test_bad_arguments_are_named(arguments, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(**{"scenario": BASE, **arguments})
+
+
+@pytest.mark.parametrize("text", ["x=" + "[" * 3000, "x=" + "9" * 5000, "swarm.num_vehicles=1\nfoo=2", "=3"])
+def test_what_the_command_line_cannot_mean_is_refused(text):
+    with pytest.raises(ScenarioError, match="--set"):
+        parse_override(text)
+
+
+def test_a_circle_of_files_is_seen_through_its_paths(tmp_path):
+    for here, there in (("e", "f"), ("f", "e")):
+        (tmp_path / here).mkdir()
+        (tmp_path / here / "x.toml").write_text(f'extends = "../{there}/x.toml"\n')
+    with pytest.raises(ScenarioError, match="must not lead back"):
+        load_scenario(tmp_path / "e" / "x.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = " + "[" * 3000, "nested too deeply"),
+        ("x = " + "9" * 5000, "not valid TOML"),
+        ("x = 1 #" + " " * 1_000_000, "no scenario: it has more than 1,000,000 bytes"),
+    ],
+)
+def test_files_that_are_too_much_are_refused(tmp_path, text, message):
+    (tmp_path / "much.toml").write_text(text)
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(tmp_path / "much.toml")
+
+
+FORMS = {
+    "tables": "[vehicle]\nm_kg = 300.0\n[trajectory]\nspeed_mps = 2.5  # my ship's log\n",
+    "inline": "vehicle = {m_kg = 300.0}\ntrajectory = {speed_mps = 2.5}  # my ship's log\n",
+    "dotted": "vehicle.m_kg = 300.0\ntrajectory.speed_mps = 2.5  # my ship's log\n",
+    "no obstacles": "obstacles = []\n[vehicle]\nm_kg = 300.0\n",
+    "other arrays": "obstacles = [{centre_m = [350.0, 350.0], radius_m = 20.0}]\nvehicle.m_kg = 300.0\n"
+    "[[sonar.arrays]]\n"
+    'name = "all"\nkind = "active"\nmounting_deg = 0.0\naperture_deg = 360.0\nrange_m = 80.0\nsub_sectors = 9\n',
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_is_shown_loads_and_names_the_users_file(form, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(f'extends = "single_obstacle"\n{FORMS[form]}')
+    shown = show(path)
+    assert "m_kg = 300.0  # mine.toml" in shown
+    assert "I_z_kgm2 = 50.0  # Repoulias" in shown
+    assert "speed_mps = 2.5  # section" not in shown
+    if form in ("tables", "dotted"):
+        assert "speed_mps = 2.5  # my ship's log" in shown
+    if form == "other arrays":
+        assert "radius_m = 20.0  # mine.toml" in shown or "radius_m = 20.0}" in shown
+        assert "sub_sectors = 9  # mine.toml" in shown
+    before = load_scenario(path)
+    path.write_text(shown)
+    assert load_scenario(path) == before
+
+
+def test_a_speed_that_no_vehicle_holds_is_said_once(caplog):
+    warn_of_speed.cache_clear()
+    for _ in range(2):
+        load_scenario(BASE, overrides={"trajectory.speed_mps": 30.0})
+    assert [record.getMessage()[:26] for record in caplog.records] == ["trajectory.speed_mps = 30 "]
+
+
+VEHICLE = ("m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "N_rdot_kgm2", "X_u", "Y_v", "N_r", "X_uu", "Y_vv", "N_rr")
+
+
+def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
+    from uuv_marl.sim.vehicle import advance, plant
+
+    rng, base, accepted = np.random.default_rng(5), load_scenario(BASE), 0
+    for _ in range(30):
+        scale = dict(zip(VEHICLE, np.exp(rng.uniform(-2.3, 2.3, len(VEHICLE))), strict=True))
+        changes = {f"vehicle.{name}": getattr(base.vehicle, name) * float(k) for name, k in scale.items()}
+        force, torque = 3000.0 * np.exp(rng.uniform(-3.4, 3.4, 2))
+        changes |= {"actuators.max_force_n": float(force), "actuators.max_torque_nm": float(torque)}
+        try:
+            p = plant(load_scenario(base, overrides=changes))
+        except ScenarioError:
+            continue
+        accepted += 1
+        for hold in (1, 10, 100, 600):
+            state = (0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
+            for angle in np.repeat(rng.uniform(0.0, 2 * np.pi, 600 // hold), hold):
+                state = advance(*state, force * np.cos(angle), torque * np.sin(angle), 0.1, p)
+            assert np.isfinite(state).all(), changes
+    assert accepted > 5
+
+
+def test_light_commands_import_nothing_heavy():
+    code = (
+        "import sys; from typer.testing import CliRunner; from uuv_marl.cli import app\n"
+        "for command in ('scenarios', 'policies'): assert CliRunner().invoke(app, [command]).exit_code == 0\n"
+        "assert not {'matplotlib', 'scipy.stats'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

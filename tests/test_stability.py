@@ -10,7 +10,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.reproduce import formation, rest, softening, stability
-from uuv_marl.reproduce.columns import read_columns, write_columns
+from uuv_marl.reproduce.study import read_columns, write_columns
 from uuv_marl.sim.swarm import Swarm
 
 GAINS = Gains()

@@ -296,7 +296,7 @@ def test_contact_ends_the_vehicles_only_where_the_scenario_says_so(place):
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        (np.zeros((1, 3, 2)), "float32"),
+        (np.zeros((1, 3, 2), complex), "real numbers"),
         (np.zeros((1, 2, 2), np.float32), r"\(1, 3, 2\)"),
         (np.full((1, 3, 2), np.nan, np.float32), "finite, got nan for vehicle 0 of world 0"),
     ],

@@ -11,11 +11,20 @@ from tensordict.nn.distributions import NormalParamExtractor
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # TorchRL 0.14 deprecates parts of itself as it is imported.
     from torchrl.collectors import Collector
-    from torchrl.envs import Compose, FrameSkipTransform, InitTracker, RewardSum, TransformedEnv
+    from torchrl.envs import (
+        Compose,
+        FrameSkipTransform,
+        GymWrapper,
+        InitTracker,
+        PettingZooWrapper,
+        RewardSum,
+        TransformedEnv,
+    )
     from torchrl.envs.utils import check_env_specs
     from torchrl.modules import MultiAgentMLP, ProbabilisticActor, TanhNormal
     from torchrl.objectives import ClipPPOLoss, ValueEstimators
 
+import uuv_marl
 from uuv_marl.envs.torchrl import SwarmEnv
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
@@ -147,3 +156,33 @@ def test_ppo_loss_trains_with_the_collector(actor, scenario):
     after = torch.nn.utils.parameters_to_vector(actor.parameters())
     assert torch.isfinite(after).all()
     assert not torch.equal(before, after)
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
+def test_torchrls_wrapper_of_gymnasium_environments(mode):
+    options = {"num_vehicles": 4, "decision_period": 0.5, "overrides": SHORT}
+    env = GymWrapper(uuv_marl.vector_env(3, "random_field", autoreset_mode=mode, **options))
+    check_env_specs(env)
+    data = env.rollout(40, break_when_any_done=False)
+    over = data["next", "done"].squeeze(-1)
+    assert over.sum() >= 6
+    assert data["observation"].shape == (3, 40, 4, 98)
+    first, last = data["observation"][:, 1:][over[:, :-1]], data["next", "observation"][:, :-1][over[:, :-1]]
+    assert not torch.equal(first, last), "the new episode's observation, and the old one's last"
+    assert (data["observation"][:, 1:] == data["next", "observation"][:, :-1])[~over[:, :-1]].all()
+    with pytest.raises(RuntimeError, match="must be one of SAME_STEP or DISABLED"):
+        GymWrapper(uuv_marl.vector_env(1, autoreset_mode="NextStep", **options))
+
+
+@pytest.mark.parametrize("scenario", ["random_field", "lossy"])
+def test_torchrls_wrapper_of_pettingzoo_environments(scenario):
+    overrides = LOSSES if scenario == "lossy" else SHORT
+    inner = uuv_marl.parallel_env(scenario, num_vehicles=4, decision_period=0.5, overrides=overrides)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "PettingZoo in TorchRL is tested using version")
+        env = PettingZooWrapper(inner, return_state=True, use_mask=True)
+    check_env_specs(env)
+    data = env.rollout(60, break_when_any_done=False)
+    assert data["uuv", "observation"].shape == (60, 4, 98)
+    assert data["state"].shape == (60, inner.state_space.shape[0])
+    assert data["next", "done"].any()

@@ -69,9 +69,9 @@ def test_seeds_per_world_and_masks():
     with pytest.raises(ValueError, match="one seed for each of 3 worlds, got 2"):
         env.reset(seed=[1, 2])
     for bad in (-5, -1, [1, -2, 3]):
-        with pytest.raises(ValueError, match="seed must not be negative"):
+        with pytest.raises(ValueError, match="seed must be a whole number from 0, got -"):
             env.reset(seed=bad)
-    with pytest.raises(TypeError):
+    with pytest.raises(TypeError, match="seed must be a whole number from 0, got 1.5"):
         env.reset(seed=[1.5, 2, 3])
     for large in (2**63 - 1, 2**64):
         assert env.reset(seed=large)[0].tobytes() == env.reset(seed=large)[0].tobytes()
@@ -101,8 +101,83 @@ def test_without_autoreset_an_ended_world_waits_unpaid():
     np.testing.assert_array_equal(again[0], observation[0])
     *_, truncated, _ = env.step(random_actions(env, 1)[0])
     np.testing.assert_array_equal(truncated, ~mask)
-    with pytest.raises(ValueError, match="must be SAME_STEP or DISABLED"):
-        short(autoreset_mode=AutoresetMode.NEXT_STEP)
+
+
+def test_gymnasiums_default_autoreset():
+    """NEXT_STEP: what Gymnasium's own ``SyncVectorEnv`` does, step by step; the run is that of SAME_STEP."""
+    env, same = short(autoreset_mode="NextStep", max_cycles=9), short(max_cycles=9)
+    assert env.autoreset_mode is env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert same.autoreset_mode is AutoresetMode.SAME_STEP
+    first, _ = env.reset(seed=3)
+    np.testing.assert_array_equal(same.reset(seed=3)[0], first)
+    rng, ends = np.random.default_rng(2), 0
+    for _ in range(4):
+        over = np.zeros(3, bool)
+        while not over.any():
+            actions = rng.uniform(-1, 1, (3, 5, 2)).astype(np.float32)
+            observation, reward, terminated, truncated, infos = env.step(actions)
+            theirs, paid, *_, known = same.step(actions)
+            np.testing.assert_array_equal(reward, paid)
+            over = terminated | truncated
+        assert over.all()
+        assert not infos["agent_mask"].any()
+        assert infos["ending"].tolist() == known["final_info"]["ending"].tolist() == ["time_limit"] * 3
+        assert infos["_ending"].all()
+        for w in range(3):
+            np.testing.assert_array_equal(observation[w], known["final_obs"][w])
+        observation, reward, terminated, truncated, infos = env.step(actions)
+        np.testing.assert_array_equal(observation, theirs)
+        ended = ("agent_terminated", "agent_truncated", "agent_reward")
+        assert not any(part.any() for part in (reward, terminated, truncated, *(infos[name] for name in ended)))
+        assert "ending" not in infos
+        assert infos["agent_mask"].all()
+        ends += 1
+    assert ends == 4
+
+
+def test_a_reset_by_hand_comes_before_the_next_steps():
+    env = short(autoreset_mode=AutoresetMode.NEXT_STEP, max_cycles=1)
+    env.reset(seed=0)
+    actions = np.zeros((3, 5, 2), np.float32)
+    env.step(actions)
+    begun, _ = env.reset(seed=[7, 8, 9], options={"reset_mask": np.array([False, True, False])})
+    _, _, _, truncated, _ = env.step(actions)
+    assert truncated.tolist() == [False, True, False], "world 1 was stepped, the others were reset"
+    np.testing.assert_array_equal(begun[1], short(1).reset(seed=8)[0][0])
+
+
+class Alone(gymnasium.Env):
+    """One world as a plain Gymnasium environment, for Gymnasium's own ``SyncVectorEnv``."""
+
+    def __init__(self):
+        self.env = short(1, max_cycles=4, autoreset_mode="Disabled")
+        self.observation_space, self.action_space = self.env.single_observation_space, self.env.single_action_space
+
+    def reset(self, *, seed=None, options=None):
+        return self.env.reset(seed=seed)[0][0], {}
+
+    def step(self, action):
+        observation, reward, terminated, truncated, infos = self.env.step(action[None])
+        info = {"ending": infos["ending"][0]} if "ending" in infos else {}
+        return observation[0], reward[0], terminated[0], truncated[0], info
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+def test_resets_come_when_gymnasiums_own_vectoriser_makes_them(mode):
+    ours = short(2, max_cycles=4, autoreset_mode=mode)
+    theirs = gymnasium.vector.SyncVectorEnv([Alone, Alone], autoreset_mode=mode)
+    np.testing.assert_array_equal(ours.reset(seed=6)[0], theirs.reset(seed=6)[0])
+    for actions in random_actions(ours, 20):
+        *mine, my_infos = ours.step(actions)
+        *given, infos = theirs.step(actions)
+        for a, b in zip(mine, given, strict=True):
+            np.testing.assert_array_equal(a, b)
+        if mode is AutoresetMode.SAME_STEP:
+            assert ("final_obs" in my_infos) == ("final_obs" in infos)
+            my_infos, infos = my_infos.get("final_info", {}), infos.get("final_info", {})
+        assert ("ending" in my_infos) == ("ending" in infos)
+        if "ending" in infos:
+            assert my_infos["ending"].tolist() == infos["ending"].tolist()
 
 
 def test_observations_handed_out_stay_as_they_are():
@@ -149,6 +224,44 @@ def test_gymnasium_wrappers_work():
         assert infos[0]["agent_reward"].shape == (5,)
         assert infos[0]["reward_terms"]["effort"].shape == (5,)
     assert seen >= 6
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
+def test_wrappers_that_change_observations_work_where_gymnasium_lets_them(mode):
+    names = ["FlattenObservation", "DtypeObservation", "ReshapeObservation"]
+    names += ["NormalizeObservation"] if mode == "NextStep" else []
+    arguments = {"DtypeObservation": (np.float32,), "ReshapeObservation": ((5 * 98,),)}
+    for name in names:
+        env = getattr(wrappers, name)(short(autoreset_mode=mode, max_cycles=4), *arguments.get(name, ()))
+        env.reset(seed=0)
+        ended = 0
+        for action in random_actions(short(), 12):
+            _, _, terminated, truncated, _ = env.step(action.reshape(env.action_space.shape))
+            over = terminated | truncated
+            ended += int(over.sum())
+            if mode == "Disabled" and over.any():
+                env.reset(options={"reset_mask": over})
+        assert ended >= 6, name
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+def test_solo_in_gymnasiums_own_vectoriser_tells_how_it_ended(mode):
+    options = {"scenario": "random_field", "num_vehicles": 4, "decision_period": 0.5, "max_cycles": 3}
+    envs = gymnasium.make_vec(
+        "uuv_marl/Solo-v0",
+        2,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": AutoresetMode(mode)},
+        **options,
+    )
+    envs = wrappers.RecordEpisodeStatistics(envs)
+    envs.reset(seed=0)
+    *_, truncated, infos = [envs.step(np.zeros((2, 2), np.float32)) for _ in range(3)][-1]
+    assert truncated.all()
+    assert infos["episode"]["l"].tolist() == [3, 3]
+    told = infos["final_info"] if mode == "SameStep" else infos
+    assert told["ending"].tolist() == ["time_limit"] * 2
+    assert told["is_success"].tolist() == [False, False]
 
 
 def test_final_info_tells_how_a_world_ended():
@@ -218,6 +331,9 @@ def test_bad_actions_and_order():
     bad[1, 2] = np.nan
     with pytest.raises(ValueError, match="vehicle 2 of world 1"):
         env.step(bad)
+    for wrong in ("ab", bad * 1j, np.ma.masked_invalid(bad), [[0.1], [0.2, 0.3]], {}):
+        with pytest.raises(ValueError, match="action must hold real numbers, got"):
+            env.step(wrong)
 
 
 def test_registries():
@@ -300,7 +416,7 @@ def test_solo_takes_the_options_of_the_parallel_environment():
 def test_solo_says_what_is_wrong():
     env = solo()
     env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"must be finite and of shape \(2,\), got \[nan, 0.0\]"):
+    with pytest.raises(ValueError, match=r"the action must be finite, got \[nan, 0.0\]"):
         env.unwrapped.step([np.nan, 0.0])
     with pytest.raises(baselines.PolicyError, match="did you mean 'bio_inspired'"):
         solo("bio_inspird")

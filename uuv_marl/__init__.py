@@ -47,4 +47,9 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'uuv_marl' has no attribute {name!r}")
 
 
+def __dir__() -> list[str]:
+    """The public names, for tab completion: they are imported on first use."""
+    return sorted(__all__)
+
+
 registration.register()

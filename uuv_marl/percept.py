@@ -5,6 +5,7 @@ dividing by them (the observation) and multiplying again loses nothing.
 """
 
 import dataclasses
+import difflib
 import functools
 import math
 from typing import NamedTuple
@@ -57,6 +58,7 @@ class Offsets(NamedTuple):
     link_velocity: int
 
 
+@functools.cache
 def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = ()) -> tuple[PerceptField, ...]:
     """The fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
     position = ("m", _POSITION_SCALE_M, -MAX_RANGE_M, MAX_RANGE_M)
@@ -65,18 +67,18 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
     table = [
         PerceptField("velocity", (2,), *speed, "own surge and sway velocity"),
         PerceptField("yaw_rate", (1,), "rad/s", 1.0, -MAX_SPEED, MAX_SPEED, "own yaw rate"),
-        PerceptField("reference", (2,), *position, "from the vehicle to l(t); saturates, direction kept"),
+        PerceptField("reference", (2,), *position, "vector to the reference point l(t); a longer one is cut to 4096 m"),
         PerceptField("reference_velocity", (2,), *speed, "velocity of the reference point"),
-        PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard"),
-        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: nearest vehicle's position, else 0"),
-        PerceptField("echo", (num_active,), *flag, "per active sub-sector: 1 if an obstacle echoes"),
+        PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
+        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: that vehicle's position, else 0"),
+        PerceptField("echo", (num_active,), *flag, "per active sub-sector: 1 if an obstacle returns an echo, else 0"),
         PerceptField(
             "echo_range", (num_active,), "m", _POSITION_SCALE_M, 0.0, MAX_RANGE_M,
-            "per active sub-sector: range of the nearest obstacle's surface in the beam, else 0",
+            "per active sub-sector: range to the nearest obstacle's surface in it, else 0",
         ),
         PerceptField(
             "echo_position", (num_active, 2), *position,
-            "per active sub-sector: the obstacle's centre, or the surface point heard (sonar.echo_reports), else 0",
+            "per active sub-sector: position of its centre, or of that surface point (sonar.echo_reports), else 0",
         ),
     ]  # fmt: skip
     if "compass" in channels:
@@ -87,7 +89,7 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
                 "link_identity", (num_sectors,), "1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES,
                 "per sub-sector: 1 + index of the vehicle heard, else 0",
             ),
-            PerceptField("link_velocity", (num_sectors, 2), *speed, "per sub-sector: velocity of the vehicle heard"),
+            PerceptField("link_velocity", (num_sectors, 2), *speed, "per sub-sector: velocity of that vehicle, else 0"),
         ]  # fmt: skip
     return tuple(table)
 
@@ -139,21 +141,34 @@ class PerceptLayout:
         return np.repeat(np.array(values, np.float32), [field.size for field in self.table])
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Percept:
     """What vehicles know: ``flat`` of shape (..., layout.size), float32, physical units; its fields as views.
 
     ``velocity`` (..., 2), ``yaw_rate`` (..., 1), ``reference`` (..., 2), ``reference_velocity`` (..., 2),
     ``heard`` (..., sector), ``neighbour`` (..., sector, 2), ``echo`` (..., active), ``echo_range`` (..., active),
     ``echo_position`` (..., active, 2), and where granted ``compass`` (..., 2), ``link_identity`` (..., sector),
-    ``link_velocity`` (..., sector, 2). Any of them by ``percept["name"]``.
+    ``link_velocity`` (..., sector, 2). Any of them by ``percept["name"]``; ``percept.names`` lists those there are.
     """
 
     flat: Float32
     layout: PerceptLayout
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The fields that ``percept["name"]`` gives, in the order of the flat vector."""
+        return tuple(self.layout.starts)
+
+    def __repr__(self) -> str:
+        fields = ", ".join(f"{name} {self[name].shape}" for name in self.names)
+        return f"Percept(flat {self.flat.shape}; {fields})"
+
     def __getitem__(self, name: str) -> Float32:
-        """A field by name, as a view. Raises KeyError where the channel is not granted."""
+        """A field by name, as a view. Raises KeyError where there is none, or where its channel is not granted."""
+        if name not in self.layout.starts:
+            near = difflib.get_close_matches(str(name), self.names, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise KeyError(f"percept has no field {name!r}; {hint}It has {', '.join(self.names)}")
         start = self.layout.starts[name]
         field = next(field for field in self.layout.table if field.name == name)
         return self.flat[..., start : start + field.size].reshape(*self.flat.shape[:-1], *field.shape)

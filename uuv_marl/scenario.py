@@ -8,7 +8,8 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from uuv_marl import scenario_checks
 
@@ -17,10 +18,28 @@ MAX_RANGE_M = 4096.0
 NOMINAL_VEHICLES = 54
 """The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-NonPositive = Annotated[float, Field(le=0, allow_inf_nan=False)]
+
+def within(low: float, high: float) -> AfterValidator:
+    """The range in which a number is plausible, both ends included."""
+
+    def check(value: float) -> float:
+        if not low <= value <= high:
+            limits = {"low": f"{low:,.9g}", "high": f"{high:,.9g}"}
+            raise PydanticCustomError("range", "must lie within {low} to {high}", limits)
+        return value
+
+    return AfterValidator(check)
+
+
+Signed = Annotated[float, within(-1_000_000, 1_000_000)]
+Positive = Annotated[float, within(0.001, 1_000_000)]
+NonNegative = Annotated[float, within(0, 1_000_000)]
+NonPositive = Annotated[float, within(-1_000_000, 0)]
+Speed = Annotated[float, within(0, 100)]
+Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
+Clock = Annotated[float, within(0.0001, 3_600)]
+Legs = Annotated[int, within(1, 8)]
+Discs = Annotated[int, within(0, 64)]
 Channel = Literal["compass", "link"]
 
 
@@ -33,7 +52,7 @@ class Section(BaseModel):
 class Swarm(Section):
     """How many."""
 
-    num_vehicles: Annotated[int, Field(gt=0, le=16384)]
+    num_vehicles: Annotated[int, within(1, 16_384)]
     """Vehicles at the start."""
 
 
@@ -48,9 +67,9 @@ class Start(Section):
     """Between the two."""
     spacing_m: Positive
     """Smallest distance between two vehicles at the start."""
-    speed_min_mps: NonNegative
+    speed_min_mps: Speed
     """Lowest initial surge speed; uniform, with uniform heading."""
-    speed_max_mps: NonNegative
+    speed_max_mps: Speed
     """Highest initial surge speed."""
 
     def sides(self, num_vehicles: int) -> tuple[float, float]:
@@ -69,9 +88,9 @@ class Start(Section):
 class Trajectory(Section):
     """The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest."""
 
-    speed_mps: Positive
+    speed_mps: Annotated[float, within(0.01, 100)]
     """Speed along the polyline."""
-    waypoints_m: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=2)] | None = None
+    waypoints_m: Annotated[tuple[tuple[Signed, Signed], ...], Field(min_length=2, max_length=1024)] | None = None
     """North and east of each corner; absent where ``random_field`` draws them."""
 
     @property
@@ -84,24 +103,24 @@ class Trajectory(Section):
 class Obstacle(Section):
     """A disc."""
 
-    centre_m: tuple[Finite, Finite]
+    centre_m: tuple[Signed, Signed]
     """North and east of the centre."""
-    radius_m: Positive
+    radius_m: Radius
     """Radius."""
 
 
 class RandomField(Section):
     """Distribution of trajectories and obstacles, one draw per episode."""
 
-    legs: tuple[int, int]
+    legs: tuple[Legs, Legs]
     """Fewest and most legs."""
     leg_length_m: tuple[Positive, Positive]
     """Shortest and longest leg."""
-    turn_max_deg: Annotated[float, Field(ge=0, le=150)]
+    turn_max_deg: Annotated[float, within(0, 150)]
     """Sharpest turn between legs."""
-    obstacles: tuple[int, int]
+    obstacles: tuple[Discs, Discs]
     """Fewest and most obstacles wished for; where the field is full there are fewer."""
-    radius_m: tuple[Positive, Positive]
+    radius_m: tuple[Radius, Radius]
     """Smallest and largest radius."""
     offset_max_m: NonNegative
     """Largest distance of an obstacle's centre from the trajectory."""
@@ -114,10 +133,6 @@ class RandomField(Section):
             low, high = getattr(self, name)
             if low > high:
                 raise ValueError(f"random_field.{name} must be [low, high] with low <= high, got [{low}, {high}]")
-        if self.legs[0] < 1 or self.legs[1] > 8:
-            raise ValueError(f"random_field.legs must lie within 1 to 8, got {list(self.legs)}")
-        if self.obstacles[0] < 0 or self.obstacles[1] > 64:
-            raise ValueError(f"random_field.obstacles must lie within 0 to 64, got {list(self.obstacles)}")
         return self
 
 
@@ -126,20 +141,20 @@ class Vehicle(Section):
 
     m_kg: Positive
     I_z_kgm2: Positive
-    x_G_m: Finite
+    x_G_m: Annotated[float, within(-100, 100)]
     X_udot_kg: NonPositive
     Y_vdot_kg: NonPositive
-    Y_rdot_kgm: Finite
+    Y_rdot_kgm: Signed
     N_rdot_kgm2: NonPositive
     X_u: NonNegative
     Y_v: NonNegative
-    Y_r: Finite
-    N_v: Finite
+    Y_r: Signed
+    N_v: Signed
     N_r: NonNegative
     X_uu: NonNegative
     Y_vv: NonNegative
-    Y_rr: Finite
-    N_rv: Finite
+    Y_rr: Signed
+    N_rv: Signed
     N_rr: NonNegative
 
 
@@ -150,7 +165,7 @@ class Actuators(Section):
     """Surge force at full action, ahead or astern."""
     max_torque_nm: Positive
     """Yaw torque at full action."""
-    lever_arm_m: Positive
+    lever_arm_m: Annotated[float, within(0.001, 1_000)]
     """Turns the sideways component of a desired force into a torque (Eq. 22)."""
     yaw_damping_nms: NonNegative
     """Inner loop: torque -c r, added within the torque limit."""
@@ -163,13 +178,13 @@ class SonarArray(Section):
     """Unique within the suite."""
     kind: Literal["active", "passive"]
     """Only active arrays hear obstacles."""
-    mounting_deg: Annotated[float, Field(ge=-360, le=360)]
+    mounting_deg: Annotated[float, within(-360, 360)]
     """Direction of the fan's axis, clockwise from the bow."""
-    aperture_deg: Annotated[float, Field(gt=0, le=360)]
+    aperture_deg: Annotated[float, within(0.01, 360)]
     """Width of the fan."""
-    range_m: Annotated[float, Field(gt=0, le=MAX_RANGE_M)]
+    range_m: Radius
     """Vehicles nearer than this, and obstacles whose surface is, are heard."""
-    sub_sectors: Annotated[int, Field(gt=0, le=64)]
+    sub_sectors: Annotated[int, within(1, 64)]
     """k_a (Eq. 12)."""
 
 
@@ -210,11 +225,11 @@ class Sonar(Section):
 class Timing(Section):
     """Three clocks."""
 
-    control_hold_s: Positive
+    control_hold_s: Clock
     """t_r: body forces are held this long."""
-    integration_step_s: Positive
+    integration_step_s: Clock
     """Runge-Kutta step; divides the control hold."""
-    decision_period_s: Positive
+    decision_period_s: Clock
     """A policy acts this often, a multiple of the control hold; the force is held in the world frame meanwhile."""
 
     @property
@@ -264,7 +279,7 @@ class Arrival(Section):
 
     radius_m: Positive
     """The swarm's centre this close to the end of the trajectory, with l(t) at rest there ..."""
-    dwell_s: NonNegative
+    dwell_s: Annotated[float, within(0, 3_600)]
     """... for so long."""
     spread_m: Positive
     """Every vehicle this close to the end, for up to 54 vehicles."""
@@ -273,7 +288,7 @@ class Arrival(Section):
 class TimeLimit(Section):
     """When it is given up."""
 
-    factor: Positive
+    factor: Annotated[float, within(0.001, 1_000)]
     """Times the trajectory's duration ..."""
     extra_s: NonNegative
     """... plus this."""
@@ -282,7 +297,7 @@ class TimeLimit(Section):
 class Disturbance(Section):
     """What goes wrong."""
 
-    loss_times_s: tuple[NonNegative, ...]
+    loss_times_s: Annotated[tuple[NonNegative, ...], Field(max_length=16384)]
     """At each of these times a vehicle, drawn by the seed, is lost."""
 
 
@@ -300,18 +315,18 @@ class Reward(Section):
 class Scenario(Section):
     """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
     """Set by the loader: the file's name; names results and pictures."""
     title: str
     """One line."""
     source: str
     """Where it comes from."""
-    version: Annotated[int, Field(gt=0)]
+    version: Annotated[int, within(1, 1_000_000)]
     """Raised by any change of its numbers."""
     swarm: Swarm
     start: Start
     trajectory: Trajectory
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: Annotated[tuple[Obstacle, ...], Field(max_length=1024)] = ()
     random_field: RandomField | None = None
     vehicle: Vehicle
     actuators: Actuators
@@ -334,6 +349,7 @@ class Scenario(Section):
         scenario_checks.check_start(self)
         scenario_checks.check_course(self)
         scenario_checks.check_losses(self)
+        scenario_checks.check_times(self)
         scenario_checks.check_vehicle(self)
         return self
 

@@ -3,26 +3,25 @@
 import difflib
 import os
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast, get_args, get_origin
 
 import tomlkit
 from pydantic import ValidationError
 from tomlkit.container import Container
-from tomlkit.items import Array, Item, Table
+from tomlkit.items import AbstractTable
 
+from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario import Scenario
 
 _FOLDER = Path(__file__).resolve().parent / "scenarios"
-_BASE = "base"
+_BASE = _FOLDER / "base.toml"
+_MAX_BYTES = 1_000_000
+_SHOWN = 80
 _EXPLANATIONS = {
-    "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be at least {ge:g}",
-    "less_than": "must be less than {lt:g}",
-    "less_than_equal": "must be at most {le:g}",
-    "finite_number": "must be a finite number",
+    "range": "{message}",
     "float_type": "must be a number",
     "int_type": "must be a whole number",
     "bool_type": "must be true or false",
@@ -33,16 +32,15 @@ _EXPLANATIONS = {
     "model_type": "must be a table of fields",
     "too_short": "must have at least {min_length} entries",
     "too_long": "must have at most {max_length} entries",
+    "string_too_short": "must not be empty",
+    "string_too_long": "must have at most {max_length} characters",
+    "invalid_key": "must be a text",
 }
-
-
-class ScenarioError(ValueError):
-    """A scenario that can't be used; the message says which field, what it is and what to do."""
 
 
 def scenario_names() -> list[str]:
     """Names of the scenarios that ship with the package."""
-    return sorted(path.stem for path in _FOLDER.glob("*.toml") if path.stem != _BASE)
+    return sorted(path.stem for path in _FOLDER.glob("*.toml") if path != _BASE)
 
 
 def load_scenario(
@@ -63,31 +61,38 @@ def load_scenario(
     Raises:
         ScenarioError: names the field, the value and the remedy.
     """
-    if isinstance(scenario, Scenario):
-        data = scenario.model_dump(mode="json", exclude_none=True)
-    else:
-        path = _find(scenario)
-        data = {**_read(path), "name": path.stem}
-    for field, value in (overrides or {}).items():
-        _assign(data, field, value)
-    if num_vehicles is not None:
-        _assign(data, "swarm.num_vehicles", int(num_vehicles) if isinstance(num_vehicles, Integral) else num_vehicles)
+    if not isinstance(overrides, Mapping | None):
+        raise ScenarioError(f"overrides must be a dictionary of fields and values, got {_shown(overrides)}")
+    data: dict[str, Any] = {}
     try:
+        data = _data(scenario)
+        for field, value in (overrides or {}).items():
+            _assign(data, str(field), value)
+        if num_vehicles is not None:
+            whole = isinstance(num_vehicles, Integral) and not isinstance(num_vehicles, bool)
+            _assign(data, "swarm.num_vehicles", int(num_vehicles) if whole else num_vehicles)
         return Scenario.model_validate(_frozen(data))
     except ValidationError as error:
-        raise ScenarioError("\n".join(_explain(dict(e), data) for e in error.errors())) from None
+        raise ScenarioError("\n".join(_explain(dict(e), data) for e in error.errors()[:10])) from None
+    except RecursionError:
+        raise ScenarioError(
+            f"scenario {_shown(scenario)} or its overrides are nested too deeply; flatten them"
+        ) from None
 
 
 def parse_override(text: str) -> tuple[str, object]:
     """``field=value`` as the command line gives it; the value in TOML, a bare word taken as text."""
     field, equals, value = text.partition("=")
-    if not equals or not field.strip():
-        raise ScenarioError(f"--set must look like field=value, got {text!r}; for instance swarm.num_vehicles=20")
+    if not equals or not field.strip() or "\n" in text.strip():
+        raise ScenarioError(
+            f"--set must look like field=value, on one line, got {_shown(text)}; for instance swarm.num_vehicles=20"
+        )
     try:
-        parsed: object = tomllib.loads(f"value = {value}")["value"]
+        return field.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        parsed = value.strip()
-    return field.strip(), parsed
+        return field.strip(), value.strip()
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(f"--set {_shown(field.strip())} can't be read: {error}; give a plain value") from None
 
 
 def to_toml(scenario: Scenario) -> str:
@@ -116,34 +121,48 @@ def _leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
 
 
 def show(name: str | os.PathLike[str]) -> str:
-    """A scenario's complete TOML with the source of every number, its own values over those that all share."""
-    load_scenario(name)  # says what is wrong, where something is
-    document = tomlkit.parse((_FOLDER / f"{_BASE}.toml").read_text(encoding="utf-8"))
-    title = tomlkit.document()
-    for path in reversed(_chain(_find(name))):
-        if path.stem != _BASE:
-            _overlay(cast(Container, document), cast(Container, tomlkit.parse(path.read_text(encoding="utf-8"))), title)
-    return tomlkit.dumps(title) + "\n" + tomlkit.dumps(document)  # pyright: ignore[reportUnknownMemberType]
+    """A scenario's complete TOML with the source of every number: its comment, or the user's file that sets it."""
+    document = tomlkit.parse(to_toml(load_scenario(name)))
+    sources: dict[str, str] = {}
+    for file in reversed(_chain(_find(name))):
+        own = "" if file.path.parent == _FOLDER else f"# {file.path.name}"
+        sources |= {field: item.trivia.comment or own for field, item in _items(tomlkit.parse(file.text))}
+    for field, item in _items(document):
+        if "." in field and sources.get(field):
+            item.trivia.comment_ws, item.trivia.comment = "  ", sources[field]
+    return tomlkit.dumps(document)  # pyright: ignore[reportUnknownMemberType]
 
 
-def _overlay(document: Container, changes: Container, title: Any) -> None:
-    for key, item in changes.items():
-        if not isinstance(item, (Table, list)) or isinstance(item, Array):
-            title[key] = item
-        elif isinstance(item, Table) and key in document:
-            for field, value in cast(dict[str, Item], item).items():
-                cast(Table, document[key])[field] = value
+def _items(table: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Every value of a parsed table with its field; entries of lists of tables by their index."""
+    for key, item in (table if isinstance(table, Container) else table.value).body:
+        if key is None:
+            continue
+        field = prefix + key.key
+        if isinstance(item, AbstractTable):
+            yield from _items(item, f"{field}.")
+        elif isinstance(item, list) and item and isinstance(item[0], AbstractTable):
+            for k, entry in enumerate(cast(list[Any], item)):
+                yield from _items(entry, f"{field}.{k}.")
         else:
-            document[key] = cast(Item, item)
+            yield field, item
 
 
-def _find(name: str | os.PathLike[str], beside: Path | None = None) -> Path:
-    text = os.fspath(name)
+class _File(NamedTuple):
+    path: Path
+    text: str
+    data: dict[str, Any]
+
+
+def _find(name: Any, beside: Path | None = None) -> Path:
+    if not isinstance(name, str | os.PathLike):
+        raise ScenarioError(f"scenario must be a name, a path ending in .toml, or a Scenario, got {_shown(name)}")
+    text = os.fsdecode(cast(str, name))
     if text.endswith(".toml"):
         path = (beside or Path()) / text
-        if not path.is_file():
+        if not os.path.isfile(path):  # noqa: PTH113 - says no to names that no file can have
             raise ScenarioError(
-                f"scenario file {text} does not exist; give the path of a TOML file, or a name: "
+                f"scenario file {_shown(text)} does not exist; give the path of a TOML file, or a name: "
                 f"{', '.join(scenario_names())}"
             )
         return path
@@ -152,37 +171,52 @@ def _find(name: str | os.PathLike[str], beside: Path | None = None) -> Path:
     near = difflib.get_close_matches(text, scenario_names(), n=1, cutoff=0.4)
     hint = f"did you mean {near[0]!r}? " if near else ""
     raise ScenarioError(
-        f"scenario {text!r} is unknown; {hint}There are {', '.join(scenario_names())}, and any path ending in .toml"
+        f"scenario {_shown(text)} is unknown; {hint}give one of {', '.join(scenario_names())}, "
+        "or a path ending in .toml"
     )
 
 
-def _parse(path: Path) -> dict[str, Any]:
+def _parse(path: Path) -> _File:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        if path.stat().st_size > _MAX_BYTES:
+            raise ScenarioError(f"{path} is no scenario: it has more than {_MAX_BYTES:,} bytes")
+        text = path.read_text(encoding="utf-8")
+        return _File(path, text, tomllib.loads(text))
+    except OSError as error:
+        raise ScenarioError(f"{path} can't be read ({error.strerror}); give another file") from None
+    except RecursionError:
+        raise ScenarioError(f"{path} is nested too deeply; flatten it") from None
+    except ScenarioError:
+        raise
+    except ValueError as error:
         raise ScenarioError(f"{path} is not valid TOML: {error}") from None
 
 
-def _chain(path: Path) -> list[Path]:
+def _chain(path: Path) -> list[_File]:
     """The file and all that it extends, down to the base."""
-    chain = [path]
-    while chain[-1] != _FOLDER / f"{_BASE}.toml":
-        name = _parse(chain[-1]).get("extends")
+    chain = [_parse(path)]
+    while not chain[-1].path.samefile(_BASE):
+        last = chain[-1]
+        name = last.data.get("extends")
         if not isinstance(name, str | None):
-            raise ScenarioError(f"{chain[-1]}: extends must be a scenario's name or file, got {name!r}")
-        parent = _FOLDER / f"{_BASE}.toml" if name is None else _find(name, chain[-1].parent)
-        if parent in chain:
+            raise ScenarioError(f"{last.path}: extends must be a scenario's name or file, got {_shown(name)}")
+        parent = _BASE if name is None else _find(name, last.path.parent)
+        if any(parent.samefile(file.path) for file in chain):
             raise ScenarioError(f"{path}: extends must not lead back to {parent}; name another scenario")
-        chain.append(parent)
+        chain.append(_parse(parent))
     return chain
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _data(scenario: Any) -> dict[str, Any]:
+    """A scenario's fields and values, not yet checked."""
+    if isinstance(scenario, Scenario):
+        return scenario.model_dump(mode="json", exclude_none=True)
+    path = _find(scenario)
     data: dict[str, Any] = {}
     for file in reversed(_chain(path)):
-        data = _merged(data, _parse(file))
+        data = _merged(data, file.data)
     data.pop("extends", None)
-    return data
+    return {**data, "name": path.stem}
 
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
@@ -206,7 +240,7 @@ def _assign(data: dict[str, Any], field: str, value: object) -> None:
         entries = cast(list[Any], place)
         entries[_index(entries, last, field)] = value
     else:
-        raise ScenarioError(f"{field} is unknown: {'.'.join(path)} is a value, not a table")
+        raise ScenarioError(f"{_short(field)} is unknown: {_short('.'.join(path))} is a value, not a table")
 
 
 def _step(place: Any, part: str, field: str) -> Any:
@@ -214,18 +248,18 @@ def _step(place: Any, part: str, field: str) -> Any:
         entries = cast(list[Any], place)
         return entries[_index(entries, part, field)]
     if not isinstance(place, dict):
-        raise ScenarioError(f"{field} is unknown: a value comes before {part!r}")
+        raise ScenarioError(f"{_short(field)} is unknown: a value comes before {_shown(part)}")
     return cast(dict[str, Any], place).setdefault(part, {})
 
 
 def _index(entries: Sequence[Any], part: str, field: str) -> int:
-    names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
-    if part in names:
-        return names.index(part)
-    if part.isdigit() and int(part) < len(entries):
-        return int(part)
-    known = [name for name in names if name] or [str(k) for k in range(len(entries))]
-    raise ScenarioError(f"{field} is unknown: there is no entry {part!r}; use one of {', '.join(known) or 'none'}")
+    places = {str(k): k for k in range(len(entries))}
+    names = {str(entry["name"]): k for k, entry in enumerate(entries) if isinstance(entry, dict) and "name" in entry}
+    found = (places | names).get(part)
+    if found is None:
+        known = ", ".join(names or places) or "none"
+        raise ScenarioError(f"{_short(field)} is unknown: there is no entry {_shown(part)}; use one of {known}")
+    return found
 
 
 def _frozen(value: Any) -> Any:
@@ -250,25 +284,42 @@ def _explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
             place = None
         name = cast(dict[str, Any], place).get("name") if isinstance(part, int) and isinstance(place, dict) else None
         names.append(str(name or part))
-    field = ".".join(names)
+    field = _short(".".join(names)) or "''"
     if kind == "missing":
         return f"{field} is missing; set it in the scenario's file or override it"
     if kind == "extra_forbidden":
         return f"{field} is unknown{_nearest(error['loc'])}"
-    context = {**error.get("ctx", {})}
-    if kind == "greater_than" and context["gt"] == 0:
-        return f"{field} must be positive, got {got!r}"
-    explanation = _EXPLANATIONS.get(kind)
-    return f"{field} {explanation.format(**context) if explanation else ': ' + error['msg']}, got {got!r}"
+    explanation = _EXPLANATIONS.get(kind, "is not usable: {message}")
+    return f"{field} {explanation.format(**error.get('ctx', {}), message=error['msg'])}, got {_shown(got)}"
 
 
 def _nearest(location: Sequence[str | int]) -> str:
-    model: Any = Scenario
-    for part in location[:-1]:
-        if not isinstance(part, int):
-            annotation = model.model_fields[part].annotation
-            inner = [a for a in getattr(annotation, "__args__", ()) if hasattr(a, "model_fields")]
-            model = annotation if hasattr(annotation, "model_fields") else inner[0] if inner else model
-    fields = list(model.model_fields)
-    near = difflib.get_close_matches(str(location[-1]), fields, n=1, cutoff=0.5)
-    return f"; did you mean {near[0]!r}?" if near else f"; the fields here are {', '.join(fields)}"
+    """What an unknown field may mean: the same name elsewhere, else a like one here, else a like one elsewhere."""
+    last, prefix = str(location[-1]), "".join(f"{0 if isinstance(part, int) else part}." for part in location[:-1])
+    every = list(_fields(Scenario))
+    here = dict.fromkeys(field.removeprefix(prefix).partition(".")[0] for field in every if field.startswith(prefix))
+    leaves = {field.rpartition(".")[2]: field for field in reversed(every)}
+    near = [leaves[last]] if last in leaves else difflib.get_close_matches(last, here, n=1, cutoff=0.5)
+    near = near or [leaves[name] for name in difflib.get_close_matches(last, leaves, n=1, cutoff=0.5)]
+    return f"; did you mean {near[0]!r}?" if near else f"; the fields here are {', '.join(here)}"
+
+
+def _fields(model: Any, prefix: str = "") -> Iterator[str]:
+    """All fields of a scenario as overrides address them; the first entry stands for a list's."""
+    for name, info in model.model_fields.items():
+        kind = info.annotation
+        inner = [part for part in (kind, *get_args(kind)) if hasattr(part, "model_fields")]
+        place = f"{prefix}{name}.0." if get_origin(kind) is tuple else f"{prefix}{name}."
+        yield from _fields(inner[0], place) if inner else [prefix + name]
+
+
+def _shown(value: object) -> str:
+    """A value as a message can hold it."""
+    try:
+        return _short(repr(value))
+    except (ValueError, RecursionError):
+        return f"{type(value).__name__} that is too large to show"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."

@@ -37,6 +37,7 @@ from uuv_marl.benchmark.distributed import chunks, connected, evaluate_on_cluste
 from uuv_marl.benchmark.results import Results, ResultsError
 from uuv_marl.cli import app
 from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
+from uuv_marl.errors import ClusterError
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
@@ -225,7 +226,7 @@ def test_every_runner_starts_from_its_own_world(joined):
 def test_training_seeds_keep_their_range_and_differ():
     seeds = {rllib.world_seed(seed, steps) for seed in range(50) for steps in (0, 100, 200)}
     assert len(seeds) == 150
-    assert all(100_000 <= seed < 999_000 for seed in seeds)
+    assert all(100_000 <= seed < 899_000 for seed in seeds), "900,000 and more are for validation"
 
 
 def rows(folder):
@@ -279,7 +280,7 @@ def test_folders_that_are_used_or_empty_or_of_other_settings_are_refused(tmp_pat
     (tmp_path / "config.json").write_text('{"settings": {}, "sessions": []}')
     with pytest.raises(ResultsError, match="is not empty; give --resume"):
         next(train(tmp_path, 100, SMALL))
-    with pytest.raises(ResultsError, match="another scenario; give the same options"):
+    with pytest.raises(ResultsError, match="begun with .* give the same options"):
         next(train(tmp_path, 100, SMALL, resume=True))
     with pytest.raises(ResultsError, match="no training to resume"):
         next(train(tmp_path / "new", 100, SMALL, resume=True))
@@ -287,7 +288,7 @@ def test_folders_that_are_used_or_empty_or_of_other_settings_are_refused(tmp_pat
 
 
 def test_a_cluster_that_is_missing_or_too_small_is_explained(tmp_path, joined):
-    with pytest.raises(runner.ClusterError, match="has 2; give --env-runners 2"):
+    with pytest.raises(ClusterError, match="has 2; give --env-runners 2"):
         next(train(tmp_path / "a", 100, SMALL, num_env_runners=3))
     assert not (tmp_path / "a").exists()
 
@@ -392,7 +393,7 @@ def test_a_stopped_benchmark_keeps_its_seeds_and_goes_on(tmp_path, joined):
 def test_other_code_on_a_node_is_refused(joined, monkeypatch):
     monkeypatch.setattr("uuv_marl.benchmark.distributed.source_fingerprint", lambda: "of another version")
     scenario = uuv_marl.load_scenario("tracking", num_vehicles=5, overrides=SHORT)
-    with pytest.raises(runner.ClusterError, match="other code of uuv_marl"):
+    with pytest.raises(ClusterError, match="other code of uuv_marl"):
         list(evaluate_on_cluster(scenario, "idle", [0]))
 
 
@@ -423,7 +424,7 @@ def test_a_missing_ray_is_explained(arguments, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     done = CliRunner().invoke(app, [*arguments, f"--output={tmp_path / 'out'}"])
     assert done.exit_code == 2
-    assert "needs ray: install the extra, in the checkout: pip install -e '.[distributed]'" in " ".join(
+    assert "needs ray, which comes with the extra 'distributed': pip install 'uuv_marl[distributed]'" in " ".join(
         done.output.split()
     )
     assert not (tmp_path / "out").exists()

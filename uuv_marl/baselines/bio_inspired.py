@@ -66,8 +66,9 @@ class BioInspired(Policy):
 
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        action = np.empty((*percept.flat.shape[:2], 2), np.float32)
-        _act(percept.flat, self.layout.offsets, self.gains, self.limits, self._once, self._centres, action, self.clamps)
+        flat = self.flat(percept)
+        action = np.empty((*flat.shape[:2], 2), np.float32)
+        _act(flat, self.layout.offsets, self.gains, self.limits, self._once, self._centres, action, self.clamps)
         return action
 
 

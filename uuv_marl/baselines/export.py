@@ -11,16 +11,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 from numpy.typing import NDArray
-from onnx import TensorProto, helper, numpy_helper
 
+from uuv_marl.atomic import writing
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
-from uuv_marl.baselines.learned import MOST_BARRIER, Learned
+from uuv_marl.baselines.learned import MOST_BARRIER, Learned, Trained
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.registry import granted, policy_class
+from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario
+
+with extra("onnx", "export to ONNX"):
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
 
 OPSET = 18
 """Version of ONNX's operators: the first that has every operator in its present form."""
@@ -112,17 +116,19 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
         path: the file.
 
     Raises:
-        PolicyError: the policy is no network, or was trained on another percept than the scenario has.
+        PolicyError: the policy is no network, or was trained on another percept or vehicle than the scenario has.
+        ResultsError: the file can't be written.
     """
     kind = policy_class(policy)
-    if not issubclass(kind, Learned):
+    if not isinstance(kind, Trained):
         raise PolicyError(
             f"policy {policy!r} is no network, so ONNX has no form for it; give a learned policy, such as the folder "
             "best of a training (uuv-marl train mappo)"
         )
     model = _model(kind(granted(policy, scenario)))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(model.SerializeToString())
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(model.SerializeToString())
 
 
 def _model(policy: Learned) -> onnx.ModelProto:

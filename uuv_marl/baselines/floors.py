@@ -30,7 +30,7 @@ class Random(Policy):
 
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        n = percept.flat.shape[1]
+        n = self.flat(percept).shape[1]
         drawn = np.stack([rng.random((n, 2)) for rng in self._rngs])
         radius, angle = np.sqrt(drawn[..., 0]), 2.0 * math.pi * drawn[..., 1]
         return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1).astype(np.float32)
@@ -41,4 +41,4 @@ class Idle(Policy):
 
     def act(self, percept: Percept) -> Float32:
         """Zeros of shape (world, vehicle, 2)."""
-        return np.zeros((*percept.flat.shape[:2], 2), np.float32)
+        return np.zeros((*self.flat(percept).shape[:2], 2), np.float32)

@@ -4,13 +4,13 @@ A checkpoint is one safetensors file: the weights, and in its header a ``Card`` 
 trained on. Loading it executes nothing.
 """
 
+import functools
 import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, cast
+from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
 import pydantic
@@ -18,6 +18,7 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import replacing
 from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits, Policy, PolicyError
 from uuv_marl.percept import Offsets, Percept, PerceptLayout
@@ -36,9 +37,32 @@ BARRIER = Gains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)
 MOST_BARRIER = 8.0
 """The barrier is bounded here [full force]; the action is bounded by 1 after the sum."""
 _CARD = "uuv_marl"
+_MOST_WEIGHT = 1e6
+"""Larger weights are no result of training, and overflow in single precision."""
+_FIRST_VEHICLE = {
+    "vehicle.m_kg": 185.0, "vehicle.I_z_kgm2": 50.0, "vehicle.x_G_m": 0.0, "vehicle.X_udot_kg": -30.0,
+    "vehicle.Y_vdot_kg": -80.0, "vehicle.Y_rdot_kgm": 0.0, "vehicle.N_rdot_kgm2": -30.0, "vehicle.X_u": 70.0,
+    "vehicle.Y_v": 100.0, "vehicle.Y_r": 0.0, "vehicle.N_v": 0.0, "vehicle.N_r": 50.0, "vehicle.X_uu": 100.0,
+    "vehicle.Y_vv": 200.0, "vehicle.Y_rr": 0.0, "vehicle.N_rv": 0.0, "vehicle.N_rr": 100.0,
+    "actuators.max_force_n": 3000.0, "actuators.max_torque_nm": 3000.0, "actuators.lever_arm_m": 1.0,
+}  # fmt: skip
+"""The vehicle of version 0.1.0, which wrote checkpoints without saying so."""
 
 
-class Card(pydantic.BaseModel, frozen=True, extra="forbid"):
+def vehicle_of(scenario: Scenario) -> dict[str, float]:
+    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare themselves."""
+    sections = {"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()}
+    numbers = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
+    return {field: value for field, value in numbers.items() if field != "actuators.yaw_damping_nms"}
+
+
+def _all_gains(gains: Any) -> Any:
+    if isinstance(gains, list) and len(cast(list[Any], gains)) != len(Gains._fields):
+        raise ValueError(f"must hold {', '.join(Gains._fields)}, got {gains}")
+    return cast(Any, gains)
+
+
+class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """What a checkpoint says of itself."""
 
     format: Literal[1] = 1
@@ -50,8 +74,10 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid"):
     """Inner loop that it was trained with [N m s]."""
     channels: tuple[str, ...] = ()
     """Channels beyond the percept."""
-    barrier: Gains = BARRIER
+    barrier: Annotated[Gains, pydantic.BeforeValidator(_all_gains)] = BARRIER
     """Of Eq. 20-21; what the actor says is added to their force."""
+    vehicle: dict[str, float] = _FIRST_VEHICLE
+    """Hull and actuators that it was trained on, by field of the scenario."""
     training: dict[str, Any] = {}
     """How it came about: settings, versions, agent-steps, validation."""
 
@@ -75,25 +101,41 @@ class Checkpoint(NamedTuple):
 class Learned(Policy):
     """A checkpoint's actor: tanh layers from local, body-frame features to a force, plus the barrier. Deterministic.
 
-    ``learned_class`` makes the subclass of a checkpoint.
+    Args:
+        scenario: gives the percept's layout and the vehicle's limits.
+        num_worlds: first axis of the percepts.
+        trained: the actor, and the name by which messages call it.
+        any_vehicle: run it also on a vehicle that it was not trained on.
+
+    Raises:
+        PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.
     """
 
-    checkpoint: ClassVar[Checkpoint]
-
-    def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, trained: "Trained", any_vehicle: bool = False
+    ) -> None:
+        self.name, self.checkpoint, card = trained.name, trained.checkpoint, trained.checkpoint.card
+        self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds)
-        name, card = type(self).__name__, self.checkpoint.card
-        trained, here = card.percept, rows_of(self.layout)
-        if trained != here:
-            raise PolicyError(
-                f"{name} was trained on another percept than scenario {scenario.name!r} has: "
-                f"{_difference(trained, here)}; use a scenario with the sonar suite of its training, or train on this "
-                "one (uuv-marl train mappo)"
-            )
+        tables = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, rows_of(self.layout)))
+        vehicles = () if any_vehicle else (card.vehicle, vehicle_of(scenario))
+        for what, other, remedy in (
+            ("percept", _difference(*tables), "use a scenario with the sonar suite of its training"),
+            (
+                "vehicle",
+                vehicles and _difference(*vehicles),
+                "leave it out, run it all the same with make(..., any_vehicle=True)",
+            ),
+        ):
+            if other:
+                raise PolicyError(
+                    f"{self.name} was trained on another {what} than scenario {scenario.name!r} has: {other}; {remedy}"
+                    ", or train on this one (uuv-marl train mappo --scenario)"
+                )
         shortest, longest = card.decision_period_s
         if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
             raise PolicyError(
-                f"{name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
+                f"{self.name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
                 f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
             )
         self._eyes = Eyes(scenario, card.barrier)
@@ -101,10 +143,11 @@ class Learned(Policy):
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         acting = np.flatnonzero(self.active)
-        worlds, n = len(acting), percept.flat.shape[1]
+        flat = self.flat(percept)
+        worlds, n = len(acting), flat.shape[1]
         features, barrier = np.empty((worlds, n, self._eyes.size), np.float32), np.empty((worlds, n, 2), np.float32)
         clamps = np.zeros(worlds, np.int64)
-        self._eyes.look(percept.flat[acting], features, barrier, clamps)
+        self._eyes.look(flat[acting], features, barrier, clamps)
         self.clamps[acting] += clamps
         wish = forward(self.checkpoint.layers, features.reshape(worlds * n, -1))
         action = np.empty((worlds * n, 2), np.float32)
@@ -158,27 +201,41 @@ def is_checkpoint(name: str) -> bool:
     return "/" in name or os.sep in name or (":" not in name and Path(name).exists())
 
 
-_classes: dict[str, type[Learned]] = {}
+class Trained:
+    """A learned policy before it is made for a scenario: call it with the arguments of ``Learned``.
+
+    Args:
+        name: by which messages call it.
+        path: of the checkpoint, a file or the folder that holds it; read when something of it is asked for.
+        doc: what it is.
+    """
+
+    def __init__(self, name: str, path: Path, doc: str | None = Learned.__doc__) -> None:
+        self.name, self._path, self.__doc__ = name, path, doc
+
+    @functools.cached_property
+    def checkpoint(self) -> Checkpoint:
+        """What the file holds. Raises PolicyError where that is no policy."""
+        return load_checkpoint(self._path)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels needed beyond the percept."""
+        return self.checkpoint.card.channels
+
+    @property
+    def yaw_damping_nms(self) -> float:
+        """Inner loop that it was trained with [N m s]."""
+        return self.checkpoint.card.yaw_damping_nms
+
+    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned:
+        """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
+        return Learned(scenario, num_worlds, trained=self, any_vehicle=any_vehicle)
 
 
-def learned_class(name: str) -> type[Learned]:
-    """The policy in a checkpoint, a file or the folder that holds it. Raises PolicyError where there is none."""
-    checkpoint = load_checkpoint(Path(name))
-    if name not in _classes or _classes[name].checkpoint.digest != checkpoint.digest:
-        _classes[name] = _class_of(name, checkpoint, Learned.__doc__)
-    return _classes[name]
-
-
-def shipped(name: str, doc: str) -> type[Learned]:
+def shipped(name: str, doc: str) -> Trained:
     """The policy of a checkpoint in ``uuv_marl/baselines/trained``."""
-    with resources.as_file(resources.files("uuv_marl.baselines").joinpath("trained", f"{name}.safetensors")) as path:
-        return _class_of(name, load_checkpoint(path), doc)
-
-
-def _class_of(name: str, checkpoint: Checkpoint, doc: str | None) -> type[Learned]:
-    card = checkpoint.card
-    declared = {"channels": card.channels, "yaw_damping_nms": card.yaw_damping_nms, "checkpoint": checkpoint}
-    return type(name, (Learned,), {**declared, "__doc__": doc, "__module__": __name__})
+    return Trained(name, Path(__file__).parent / "trained" / f"{name}.safetensors", doc)
 
 
 def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:
@@ -186,9 +243,8 @@ def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:
     tensors = {f"{k}.{name}": array for k, layer in enumerate(layers) for name, array in layer._asdict().items()}
     contiguous = {name: np.ascontiguousarray(array, np.float32) for name, array in tensors.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    partial.write_bytes(safetensors.numpy.save(contiguous, {_CARD: card.model_dump_json()}))
-    partial.replace(path)
+    with replacing(path) as partial:
+        partial.write_bytes(safetensors.numpy.save(contiguous, {_CARD: card.model_dump_json()}))
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
@@ -204,34 +260,45 @@ def load_checkpoint(path: Path) -> Checkpoint:
     try:
         tensors: dict[str, NDArray[Any]] = safetensors.numpy.load(data)
         header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-        card = Card.model_validate_json(header["__metadata__"][_CARD])
-        layers = tuple(Layer(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(len(tensors) // 2))
+        card = Card.model_validate_json(header.get("__metadata__", {}).get(_CARD, "null"))
+        layers = tuple(Layer(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(max(len(tensors) // 2, 1)))
         _check(card, layers)
     except (ValueError, KeyError, safetensors.SafetensorError) as error:
         raise PolicyError(
-            f"{file} holds no policy of uuv_marl ({error}); give a folder that train mappo wrote"
+            f"{file} holds no policy of uuv_marl ({_reason(error)}); give a folder that uuv-marl train wrote"
         ) from None
     return Checkpoint(card, layers, hashlib.sha256(data).hexdigest()[:16])
 
 
+def _reason(error: Exception) -> str:
+    """What is wrong with a checkpoint, in a line."""
+    if isinstance(error, pydantic.ValidationError):
+        first = error.errors()[0]
+        field = ".".join(map(str, first["loc"]))
+        return f"its card's {field}: {first['msg']}" if field else "it has no card"
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
+
+
 def _check(card: Card, layers: Sequence[Layer]) -> None:
+    """Raises ValueError that names what can't be run."""
     sizes: Mapping[str, int] = {name: size for name, size, _, _ in card.percept}
+    if not 0.0 < card.decision_period_s[0] <= card.decision_period_s[1]:
+        raise ValueError(f"its card's decision_period_s must be [shortest, longest], got {card.decision_period_s}")
     width = 11 + 4 * sizes["heard"] + 4 * sizes.get("echo", 0)
-    for weight, bias in layers:
-        if weight.dtype != np.float32 or bias.dtype != np.float32 or weight.shape != (width, *bias.shape):
-            raise ValueError(f"a layer has weights {weight.dtype} {weight.shape}, expected float32 ({width}, ...)")
-        width = cast(int, weight.shape[1])
-    if width != 2:
-        raise ValueError(f"the last layer has {width} outputs, expected 2")
+    for k, (weight, bias) in enumerate(layers):
+        outputs = weight.shape[-1] if weight.ndim == 2 and k < len(layers) - 1 else 2
+        for name, array, shape in (("weight", weight, (width, outputs)), ("bias", bias, (outputs,))):
+            if array.dtype != np.float32 or array.shape != shape:
+                raise ValueError(f"{k}.{name} is {array.dtype} {array.shape}, expected float32 {shape}")
+            if not (np.abs(array) <= _MOST_WEIGHT).all():  # NaN is not either
+                raise ValueError(f"{k}.{name} must hold finite numbers of at most {_MOST_WEIGHT:g}")
+        width = outputs
 
 
-def _difference(trained: Sequence[Row], here: Sequence[Row]) -> str:
-    """The first row of the tables that differs, for a message."""
-    for k in range(max(len(trained), len(here))):
-        rows = [" ".join(map(str, table[k])) if k < len(table) else "nothing" for table in (trained, here)]
-        if rows[0] != rows[1]:
-            return f"{rows[0]!r} against {rows[1]!r}"
-    return "nothing"
+def _difference(then: Mapping[str, object], now: Mapping[str, object]) -> str:
+    """The first entry that differs, for a message; nothing where none does."""
+    other = (name for name in {**then, **now} if then.get(name) != now.get(name))
+    return next((f"{name} was {then.get(name)} and is {now.get(name)}" for name in other), "")
 
 
 @compiled

@@ -9,10 +9,11 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.swarm import world_seeds
 from uuv_marl.sim.vehicle import project
 
 Float32 = NDArray[np.float32]
@@ -39,10 +40,6 @@ class Limits(NamedTuple):
         )  # fmt: skip
 
 
-class PolicyError(ValueError):
-    """A policy that can't drive this scenario; the message names the remedy."""
-
-
 class Policy(abc.ABC):
     """Maps the percepts of any number of worlds to actions.
 
@@ -60,7 +57,8 @@ class Policy(abc.ABC):
     """Inner loop that the policy was designed with [N m s]."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
-        name = type(self).__name__
+        self.name: str = getattr(self, "name", type(self).__name__)
+        """By which messages call it."""
         missing = [channel for channel in self.channels if channel not in scenario.sonar.channels]
         needs: list[str] = []
         if missing:
@@ -69,7 +67,7 @@ class Policy(abc.ABC):
             needs.append(f"a yaw damping of {self.yaw_damping_nms:g} N m s (actuators.yaw_damping_nms)")
         if needs:
             raise PolicyError(
-                f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
+                f"{self.name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
                 "use uuv_marl.baselines.granted(policy, scenario), or override these fields"
             )
         if num_worlds < 1:
@@ -84,10 +82,10 @@ class Policy(abc.ABC):
         """Worlds whose actions count, shape (world,), all unless a caller says otherwise; ``act`` may leave the others'
         zero, to save time."""
 
-    def reset(self, seed: int | Sequence[int] | NDArray[np.integer] = 0, worlds: Sequence[int] | None = None) -> None:
-        """Forget the past of these worlds (default all); seeds as in ``Swarm.reset``."""
+    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
+        """Forget the past of these worlds (default all); world w draws from ``seed + w``, or one seed for each."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
-        seeds = world_seeds(seed, chosen)
+        seeds = [own or 0 for own in world_seeds(seed, chosen)]
         self.clamps[chosen] = 0
         self.forget(chosen, seeds)
 
@@ -97,6 +95,26 @@ class Policy(abc.ABC):
     @abc.abstractmethod
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2), float32, within the unit disc, from percepts (world, vehicle, ...)."""
+
+    def flat(self, percept: Percept) -> Float32:
+        """The percept's rows for compiled code, shape (world, vehicle, entry), float32.
+
+        Raises:
+            PolicyError: they are of other worlds, vehicles or fields than the policy was made for. Compiled code has no
+                bounds checks, so that they would be read, and memory be written, beyond their ends.
+        """
+        rows, expected = percept.flat, (self.num_worlds, self.scenario.swarm.num_vehicles, self.layout.size)
+        if rows.shape != expected or rows.dtype != np.float32:
+            raise PolicyError(
+                f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry), and "
+                f"got {rows.dtype} of shape {rows.shape}; make one for this swarm: make(name, scenario, num_worlds)"
+            )
+        if percept.layout != self.layout:
+            raise PolicyError(
+                f"{self.name} was made for other fields of a percept than it got; make it from the scenario "
+                "that the swarm was made from"
+            )
+        return np.ascontiguousarray(rows)
 
 
 @compiled

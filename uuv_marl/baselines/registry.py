@@ -3,7 +3,8 @@
 import difflib
 import importlib
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol, overload
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.floors import Idle, Random
-from uuv_marl.baselines.learned import is_checkpoint, learned_class, shipped
+from uuv_marl.baselines.learned import Trained, is_checkpoint, shipped
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
@@ -21,7 +22,10 @@ from uuv_marl.scenario_files import load_scenario
 
 Float32 = NDArray[np.float32]
 
-POLICIES: dict[str, type[Policy]] = {
+Kind = type[Policy] | Trained
+"""A policy before it is made: called with a scenario it gives one; with ``channels`` and ``yaw_damping_nms``."""
+
+POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
     "bio_inspired_plus": BioInspiredPlus,
     "sff": Sff,
@@ -70,15 +74,17 @@ class EnvPolicy:
         return {agent: actions[i] for i, agent in enumerate(self._agents) if agent in observations}
 
 
-def policy_class(name: str) -> type[Policy]:
-    """A policy's class by its name, checkpoint, or ``module:Class``. Raises PolicyError with the nearest name."""
+def policy_class(name: str) -> Kind:
+    """A policy's kind by its name, checkpoint, or ``module:Class``. Raises PolicyError with the nearest name."""
     if name not in POLICIES and is_checkpoint(name):
-        return learned_class(name)
+        trained = Trained(name, Path(name))
+        trained.checkpoint  # noqa: B018 - refused now, not in the middle of a benchmark
+        return trained
     if ":" in name:
         module, _, attribute = name.partition(":")
         try:
             made: object = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError) as error:
+        except (ImportError, AttributeError, ValueError) as error:
             raise PolicyError(f"policy {name!r} can't be imported: {error}") from None
         if not (isinstance(made, type) and issubclass(made, Policy)):
             raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {made!r}")
@@ -122,7 +128,7 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
     Raises:
         PolicyError: unknown name or parameter, or the target lacks what the policy declares (see ``granted``).
     """
-    constructor: Callable[..., Policy] = policy_class(name)
+    constructor: Any = policy_class(name)
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     unknown = [key for key in parameters if key not in known]
     if unknown:

@@ -90,15 +90,16 @@ class Sdc(Policy):
 
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
+        flat = self.flat(percept)
         for w in np.flatnonzero(self._decisions == 0):
-            self._assign(int(w), Percept(percept.flat[w], percept.layout))
-        action = np.empty((*percept.flat.shape[:2], 2), np.float32)
+            self._assign(int(w), Percept(flat[w], percept.layout))
+        action = np.empty((*flat.shape[:2], 2), np.float32)
         g = self.gains
         rho = (g.rho_0 - g.rho_inf) * np.exp(
             -g.kappa * self.scenario.timing.decision_period_s * self._decisions
         ) + g.rho_inf
         _act(
-            percept.flat, self.layout.offsets, g, self.limits, self._slots, self._depth, self.all_informed, rho,
+            flat, self.layout.offsets, g, self.limits, self._slots, self._depth, self.all_informed, rho,
             action, self.clamps,
         )  # fmt: skip
         self._decisions += 1
@@ -160,6 +161,12 @@ def _act(
 
 
 @compiled
+def _index(identity: float, num: int) -> int:
+    """Index of the vehicle with this identity, -1 where nobody has it: no number of a percept is an index unchecked."""
+    return int(identity) - 1 if 1.0 <= identity < num + 1.0 else -1
+
+
+@compiled
 def _force(
     row: Float32,
     at: Offsets,
@@ -176,7 +183,8 @@ def _force(
     # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.
     follows = False
     for k in range(at.neighbour - at.heard):
-        follows = follows or (row[at.heard + k] > 0.0 and depth[int(row[at.link_identity + k]) - 1] < depth[i])
+        j = _index(row[at.link_identity + k], depth.shape[0])
+        follows = follows or (row[at.heard + k] > 0.0 and j >= 0 and depth[j] < depth[i])
     z_x, z_y, w_x, w_y, near_x, near_y, num = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for k in range(at.neighbour - at.heard):
         if row[at.heard + k] == 0.0:
@@ -185,8 +193,8 @@ def _force(
         distance = max(math.hypot(p_x, p_y), 0.1)
         away = g.short * bump(distance / g.short_range) / distance
         near_x, near_y = near_x - away * p_x, near_y - away * p_y
-        j = int(row[at.link_identity + k]) - 1
-        if depth[j] < depth[i] or not follows:
+        j = _index(row[at.link_identity + k], depth.shape[0])
+        if j >= 0 and (depth[j] < depth[i] or not follows):
             d_x, d_y = slots[j, 0] - slots[i, 0], slots[j, 1] - slots[i, 1]
             z_x, z_y = z_x + c * d_x + s * d_y - p_x, z_y + c * d_y - s * d_x - p_y
             w_x, w_y = w_x + row[at.link_velocity + 2 * k] - u, w_y + row[at.link_velocity + 2 * k + 1] - v

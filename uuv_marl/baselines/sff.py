@@ -89,9 +89,10 @@ class Sff(Policy):
 
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        action = np.empty((*percept.flat.shape[:2], 2), np.float32)
+        flat = self.flat(percept)
+        action = np.empty((*flat.shape[:2], 2), np.float32)
         period = self.scenario.timing.decision_period_s
-        _act(percept.flat, self.layout.offsets, self.gains, self.limits, period, self._memory, action)
+        _act(flat, self.layout.offsets, self.gains, self.limits, period, self._memory, action)
         return action
 
 
@@ -111,6 +112,9 @@ def clustering(d: float, g: Gains) -> float:
 
 @compiled
 def _recall(identity: float, known: Float32) -> int:
+    """The sub-sector in which a vehicle was heard before, -1 for none; 0 is nobody's identity."""
+    if not identity >= 1.0:
+        return -1
     for k in range(known.shape[0]):
         if known[k] == identity:
             return k

@@ -8,12 +8,14 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-import ray as _ray  # pyright: ignore[reportMissingImports]
-
 from uuv_marl.benchmark.evaluate import BATCH, Run, evaluate
 from uuv_marl.benchmark.results import source_fingerprint
-from uuv_marl.benchmark.runner import ClusterError
+from uuv_marl.errors import ClusterError
+from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
+
+with extra("distributed", "spreading over a Ray cluster"):
+    import ray as _ray  # pyright: ignore[reportMissingImports]
 
 ray: Any = _ray
 

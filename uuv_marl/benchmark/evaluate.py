@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines import make
 from uuv_marl.benchmark.metrics import Meter, Metrics
+from uuv_marl.errors import DivergenceError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
 
-BATCH = 32
-"""Seeds stepped together."""
+BATCH = 8
+"""Seeds stepped together: enough for all cores, and few are lost where a benchmark is stopped."""
 ROUTE_PERIOD_S = 0.5
 """Between two samples of the routes."""
 MOST_SAMPLES = 1_500_000
@@ -62,6 +63,10 @@ def evaluate(scenario: Scenario, policy: str, seeds: Sequence[int], **parameters
 
     The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed
     alone, not on the seeds beside it. ``parameters`` go to the policy.
+
+    Raises:
+        DivergenceError: the integration step could not follow a vehicle. Such a run has no metrics; those of the seeds
+            beside it come first.
     """
     for first in range(0, len(seeds), BATCH):
         batch = seeds[first : first + BATCH]
@@ -86,13 +91,17 @@ def _batch(
     steps, step = math.ceil(limits.max() / period) + 1, 0
     every = max(round(ROUTE_PERIOD_S / period), math.ceil(steps * swarm.num_vehicles / MOST_SAMPLES), 1)
     samples = [_sample(swarm)]
+    diverged: list[str] = []
     report_every = max(1, round(2.0 / period))
     while active.any():
         percept = swarm.step(actor.act(percept), active)
         meter.update(active)
         step += 1
-        ended = active & (swarm.arrived | swarm.timed_out | ~swarm.state.alive.any(axis=1))
+        ended = active & swarm.ended
         for w in (int(index) for index in np.flatnonzero(ended)):
+            if swarm.facts.diverged[w] >= 0:
+                diverged.append(f"seed {seeds[w]}: {swarm.divergence(w)}")
+                continue
             course, discs = swarm.course, int(swarm.course.num_obstacles[w])
             yield Run(
                 seed=seeds[w],
@@ -109,6 +118,8 @@ def _batch(
         if step % report_every == 0:
             done = np.where(active, swarm.facts.time_s, limits)
             yield Progress(float(done.sum() / limits.sum()))
+    if diverged:
+        raise DivergenceError("; ".join(diverged))
 
 
 def _sample(swarm: Swarm) -> tuple[Float32, Float32]:

@@ -1,134 +1,162 @@
-"""The benchmark's pictures: routes with obstacles, distance to obstacles and spacing over time."""
+"""The benchmark's pictures, a panel for each policy: routes, distance to obstacles and spacing over time."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
-import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from uuv_marl.benchmark.results import Results, scenario_hash
+from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, draw_course, house_style, legend, panels, save
 
 Float32 = NDArray[np.float32]
-Value = Callable[[dict[str, Float32]], Float32]
-# Okabe and Ito's palette, distinguishable without colour vision; the yellow is left out on white.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+Trace = dict[str, Float32]
 _GRID_S = 0.5
+_ROUTE_S = 2.0
+_TICKS_M = (-20, -10, -5, 0, 5, 10, 20, 50, 100, 200)
 
 
 def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Path]:
     """All pictures of a scenario, as PNG in ``figures/``; the paths."""
-    folder = results.folder / "figures"
-    folder.mkdir(exist_ok=True)
     present = [policy for policy in policies if results.select(scenario, policy, seeds)]
     if not present:
         return []
-    made = [_routes(results, scenario, present, folder)]
-    if results.trace(scenario, present[0], results.select(scenario, present[0], seeds)[0].seed)["obstacles"].size:
-        made.append(_distance(results, scenario, present, seeds, folder))
-    made.append(_spacing(results, scenario, present, seeds, folder))
-    return [path for path in made if path is not None]
+    constraints, hull_m = results.scenarios[scenario].constraints, results.scenarios[scenario].contact.hull_radius_m
+    curves = {p: [results.trace(scenario, p, row.seed) for row in results.select(scenario, p, seeds)] for p in present}
+    where = f"{scenario}, {results.scenarios[scenario].swarm.num_vehicles} vehicles, {len(seeds)} seeds"
+    made: dict[str, Figure] = {}
+    with house_style():
+        if shown := [p for p in present if results.has(scenario, p, 0)]:
+            made["routes"] = _routes(results, scenario, shown)
+        if curves[present[0]][0]["obstacles"].size:
+            limits = {"keep clear (s_o)": constraints.s_o_m, "collision": hull_m}
+            figure, axes = _over_time(curves, _nearest, limits, "distance to the nearest obstacle [m]")
+            low = min(-1.0, *(float(ax.dataLim.ymin) - 1.0 for ax in axes))
+            axes[0].set_yscale("symlog", linthresh=10.0)
+            axes[0].set_yticks(_TICKS_M, labels=[str(tick) for tick in _TICKS_M], minor=False)
+            axes[0].set_ylim(bottom=low)
+            for ax in axes:
+                ax.axhspan(low, 0.0, color="0.85", zorder=0, label="inside the obstacle")
+            figure.suptitle(f"How near the swarm comes to obstacles' surfaces: {where}")
+            made["obstacle_distance"] = figure
+        limits = {"keep apart (s_u)": constraints.s_u_m, "collision": 2.0 * hull_m}
+        figure, axes = _over_time(curves, lambda trace: trace["min_spacing_m"], limits, "smallest spacing [m]")
+        axes[0].set_ylim(bottom=0.0)
+        figure.suptitle(f"How near the two closest vehicles are: {where}")
+        made["spacing"] = figure
+        for figure in (figure for name, figure in made.items() if name != "routes"):
+            legend(figure, figure.axes[-1])
+        return [save(figure, results.folder / "figures" / f"{scenario}_{name}.png") for name, figure in made.items()]
 
 
-def _routes(results: Results, scenario: str, policies: Sequence[str], folder: Path) -> Path | None:
-    shown = [p for p in policies if results.has(scenario, p, 0)]
-    if not shown:
-        return None
-    columns = min(3, len(shown))
-    rows = -(-len(shown) // columns)
-    figure = Figure(figsize=(4.2 * columns + 0.4, 4.2 * rows + 0.6), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-    for k, policy in enumerate(shown):
-        ax: Axes = axes[k // columns, k % columns]
-        trace = results.trace(scenario, policy, 0)
-        routes, waypoints = trace["route_position"], trace["waypoints"]
-        ax.plot(routes[:, :, 1], routes[:, :, 0], color=COLOURS[0], linewidth=0.4, alpha=0.6)
-        ax.plot(waypoints[:, 1], waypoints[:, 0], color="black", linewidth=1.0, linestyle="--")
-        ax.plot(routes[0, :, 1], routes[0, :, 0], ".", color=COLOURS[2], markersize=3)
-        ax.plot(routes[-1, :, 1], routes[-1, :, 0], ".", color=COLOURS[1], markersize=3)
-        for x, y, radius in trace["obstacles"]:
-            ax.add_patch(Circle((float(y), float(x)), float(radius), color="0.35"))
-        ax.set_title(policy, fontsize=10)
-        ax.set_aspect("equal")
-        ax.grid(alpha=0.25)
-    for k in range(len(shown), rows * columns):
-        axes[k // columns, k % columns].axis("off")
+def _grid(num: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    """Panels on common axes, and at least one empty one at the end for the legend."""
+    rows = -(-(num + 1) // 4)
+    figure, axes = panels(num + 1, -(-(num + 1) // rows), size, sharex=True, sharey=True)
+    for ax in axes[num:]:
+        ax.set_axis_off()
+    for ax in axes[max(0, num - len(axes) // rows) : num]:
+        ax.xaxis.set_tick_params(labelbottom=True)
+    return figure, axes
+
+
+def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
+    figure, axes = _grid(len(policies), (3.4, 3.6))
+    hull_m = results.scenarios[scenario].contact.hull_radius_m
+    traces = [results.trace(scenario, policy, 0) for policy in policies]
+    longest = max(float(trace["route_time_s"][-1]) for trace in traces)
+    lines: LineCollection | None = None
+    for ax, policy, trace in zip(axes, policies, traces, strict=False):
+        every = max(1, round(_ROUTE_S / float(np.diff(trace["route_time_s"][:2])[0])))
+        position = trace["route_position"][::every, :, ::-1]
+        legs = np.stack([position[:-1], position[1:]], axis=2)
+        lines = LineCollection(legs.reshape(-1, 2, 2).tolist(), cmap="viridis", linewidths=0.5)
+        lines.set_array(np.repeat(trace["route_time_s"][::every][:-1], legs.shape[1]))
+        lines.set_clim(0.0, longest)
+        ax.add_collection(lines)
+        draw_course(ax, trace["waypoints"][:, ::-1], trace["obstacles"][:, [1, 0, 2]])
+        ends = {"start": (trace["route_position"][0], "o"), "end": (trace["route_position"][-1], ".")}
+        for label, (place, mark) in ends.items():
+            ax.plot(*place.T[::-1], mark, color=BLACK, mfc="none" if mark == "o" else BLACK, ms=3, mew=0.5, label=label)
+        contacts = _contacts(trace, hull_m)
+        ax.plot(*contacts.T[::-1], "x", color=ORANGE, ms=8, mew=2.0, zorder=6, label="collision")
+        ax.set_title(f"{policy[-28:]}\n{_outcome(results.select(scenario, policy, [0])[0].metrics)}")
     figure.supxlabel("east [m]")
     figure.supylabel("north [m]")
-    title = f"{_name(results, scenario)}: routes, seed 0; green start, orange end, dashed trajectory, grey obstacles"
-    figure.suptitle(textwrap.fill(title, 55 * columns), fontsize=10)
-    return _save(figure, folder / f"{scenario}_routes.png")
-
-
-def _distance(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int], folder: Path) -> Path:
-    def nearest(trace: dict[str, Float32]) -> Float32:
-        distance = trace["obstacle_distance_m"]
-        return distance.min(axis=1) if distance.shape[1] else np.full(len(distance), np.nan, np.float32)
-
-    safe = results.scenarios[scenario].constraints.s_o_m
-    figure, ax = _time_axes(results, scenario, "smallest distance to an obstacle's surface")
-    _bands(ax, results, scenario, policies, seeds, nearest)
-    ax.axhline(safe, color="black", linestyle=":", linewidth=1.0)
-    ax.annotate(f"s_o = {safe:g} m", (1.0, safe), xycoords=("axes fraction", "data"), ha="right", va="bottom")
-    ax.axhline(0.0, color="0.35", linewidth=1.0)
-    ax.set_ylabel("distance to obstacle [m]")
-    ax.set_yscale("symlog", linthresh=10.0)
-    ax.set_ylim(bottom=min(-1.0, float(ax.dataLim.ymin) - 1.0))
-    ax.set_yticks([0, 5, 10, 20, 50, 100, 200], labels=["0", "5", "10", "20", "50", "100", "200"])
-    return _save(figure, folder / f"{scenario}_obstacle_distance.png")
-
-
-def _spacing(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int], folder: Path) -> Path:
-    safe = results.scenarios[scenario].constraints.s_u_m
-    figure, ax = _time_axes(results, scenario, "smallest distance between two vehicles")
-    _bands(ax, results, scenario, policies, seeds, lambda trace: trace["min_spacing_m"])
-    ax.axhline(safe, color="black", linestyle=":", linewidth=1.0)
-    ax.annotate(f"s_u = {safe:g} m", (1.0, safe), xycoords=("axes fraction", "data"), ha="right", va="bottom")
-    ax.set_ylabel("smallest spacing [m]")
-    ax.set_ylim(bottom=0.0)
-    return _save(figure, folder / f"{scenario}_spacing.png")
-
-
-def _time_axes(results: Results, scenario: str, what: str) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(9.0, 4.8), layout="constrained")
-    ax = figure.subplots()
-    ax.set_title(f"{_name(results, scenario)}: {what}\nmedian over seeds, band from lowest to highest", fontsize=10)
-    ax.set_xlabel("time [s]")
-    ax.grid(alpha=0.25)
-    return figure, ax
-
-
-def _bands(
-    ax: Axes, results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int], value: Value
-) -> None:
-    styles = ("-", "--")
-    for k, policy in enumerate(policies):
-        traces = [results.trace(scenario, policy, row.seed) for row in results.select(scenario, policy, seeds)]
-        end = max(float(trace["time_s"][-1]) for trace in traces)
-        grid = np.arange(0.0, end, _GRID_S)
-        curves = np.array([np.interp(grid, trace["time_s"], value(trace), right=np.nan) for trace in traces])
-        kept = np.isfinite(curves).sum(axis=0) > len(traces) / 2
-        curves, grid = curves[:, kept], grid[kept]
-        if not grid.size:
-            continue
-        colour = COLOURS[k % len(COLOURS)]
-        ax.fill_between(grid, np.nanmin(curves, axis=0), np.nanmax(curves, axis=0), color=colour, alpha=0.15, lw=0)
-        ax.plot(grid, np.nanmedian(curves, axis=0), styles[k % 2], color=colour, lw=1.4, label=policy)
-    ax.legend(fontsize=8, ncols=2)
-
-
-def _name(results: Results, scenario: str) -> str:
     loaded = results.scenarios[scenario]
-    return f"{scenario} v{loaded.version}, n = {loaded.swarm.num_vehicles}, configuration {scenario_hash(loaded)}"
+    figure.suptitle(f"Routes of each policy: {scenario}, {loaded.swarm.num_vehicles} vehicles, seed 0")
+    if lines is not None:
+        bar = axes[-1].inset_axes((0.1, 0.12, 0.8, 0.05))
+        figure.colorbar(lines, cax=bar, orientation="horizontal", label="colour of routes: time [s]")
+    axes[-1].legend(*axes[0].get_legend_handles_labels(), loc="upper center", fontsize=9)
+    return figure
 
 
-def _save(figure: Figure, path: Path) -> Path:
-    FigureCanvasAgg(figure).print_png(str(path))
-    return path
+def _outcome(metrics: Mapping[str, Any]) -> str:
+    time, collisions = metrics["task_time_s"], metrics["collisions"]
+    arrived = "never arrives" if time is None else f"arrives after {time:.0f} s"
+    return f"{arrived}, {collisions or 'no'} collision{'' if collisions == 1 else 's'}"
+
+
+def _contacts(trace: Trace, hull_m: float) -> Float32:
+    """Where contacts begin, shape (contact, 2): the vehicle that is nearest to another, or to an obstacle."""
+    found: list[Float32] = []
+    for distance, limit, of_pair in (
+        (trace["min_spacing_m"], 2.0 * hull_m, True),
+        (_nearest(trace), hull_m, False),
+    ):
+        below = distance < limit
+        for time in trace["time_s"][below & ~np.append(np.False_, below[:-1])]:
+            place = trace["route_position"][np.argmin(np.abs(trace["route_time_s"] - time))]
+            if of_pair:
+                gap = np.linalg.norm(place[:, None] - place, axis=-1) + np.diag(np.full(len(place), np.inf))
+            else:
+                discs = trace["obstacles"]
+                gap = np.linalg.norm(place[:, None] - discs[:, :2], axis=-1) - discs[:, 2]
+            found.append(place[np.argmin(np.nan_to_num(gap, nan=np.inf).min(axis=1))])  # the lost are nowhere
+    return np.array(found, np.float32).reshape(-1, 2)
+
+
+def _nearest(trace: Trace) -> Float32:
+    """Of all vehicles and obstacles over time [m]; NaN without obstacles."""
+    distance = trace["obstacle_distance_m"]
+    return distance.min(axis=1) if distance.shape[1] else np.full(len(distance), np.nan, np.float32)
+
+
+def _over_time(
+    curves: Mapping[str, Sequence[Trace]], value: Callable[[Trace], Float32], limits: Mapping[str, float], what: str
+) -> tuple[Figure, list[Axes]]:
+    """Median and range over seeds, a panel for each policy with all others' medians behind; the used panels."""
+    figure, axes = _grid(len(curves), (3.1, 2.7))
+    bands = {policy: _band([(trace["time_s"], value(trace)) for trace in traces]) for policy, traces in curves.items()}
+    for ax, (policy, traces) in zip(axes, curves.items(), strict=False):
+        for grid, _, median, _ in bands.values():
+            ax.plot(grid, median, color="0.75", linewidth=0.7, label="medians of the others")
+        grid, low, median, high = bands[policy]
+        ax.fill_between(grid, low, high, color=BLUE, alpha=0.25, lw=0, label="lowest to highest seed")
+        ax.plot(grid, median, color=BLUE, label="median over seeds")
+        for (label, limit), style in zip(limits.items(), (":", "--"), strict=True):
+            ax.axhline(limit, color=ORANGE, linestyle=style, linewidth=1.0, label=f"{label}: {limit:g} m")
+        smallest = min(float(np.nanmin(value(trace), initial=np.inf)) for trace in traces)
+        ax.set_title(f"{policy[-28:]}\nsmallest of all seeds: {smallest:.2f} m")
+    figure.supxlabel("time [s]")
+    figure.supylabel(what)
+    return figure, axes[: len(curves)]
+
+
+def _band(series: Sequence[tuple[Float32, Float32]]) -> tuple[NDArray[np.float64], ...]:
+    """Time, lowest, median and highest, as long as more than half of the seeds are under way."""
+    grid = np.arange(0.0, max(float(time[-1]) for time, _ in series), _GRID_S)
+    curves = np.array([np.interp(grid, time, values, right=np.nan) for time, values in series])
+    kept = np.isfinite(curves).sum(axis=0) > len(series) / 2
+    curves = curves[:, kept]
+    if not curves.size:
+        return grid[kept], grid[kept], grid[kept], grid[kept]
+    return grid[kept], np.nanmin(curves, axis=0), np.nanmedian(curves, axis=0), np.nanmax(curves, axis=0)

@@ -4,12 +4,46 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import TypedDict
 
-from uuv_marl.sim.swarm import ARRIVAL_RADII_M, Swarm
+from uuv_marl.sim.swarm import Swarm
 
 Float64 = NDArray[np.float64]
 Bool = NDArray[np.bool_]
-Metrics = dict[str, float | int | dict[str, float] | None]
+
+
+class Shares(TypedDict):
+    """Shares of the samples at which Eq. 7's constraints held, each from 0 to 1."""
+
+    all: float
+    s_l: float
+    s_o: float
+    s_u: float
+
+
+class Metrics(TypedDict):
+    """What one run is summed up to; docs/results-format.md defines every key. None where there is nothing to measure.
+
+    Distances are in m and taken from the start to arrival, or to the time limit; times are in s.
+    """
+
+    task_time_s: float | None
+    time_within_1_m_s: float | None
+    time_within_5_m_s: float | None
+    time_within_10_m_s: float | None
+    duration_s: float
+    min_obstacle_distance_m: float | None
+    min_spacing_m: float | None
+    mean_min_spacing_m: float | None
+    max_spacing_m: float | None
+    centre_error_m: float | None
+    order_parameter: float | None
+    collisions: int
+    constraint_share: Shares
+    effort: float
+    clamps: int
+    saturation_share: float
+    vehicles_lost: int
 
 
 class Sample(NamedTuple):
@@ -87,13 +121,12 @@ class Meter:
         table = self._table(world)
         clearance = min(float(clearance[world].min()) for clearance in self._clearances)
         all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
-        later = {
-            f"time_within_{radius:g}_m_s": _number(facts.arrival_s[world, 1 + k])
-            for k, radius in enumerate(ARRIVAL_RADII_M)
-        }
+        arrived, within_1_m, within_5_m, within_10_m = (_number(time) for time in facts.arrival_s[world])
         return {
-            "task_time_s": _number(facts.arrival_s[world, 0]),
-            **later,
+            "task_time_s": arrived,
+            "time_within_1_m_s": within_1_m,
+            "time_within_5_m_s": within_5_m,
+            "time_within_10_m_s": within_10_m,
             "duration_s": float(self._swarm.duration_s[world]),
             "min_obstacle_distance_m": _number(clearance),
             "min_spacing_m": _number(table["min_spacing_m"].min()),

@@ -5,30 +5,36 @@ import inspect
 import json
 import os
 import platform
+import zipfile
+import zlib
 from collections.abc import Container, Iterable
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from typing_extensions import TypedDict
 
 from uuv_marl import __version__
-from uuv_marl.baselines.learned import Learned
+from uuv_marl.atomic import replacing, write_text, writing
+from uuv_marl.baselines.learned import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario
 
-SCHEMA = 1
+FILE = "results.json"
 _PACKAGE = Path(__file__).resolve().parent.parent
-_SOURCES = ("percept.py", "scenario*.py", "sim/*.py", "baselines/*.py", "baselines/tuned/*.json", "benchmark/*.py")
+_SOURCES = (
+    "*.py", "scenario/**/*.py", "sim/**/*.py", "baselines/**/*.py", "baselines/tuned/*.json", "benchmark/**/*.py",
+)  # fmt: skip
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
-
-
-class ResultsError(RuntimeError):
-    """A folder that can't take these results."""
+_LONGEST_NAME = 200
+"""Bytes of a trace's name, which file systems limit to 255."""
 
 
 class Row(NamedTuple):
@@ -40,59 +46,108 @@ class Row(NamedTuple):
     metrics: Metrics
 
 
+class Knowledge(TypedDict):
+    """What a policy has beyond the percept; a hash of its file, if it is a user's."""
+
+    channels: list[str]
+    yaw_damping_nms: float
+    source: str | None
+
+
+class Content(TypedDict):
+    """What ``results.json`` holds; docs/results-format.md defines every key."""
+
+    __pydantic_config__ = ConfigDict(strict=True, extra="forbid")  # pyright: ignore[reportGeneralTypeIssues]
+
+    schema: Literal[1]
+    fingerprint: str
+    versions: dict[str, str]
+    machine: dict[str, str | int | None]
+    scenarios: dict[str, dict[str, Any]]
+    policies: dict[str, Knowledge]
+    runs: list[Row]
+
+
+_CONTENT = TypeAdapter(Content)
+
+
+def read_content(path: Path) -> Content:
+    """What a ``results.json`` holds. Raises ResultsError where it is none of this version's."""
+    try:
+        content = _CONTENT.validate_json(path.read_bytes())
+    except OSError as error:
+        reason = error.strerror or str(error)
+    except ValidationError as error:
+        first = error.errors()[0]
+        reason = f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
+    else:
+        unknown = {row.scenario for row in content["runs"]} - set(content["scenarios"])
+        unknown |= {row.policy for row in content["runs"]} - set(content["policies"])
+        if not unknown:
+            return content
+        reason = f"runs name {min(unknown)!r}, which is not described"
+    raise ResultsError(f"{path} can't be read ({reason}); move it away or give another --output")
+
+
 class Results:
     """``results.json`` in a folder, and ``traces/`` with the time series of every run.
 
+    Nothing keeps two processes from writing to one folder: take ``uuv_marl.atomic.locked`` around it.
+
     Args:
-        folder: made if missing. What it holds already is continued, if it comes from the same code and scenarios.
+        folder: made if missing. What it holds already is continued, if it comes from the same code, libraries and
+            scenarios. A policy that it names is not imported or opened before ``use``.
         scenarios: the scenarios that runs will name.
         route_seeds: seeds whose routes are kept.
+
+    Raises:
+        ResultsError: the folder can't be written, or holds what can't be continued.
     """
 
     def __init__(self, folder: Path, scenarios: Iterable[Scenario], route_seeds: Container[int] = (0,)) -> None:
         self.folder = folder
         self.scenarios = {scenario.name: scenario for scenario in scenarios}
+        self.policies: dict[str, Knowledge] = {}
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
         self._route_seeds = route_seeds
-        self._fingerprint = source_fingerprint()
-        self._policies: dict[str, dict[str, Any]] = {}
-        self.rows: list[Row] = []
-        self._path = folder / "results.json"
-        try:
+        self._fingerprint, self._versions = source_fingerprint(), _versions()
+        self._runs: dict[tuple[str, str, int], Metrics] = {}
+        self._path = folder / FILE
+        with writing(folder):
             (folder / "traces").mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ResultsError(f"{folder} can't be written ({error.strerror}); give another --output") from None
         if self._path.exists():
-            self._continue()
+            self._continue(read_content(self._path))
 
-    def _continue(self) -> None:
-        try:
-            data: dict[str, Any] = json.loads(self._path.read_text(encoding="utf-8"))
-            fingerprint, known = data["fingerprint"], data["scenarios"]
-            rows = [Row(**row) for row in data["runs"]]
-        except (ValueError, KeyError, TypeError) as error:
-            raise ResultsError(f"{self._path} can't be read ({error}); move it away or give another --output") from None
-        if fingerprint != self._fingerprint:
+    def _continue(self, content: Content) -> None:
+        elsewhere = "move it away or give another --output"
+        if content["fingerprint"] != self._fingerprint:
             raise ResultsError(
-                f"{self._path} comes from other code of uuv_marl; move it away or give another --output, "
-                "so that no table mixes the two"
+                f"{self._path} comes from other code of uuv_marl; {elsewhere}, so that no table mixes the two"
             )
-        for name, dump in self._dumps.items():
-            if name in known and known[name] != dump:
+        for library, here in self._versions.items():
+            if (there := content["versions"].get(library)) != here:
                 raise ResultsError(
-                    f"{self._path} holds runs of another {name!r} (different --set or file); "
-                    "move it away or give another --output"
+                    f"{self._path} comes from {library} {there}, and here is {here}; {elsewhere}, so that no table "
+                    "mixes the two"
                 )
-        self._policies = data["policies"]
-        for policy in self._policies:
-            self.use(policy)
-        self._dumps = {**known, **self._dumps}
-        self.rows = [row for row in rows if self.trace_path(row.scenario, row.policy, row.seed).exists()]
+        for name, dump in self._dumps.items():
+            if content["scenarios"].get(name, dump) != dump:
+                raise ResultsError(
+                    f"{self._path} holds runs of another {name!r} (different --set or file); {elsewhere}"
+                )
+        self.policies = content["policies"]
+        self._dumps = {**content["scenarios"], **self._dumps}
+        self._runs = {row[:3]: row.metrics for row in content["runs"] if zipfile.is_zipfile(self.trace_path(*row[:3]))}
+
+    @property
+    def rows(self) -> list[Row]:
+        """All runs, by scenario, policy and seed."""
+        return [Row(*key, self._runs[key]) for key in sorted(self._runs)]
 
     def use(self, policy: str) -> None:
         """Remember what a policy is, before its first run. Raises ResultsError once its file has changed."""
         now = knowledge(policy)
-        if self._policies.setdefault(policy, now).get("source") != now["source"]:
+        if self.policies.setdefault(policy, now)["source"] != now["source"]:
             raise ResultsError(
                 f"{self._path} holds runs of {policy!r} as it was before its file changed; "
                 "move it away or give another --output, and benchmark a copy of what is still being trained"
@@ -100,7 +155,7 @@ class Results:
 
     def has(self, scenario: str, policy: str, seed: int) -> bool:
         """Whether this run is done."""
-        return any((row.scenario, row.policy, row.seed) == (scenario, policy, seed) for row in self.rows)
+        return (scenario, policy, seed) in self._runs
 
     def add(self, scenario: str, policy: str, run: Run) -> None:
         """Keep a run, on disk at once; refused where the policy's file has changed, so that no table mixes two."""
@@ -108,71 +163,83 @@ class Results:
         arrays = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
         if run.seed in self._route_seeds:
             arrays |= {f"route_{name}": values for name, values in run.routes._asdict().items()}
-        trace = self.trace_path(scenario, policy, run.seed)
-        partial = trace.with_suffix(".partial.npz")
-        np.savez_compressed(partial, allow_pickle=False, **arrays)
-        partial.replace(trace)
-        self.rows.append(Row(scenario, policy, run.seed, run.metrics))
-        self._write()
+        with replacing(self.trace_path(scenario, policy, run.seed)) as partial:
+            np.savez_compressed(partial, allow_pickle=False, **arrays)
+        self._runs[scenario, policy, run.seed] = run.metrics
+        content = Content(
+            schema=1,
+            fingerprint=self._fingerprint,
+            versions=self._versions,
+            machine={"platform": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
+            scenarios=self._dumps,
+            policies=self.policies,
+            runs=self.rows,
+        )
+        runs = [row._asdict() for row in self.rows]
+        write_text(self._path, json.dumps({**content, "runs": runs}, allow_nan=False) + "\n")
 
     def select(self, scenario: str, policy: str, seeds: Iterable[int]) -> list[Row]:
         """The runs of a policy on a scenario, by seed."""
-        wanted = set(seeds)
-        rows = [row for row in self.rows if (row.scenario, row.policy) == (scenario, policy) and row.seed in wanted]
-        return sorted(rows, key=lambda row: row.seed)
+        keys = ((scenario, policy, seed) for seed in sorted(set(seeds)))
+        return [Row(*key, self._runs[key]) for key in keys if key in self._runs]
 
     def trace_path(self, scenario: str, policy: str, seed: int) -> Path:
         """Where a run's time series are."""
-        return self.folder / "traces" / f"{scenario}.{quote(policy.replace(':', '-'), safe='')}.{seed}.npz"
+        return trace_path(self.folder, scenario, policy, seed)
 
     def trace(self, scenario: str, policy: str, seed: int) -> dict[str, NDArray[np.float32]]:
-        """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
-
-        Beside them ``obstacles``, ``waypoints``, and for the seeds whose routes are kept the fields of
-        ``evaluate.Routes``, as ``route_time_s`` and so on.
-        """
-        with np.load(self.trace_path(scenario, policy, seed)) as file:
-            return {name: file[name] for name in file.files}
-
-    def _write(self) -> None:
-        data = {
-            "schema": SCHEMA,
-            "fingerprint": self._fingerprint,
-            "versions": {
-                "uuv_marl": __version__,
-                "python": platform.python_version(),
-                **{library: version(library) for library in _LIBRARIES},
-            },
-            "machine": {"platform": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
-            "scenarios": self._dumps,
-            "policies": self._policies,
-            "runs": [row._asdict() for row in self.rows],
-        }
-        partial = self._path.with_suffix(".partial")
-        partial.write_text(json.dumps(data, allow_nan=False) + "\n", encoding="utf-8")
-        partial.replace(self._path)
+        """A run's time series, as ``load_trace`` gives them."""
+        return load_trace(self.trace_path(scenario, policy, seed))
 
 
-def knowledge(policy: str) -> dict[str, Any]:
+def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
+    """Where the time series of a run are, in the folder of its ``results.json``; a long name ends in a hash."""
+    name = f"{scenario}.{quote(policy, safe='')}.{seed}"
+    if len(name.encode()) > _LONGEST_NAME:
+        name = f"{name.encode()[: _LONGEST_NAME - 17].decode(errors='ignore')}-{_hash(name.encode())}"
+    return folder / "traces" / f"{name}.npz"
+
+
+def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
+    """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
+
+    Beside them ``obstacles``, ``waypoints``, and for the seeds whose routes are kept the fields of
+    ``evaluate.Routes``, as ``route_time_s`` and so on; docs/results-format.md has shapes and units.
+
+    Raises:
+        ResultsError: the file is missing or broken.
+    """
+    try:
+        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        raise ResultsError(f"{path} can't be read ({error}); delete it, and the same command makes it again") from error
+
+
+def knowledge(policy: str) -> Knowledge:
     """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
     made = policy_class(policy)
-    if issubclass(made, Learned):
+    if isinstance(made, Trained):
         source = made.checkpoint.digest
     else:
         file = inspect.getsourcefile(made) if ":" in policy else None
-        source = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16] if file else None
-    return {"channels": list(made.channels), "yaw_damping_nms": made.yaw_damping_nms, "source": source}
+        source = _hash(Path(file).read_bytes()) if file else None
+    return Knowledge(channels=list(made.channels), yaw_damping_nms=made.yaw_damping_nms, source=source)
 
 
 def source_fingerprint() -> str:
     """Hash of all that a run's numbers come from: code of the layers up to the benchmark's, and tuned gains."""
-    digest = hashlib.sha256()
-    code = [path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)]
-    for path in sorted(code):
-        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
+    code = sorted({path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)})
+    return _hash(
+        b"".join(f"{path.relative_to(_PACKAGE).as_posix()}\0".encode() + path.read_bytes() + b"\0" for path in code)
+    )
 
 
-def scenario_hash(scenario: Scenario) -> str:
-    """Short name of a configuration, for captions."""
-    return hashlib.sha256(json.dumps(scenario.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()[:8]
+def _hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def _versions() -> dict[str, str]:
+    """Of all that runs depend on."""
+    libraries = {library: version(library) for library in _LIBRARIES}
+    return {"uuv_marl": __version__, "python": platform.python_version(), **libraries}

@@ -4,11 +4,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from uuv_marl.baselines import granted
+from uuv_marl.atomic import write_text, writing
+from uuv_marl.baselines import POLICIES, granted
 from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import Results
-from uuv_marl.benchmark.tables import CAPTION, markdown_table, rows_of
+from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
+from uuv_marl.errors import PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import differences, scenario_names
 
@@ -20,10 +22,6 @@ Report = Callable[[str, str, float], None]
 
 Evaluate = Callable[[Scenario, str, Sequence[int]], Iterator[Run | Progress]]
 """Runs a policy on a scenario over seeds: here as ``evaluate``, or elsewhere with the same runs."""
-
-
-class ClusterError(RuntimeError):
-    """A cluster that can't do the work; the message says what to do."""
 
 
 def run_missing(
@@ -41,12 +39,17 @@ def run_missing(
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
             done, fresh = len(seeds) - len(missing), 0
             report(scenario.name, policy, done / len(seeds))
-            for event in evaluator(granted(policy, scenario), policy, missing):
-                if isinstance(event, Run):
-                    results.add(scenario.name, policy, event)
-                    fresh += 1
-                share = event.share if isinstance(event, Progress) else fresh / len(missing)
-                report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
+            try:
+                for event in evaluator(granted(policy, scenario), policy, missing):
+                    if isinstance(event, Run):
+                        results.add(scenario.name, policy, event)
+                        fresh += 1
+                    share = event.share if isinstance(event, Progress) else fresh / len(missing)
+                    report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
+            except (TypeError, ValueError) as error:
+                if policy in POLICIES or isinstance(error, PolicyError):
+                    raise
+                raise PolicyError(f"policy {policy!r}: {error}") from error
             report(scenario.name, policy, 1.0)
 
 
@@ -56,7 +59,7 @@ def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     note = f"; CHANGED: {', '.join(changed)}" if changed else ""
     return (
         f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
-        f"{len(seeds)} seeds, echoes report the {scenario.sonar.echo_reports}{note}"
+        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}{note}"
     )
 
 
@@ -64,26 +67,26 @@ class Table(NamedTuple):
     """A scenario's table."""
 
     title: str
-    rows: list[tuple[str, ...]]
-
-
-def make_tables(
-    results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]
-) -> list[Table]:
-    """A table for each scenario."""
-    return [Table(title(s, seeds), rows_of(results, s.name, policies, seeds)) for s in scenarios]
+    rows: list[Cells]
 
 
 def write_report(
-    results: Results,
-    tables: Sequence[Table],
-    scenarios: Sequence[Scenario],
-    policies: Sequence[str],
-    seeds: Sequence[int],
-) -> list[Path]:
-    """``table.md`` and the pictures; the paths, the table first."""
+    results: Results, scenarios: Sequence[Scenario], seeds: Sequence[int]
+) -> tuple[list[Table], list[Path]]:
+    """``table.md`` and the pictures, of every policy that the results hold runs of on these scenarios and seeds.
+
+    Returns:
+        A table for each scenario, its rows the default policies in their order, then others by name; and the paths
+        written, that of the table first.
+
+    Raises:
+        ResultsError: a file can't be written.
+    """
+    held = [name for name in sorted(results.policies) if any(results.select(s.name, name, seeds) for s in scenarios)]
+    policies = [name for name in dict.fromkeys([*DEFAULT_POLICIES, *held]) if name in held]
+    tables = [Table(title(s, seeds), rows_of(results, s.name, policies, seeds)) for s in scenarios]
     path = results.folder / "table.md"
-    texts = [markdown_table(table.title, table.rows) for table in tables]
-    path.write_text("\n".join([*texts, CAPTION + "\n"]), encoding="utf-8")
-    figures = [figure for scenario in scenarios for figure in draw_all(results, scenario.name, policies, seeds)]
-    return [path, *figures]
+    texts = [f"## {table.title}\n\n{markdown_table(HEADERS, table.rows)}" for table in tables]
+    write_text(path, "\n".join([*texts, CAPTION + "\n"]))
+    with writing(results.folder / "figures"):
+        return tables, [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]

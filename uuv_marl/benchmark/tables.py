@@ -1,7 +1,7 @@
 """The benchmark's table: interquartile means over seeds with bootstrap intervals, worst seeds, the paper's figures."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
-from uuv_marl.benchmark.results import Results, Row, knowledge
+from uuv_marl.benchmark.results import Knowledge, Results, Row
 from uuv_marl.scenario_files import differences
 
 Float64 = NDArray[np.float64]
@@ -18,10 +18,35 @@ _CONFIDENCE = 0.95
 _RESAMPLES = 2000
 _NOTHING = "–"
 
+_FEWEST_SEEDS = 5
+"""For an interval: of fewer seeds the bootstrap tells nothing."""
+_NARROW = 110
+"""Columns of a terminal below which its table leaves out intervals and the time mean."""
+
 HEADERS = (
     "policy", "beyond the percept", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
     "spacing [m]", "worst", "mean spacing [m]", "within Eq. 7", "collisions", "paper",
 )  # fmt: skip
+
+
+class Cells(NamedTuple):
+    """A row of the table, a text for each of ``HEADERS``; estimates as ``mean [low, high]``."""
+
+    policy: str
+    knows: str
+    arrived: str
+    time: str
+    slowest: str
+    distance: str
+    nearest: str
+    spacing: str
+    closest: str
+    mean: str
+    within: str
+    collisions: str
+    paper: str
+
+
 CAPTION = (
     "Interquartile mean over seeds [95 % bootstrap interval]; worst seed; times over the seeds that arrived. "
     "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles, and its time mean. "
@@ -39,13 +64,18 @@ class Estimate(NamedTuple):
     high: float
 
 
-def estimate(values: Sequence[float]) -> Estimate:
-    """Interquartile mean over seeds and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable."""
-    data = np.asarray(values, np.float64)
-    if len(data) < 2 or np.ptp(data) == 0.0:
-        return Estimate(float(_iqm(data)), float(data.min()), float(data.max()))
-    interval = bootstrap(
-        (data,),
+def estimate(*samples: Sequence[float]) -> Estimate:
+    """Interquartile mean and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable.
+
+    Of one sample, such as a value for each seed, or of several together: each is resampled by itself.
+    """
+    data = [np.asarray(sample, np.float64) for sample in samples]
+    whole = float(_iqm(*data))
+    if min(map(len, data)) < 2 or all(np.ptp(sample) == 0.0 for sample in data):
+        return Estimate(whole, whole, whole)
+    resample: Any = bootstrap
+    interval = resample(
+        tuple(data),
         _iqm,
         confidence_level=_CONFIDENCE,
         n_resamples=_RESAMPLES,
@@ -53,122 +83,121 @@ def estimate(values: Sequence[float]) -> Estimate:
         vectorized=True,
         rng=np.random.default_rng(0),
     ).confidence_interval
-    return Estimate(float(_iqm(data)), float(interval.low), float(interval.high))
+    return Estimate(whole, float(interval.low), float(interval.high))
 
 
-def _iqm(data: Float64, axis: int = -1) -> Float64:
-    return np.asarray(trim_mean(data, 0.25, axis=axis), np.float64)
+def _iqm(*data: Float64, axis: int = -1) -> Float64:
+    return np.asarray(trim_mean(np.concatenate(data, axis=axis), 0.25, axis=axis), np.float64)
 
 
-def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, ...]]:
+def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Cells]:
     """The table's cells, a row for each policy that has runs."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[Cells] = []
     as_in_paper = not differences(results.scenarios[scenario])
     for policy in policies:
         runs = results.select(scenario, policy, seeds)
         if runs:
-            rows.append(_cells(policy, runs, PAPER.get((scenario, policy)) if as_in_paper else None))
+            paper = PAPER.get((scenario, policy)) if as_in_paper else None
+            rows.append(_cells(policy, results.policies[policy], runs, paper))
     return rows
 
 
-def _cells(policy: str, runs: Sequence[Row], paper: PaperFigure | None) -> tuple[str, ...]:
+def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigure | None) -> Cells:
     times = _values(runs, "task_time_s")
-    collisions = _values(runs, "collisions")
-    collided = sum(1 for count in collisions if count)
-    return (
-        policy,
-        _knows(policy),
-        f"{len(times)}/{len(runs)}",
-        *_pair(times, max, 1),
-        *_pair(_values(runs, "min_obstacle_distance_m"), min, 2),
-        *_pair(_values(runs, "min_spacing_m"), min, 2),
-        _pair(_values(runs, "mean_min_spacing_m"), min, 2)[0],
-        _shares(runs),
-        f"{sum(collisions):.0f} in {collided} seeds" if collided else "0",
-        _paper_cell(paper),
+    distances, spacings = _values(runs, "min_obstacle_distance_m"), _values(runs, "min_spacing_m")
+    collisions = [run.metrics["collisions"] for run in runs]
+    collided = sum(count > 0 for count in collisions)
+    shares = [run.metrics["constraint_share"] for run in runs]
+
+    def shown(values: Sequence[float], digits: int) -> str:
+        if not values:
+            return _NOTHING
+        e = estimate(values)
+        return f"{e.iqm:.{digits}f}" + (
+            f" [{e.low:.{digits}f}, {e.high:.{digits}f}]" if len(runs) >= _FEWEST_SEEDS else ""
+        )
+
+    return Cells(
+        policy=policy,
+        knows=_knows(known),
+        arrived=f"{len(times)}/{len(runs)}",
+        time=shown(times, 1),
+        slowest=f"{max(times):.1f}" if times else _NOTHING,
+        distance=shown(distances, 2),
+        nearest=f"{min(distances):.2f}" if distances else _NOTHING,
+        spacing=shown(spacings, 2),
+        closest=f"{min(spacings):.2f}" if spacings else _NOTHING,
+        mean=shown(_values(runs, "mean_min_spacing_m"), 2),
+        within=", ".join(f"{name} {np.mean([s[name] for s in shares]):.0%}" for name in ("s_l", "s_o", "s_u")),
+        collisions=f"{sum(collisions)} in {counted(collided, 'seed')}" if collided else "0",
+        paper=_paper_cell(paper),
     )
 
 
-def _values(runs: Sequence[Row], name: str) -> list[float]:
-    values = [run.metrics[name] for run in runs]
-    return [float(value) for value in values if isinstance(value, (int, float))]
+_Measured = Literal["task_time_s", "min_obstacle_distance_m", "min_spacing_m", "mean_min_spacing_m"]
 
 
-def _shares(runs: Sequence[Row]) -> str:
-    shares = [run.metrics["constraint_share"] for run in runs]
-    means = {
-        name: float(np.mean([share[name] for share in shares if isinstance(share, dict)]))
-        for name in ("s_l", "s_o", "s_u")
-    }
-    return ", ".join(f"{name} {mean:.0%}" for name, mean in means.items())
+def _values(runs: Sequence[Row], name: _Measured) -> list[float]:
+    return [value for run in runs if (value := run.metrics[name]) is not None]
 
 
-def _pair(values: Sequence[float], worst: Callable[[Sequence[float]], float], digits: int) -> tuple[str, str]:
-    if not values:
-        return _NOTHING, _NOTHING
-    e = estimate(values)
-    return f"{e.iqm:.{digits}f} [{e.low:.{digits}f}, {e.high:.{digits}f}]", f"{worst(values):.{digits}f}"
+def counted(number: int, what: str) -> str:
+    """A number with its noun: ``1 seed``, ``2 seeds``."""
+    return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def _knows(policy: str) -> str:
-    known = knowledge(policy)
-    parts = list(known["channels"])
-    if known["yaw_damping_nms"]:
-        parts.append(f"yaw damping {known['yaw_damping_nms']:g} N m s")
-    return ", ".join(parts) or _NOTHING
+def _knows(known: Knowledge) -> str:
+    damping = known["yaw_damping_nms"]
+    return ", ".join([*known["channels"], *([f"yaw damping {damping:g} N m s"] if damping else [])]) or _NOTHING
 
 
 def _paper_cell(paper: PaperFigure | None) -> str:
     if paper is None:
         return _NOTHING
-    parts: list[str] = []
-    if paper.task_time_s is not None:
-        parts.append(f"{paper.task_time_s:g} s")
-    if paper.min_obstacle_distance_m is not None:
-        parts.append("-".join(f"{distance:g}" for distance in paper.min_obstacle_distance_m) + " m")
-    if paper.min_spacing_m is not None:
-        parts.append(f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m")
-    return ", ".join(parts)
+    distances = "-".join(f"{distance:g}" for distance in paper.min_obstacle_distance_m or ())
+    parts = (
+        f"{paper.task_time_s:g} s" if paper.task_time_s else "",
+        f"{distances} m" if distances else "",
+        f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m" if paper.min_spacing_m else "",
+    )
+    return ", ".join(filter(None, parts))
 
 
-def rich_table(title: str, rows: Sequence[Sequence[str]]) -> RichTable:
-    """For the terminal: the same cells, stacked so that they fit."""
-    table = RichTable(title=title, title_justify="left", caption=CAPTION, caption_justify="left", show_lines=True)
-    table.add_column("policy\n(beyond the percept)")
+def rich_table(title: str, rows: Sequence[Cells], width: int) -> RichTable:
+    """For a terminal of so many columns: the same cells, stacked so that they fit.
+
+    A narrow one leaves out intervals, the spacing's time mean and the shares of Eq. 7, which table.md has.
+    """
+    narrow = width < _NARROW
+    table = RichTable(
+        title=title, title_justify="left", caption=CAPTION, caption_justify="left", show_lines=True,
+        padding=0 if narrow else (0, 1),
+    )  # fmt: skip
+    # A policy's name is what tells rows from each other: it is folded where it must be, and never cut.
+    longest = max((len(cells.policy) for cells in rows), default=0)
+    table.add_column("policy", overflow="fold", width=min(max(longest, 0 if narrow else 23), width // 4))
     for header in ("arrived", "task time [s]", "obstacle distance [m]", "spacing [m]"):
-        table.add_column(escape(header), justify="right")
-    table.add_column("within Eq. 7, collisions")
-    table.add_column("paper")
-    for (
-        policy,
-        knows,
-        arrived,
-        time,
-        slowest,
-        distance,
-        nearest,
-        spacing,
-        closest,
-        mean,
-        within,
-        collisions,
-        paper,
-    ) in rows:
+        table.add_column(escape(header), justify="right", overflow="fold")
+    table.add_column("collisions" if narrow else "within Eq. 7, collisions", overflow="fold")
+    table.add_column("paper", overflow="fold")
+    for c in rows:
+        time, distance, spacing = (
+            text.partition(" [")[0] if narrow else text for text in (c.time, c.distance, c.spacing)
+        )
         cells = (
-            policy if knows == _NOTHING else f"{policy}\n({knows})",
-            arrived,
-            f"{time}\nworst {slowest}",
-            f"{distance}\nworst {nearest}",
-            f"{spacing}\nworst {closest}\ntime mean {mean}",
-            f"{within}\ncollisions: {collisions}",
-            paper,
+            c.policy if c.knows == _NOTHING else f"{c.policy}\n({c.knows})",
+            c.arrived,
+            f"{time}\nworst {c.slowest}",
+            f"{distance}\nworst {c.nearest}",
+            f"{spacing}\nworst {c.closest}" + ("" if narrow else f"\ntime mean {c.mean}"),
+            c.collisions if narrow else f"{c.within}\ncollisions: {c.collisions}",
+            c.paper,
         )
         table.add_row(*map(escape, cells))
     return table
 
 
-def markdown_table(title: str, rows: Sequence[Sequence[str]]) -> str:
-    """For ``table.md``."""
-    lines = [f"## {title}", "", "| " + " | ".join(HEADERS) + " |", "|" + " --- |" * len(HEADERS)]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
-    return "\n".join(lines) + "\n"
+def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown, with a line end after the last row."""
+    lines = [headers, ("---",) * len(headers), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)

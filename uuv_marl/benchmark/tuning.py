@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import bio_inspired, granted, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.scenario import Scenario
@@ -85,25 +86,20 @@ def cost(run: Run, scenario: Scenario) -> float:
 
     A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too.
     """
-    metrics = run.metrics
-    time = metrics["task_time_s"]
-    if not isinstance(time, float):
-        limit = scenario.time_limit
-        duration = metrics["duration_s"]
-        error = metrics["centre_error_m"]
-        assert isinstance(duration, float)  # noqa: S101 - always measured
-        time = limit.factor * duration + limit.extra_s + (error if isinstance(error, float) else 0.0)
-    collisions, clearance = metrics["collisions"], metrics["min_obstacle_distance_m"]
-    assert isinstance(collisions, int)  # noqa: S101 - always counted
-    short = max(0.0, scenario.constraints.s_o_m - clearance) if isinstance(clearance, float) else 0.0
-    return time + _COLLISION_COST_S * collisions + _CLEARANCE_COST_S_PER_M * short
+    metrics, limit = run.metrics, scenario.time_limit
+    time, clearance = metrics["task_time_s"], metrics["min_obstacle_distance_m"]
+    if time is None:
+        time = limit.factor * metrics["duration_s"] + limit.extra_s + (metrics["centre_error_m"] or 0.0)
+    short = 0.0 if clearance is None else max(0.0, scenario.constraints.s_o_m - clearance)
+    return time + _COLLISION_COST_S * metrics["collisions"] + _CLEARANCE_COST_S_PER_M * short
 
 
 def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], None]) -> Path:
     """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
 
     Writes ``output/POLICY.json`` with the best parameters and ``POLICY.csv`` with every trial, and keeps Optuna's
-    journal beside them. ``report`` is called with the number of trials done and the best cost [s].
+    journal beside them, from which Optuna unpickles: go on with none that you do not trust. ``report`` is called with
+    the number of trials done and the best cost [s].
     """
     import optuna  # noqa: PLC0415 - an extra
     from optuna.storages.journal import JournalFileBackend  # noqa: PLC0415
@@ -140,10 +136,10 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         "best_cost_s": round(study.best_value, 3),
     }
     trials_path, path = output / f"{policy}.csv", output / f"{policy}.json"
-    with trials_path.open("w", newline="", encoding="utf-8") as file:
+    with replacing(trials_path) as partial_path, partial_path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["cost_s", *space])
         for trial in study.get_trials(states=complete):
             writer.writerow([f"{trial.value:.3f}", *(f"{trial.params[name]:.4g}" for name in space)])
-    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(result, indent=1) + "\n")
     return path

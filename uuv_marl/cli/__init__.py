@@ -14,6 +14,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_show_locals=False,
     rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
     benchmark.benchmark, heldout.heldout, reproduce.reproduce, lists.scenarios, lists.policies, benchmark.tune,

@@ -1,5 +1,6 @@
 """``uuv-marl benchmark``, and ``tune``, which found the gains of what it compares."""
 
+import itertools
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -9,10 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.progress import TaskID
 
-from uuv_marl.cli.console import console, explained, extra, progress_bar
+from uuv_marl.cli.console import console, explained, extra, working
 
 if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
+
+_NEXT = """Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}");
+train a policy with uuv-marl train mappo --output runs/mappo, and compare it with --policy runs/mappo/best."""
 
 
 def benchmark(
@@ -22,8 +26,8 @@ def benchmark(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, checkpoint (runs/mappo/best) or module:Class; repeat for several. Default: the paper's three "
-            "and stronger variants."
+            help="Name, checkpoint (runs/mappo/best) or module:Class, whose module is looked for in the current folder "
+            "too, after all installed ones; repeat for several. Default: the paper's three, stronger variants, mappo."
         ),
     ] = None,
     seeds: Annotated[
@@ -31,7 +35,7 @@ def benchmark(
     ] = 20,
     overrides: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as sonar.echo_reports=surface."),
+        typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder of results, table and pictures.")] = Path("results/benchmark"),
     ray: Annotated[
@@ -43,56 +47,52 @@ def benchmark(
 ) -> None:
     """Compare policies on scenarios over seeds.
 
-    Prints a table beside the paper's figures and writes results.json (every seed and metric), table.md and
-    figures/*.png. Ctrl-C keeps the finished seeds; the same command goes on.
+    Prints a table beside the paper's figures and writes `results.json` (every seed and metric), `table.md` and
+    `figures/*.png`. Table and pictures show every policy of which results.json holds runs on these scenarios and seeds.
+    Ctrl-C keeps the finished seeds; the same command goes on.
 
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import PolicyError
-        from uuv_marl.baselines.registry import policy_class
+        from uuv_marl.baselines import PolicyError, granted, make
+        from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
-        from uuv_marl.benchmark.runner import DEFAULT_POLICIES, make_tables, run_missing, write_report
         from uuv_marl.benchmark.tables import rich_table
         from uuv_marl.scenario_files import ScenarioError, load_scenario, parse_override
 
         changes = dict(parse_override(text) for text in overrides or [])
-        for field in sorted({"sonar.channels", "actuators.yaw_damping_nms"} & set(changes)):
+        for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
             raise PolicyError(f"{field} can't be set here: every policy brings its own, see 'uuv-marl policies'")
         scenarios = [load_scenario(name, overrides=changes) for name in scenario or ["single_obstacle"]]
         names = [loaded.name for loaded in scenarios]
         if len(set(names)) < len(names):
             raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
-        policies = list(dict.fromkeys(policy or DEFAULT_POLICIES))
-        sys.path.insert(0, "")  # --policy module:Class finds modules of this folder
-        for name in policies:
-            policy_class(name)
+        policies = list(dict.fromkeys(policy or runner.DEFAULT_POLICIES))
+        if any(":" in name for name in policies):
+            sys.path.append("")  # last, so that no file of this folder takes the place of an installed module
+        for name, loaded in itertools.product(policies, scenarios):
+            make(name, granted(name, loaded))  # refused now, not after hours of others' runs
         evaluator, cluster = _where(ray, policies)
-        results = Results(output, scenarios)
-        wanted = list(range(seeds))
-        try:
-            with cluster, progress_bar() as bar:
-                tasks: dict[tuple[str, str], TaskID] = {}
+        wanted = range(seeds)
+        with working(f"The finished runs are in {output}", alone=output) as bar:
+            results = Results(output, scenarios)
+            tasks: dict[tuple[str, str], TaskID] = {}
 
-                def report(name: str, policy_name: str, share: float) -> None:
-                    key = (name, policy_name)
-                    if key not in tasks:
-                        tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
-                    bar.update(tasks[key], completed=share)
+            def report(name: str, policy_name: str, share: float) -> None:
+                key = (name, policy_name)
+                if key not in tasks:
+                    tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
+                bar.update(tasks[key], completed=share)
 
-                run_missing(results, scenarios, policies, wanted, report, evaluator)
-        except KeyboardInterrupt:
-            console.print(
-                f"Stopped. {len(results.rows)} finished runs are in {output}/results.json; the same command goes on."
-            )
-            raise typer.Exit(130) from None
-        tables = make_tables(results, scenarios, policies, wanted)
-        written = write_report(results, tables, scenarios, policies, wanted)
+            with cluster:
+                runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
+            tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
-            console.print(rich_table(table.title, table.rows))
-        console.print(f"Every seed: {output}/results.json   table: {written[0]}   pictures:")
-        for path in written[1:]:
+            console.print(rich_table(table.title, table.rows, console.width))
+        console.print(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
+        for path in pictures:
             console.print(f"  {path}", highlight=False)
+        console.print(_NEXT.format(output=output), markup=False, highlight=False)
 
 
 def _where(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
@@ -117,7 +117,8 @@ def tune(
     """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
 
     Needs the extra "tune". Takes ten to fifteen minutes per policy. Ctrl-C keeps the finished trials; the same command
-    goes on. The shipped results are in uuv_marl/baselines/tuned.
+    goes on. The shipped results are in uuv_marl/baselines/tuned. The trials' journal may hold pickled data: go on with
+    none that you do not trust.
     """
     with explained():
         from uuv_marl.baselines import PolicyError
@@ -127,17 +128,13 @@ def tune(
         for name in policy or SPACES:
             if name not in SPACES:
                 raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
-        try:
-            with extra("tune", "tuning"), progress_bar() as bar:
-                for name in policy or SPACES:
-                    task = bar.add_task(name, total=trials)
-                    path = search(
-                        name, output, trials,
-                        lambda done, best, task=task, name=name: bar.update(
-                            task, completed=done, description=f"{name}: best {best:.1f} s"
-                        ),
-                    )  # fmt: skip
-                    bar.console.print(f"{path}", highlight=False)
-        except KeyboardInterrupt:
-            console.print(f"Stopped. The finished trials are in {output}; the same command goes on.")
-            raise typer.Exit(130) from None
+        with extra("tune", "tuning"), working(f"The finished trials are in {output}", alone=output) as bar:
+            for name in policy or SPACES:
+                task = bar.add_task(name, total=trials)
+                path = search(
+                    name, output, trials,
+                    lambda done, best, task=task, name=name: bar.update(
+                        task, completed=done, description=f"{name}: best {best:.1f} s"
+                    ),
+                )  # fmt: skip
+                bar.console.print(f"{path}", highlight=False)

@@ -1,45 +1,61 @@
 """What all commands share: the consoles, the progress bar, and errors that say what to do."""
 
+import errno
 import sys
+import sysconfig
+import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from uuv_marl.atomic import locked
+from uuv_marl.errors import ClusterError, DivergenceError, MissingExtraError, PolicyError, ResultsError, ScenarioError
+from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
+
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
 errors = Console(stderr=True)
 
+_MENDABLE = (ScenarioError, PolicyError, DivergenceError, ResultsError, ClusterError, MissingExtraError)
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+_PACKAGE = str(Path(__file__).resolve().parent.parent)
+_NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")))
+_MOST_FRAMES = 5
+
 
 @contextmanager
 def explained() -> Iterator[None]:
-    """Turn what a user can mend into one message, without a traceback."""
-    from uuv_marl.baselines import PolicyError
-    from uuv_marl.benchmark.results import ResultsError
-    from uuv_marl.benchmark.runner import ClusterError
-    from uuv_marl.scenario_files import ScenarioError
-
+    """Turn what a user can mend into one message: no traceback but the lines of the user's own code."""
     try:
         yield
-    except (ScenarioError, PolicyError, ResultsError, ClusterError) as error:
-        errors.print(f"[bold red]Error:[/] {escape(str(error))}", highlight=False)
+    except Exception as error:
+        frames = _own_frames(error) or _own_frames(error.__cause__)
+        if isinstance(error, _MENDABLE):
+            message = str(error)
+        elif frames:
+            message = f"{type(error).__name__}: {error}"
+        elif isinstance(error, OSError) and error.errno in _FULL:
+            message = (
+                f"{error.filename or 'a file'} can't be written ({error.strerror}); what was finished before is safe"
+            )
+        else:
+            raise
+        errors.print(f"[bold red]Error:[/] {escape(message)}", highlight=False)
+        for frame in frames[-_MOST_FRAMES:]:
+            where = f"  {frame.filename}:{frame.lineno}, in {frame.name}\n    {frame.line}"
+            errors.print(escape(where), highlight=False, soft_wrap=True)
         raise typer.Exit(2) from None
 
 
-@contextmanager
-def extra(name: str, what: str) -> Iterator[None]:
-    """Say which extra to install where a library is missing."""
-    from uuv_marl.baselines import PolicyError
-
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise PolicyError(
-            f"{what} needs {error.name}: install the extra, in the checkout: pip install -e '.[{name}]'"
-        ) from None
+def _own_frames(error: BaseException | None) -> list[traceback.FrameSummary]:
+    """The part of an error's traceback that lies in files which belong to neither this package nor a library."""
+    frames = traceback.extract_tb(error.__traceback__ if error else None)
+    return [f for f in frames if Path(f.filename).is_file() and not f.filename.startswith(_NOT_THE_USERS)]
 
 
 def progress_bar() -> Progress:
@@ -48,3 +64,19 @@ def progress_bar() -> Progress:
         TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console,
     )  # fmt: skip
+
+
+@contextmanager
+def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
+    """The progress bar of a long work. Ctrl-C ends the command and says what is kept: "The trials are in x".
+
+    Args:
+        kept: a sentence without its end.
+        alone: the folder that no other command may write to meanwhile.
+    """
+    try:
+        with nullcontext() if alone is None else locked(alone), progress_bar() as bar:
+            yield bar
+    except KeyboardInterrupt:
+        console.print(f"Stopped. {kept}; the same command goes on.")
+        raise typer.Exit(130) from None

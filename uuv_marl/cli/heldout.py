@@ -1,49 +1,47 @@
-"""``uuv-marl heldout``: learned policies on what they were never trained on."""
+"""``uuv-marl heldout`` evaluates learned policies on what they were never trained on."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import console, explained, progress_bar
+from uuv_marl.cli.console import console, explained, working
 
 
 def heldout(
     only: Annotated[
-        list[str] | None, typer.Option(help="A set, such as random_field; repeat for several. Default: all.")
+        list[str] | None, typer.Option(help="Run only this set, such as random_field. Repeat it for several sets.")
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, max=10_000, help="At most so many of every set; 100 to 500 are usual.")
+        int | None, typer.Option(min=1, max=10_000, help="Most seeds of a set. Without it a set has 20 to 500.")
     ] = None,
     trainings: Annotated[
-        Path | None, typer.Option(help="Folder of outputs of uuv-marl train, one for each algorithm and seed.")
+        Path | None, typer.Option(help="Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of results, page and pictures.")] = Path("results/heldout"),
+    output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/heldout"),
 ) -> None:
     """Evaluate the shipped learned policies beside the hand-made ones, on what no training has seen.
 
-    500 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface, other decision
-    periods. Writes report.md, episodes.csv, pictures, and with --trainings the comparison over training seeds, also as
-    marl_eval.json. Took 40 minutes as two processes, each with its --only. Ctrl-C keeps the finished episodes; the same
-    command goes on.
+    The sets are 500 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface,
+    and other decision periods. It writes report.md, episodes.csv and pictures; with --trainings it also compares
+    algorithms over training seeds, and writes marl_eval.json. All sets took 40 minutes in two processes, each with its
+    own --only. Ctrl-C keeps the finished episodes, and the same command continues.
 
     Example: uuv-marl heldout --only single_obstacle --seeds 5
     """
     with explained():
+        from uuv_marl.atomic import locked
         from uuv_marl.heldout.episodes import episodes_of
         from uuv_marl.heldout.job import run
         from uuv_marl.heldout.page import write_page
 
-        try:
-            with progress_bar() as bar:
-                task = bar.add_task("held out", total=1.0)
-                results, trained = run(
-                    output, trainings, only or [], seeds,
-                    lambda what, share: bar.update(task, completed=share, description=what[-60:]),
-                )  # fmt: skip
-                bar.update(task, completed=1.0, description="held out")
-        except KeyboardInterrupt:
-            console.print(f"Stopped. The finished episodes are in {output}; the same command goes on.")
-            raise typer.Exit(130) from None
-        for path in write_page(output, episodes_of(results, trained), trained):
-            console.print(f"  {path}", highlight=False)
+        with working(f"The finished episodes are in {output}") as bar:
+            task = bar.add_task("held out", total=1.0)
+            results, trained = run(
+                output, trainings, only or [], seeds,
+                lambda what, share: bar.update(task, completed=share, description=what[-60:]),
+            )  # fmt: skip
+            bar.update(task, completed=1.0, description="held out")
+        with locked(output, wait_s=60.0):
+            for path in write_page(output, episodes_of(results, trained), trained):
+                console.print(f"  {path}", highlight=False)

@@ -1,51 +1,86 @@
 """``uuv-marl train``: a command for each library."""
 
+import re
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from uuv_marl.cli.console import console, explained, extra, progress_bar
 
 app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
 
 
+def _whole(text: str) -> int:
+    if not re.fullmatch(r"[1-9]\d{0,14}|[1-9](\.\d+)?e\d{1,2}", str(text)):
+        raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give for instance 3000000 or 3e6")
+    return int(float(text))
+
+
+class _Command(TyperCommand):
+    """Says how an option of two values looks."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As a command does, with an example in the message."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            if "2 arguments" not in str(error):
+                raise
+            raise typer.BadParameter(f"{error} Give it at the start and at the end: --noise 0.4 0.08", ctx) from None
+
+
 Scenario = Annotated[str, typer.Option(help="Name or TOML file.")]
+Vehicles = Annotated[
+    int | None,
+    typer.Option(min=1, help="Of every swarm. Default: the scenario's; 10 to 100 at once where that has 54."),
+]
 Steps = Annotated[
-    int, typer.Option(min=1, help="Agent-steps in all: decisions times vehicles. Noise and rates anneal over them.")
+    int,
+    typer.Option(parser=_whole, metavar="NUMBER", help="Agent-steps in all, such as 3e6: decisions times vehicles."),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
 Start = Annotated[
     Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
 ]
-Output = Annotated[Path, typer.Option(help="Folder of settings, progress, checkpoint and best.")]
+Output = Annotated[Path, typer.Option(help="Folder of settings, progress and checkpoint.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")]
 
 
-@app.command("mappo")
+@app.command("mappo", cls=_Command)
 def train_mappo(
     scenario: Scenario = "random_field",
+    num_vehicles: Vehicles = None,
     steps: Steps = 30_000_000,
     seed: Seed = 0,
     start: Start = None,
     noise: Annotated[
         tuple[float, float] | None,
-        typer.Option(min=1e-3, help="Of actions, at the start and at the end [full force]. Default: 0.4 0.08."),
+        typer.Option(
+            min=1e-3, max=10.0, help="Of actions, at the start and at the end [full force]. Default: 0.4 0.08."
+        ),
     ] = None,
     rate: Annotated[
         tuple[float, float] | None,
-        typer.Option(min=0.0, help="The actor's learning rate, at the start and at the end. Default: 0.0015 0.00015."),
+        typer.Option(
+            min=1e-9, max=1.0, help="The actor's learning rate, at the start and at the end. Default: 0.0015 0.00015."
+        ),
     ] = None,
     output: Output = Path("results/mappo"),
     resume: Resume = False,
 ) -> None:
     """Train one policy for all vehicles with MAPPO, on swarms of 10 to 100 at once, on one core.
 
-    Vehicles decide every 0.5 s, with yaw damping. Needs the extra "train". Writes config.json (settings, seeds,
-    versions), progress.csv, checkpoints/, tensorboard/ and best/, the policy that did best on validation seeds: give it
-    to uuv-marl benchmark as --policy. Ctrl-C or a kill keeps the last checkpoint; the same command with --resume goes
-    on exactly.
+    Vehicles decide every 0.5 s, with yaw damping, whatever the scenario says. Noise and rates anneal over --steps.
+    Needs the extra "train". Writes config.json (settings, seeds, versions), progress.csv (a row per iteration),
+    checkpoints/, tensorboard/ and best/, the policy that did best on validation seeds: give it to uuv-marl benchmark as
+    --policy. Ctrl-C ends the training with a checkpoint after the iteration under way; the same command with --resume
+    goes on exactly. A kill leaves the last checkpoint, which is written every 20 iterations.
 
     Example: uuv-marl train mappo --output runs/mappo
     """
@@ -53,14 +88,18 @@ def train_mappo(
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
 
-        by = Hyperparameters()
-        algorithm = replace(by, noise=noise or by.noise, learning_rate=rate or by.learning_rate)
-        _train(output, resume, scenario=scenario, steps=steps, seed=seed, start=start, algorithm=algorithm)
+        given = {name: pair for name, pair in (("noise", noise), ("learning_rate", rate)) if pair}
+        try:
+            algorithm = replace(Hyperparameters(), **given)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+        _train(output, resume, num_vehicles, start, scenario=scenario, steps=steps, seed=seed, algorithm=algorithm)
 
 
-@app.command("ppo")
+@app.command("ppo", cls=_Command)
 def train_ppo(
     scenario: Scenario = "random_field",
+    num_vehicles: Vehicles = None,
     steps: Steps = 30_000_000,
     seed: Seed = 0,
     start: Start = None,
@@ -79,54 +118,81 @@ def train_ppo(
             from uuv_marl.train.ppo import Hyperparameters
 
         algorithm = Hyperparameters()
-        _train(output, resume, scenario=scenario, steps=steps, seed=seed, start=start, algorithm=algorithm)
+        _train(output, resume, num_vehicles, start, scenario=scenario, steps=steps, seed=seed, algorithm=algorithm)
 
 
-def _train(output: Path, resume: bool, *, steps: int, start: Path | None, **settings: Any) -> None:
+def _train(output: Path, resume: bool, num_vehicles: int | None, start: Path | None, **settings: Any) -> None:
     """Train with these settings, and show how it goes."""
-    from uuv_marl.train.training import Settings, train
+    from uuv_marl.train.training import OVERRIDES, Settings, train
 
-    settings["start"] = None if start is None else str(start)
-    records = train(output, Settings(steps=steps, **settings), resume=resume)
-    last, validated = "no iteration was needed: --steps are done already", ""
-    try:
-        with progress_bar() as bar:
-            task = bar.add_task("starting", total=steps)
-            for record in records:
-                rate = f"{record.agent_steps / record.seconds:,.0f} agent-steps/s"
-                if record.score is not None:
-                    validated = (
-                        f", validation: score {record.score:.3f} (best {record.best:.3f}), arrived "
-                        f"{record.arrived:.0%}, collisions {record.collisions}"
-                    )
-                last = f"{rate}, reward {record.reward:.3f}{validated}"
-                bar.update(task, completed=record.agent_steps, description=last)
-    except KeyboardInterrupt:
-        console.print(f"Stopped. The last checkpoint is in {output}; the same command with --resume goes on.")
-        raise typer.Exit(130) from None
+    size = {} if num_vehicles is None else {"swarm.num_vehicles": num_vehicles}
+    chosen = Settings(**settings, overrides={**OVERRIDES, **size}, start=None if start is None else str(start))
+    texts = {
+        "reward": "reward {reward:.3f}",
+        "score": "validation: score {score:.3f} (best {best:.3f}), arrived {arrived:.0%}, collisions {collisions}",
+    }
+    with _stoppable(output) as stop:
+        records = train(output, chosen, resume=resume, say=console.print, stop=stop)
+        last = _follow(records, chosen.steps, texts)
     console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
 
 
-@app.command("rllib")
+def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str:
+    """Show a training in a bar, with a text for each field that was known so far; how it stood at last."""
+    last, known = "no iteration was needed: --steps are done already", {}
+    with progress_bar() as bar:
+        task = bar.add_task("starting", total=steps)
+        for record in records:
+            known |= {name: value for name, value in record._asdict().items() if value is not None}
+            told = [text.format(**known) for name, text in texts.items() if name in known]
+            last = ", ".join([f"{record.agent_steps / record.seconds:,.0f} agent-steps/s", *told])
+            bar.update(task, completed=record.agent_steps, description=last)
+    return last
+
+
+@contextmanager
+def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
+    """Gives whether the block is to stop: the first Ctrl-C is only noted, and the second ends the block at once."""
+    noted: list[int] = []
+
+    def note(number: int, frame: Any) -> None:
+        if noted:
+            signal.default_int_handler(number, frame)
+        noted.append(number)
+        console.print("Stopping after this iteration, with a checkpoint. Ctrl-C again stops at once, without.")
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(noted)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if noted:
+        kept = any((output / "checkpoints").glob("[0-9]*[0-9]"))
+        rest = "The last checkpoint is" if kept else "There is no checkpoint yet, only settings"
+        console.print(f"Stopped. {rest} in {output}; the same command with --resume goes on.")
+        raise typer.Exit(130)
+
+
+@app.command("rllib", cls=_Command)
 def train_rllib(
-    scenario: Annotated[str, typer.Option(help="Name or TOML file.")] = "single_obstacle",
+    scenario: Scenario = "single_obstacle",
     num_vehicles: Annotated[int | None, typer.Option(min=1, help="Replaces the scenario's.")] = None,
-    steps: Annotated[
-        int, typer.Option(min=1, help="Agent-steps in all: decisions times vehicles; whole batches.")
-    ] = 1_000_000,
+    steps: Steps = 1_000_000,
     seed: Annotated[int, typer.Option(min=0, help="Of the first worlds and weights.")] = 0,
-    env_runners: Annotated[int, typer.Option(min=0, help="Processes that sample, a core each.")] = 2,
+    env_runners: Annotated[int, typer.Option(min=0, max=1000, help="Processes that sample, a core each.")] = 2,
     ray: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster (auto: the one here). Default: this machine.")
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of settings, progress and checkpoint.")] = Path("results/rllib"),
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")] = False,
+    output: Output = Path("results/rllib"),
+    resume: Resume = False,
 ) -> None:
     """Train one policy for all vehicles with RLlib's PPO, on this machine or a Ray cluster.
 
     Vehicles decide every 0.5 s, with yaw damping. Needs the extra "distributed". Writes config.json (settings, seeds,
-    versions), progress.csv (a row per iteration) and checkpoints/. Ctrl-C keeps the last checkpoint; the same command
-    with --resume goes on, to more --steps too.
+    versions), progress.csv (a row per iteration) and checkpoints/. Ctrl-C ends it with a checkpoint after the iteration
+    under way; the same command with --resume goes on, to more --steps too.
 
     Example: uuv-marl train rllib --scenario tracking --num-vehicles 8 --steps 200000
     """
@@ -135,20 +201,16 @@ def train_rllib(
             from uuv_marl.train.rllib import Settings, train
 
         settings = Settings(scenario=scenario, num_vehicles=num_vehicles, seed=seed)
-        records = train(output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume)
-        last = "no iteration was needed: --steps are done already"
+        texts = {
+            "agent_steps": "{agent_steps:,} agent-steps",
+            "episode_return": "last return per vehicle {episode_return:.1f}",
+        }
         console.print("Starting Ray takes about 15 s.")
-        try:
-            with progress_bar() as bar:
-                task = bar.add_task("sampling", total=steps)
-                shown = "–"
-                for record in records:
-                    if record.episode_return is not None:
-                        shown = f"{record.episode_return:.1f}"
-                    rate = f"{record.agent_steps / record.seconds:,.0f} agent-steps/s"
-                    bar.update(task, completed=record.agent_steps, description=f"{rate}, return {shown}")
-                    last = f"{record.agent_steps:,} agent-steps, {rate}, last return per vehicle {shown}"
-        except KeyboardInterrupt:
-            console.print(f"Stopped. The last checkpoint is in {output}; the same command with --resume goes on.")
-            raise typer.Exit(130) from None
+        with _stoppable(output) as stop:
+            last = _follow(
+                train(
+                    output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume,
+                    say=console.print, stop=stop,
+                ), steps, texts,
+            )  # fmt: skip
         console.print(f"Done: {last}. Progress: {output}/progress.csv   checkpoint: {output}/checkpoints")

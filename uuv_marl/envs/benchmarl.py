@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from benchmarl.environments import Task, TaskClass  # pyright: ignore[reportMissingImports]
-from torchrl.data import Composite
-from torchrl.envs import EnvBase
-
 from uuv_marl.envs.task import make_task, refuse_losses
+from uuv_marl.extras import extra
+
+with extra("benchmarl", "SwarmTask"):
+    from benchmarl.environments import Task, TaskClass  # pyright: ignore[reportMissingImports]
+    from torchrl.data import Composite
+    from torchrl.envs import EnvBase
+
 from uuv_marl.envs.torchrl import GROUP, SwarmEnv
 
 

@@ -1,7 +1,7 @@
 """The PettingZoo environments: ``parallel_env`` (all agents at once) and ``env`` (AEC, one after the other)."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from gymnasium.spaces import Box, Space
@@ -9,33 +9,36 @@ from numpy.typing import ArrayLike, NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
-from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, TaskBased, make_task
-from uuv_marl.envs.view import View
+from uuv_marl.envs.ending import ending
+from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, make_task
+from uuv_marl.envs.view import OneWorld
+from uuv_marl.sim.arguments import action_array
 
 Float32 = NDArray[np.float32]
 Infos = dict[str, dict[str, Any]]
 
 
-class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
+class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
     """A swarm of UUVs that follows a trajectory around obstacles. See ``parallel_env`` for the arguments.
 
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
     and yaw torque as shares of full force, projected onto the unit disc.
+
+    An agent's last info tells how its part ended: ``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``
+    (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users: ``reset(seed=s)`` seeds it
+    from ``s``, and the environment itself never draws from it.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form
         "name": "uuv_swarm_v0",
         "render_modes": ["human", "rgb_array"],
         "is_parallelizable": True,
-        "render_fps": 10,
     }
 
     def __init__(self, task: Task, render_mode: str | None = None, info_terms: bool = False) -> None:
-        self._task = task
-        self._view = View(render_mode, self.metadata["render_modes"], self.scenario)
-        self.render_mode = render_mode
+        self._show(task, render_mode)
         self._info_terms = info_terms
-        self.metadata = {**self.metadata, "render_fps": self._view.fps}
+        self.np_random = np.random.default_rng()
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
@@ -69,6 +72,8 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
     ) -> tuple[dict[str, Float32], Infos]:
         """Start an episode. Without a seed the environment's own random stream goes on. ``options`` are ignored."""
         observation = self._task.reset(seed)[0]
+        if seed is not None:
+            self.np_random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0,)))
         self.agents = list(self.possible_agents)
         self._rows = slice(None)
         self._view.update(self.swarm)
@@ -77,78 +82,71 @@ class SwarmParallelEnv(TaskBased, ParallelEnv[str, Float32, Float32 | None]):
     def step(
         self, actions: Mapping[str, ArrayLike | None]
     ) -> tuple[dict[str, Float32], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
-        """One decision of every agent.
+        """One decision of every agent. After the episode's end, ``step({})`` returns empty dictionaries.
 
         Raises:
             ValueError: an agent's action is missing, misshapen or not finite, or an agent is unknown.
-            RuntimeError: before ``reset``, or after the episode's end.
+            RuntimeError: before ``reset``, or with actions after the episode's end.
         """
         if not self.agents:
             self._task.need_reset("step")
-            raise RuntimeError("the episode is over; call reset() to start an episode")
+            if actions:
+                raise RuntimeError("the episode is over; call reset() to start an episode")
+            return {}, {}, {}, {}, {}
         outcome = self._task.step(self._action_array(actions))
         acted, rows = self.agents, self._rows
         going = outcome.acting[0, rows]
+        infos = self._infos(outcome, acted, rows)
         if not going.all():
+            for agent, goes in zip(acted, going.tolist(), strict=True):
+                infos[agent] |= {} if goes else ending(self._task, 0, self._index[agent])
             self.agents = [agent for agent, goes in zip(acted, going.tolist(), strict=True) if goes]
             self._rows = np.array([self._index[agent] for agent in self.agents], np.int64)
         self._view.update(self.swarm)
-        return (
-            dict(zip(acted, outcome.observation[0, rows], strict=True)),
-            dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True)),
-            dict(zip(acted, outcome.terminated[0, rows].tolist(), strict=True)),
-            dict(zip(acted, outcome.truncated[0, rows].tolist(), strict=True)),
-            self._infos(outcome, acted, rows),
-        )
+        observations = dict(zip(acted, outcome.observation[0, rows], strict=True))
+        rewards = dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True))
+        flags = (outcome.terminated, outcome.truncated)
+        terminated, truncated = (dict(zip(acted, flag[0, rows].tolist(), strict=True)) for flag in flags)
+        return observations, rewards, terminated, truncated, infos
 
     def _infos(self, outcome: Outcome, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
         if not self._info_terms:
             return {agent: {} for agent in agents}
-        if not outcome.terms:
-            return {agent: {"reward_terms": {}} for agent in agents}
-        terms = np.stack([term[0, rows] for term in outcome.terms.values()], axis=1).tolist()
-        return {
-            agent: {"reward_terms": dict(zip(outcome.terms, values, strict=True))}
-            for agent, values in zip(agents, terms, strict=True)
-        }
+        terms = {name: term[0, rows].tolist() for name, term in outcome.terms.items()}
+        return {agent: {"reward_terms": {name: of[k] for name, of in terms.items()}} for k, agent in enumerate(agents)}
 
     def _action_array(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
         array = np.zeros((1, len(self.possible_agents), 2), np.float32)
         try:
-            given = np.array([actions[agent] for agent in self.agents], np.float32)
-        except (KeyError, TypeError, ValueError):
+            rows = [actions[agent] for agent in self.agents]
+            masked = np.ma.MaskedArray in set(map(type, rows))  # an array of them would lose the masks
+            given = None if masked else action_array(np.array(rows), (len(rows), 2), "actions")
+        except (LookupError, TypeError, ValueError, RuntimeError, OverflowError):
             given = None
-        if given is None or given.shape != (len(self.agents), 2) or not np.isfinite(given).all():
-            self._name_bad_action(actions)
+        if given is None or not np.isfinite(given).all():
+            given = self._one_by_one(actions)
         if not actions.keys() <= self._index.keys():
-            unknown = min(actions.keys() - self._index.keys())
+            unknown = min(actions.keys() - self._index.keys(), key=str)
             raise ValueError(f"there is no agent {unknown!r}; agents are uuv_0 to {self.possible_agents[-1]}")
         array[0, self._rows] = given
         return array
 
-    def _name_bad_action(self, actions: Mapping[str, ArrayLike | None]) -> None:
-        """Raise ValueError with the first agent whose action can't be used."""
+    def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> list[Float32]:
+        """Every agent's action. Raises ValueError with the first agent whose action can't be used."""
+        if not isinstance(actions, Mapping):
+            raise TypeError(f"actions must be a dictionary with an action for each agent, got {type(actions).__name__}")
+        given: list[Float32] = []
         for agent in self.agents:
             if agent not in actions:
                 raise ValueError(f"the action of {agent} is missing; give one for each of env.agents")
-            action = np.asarray(actions[agent], np.float32)
-            if action.shape != (2,):
-                raise ValueError(f"the action of {agent} must have shape (2,), got {action.shape}")
-            if not np.isfinite(action).all():
-                raise ValueError(f"the action of {agent} must be finite, got {action.tolist()}")
+            given.append(action_array(cast(ArrayLike, actions[agent]), (2,), f"the action of {agent}"))
+            if not np.isfinite(given[-1]).all():
+                raise ValueError(f"the action of {agent} must be finite, got {given[-1].tolist()}")
+        return given
 
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""
         return self._task.state()[0]
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
-        self._task.need_reset("render()")
-        return self._view.draw(self.swarm)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._view.close()
 
 
 def parallel_env(
@@ -176,8 +174,9 @@ def parallel_env(
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
     """
     task = make_task(
-        scenario, 1, num_vehicles, max_cycles, reward=reward, decision_period=decision_period, overrides=overrides
-    )
+        scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
+        overrides=overrides,
+    )  # fmt: skip
     return SwarmParallelEnv(task, render_mode, info_terms)
 
 

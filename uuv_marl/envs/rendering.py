@@ -1,16 +1,17 @@
 """Pictures of a world: north up, east right. Drawn with pygame; only a window needs a display."""
 
+import os
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.extras import extra
 from uuv_marl.scenario import growth
 from uuv_marl.sim.swarm import Swarm
 
-try:
+with extra("render", "rendering"):
     import pygame
-except ModuleNotFoundError as error:
-    message = "rendering needs pygame: install the extra, in the checkout: pip install -e '.[render]'"
-    raise ModuleNotFoundError(message) from error
 
 SIZE_PX = 800
 _MARGIN_M = 130.0
@@ -32,24 +33,23 @@ class Canvas:
         self._font = pygame.font.Font(None, 24)
         self._surface = pygame.Surface((SIZE_PX, SIZE_PX))
         self._fps = fps
-        self._window: pygame.Surface | None = None
         self._clock = pygame.time.Clock()
-        if window:
-            pygame.display.init()
-            self._window = pygame.display.set_mode((SIZE_PX, SIZE_PX))
-            pygame.display.set_caption("uuv_marl")
+        self._to_window = window
+        self._window = _open_window() if window else None
 
     def draw(self, swarm: Swarm, world: int = 0) -> NDArray[np.uint8] | None:
-        """The picture as (height, width, 3), or None where it went to the window."""
-        self._paint(swarm, world)
-        if self._window is None:
+        """The picture as (height, width, 3), or None where it goes to the window, also after the user has closed it."""
+        if not self._to_window:
+            self._paint(swarm, world)
             return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))
-        self._window.blit(self._surface, (0, 0))
-        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+        if self._window is not None and any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
-            raise SystemExit("the window was closed")
-        pygame.display.flip()
-        self._clock.tick(self._fps)
+            warnings.warn("the window was closed; the run goes on without it", stacklevel=2)
+        if self._window is not None:
+            self._paint(swarm, world)
+            self._window.blit(self._surface, (0, 0))
+            pygame.display.flip()
+            self._clock.tick(self._fps)
         return None
 
     def close(self) -> None:
@@ -89,3 +89,21 @@ class Canvas:
         pygame.draw.circle(surface, _REFERENCE, pixel(facts.reference[world, :2]).tolist(), 6, 2)
         caption = f"{swarm.scenario.name}   t = {facts.time_s[world]:.1f} s   {int(alive.sum())} vehicles"
         surface.blit(self._font.render(caption, True, _TEXT), (12, 10))
+
+
+def _open_window() -> pygame.Surface:
+    """A window. Raises RuntimeError where nobody could see it: SDL then draws into memory without a word."""
+    chosen = os.environ.get("SDL_VIDEODRIVER") or os.environ.get("SDL_VIDEO_DRIVER")
+    try:
+        pygame.display.init()
+        unseen = not chosen and pygame.display.get_driver() in ("dummy", "offscreen")
+    except pygame.error:
+        unseen = True
+    if unseen:
+        pygame.display.quit()
+        raise RuntimeError(
+            "render_mode='human' found no display for its window; use render_mode='rgb_array', which needs none, or "
+            "set the environment variable SDL_VIDEODRIVER=dummy to draw into nothing"
+        )
+    pygame.display.set_caption("uuv_marl")
+    return pygame.display.set_mode((SIZE_PX, SIZE_PX))

@@ -28,15 +28,16 @@ RewardFunction = Callable[[Swarm], Float64]
 
 
 TERMS: Mapping[str, str] = {
-    "tracking": "- w x period x (distance to l(t) / s_l - 1), the bracket within 0 and 1",
-    "obstacle": "- w x period x (1 - distance to the nearest obstacle's surface / s_o), likewise",
-    "spacing": "- w x period x (1 - distance to the nearest vehicle / s_u), likewise",
-    "effort": "- w x period x squared length of the action",
-    "collision": "- w for every contact episode that begins",
-    "loss": "lost vehicle: minus collision's w, arrival's w, and the most that the four rates cost until the limit",
-    "arrival": "+ w for every vehicle when the swarm arrives",
+    "tracking": "-w · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's distance to l(t)",
+    "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
+    "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
+    "effort": "-w · dt · a²; a²: mean squared length of the action, 1 at full force",
+    "collision": "-w for every collision that begins",
+    "loss": "once, for a lost vehicle: -(w_collision + w_arrival + (w_tracking + w_obstacle + w_spacing + w_effort) · "
+    "T); T: time left until the limit",
+    "arrival": "+w for every vehicle when the swarm arrives",
 }
-"""What each term is; w is its weight in the scenario's ``reward``, the period that between decisions [s]."""
+"""The formula of each term; w is its weight in the scenario's ``reward``, dt the time between two decisions [s]."""
 
 
 class Rates(NamedTuple):

@@ -5,11 +5,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from ray.rllib.env.multi_agent_env import MultiAgentEnv  # pyright: ignore[reportMissingImports]
-from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
 
 from uuv_marl.envs.parallel_env import Infos, parallel_env
+from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
+
+with extra("distributed", "SwarmMultiAgentEnv"):
+    from ray.rllib.env.multi_agent_env import MultiAgentEnv  # pyright: ignore[reportMissingImports]
+    from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
 
 Float32 = NDArray[np.float32]
 

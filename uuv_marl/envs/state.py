@@ -17,17 +17,17 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     """The fields in order. Positions are relative to l(t), north and east; vehicles come in the order of agents."""
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
     return (
-        PerceptField("alive", (n,), "1", 1.0, 0.0, 1.0, "per vehicle: 0 once lost"),
-        PerceptField("position", (n, 2), *_FAR, "per vehicle: north and east of l(t)"),
-        PerceptField("heading", (n, 2), *_UNIT, "per vehicle: cosine and sine from north"),
-        PerceptField("velocity", (n, 2), *_SPEED, "per vehicle: surge and sway"),
-        PerceptField("yaw_rate", (n,), "rad/s", 1.0, -64.0, 64.0, "per vehicle"),
-        PerceptField("reference_velocity", (2,), *_SPEED, "of l(t), north and east"),
-        PerceptField("end", (2,), *_FAR, "end of the trajectory, north and east of l(t)"),
+        PerceptField("alive", (n,), "1", 1.0, 0.0, 1.0, "per vehicle: 1, or 0 once it is lost"),
+        PerceptField("position", (n, 2), *_FAR, "per vehicle: position relative to l(t), north and east"),
+        PerceptField("heading", (n, 2), *_UNIT, "per vehicle: cosine and sine of the heading from north"),
+        PerceptField("velocity", (n, 2), *_SPEED, "per vehicle: surge and sway velocity"),
+        PerceptField("yaw_rate", (n,), "rad/s", 1.0, -64.0, 64.0, "per vehicle: yaw rate"),
+        PerceptField("reference_velocity", (2,), *_SPEED, "velocity of l(t), north and east"),
+        PerceptField("end", (2,), *_FAR, "end of the trajectory relative to l(t), north and east"),
         PerceptField("time", (1,), "1", 1.0, 0.0, 2.0, "share of the time limit that has passed"),
-        PerceptField("obstacle", (m,), "1", 1.0, 0.0, 1.0, "per obstacle: 0 for padding"),
-        PerceptField("obstacle_position", (m, 2), *_FAR, "per obstacle: centre, north and east of l(t)"),
-        PerceptField("obstacle_radius", (m,), "m", 64.0, 0.0, MAX_RANGE_M, "per obstacle"),
+        PerceptField("obstacle", (m,), "1", 1.0, 0.0, 1.0, "per obstacle: 1, or 0 for an unused row"),
+        PerceptField("obstacle_position", (m, 2), *_FAR, "per obstacle: centre relative to l(t), north and east"),
+        PerceptField("obstacle_radius", (m,), "m", 64.0, 0.0, MAX_RANGE_M, "per obstacle: radius"),
     )
 
 

@@ -1,10 +1,9 @@
 """What every environment API shares: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
 
 import math
-import operator
 import os
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +13,7 @@ from uuv_marl.envs.reward import RewardFunction, pay, rates
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import ScenarioError, load_scenario
+from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 
@@ -72,6 +72,8 @@ class Task:
         self._rates = rates(scenario)
         self._ready = np.zeros(num_worlds, np.bool_)
         self._over = np.zeros(num_worlds, np.bool_)
+        self.collisions = np.zeros(num_worlds, np.int64)
+        """Contact episodes that began since the reset, shape (world,)."""
         self.max_cycles = max_cycles
         self._reward: Reward = reward
 
@@ -82,9 +84,7 @@ class Task:
 
     @max_cycles.setter
     def max_cycles(self, value: int | None) -> None:
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1):
-            raise ValueError(f"max_cycles must be a whole number from 1, or None for the time limit, got {value!r}")
-        self._max_cycles = value
+        self._max_cycles = None if value is None else whole_number("max_cycles", value, 1)
 
     @property
     def longest_episode(self) -> int:
@@ -95,7 +95,7 @@ class Task:
         cycles = math.ceil(seconds / scenario.timing.decision_period_s)
         return min(cycles, self.max_cycles or cycles)
 
-    def reset(self, seed: int | Sequence[int | None] | None = None, worlds: Sequence[int] | None = None) -> Float32:
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> Float32:
         """Start worlds anew; the observations of all, shape (world, vehicle, entry).
 
         Args:
@@ -104,13 +104,8 @@ class Task:
             worlds: which ones, default all.
         """
         chosen = list(range(self.swarm.num_worlds)) if worlds is None else list(worlds)
-        seeds = _seeds(seed, chosen)
-        seeded = {world: value for world, value in zip(chosen, seeds, strict=True) if value is not None}
-        if seeded:
-            self.swarm.reset(list(seeded.values()), list(seeded))
-        if len(seeded) < len(chosen):
-            self.swarm.reset(None, [world for world in chosen if world not in seeded])
-        self._ready[chosen], self._over[chosen] = True, False
+        self.swarm.reset(seed, chosen)
+        self._ready[chosen], self._over[chosen], self.collisions[chosen] = True, False, 0
         return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
 
     def need_reset(self, what: str) -> None:
@@ -126,17 +121,17 @@ class Task:
         self.need_reset("step")
         swarm = self.swarm
         before = swarm.state.alive.copy()
-        swarm.step(np.asarray(action, np.float32), ~self._over)
-        alive, arrived = swarm.state.alive, swarm.arrived
+        swarm.step(action, ~self._over)
+        self.collisions += swarm.facts.collisions * ~self._over
+        alive = swarm.state.alive
         reward, world_reward, terms = self._rewards(before & ~self._over[:, None])
-        late = swarm.timed_out | (swarm.state.tick >= self._last_tick)
-        world_terminated = arrived | ~alive.any(axis=1)
-        world_truncated = late & ~world_terminated
+        world_terminated = swarm.terminated
+        world_truncated = (swarm.truncated | (swarm.state.tick >= self._last_tick)) & ~world_terminated
         self._over = world_terminated | world_truncated
         return Outcome(
             observation=observe(swarm),
             reward=reward,
-            terminated=before & (arrived[:, None] | ~alive),
+            terminated=before & (swarm.arrived[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
             acting=alive & ~self._over[:, None],
             world_reward=world_reward,
@@ -178,56 +173,42 @@ class Task:
         return np.inf if self.max_cycles is None else self.max_cycles * self.swarm.scenario.timing.holds_per_decision
 
 
-class TaskBased:
-    """What every API's object shows of the task below it."""
+class Changes(TypedDict, total=False):
+    """Arguments of every environment API that change the scenario, explained by ``uuv_marl.parallel_env``."""
 
-    _task: Task
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
-        return self._task.swarm
+    num_vehicles: int | None
+    decision_period: float | None
+    overrides: Mapping[str, object] | None
 
 
-def _seeds(seed: int | Sequence[int | None] | None, worlds: Sequence[int]) -> list[int | None]:
-    """A seed, or None, for each of these worlds."""
-    if seed is None:
-        return [None] * len(worlds)
-    if isinstance(seed, int | np.integer):
-        seeds: list[int | None] = [int(seed) + world for world in worlds]
-    else:
-        seeds = [None if value is None else operator.index(value) for value in seed]
-    if len(seeds) != len(worlds):
-        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
-    if any(value is not None and value < 0 for value in seeds):
-        raise ValueError(f"seed must not be negative, got {seed}")
-    return seeds
+class TaskOptions(Changes, total=False):
+    """Arguments of every environment API beyond the scenario, explained by ``uuv_marl.parallel_env``."""
+
+    max_cycles: int | None
+    reward: Reward
+
+
+def changed(
+    scenario: ScenarioLike,
+    num_vehicles: int | None = None,
+    decision_period: float | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> Scenario:
+    """The scenario with the ``Changes``."""
+    period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
+    return load_scenario(scenario, num_vehicles=num_vehicles, overrides={**(overrides or {}), **period})
 
 
 def make_task(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
-    num_vehicles: int | None = None,
-    max_cycles: int | None = None,
     *,
+    max_cycles: int | None = None,
     reward: Reward = "individual",
-    decision_period: float | None = None,
-    overrides: Mapping[str, object] | None = None,
+    **changes: Unpack[Changes],
 ) -> Task:
     """A task from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
-    changes = with_period(overrides, decision_period)
-    return Task(load_scenario(scenario, num_vehicles=num_vehicles, overrides=changes), num_worlds, reward, max_cycles)
-
-
-def with_period(overrides: Mapping[str, object] | None, decision_period: float | None) -> Mapping[str, object]:
-    """The overrides with the decision period [s] among them, where one is given."""
-    period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
-    return {**(overrides or {}), **period}
+    return Task(changed(scenario, **changes), num_worlds, reward, max_cycles)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

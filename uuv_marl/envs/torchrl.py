@@ -1,17 +1,22 @@
 """``SwarmEnv``: worlds as a batched TorchRL environment with one group of agents, ``uuv``."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from tensordict import TensorDict, TensorDictBase
-from torchrl.data import Bounded, Categorical, Composite, Unbounded
-from torchrl.envs import EnvBase
 
-from uuv_marl.envs.task import Bool, Reward, ScenarioLike, TaskBased, make_task
+from uuv_marl.envs.task import Bool, ScenarioLike, TaskOptions, make_task
+from uuv_marl.envs.view import TaskBased
+from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
+from uuv_marl.sim.arguments import world_seeds
+
+with extra("torchrl", "SwarmEnv"):
+    import torch
+    from tensordict import TensorDict, TensorDictBase
+    from torchrl.data import Bounded, Categorical, Composite, Unbounded
+    from torchrl.envs import EnvBase
 
 GROUP = "uuv"
 
@@ -27,30 +32,26 @@ class SwarmEnv(TaskBased, EnvBase):
 
     Args:
         num_worlds: worlds stepped together.
+        scenario: a name, a TOML file or a ``Scenario``.
         seed: of the first reset, world w from ``seed + w``; as ``set_seed``.
         device: where the tensors go; the water stays on the CPU.
-        scenario, num_vehicles, max_cycles, reward, decision_period, overrides: as for ``uuv_marl.parallel_env``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as for
+            ``uuv_marl.parallel_env``.
     """
 
     def __init__(
         self,
         num_worlds: int = 1,
         scenario: ScenarioLike = "single_obstacle",
-        num_vehicles: int | None = None,
-        max_cycles: int | None = None,
         *,
         seed: int | None = None,
         device: torch.device | str = "cpu",
-        reward: Reward = "individual",
-        decision_period: float | None = None,
-        overrides: Mapping[str, object] | None = None,
+        **options: Unpack[TaskOptions],
     ) -> None:
+        task = make_task(scenario, num_worlds, **options)
         super().__init__(device=device, batch_size=torch.Size([num_worlds]))
-        self._task = make_task(
-            scenario, num_worlds, num_vehicles, max_cycles, reward=reward, decision_period=decision_period,
-            overrides=overrides,
-        )  # fmt: skip
-        self._pending: list[int | None] = [None] * num_worlds
+        self._task = task
+        self._pending: list[int | None]
         self._set_seed(seed)
         self.group_map = {GROUP: [f"uuv_{i}" for i in range(self.swarm.num_vehicles)]}
         self._make_specs()
@@ -79,7 +80,7 @@ class SwarmEnv(TaskBased, EnvBase):
 
     def _set_seed(self, seed: int | None) -> None:
         """Each world starts from its seed when it is reset next."""
-        self._pending = [None if seed is None else seed + world for world in range(self.swarm.num_worlds)]
+        self._pending = world_seeds(seed, range(self.swarm.num_worlds))
 
     def _reset(
         self, tensordict: TensorDictBase | None = None, seed: int | None = None, **_kwargs: Any

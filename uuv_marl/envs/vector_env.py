@@ -1,7 +1,7 @@
 """``vector_env``: many worlds as a Gymnasium vector environment, a row per world."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -9,8 +9,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, Reward, ScenarioLike, Task, TaskBased, make_task
-from uuv_marl.envs.view import View
+from uuv_marl.envs.ending import ending
+from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, ScenarioLike, Task, TaskOptions, make_task
+from uuv_marl.envs.view import TaskBased
+from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
 
 Infos = dict[str, Any]
 
@@ -19,9 +21,15 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
     """Worlds stepped together. See ``vector_env`` for the arguments.
 
     Observation of shape (num_envs, vehicle, entry), action of shape (num_envs, vehicle, 2), reward the mean over a
-    world's vehicles. A world terminates when its swarm arrived or is lost as a whole, is truncated by the time limit,
-    and is reset in the same step (``AutoresetMode.SAME_STEP``): its last observation is ``infos["final_obs"][world]``.
-    With ``AutoresetMode.DISABLED`` it stays as it is until you reset it.
+    world's vehicles. A world terminates when its swarm arrived or is lost as a whole, and the time limit truncates
+    it. What happens then is ``autoreset_mode``, Gymnasium's:
+
+    * ``SAME_STEP``: the world is reset in the step in which it ends. ``infos["final_obs"][world]`` is its last
+      observation, ``infos["final_info"]`` how it ended (``uuv_marl.envs.ending.ending``) and the last ``state``.
+    * ``NEXT_STEP``: the world is reset in the step after, which ignores its actions and pays nothing.
+    * ``DISABLED``: the world stays as it is, its flags too, until you reset it.
+
+    In the last two the observation of the last step is the episode's own, and how it ended stands in ``infos`` itself.
 
     ``infos``, arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated`` of
     this step, and ``agent_mask``, the vehicles that act in the next one. Rows of vehicles lost before are zero.
@@ -31,7 +39,6 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         "name": "uuv_swarm_v0",
         "autoreset_mode": AutoresetMode.SAME_STEP,
         "render_modes": ["rgb_array"],
-        "render_fps": 10,
     }
     closed = True  # until it is complete: Gymnasium closes what is dropped
 
@@ -42,15 +49,12 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         info_terms: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     ) -> None:
-        self._resets = AutoresetMode(autoreset_mode)
-        if self._resets is AutoresetMode.NEXT_STEP:
-            raise ValueError("autoreset_mode must be SAME_STEP or DISABLED, got NEXT_STEP: it would waste a step")
-        self._task = task
-        self._view = View(render_mode, self.metadata["render_modes"], self.scenario)
+        self._show(task, render_mode)
         self._info_terms = info_terms
-        self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": self._view.fps, "autoreset_mode": self._resets}
+        self.autoreset_mode = self.metadata["autoreset_mode"] = AutoresetMode(autoreset_mode)
         self.num_envs = task.swarm.num_worlds
+        self._due = np.zeros(self.num_envs, np.bool_)
+        """Worlds that the next step resets."""
         n, layout = task.swarm.num_vehicles, task.swarm.layout
         self.single_observation_space = Box(np.tile(layout.low, (n, 1)), np.tile(layout.high, (n, 1)))
         self.single_action_space = Box(-1.0, 1.0, (n, 2))
@@ -59,12 +63,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         self.state_space = Box(task.state_layout.low, task.state_layout.high)
         self.closed = False
 
-    def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
-    ) -> tuple[Float32, Infos]:
+    def reset(self, *, seed: SeedLike = None, options: dict[str, Any] | None = None) -> tuple[Float32, Infos]:
         """Start episodes.
 
         Args:
@@ -74,24 +73,32 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         """
         mask = self._mask(options)
         worlds = np.flatnonzero(mask).tolist()
-        if seed is None or isinstance(seed, int | np.integer):
-            observation = self._task.reset(seed, worlds)
-            super().reset(seed=None if seed is None else int(seed))
-        elif len(seed) != self.num_envs:
-            raise ValueError(f"seed must hold one seed for each of {self.num_envs} worlds, got {len(seed)}")
-        else:
-            observation = self._task.reset([seed[world] for world in worlds], worlds)
+        seeds = world_seeds(seed, range(self.num_envs))
+        observation = self._task.reset([seeds[world] for world in worlds], worlds)
+        if isinstance(seed, int | np.integer):
+            super().reset(seed=int(seed))
+        self._due = self._due & ~mask
         return observation, _masked({"agent_mask": self.swarm.state.alive.copy()}, mask)
 
     def step(self, actions: ArrayLike) -> tuple[Float32, Float64, Bool, Bool, Infos]:
-        """One decision of every vehicle of every world; worlds that end are reset."""
-        outcome = self._task.step(actions)
-        infos = self._infos(outcome)
-        observation = outcome.observation
-        if outcome.over.any() and self._resets is AutoresetMode.SAME_STEP:
-            infos |= self._final_infos(outcome)
-            observation = self._task.reset(worlds=np.flatnonzero(outcome.over).tolist())
-            infos["agent_mask"] = self.swarm.state.alive & (outcome.acting | outcome.over[:, None])
+        """One decision of every vehicle of every world, and the resets that ``autoreset_mode`` asks for."""
+        outcome, due = self._task.step(actions), self._due
+        if due.any():
+            outcome = outcome._replace(
+                terminated=outcome.terminated & ~due[:, None],
+                truncated=outcome.truncated & ~due[:, None],
+                world_terminated=outcome.world_terminated & ~due,
+                world_truncated=outcome.world_truncated & ~due,
+            )
+        observation, over, infos = outcome.observation, outcome.over, self._infos(outcome)
+        if over.any():
+            infos |= self._endings(observation, over)
+        resets = over if self.autoreset_mode is AutoresetMode.SAME_STEP else due
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
+            self._due = over
+        if resets.any():
+            observation = self._task.reset(worlds=np.flatnonzero(resets).tolist())
+            infos["agent_mask"] = self.swarm.state.alive & (outcome.acting | resets[:, None])
         return observation, outcome.world_reward, outcome.world_terminated, outcome.world_truncated, infos
 
     def _infos(self, outcome: Outcome) -> Infos:
@@ -105,18 +112,16 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
             infos["reward_terms"] = dict(outcome.terms)
         return _masked(infos, np.ones(self.num_envs, np.bool_))
 
-    def _final_infos(self, outcome: Outcome) -> Infos:
-        """What a world ended with, before its reset."""
-        over = outcome.over
-        final = np.full(self.num_envs, None, dtype=object)
-        for world in np.flatnonzero(over):
-            final[world] = outcome.observation[world]
-        facts = {
-            "arrived": self.swarm.arrived & over,
-            "time_s": np.where(over, self.swarm.facts.time_s, 0.0),
-            "state": self._task.state() * over[:, None],
-        }
-        return _masked({"final_obs": final, "final_info": _masked(facts, over)}, over)
+    def _endings(self, observation: Float32, over: Bool) -> Infos:
+        """How worlds ended, before their reset."""
+        infos: Infos = {}
+        same_step, state = self.autoreset_mode is AutoresetMode.SAME_STEP, self._task.state()
+        for world in np.flatnonzero(over).tolist():
+            info = ending(self._task, world)
+            if same_step:
+                info = {"final_obs": observation[world], "final_info": {**info, "state": state[world]}}
+            infos = self._add_info(infos, info, world)
+        return infos
 
     def _mask(self, options: Mapping[str, Any] | None) -> Bool:
         mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, np.bool_)))
@@ -149,29 +154,27 @@ def _masked(infos: Infos, mask: Bool) -> Infos:
 def vector_env(
     num_envs: int = 1,
     scenario: ScenarioLike = "single_obstacle",
-    num_vehicles: int | None = None,
-    max_cycles: int | None = None,
-    render_mode: str | None = None,
     *,
-    reward: Reward = "individual",
+    render_mode: str | None = None,
     info_terms: bool = False,
-    decision_period: float | None = None,
-    overrides: Mapping[str, object] | None = None,
     autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+    **options: Unpack[TaskOptions],
 ) -> SwarmVectorEnv:
-    """A Gymnasium vector environment of ``num_envs`` worlds; the other arguments are those of ``parallel_env``.
+    """A Gymnasium vector environment of ``num_envs`` worlds.
 
     World w of ``reset(seed=s)`` is ``parallel_env().reset(seed=s + w)``, bit for bit, whatever the number of worlds and
-    threads. ``reward`` shapes ``infos["agent_reward"]``; the row's own reward is the mean over all vehicles.
-    ``autoreset_mode`` is ``SAME_STEP``, or ``DISABLED`` for those who reset by ``options={"reset_mask": ...}``.
+    threads.
+
+    Args:
+        num_envs: worlds stepped together.
+        scenario: a name, a TOML file or a ``Scenario``.
+        render_mode: ``rgb_array`` or None.
+        info_terms: put the reward's terms into the infos.
+        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
+            ``SwarmVectorEnv``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as for
+            ``uuv_marl.parallel_env``. ``reward`` shapes ``infos["agent_reward"]``; the row's own is the mean over all
+            vehicles.
     """
-    task = make_task(
-        scenario,
-        num_envs,
-        num_vehicles,
-        max_cycles,
-        reward=reward,
-        decision_period=decision_period,
-        overrides=overrides,
-    )
+    task = make_task(scenario, whole_number("num_envs", num_envs, 1), **options)
     return SwarmVectorEnv(task, render_mode, info_terms, autoreset_mode)

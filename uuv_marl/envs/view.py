@@ -1,4 +1,4 @@
-"""What ``render_mode`` asks for: nothing, pictures or a window. pygame, an extra, is imported on first use."""
+"""What every API's object shows: the scenario, the swarm, pictures. pygame, an extra, is imported on first use."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.envs.task import Task
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 
@@ -50,3 +51,41 @@ class View:
     def __getstate__(self) -> dict[str, Any]:
         """For pickle and deepcopy: everything but the window."""
         return {**self.__dict__, "_canvas": None}
+
+
+class TaskBased:
+    """What every API's object shows of the task below it, and how it draws."""
+
+    _task: Task
+    _view: View
+    metadata: dict[str, Any]
+
+    def _show(self, task: Task, render_mode: str | None) -> None:
+        """Take a task and the render mode, one of ``metadata["render_modes"]`` or None."""
+        self._task = task
+        self._view = View(render_mode, self.metadata["render_modes"], self.scenario)
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": self._view.fps}
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is simulated."""
+        return self._task.swarm.scenario
+
+    @property
+    def swarm(self) -> Swarm:
+        """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
+        return self._task.swarm
+
+
+class OneWorld(TaskBased):
+    """What the environments of one world share: pictures and a window."""
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
+        self._task.need_reset("render()")
+        return self._view.draw(self.swarm)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._view.close()

@@ -1,17 +1,11 @@
 """Algorithms over training seeds: interquartile means with stratified bootstrap intervals (Agarwal et al. 2021)."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import bootstrap, trim_mean
 
-from uuv_marl.benchmark.tables import Estimate
 from uuv_marl.heldout.episodes import Episode
-
-Float64 = NDArray[np.float64]
-_RESAMPLES = 2000
+from uuv_marl.heldout.sets import ACROSS, HeldOut
 
 
 def success(episodes: Sequence[Episode]) -> float:
@@ -28,23 +22,15 @@ SCORES = {"success": success, "efficiency": efficiency}
 """Of a run on a task, from 0 to 1."""
 
 
-def stratified(tasks: Sequence[Sequence[float]]) -> Estimate:
-    """Interquartile mean over all runs of all tasks, runs resampled within each task; a score for each run."""
-    data = [np.asarray(scores, np.float64) for scores in tasks]
-    whole = _iqm(*data)
-    if min(len(scores) for scores in data) < 2 or all(np.ptp(scores) == 0.0 for scores in data):
-        return Estimate(whole, whole, whole)
-    resample: Any = bootstrap
-    interval = resample(
-        tuple(data),
-        _iqm,
-        vectorized=False,
-        n_resamples=_RESAMPLES,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return Estimate(whole, float(interval.low), float(interval.high))
+def tasks(episodes: Sequence[Episode]) -> list[HeldOut]:
+    """The tasks of the comparison on which trainings were run."""
+    return [held for held in ACROSS if any(e.set == held.name and e.training_seed is not None for e in episodes)]
 
 
-def _iqm(*tasks: Float64) -> float:
-    return float(trim_mean(np.concatenate(tasks), 0.25))
+def runs(episodes: Sequence[Episode], held: HeldOut, policy: str, trained: bool) -> list[list[Episode]]:
+    """A policy's episodes of a task, a list for each training; a policy that ships counts as one."""
+    found: dict[int | None, list[Episode]] = {}
+    for e in episodes:
+        if (e.set, e.policy, e.training_seed is not None) == (held.name, policy, trained) and e.seed < held.seeds:
+            found.setdefault(e.training_seed, []).append(e)
+    return list(found.values())

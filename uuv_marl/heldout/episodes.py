@@ -3,11 +3,12 @@
 import csv
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import Results
 from uuv_marl.heldout.trainings import Trained
+
+_COUNTS = ("training_seed", "seed", "collisions", "clamps")
 
 
 class Episode(NamedTuple):
@@ -46,35 +47,12 @@ def episodes_of(results: Mapping[str, Results], trained: Sequence[Trained]) -> l
     rows: list[Episode] = []
     for name, kept in results.items():
         for row in sorted(kept.rows, key=lambda row: (row.policy, row.seed)):
-            one = labels.get(row.policy)
+            one, metrics = labels.get(row.policy), dict[str, Any](row.metrics)
+            measured = {field: metrics[field] for field in Episode._fields if field in metrics}
+            measured["within_eq7"] = metrics["constraint_share"]["all"]
             policy, seed = (one.algorithm, one.seed) if one else (row.policy, None)
-            rows.append(_episode(name, policy, seed, row.seed, row.metrics))
+            rows.append(Episode(set=name, policy=policy, training_seed=seed, seed=row.seed, **measured))
     return rows
-
-
-def _episode(name: str, policy: str, training_seed: int | None, seed: int, metrics: Metrics) -> Episode:
-    shares = metrics["constraint_share"]
-    return Episode(
-        set=name,
-        policy=policy,
-        training_seed=training_seed,
-        seed=seed,
-        duration_s=_number(metrics, "duration_s") or 0.0,
-        task_time_s=_number(metrics, "task_time_s"),
-        collisions=int(_number(metrics, "collisions") or 0),
-        min_obstacle_distance_m=_number(metrics, "min_obstacle_distance_m"),
-        min_spacing_m=_number(metrics, "min_spacing_m"),
-        mean_min_spacing_m=_number(metrics, "mean_min_spacing_m"),
-        within_eq7=shares["all"] if isinstance(shares, dict) else 0.0,
-        centre_error_m=_number(metrics, "centre_error_m"),
-        effort=_number(metrics, "effort") or 0.0,
-        clamps=int(_number(metrics, "clamps") or 0),
-    )
-
-
-def _number(metrics: Metrics, name: str) -> float | None:
-    value = metrics[name]
-    return None if value is None or isinstance(value, dict) else float(value)
 
 
 def write_episodes(episodes: Iterable[Episode], path: Path) -> None:
@@ -88,27 +66,10 @@ def write_episodes(episodes: Iterable[Episode], path: Path) -> None:
 
 def read_episodes(path: Path) -> list[Episode]:
     """What ``write_episodes`` wrote."""
+    types: dict[str, Any] = {"set": str, "policy": str} | dict.fromkeys(_COUNTS, int)
+
+    def parsed(name: str, text: str) -> Any:
+        return types.get(name, float)(text) if text else None
+
     with path.open(newline="", encoding="utf-8") as file:
-        return [_parsed(row) for row in csv.DictReader(file)]
-
-
-def _parsed(row: Mapping[str, str]) -> Episode:
-    def number(name: str) -> float | None:
-        return float(row[name]) if row[name] else None
-
-    return Episode(
-        set=row["set"],
-        policy=row["policy"],
-        training_seed=int(row["training_seed"]) if row["training_seed"] else None,
-        seed=int(row["seed"]),
-        duration_s=float(row["duration_s"]),
-        task_time_s=number("task_time_s"),
-        collisions=int(row["collisions"]),
-        min_obstacle_distance_m=number("min_obstacle_distance_m"),
-        min_spacing_m=number("min_spacing_m"),
-        mean_min_spacing_m=number("mean_min_spacing_m"),
-        within_eq7=float(row["within_eq7"]),
-        centre_error_m=number("centre_error_m"),
-        effort=float(row["effort"]),
-        clamps=int(row["clamps"]),
-    )
+        return [Episode(**{name: parsed(name, text) for name, text in row.items()}) for row in csv.DictReader(file)]

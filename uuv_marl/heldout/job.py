@@ -1,8 +1,10 @@
 """The evaluation as a job: what is missing of every set is run, here, and every finished episode is kept."""
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
+from uuv_marl.atomic import locked
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.results import Results, ResultsError
 from uuv_marl.benchmark.runner import run_missing
@@ -48,16 +50,18 @@ def run(
             policy_class(policy)
     results: dict[str, Results] = {}
     weights = [_weight(*job) for job in jobs]
-    for k, (held, policies, count) in enumerate(jobs):
-        scenario = held.load()
-        if held.name not in results:
-            results[held.name] = Results(output / held.name, [scenario])
-        before, own = sum(weights[:k]) / sum(weights), weights[k] / sum(weights)
+    with ExitStack() as locks:
+        for k, (held, policies, count) in enumerate(jobs):
+            scenario = held.load()
+            if held.name not in results:
+                locks.enter_context(locked(output / held.name))
+                results[held.name] = Results(output / held.name, [scenario])
+            before, own = sum(weights[:k]) / sum(weights), weights[k] / sum(weights)
 
-        def note(what: str, share: float, before: float = before, own: float = own) -> None:
-            report(what, before + own * share)
+            def note(what: str, share: float, before: float = before, own: float = own) -> None:
+                report(what, before + own * share)
 
-        run_missing(results[held.name], [scenario], policies, range(count), _overall(policies, note))
+            run_missing(results[held.name], [scenario], policies, range(count), _overall(policies, note))
     return results, trained
 
 

@@ -27,10 +27,16 @@ class Trained(NamedTuple):
     """The checkpoint that did best on validation."""
     validations: tuple[Validation, ...]
 
+    @property
+    def best(self) -> Validation:
+        """The validation of the policy."""
+        return max(self.validations, key=lambda v: v.score)
+
 
 def find_trainings(folder: Path) -> list[Trained]:
     """The trainings in ``folder/*``, by algorithm and seed. Raises ResultsError where there is none."""
-    found = [_read(path.parent) for path in folder.glob("*/config.json") if (path.parent / "best").is_dir()]
+    read = [_read(path.parent) for path in folder.glob("*/config.json") if (path.parent / "best").is_dir()]
+    found = [one for one in read if one.validations]
     if not found:
         raise ResultsError(
             f"{folder} holds no trainings with a best policy; give a folder of outputs of uuv-marl train"

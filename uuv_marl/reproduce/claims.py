@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.reproduce import measures
-from uuv_marl.reproduce.cases import (
+from uuv_marl.reproduce.study import (
     COMPARATORS,
     DELTA_LARGE,
     DELTA_SMALL,

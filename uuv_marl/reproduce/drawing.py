@@ -1,47 +1,24 @@
-"""What the reproduced figures share: axes in the paper's coordinates, routes, obstacles, saving."""
+"""What the reproduced figures share: plan views in the paper's coordinates, routes, and series over time."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from uuv_marl.benchmark.figures import COLOURS
-from uuv_marl.reproduce.cases import Case, Study, Trace
-from uuv_marl.reproduce.columns import Columns
-from uuv_marl.reproduce.motion import corner_times
-
-BLUE, ORANGE, GREEN, PINK, AMBER, SKY, BLACK, GREY = COLOURS
-
-
-def panels(num: int, width: float = 5.2, height: float = 4.4) -> tuple[Figure, list[Axes]]:
-    """A figure with panels (a), (b), ... side by side."""
-    figure = Figure(figsize=(width * num, height), layout="constrained")
-    axes = [figure.add_subplot(1, num, k + 1) for k in range(num)]
-    for ax in axes:
-        ax.grid(alpha=0.25)
-    return figure, axes
-
-
-def letter(ax: Axes, text: str) -> None:
-    """A panel's heading, such as (a) start."""
-    ax.set_title(text, fontsize=10, loc="left")
+from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, draw_course
+from uuv_marl.reproduce.measures import corner_times
+from uuv_marl.reproduce.study import Case, Columns, Study, Trace
 
 
 def plan(ax: Axes, case: Case) -> None:
     """The paper's plan view: its first coordinate (north) to the right; trajectory and obstacles of a case."""
     scenario = case.load()
-    waypoints = np.array(scenario.trajectory.waypoints_m)
-    ax.plot(waypoints[:, 0], waypoints[:, 1], "--", color=BLACK, linewidth=1.0, label="trajectory", zorder=3)
-    for k, obstacle in enumerate(scenario.obstacles):
-        x, y = obstacle.centre_m
-        ax.add_patch(Circle((x, y), obstacle.radius_m, color="0.45", zorder=2))
-        if len(scenario.obstacles) > 1:
-            ax.annotate(f"{k + 1}", (x, y), ha="center", va="center", color="white", fontsize=8, zorder=4)
-    ax.set_aspect("equal")
+    discs = [(*obstacle.centre_m, obstacle.radius_m) for obstacle in scenario.obstacles]
+    draw_course(ax, np.array(scenario.trajectory.waypoints_m), discs)
+    for k, (x, y, _) in enumerate(discs if len(discs) > 1 else ()):
+        ax.annotate(f"{k + 1}", (x, y), ha="center", va="center", color="white", fontsize=8, zorder=4)
     ax.set_xlabel("x, north [m]")
     ax.set_ylabel("y, east [m]")
 
@@ -61,12 +38,22 @@ def mark_corners(ax: Axes, case: Case) -> None:
 
 
 def draw_routes(ax: Axes, table: Columns) -> None:
-    """Routes by the group of the start: one side of the first leg blue, the other orange; dots at the end."""
-    for vehicle in np.unique(table["vehicle"]):
-        own = table["vehicle"] == vehicle
-        colour = BLUE if table["group"][own][0] == 0 else ORANGE
-        ax.plot(table["x_m"][own], table["y_m"][own], color=colour, linewidth=0.5, alpha=0.7)
-        ax.plot(table["x_m"][own][-1], table["y_m"][own][-1], ".", color=colour, markersize=4)
+    """Routes by the group of the start, with start and end of every vehicle, and the centre's place in time."""
+    vehicles = len(np.unique(table["vehicle"]))
+    x, y, group, time = (table[name].reshape(vehicles, -1).T for name in ("x_m", "y_m", "group", "time_s"))
+    for side, colour, label in ((0, BLUE, "starts to port"), (1, ORANGE, "starts to starboard")):
+        own = group[0] == side
+        lines = ax.plot(x[:, own], y[:, own], color=colour, linewidth=0.5, alpha=0.7)
+        lines[0].set_label(label)
+        ax.plot(x[0, own], y[0, own], "o", color=colour, mfc="none", ms=3, mew=0.6, label="" if side else "start")
+        ax.plot(x[-1, own], y[-1, own], ".", color=colour, label="" if side else "end")
+    end = float(time[-1, 0])
+    for moment in np.arange(60.0, end - 30.0, 60.0 if end < 300.0 else 120.0):
+        k = int(np.searchsorted(time[:, 0], moment))
+        at = (float(x[k].mean()), float(y[k].mean()))
+        ax.plot(*at, "P", color=BLACK, mec="white", mew=0.6, ms=6, ls="", zorder=6, label="swarm's centre at a time")
+        ax.annotate(f"{moment:g} s", at, xytext=(6, 4), textcoords="offset points", fontsize=7, zorder=6,
+                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5})  # fmt: skip
 
 
 def route_table(study: Study, case: Case, seed: int = 0) -> Columns:

@@ -1,6 +1,7 @@
 """Identification: the choice of what the paper leaves out that comes nearest to its numbers of 5.1 and 5.2.1.
 
-The result ships in ``identified/``. Section 5.2.2 was never looked at in the search: there it predicts.
+The result ships in ``identified/``. Section 5.2.2 was never looked at in the search: there it predicts. Beside it
+stands a hypothesis that was found with all numbers in view.
 """
 
 # pyright: reportUnknownMemberType=false
@@ -16,14 +17,27 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from uuv_marl.benchmark.figures import COLOURS
+from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.paper import PAPER
+from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, legend, panels
 from uuv_marl.reproduce import unknowns
-from uuv_marl.reproduce.columns import Columns, read_columns, write_columns
+from uuv_marl.reproduce.study import (
+    MULTI,
+    SINGLE,
+    TRACKING,
+    Case,
+    Columns,
+    Part,
+    Report,
+    Study,
+    Tables,
+    read_columns,
+    stack,
+    write_columns,
+)
 from uuv_marl.reproduce.unknowns import DEFAULTS, OBJECTIVES, SCENARIOS, SEEDS, UNKNOWNS, Numbers, Setting, Value
 
 TRIALS = 600
@@ -31,6 +45,7 @@ STARTUP = 60
 """Trials drawn at random before the optimiser learns from them."""
 GOAL = 0.05
 _STUDY = "identify"
+_SHIPPED = resources.files("uuv_marl.reproduce") / "identified"
 
 
 class Identified(NamedTuple):
@@ -51,7 +66,7 @@ class Identified(NamedTuple):
 @cache
 def identified() -> Identified:
     """The result that ships with the package."""
-    data = json.loads(_shipped("identified.json").read_text(encoding="utf-8"))
+    data = json.loads((_SHIPPED / "identified.json").read_text(encoding="utf-8"))
     values = cast(dict[str, Value], data["chosen"]["values"])
     return Identified(
         values, unknowns.setting(values), data["chosen"]["errors"], data["all_within_5_percent"], data["front"]
@@ -101,13 +116,13 @@ def identify(output: Path, trials: int, report: Callable[[int, float], None]) ->
     optimiser = f"Optuna {optuna.__version__}, multi-objective TPESampler(multivariate=True, "
     optimiser += f"n_startup_trials={STARTUP}), seeded by the number of trials before; the first trial is the defaults"
     path = output / "identified.json"
-    path.write_text(json.dumps(_summary(table, optimiser), indent=1) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(_summary(table, optimiser), indent=1) + "\n")
     return path
 
 
 def trials() -> Columns:
     """The shipped trials: a row each, its unknowns, the paper's numbers under them, and the errors."""
-    with resources.as_file(_shipped("trials.csv")) as path:
+    with resources.as_file(_SHIPPED / "trials.csv") as path:
         return read_columns(path)
 
 
@@ -117,49 +132,78 @@ def pareto(table: Columns) -> tuple[list[int], int]:
     return unknowns.front(losses), unknowns.best(losses)
 
 
-def draw(table: Columns) -> Figure:
+METRICS = ("min_spacing_m", "mean_min_spacing_m", "min_obstacle_distance_m", "task_time_s", "collisions")
+HYPOTHESIS: dict[str, object] = {"sonar.arrays.bow.range_m": 190.0}
+"""Found afterwards, with all numbers in view and against Table 1's D_i = 100 m: what would reconcile them."""
+FEWER = {"swarm.num_vehicles": 45}
+"""The same for section 5.1, which names no number of vehicles."""
+
+
+def _sets(case: Case) -> dict[str, Case]:
+    """A case under each set of parameters."""
+    chosen = identified().setting
+    posthoc = HYPOTHESIS | FEWER if case is TRACKING else HYPOTHESIS
+    return {
+        "default": case,
+        "identified": Case(f"identified {case.name}", case.scenario, "bio_inspired", chosen.overrides, chosen.policy),
+        "post hoc": Case(f"posthoc {case.name}", case.scenario, "bio_inspired", posthoc),
+    }
+
+
+SETS = tuple(_sets(case) for case in (TRACKING, SINGLE, MULTI))
+"""By scenario; of the identified ones the last is predicted, since section 5.2.2 was never looked at."""
+
+
+def tables(study: Study, _report: Report) -> Tables:
+    """Every trial of the search, and every seed of all parameter sets."""
+    rows: list[Columns] = [
+        {
+            "parameters": np.full(len(study.seeds), name),
+            "scenario": np.full(len(study.seeds), case.scenario),
+            "seed": np.arange(len(study.seeds)),
+            **{metric: study.metric(case, metric) for metric in METRICS},
+        }
+        for sets in SETS
+        for name, case in sets.items()
+    ]
+    return {"identification-trials": trials(), "identification": stack(rows)}
+
+
+def draw(made: Tables) -> Figure:
     """The paper's numbers under every trial that arrives without a collision, beside the paper's own."""
+    table = made["identification-trials"]
     members, chosen = pareto(table)
-    figure = Figure(figsize=(10.5, 5.0), layout="constrained")
-    left, right = cast(Sequence[Axes], figure.subplots(1, 2))
+    safe = table["failed"] == 0
     spacing, obstacle = PAPER["tracking", "bio_inspired"], PAPER["single_obstacle", "bio_inspired"]
-    distances = obstacle.min_obstacle_distance_m or ()
-    _panel(left, table, members, chosen, ("mean_min_spacing_m", "min_obstacle_distance_m"))
-    _box(left, (spacing.mean_min_spacing_m,), distances)
-    left.set_xlabel("tracking: time mean of the smallest spacing [m]")
-    left.set_ylabel("single_obstacle: smallest distance to the obstacle [m]")
-    _panel(right, table, members, chosen, ("min_spacing_m", "task_time_s"))
-    _box(right, (spacing.min_spacing_m,), (obstacle.task_time_s,))
-    right.set_xlabel("tracking: smallest spacing [m]")
-    right.set_ylabel("single_obstacle: task time [s]")
-    failing = int((table["failed"] > 0).sum())
-    figure.suptitle(
-        f"Identification, {len(table['trial'])} trials, {failing} of them not shown (a collision, or no arrival); "
-        f"means over {len(SEEDS)} seeds",
-        fontsize=10,
-    )
-    handles, labels = left.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=9)
+    mean, smallest = (spacing.mean_min_spacing_m,), (spacing.min_spacing_m,)
+    figure, axes = panels(2, size=(5.25, 4.7))
+    for ax, (x, x_paper, x_words), (y, y_paper, y_words) in (
+        (axes[0], ("mean_min_spacing_m", mean, "tracking: time mean of the smallest spacing [m]"),
+         ("min_obstacle_distance_m", obstacle.min_obstacle_distance_m or (),
+          "single_obstacle: smallest distance to the obstacle [m]")),
+        (axes[1], ("min_spacing_m", smallest, "tracking: smallest spacing [m]"),
+         ("task_time_s", (obstacle.task_time_s,), "single_obstacle: task time [s]")),
+    ):  # fmt: skip
+        ax.plot(table[x][safe], table[y][safe], ".", color="0.72", label="trial")
+        for rows, mark, colour, size, label in (
+            (members, "o", BLUE, 6, "Pareto front"),
+            ([0], "s", ORANGE, 9, "defaults"),
+            ([chosen], "*", GREEN, 16, "chosen"),
+        ):
+            ax.plot(table[x][rows], table[y][rows], mark, color=colour, ms=size, mec=BLACK, mew=0.5, label=label)
+        ax.add_patch(_box(x_paper, y_paper))
+        ax.set_xlabel(x_words)
+        ax.set_ylabel(y_words)
+    legend(figure)
     return figure
 
 
-def _panel(ax: Axes, table: Columns, members: Sequence[int], chosen: int, names: tuple[str, str]) -> None:
-    x, y = (table[name] for name in names)
-    safe = table["failed"] == 0
-    ax.plot(x[safe], y[safe], ".", color="0.72", ms=4, label="trial")
-    ax.plot(x[members], y[members], "o", color=COLOURS[0], ms=6, mec="white", mew=0.5, label="Pareto front")
-    ax.plot(x[0], y[0], "s", color=COLOURS[1], ms=9, mec="black", label="defaults")
-    ax.plot(x[chosen], y[chosen], "*", color=COLOURS[2], ms=16, mec="black", label="chosen")
-    ax.grid(alpha=0.25)
-
-
-def _box(ax: Axes, across: Sequence[float | None], up: Sequence[float | None]) -> None:
+def _box(across: Sequence[float | None], up: Sequence[float | None]) -> Rectangle:
     """The paper's numbers, 5 % wider: what a reproduction should hit."""
     (left, right), (low, high) = (
         (min(v for v in values if v) * (1 - GOAL), max(v for v in values if v) * (1 + GOAL)) for values in (across, up)
     )
-    box = Rectangle((left, low), right - left, high - low, fill=False, ec="black", ls="--", lw=1.3, label="paper, 5 %")
-    ax.add_patch(box)
+    return Rectangle((left, low), right - left, high - low, fill=False, ec="black", ls="--", lw=1.3, label="paper, 5 %")
 
 
 def _draw(trial: Any, name: str) -> Value:
@@ -220,5 +264,4 @@ def _member(table: Columns, row: int) -> dict[str, Any]:
     return {"trial": row, "values": part(list(UNKNOWNS)), "numbers": part(Numbers._fields), "errors": part(OBJECTIVES)}
 
 
-def _shipped(name: str) -> Any:
-    return resources.files("uuv_marl.reproduce") / "identified" / name
+PART = Part("identification", tuple(case for sets in SETS for case in sets.values()), tables, draw)

@@ -2,48 +2,36 @@
 
 import hashlib
 import json
-import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-
+from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.results import ResultsError, source_fingerprint
-from uuv_marl.reproduce import (
-    identification,
-    literal,
-    obstacle_figures,
-    rest,
-    sensitivity,
-    stability,
-    tracking_figures,
-    variations,
-)
-from uuv_marl.reproduce.cases import Report, Study
-from uuv_marl.reproduce.columns import read_columns, write_columns
+from uuv_marl.benchmark.style import house_style, save
+from uuv_marl.reproduce import identify, literal, obstacle_figures, rest, sensitivity, stability, variations
 from uuv_marl.reproduce.ledger import CASES, ledger, write_ledger
 from uuv_marl.reproduce.page import write_page
-from uuv_marl.reproduce.parts import Part
+from uuv_marl.reproduce.study import Part, Report, Study, Tables, read_columns, write_columns
+from uuv_marl.reproduce.tracking_figures import PARTS as TRACKING_PARTS
 
 Progress = Callable[[str, float], None]
 """Called with what is being done, and the share of the whole job that is done."""
 LEDGER = "ledger"
 PARTS: tuple[Part, ...] = (
-    *tracking_figures.PARTS,
+    *TRACKING_PARTS,
     *obstacle_figures.PARTS,
     literal.PART,
     sensitivity.PART,
-    identification.PART,
+    identify.PART,
     stability.PART,
     rest.PART,
     *variations.PARTS,
 )
 """In the order of the page."""
 _HERE = Path(__file__).resolve().parent
-_OVERHEAD, _PER_VEHICLE_STEP = 3e-4, 1e-6
-"""Seconds that a step of a batch takes, and a step of a vehicle: for the progress bar only."""
+_PER_VEHICLE_STEP = 1.5e-6
+"""Seconds that a step of a vehicle takes: for the progress bar only."""
 
 
 def names() -> list[str]:
@@ -95,9 +83,18 @@ def make(part: Part, study: Study, folder: Path, report: Report) -> Path:
             write_columns(paths[-1], table)
         if not part.cases:
             kept = {"code": _code(), "tables": [path.stem for path in paths]}
-            stamp.write_text(json.dumps(kept), encoding="utf-8")
-    figure = part.draw({path.stem: read_columns(path) for path in paths})
-    return _save(figure, part, folder / "figures" / f"{part.name}.png")
+            write_text(stamp, json.dumps(kept))
+    return draw(part, {path.stem: read_columns(path) for path in paths}, folder / "figures" / f"{part.name}.png")
+
+
+def draw(part: Part, tables: Tables, path: Path) -> Path:
+    """A part's picture with its title."""
+    kind, _, number = part.name.rpartition("-")
+    again = f"{kind.capitalize()} {number}: " if number.isdigit() else ""
+    with house_style():
+        figure = part.draw(tables)
+        figure.suptitle(again + part.title)  # pyright: ignore[reportUnknownMemberType]
+        return save(figure, path)
 
 
 def _kept(part: Part, stamp: Path, folder: Path) -> list[Path]:
@@ -117,25 +114,12 @@ def _code() -> str:
     return digest.hexdigest()[:16]
 
 
-def _save(figure: Figure, part: Part, path: Path) -> Path:
-    width = round(14.0 * figure.get_figwidth())
-    words = [*textwrap.wrap(f"{part.name}: {part.title}", width), *textwrap.wrap(part.caption, width)]
-    figure.suptitle("\n".join(words), fontsize=9)  # pyright: ignore[reportUnknownMemberType]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    FigureCanvasAgg(figure).print_png(str(path))  # pyright: ignore[reportUnknownMemberType]
-    return path
-
-
 def _costs(parts: Sequence[Part], seeds: int) -> list[float]:
     """Seconds that each part takes, roughly; a case that an earlier part has run costs nothing."""
     costs, ran = list[float](), set[str]()
     for part in parts:
-        cost = part.seconds
-        for case in part.cases:
-            if case.name not in ran:
-                scenario, num = case.load(), seeds if part.seeds is None else len(part.seeds)
-                steps = 1.15 * scenario.trajectory.duration_s / scenario.timing.decision_period_s
-                cost += steps * (_OVERHEAD + _PER_VEHICLE_STEP * num * scenario.swarm.num_vehicles)
-                ran.add(case.name)
-        costs.append(cost)
+        fresh = [case.load() for case in part.cases if case.name not in ran]
+        ran |= {case.name for case in part.cases}
+        steps = [s.trajectory.duration_s / s.timing.decision_period_s * s.swarm.num_vehicles for s in fresh]
+        costs.append(part.seconds + _PER_VEHICLE_STEP * sum(steps) * (seeds if part.seeds is None else len(part.seeds)))
     return costs

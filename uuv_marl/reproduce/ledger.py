@@ -8,11 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import write_text
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.reproduce.assumptions import ALL, ASSUMPTIONS, SEARCHED
-from uuv_marl.reproduce.cases import (
+from uuv_marl.reproduce.claims import CLAIMS, Claim
+from uuv_marl.reproduce.study import (
     COMPARATORS,
     DELTA_LARGE,
     DELTA_SMALL,
@@ -24,7 +26,6 @@ from uuv_marl.reproduce.cases import (
     Case,
     Study,
 )
-from uuv_marl.reproduce.claims import CLAIMS, Claim
 from uuv_marl.scenario_files import load_scenario
 
 Float64 = NDArray[np.float64]
@@ -242,9 +243,9 @@ def write_ledger(folder: Path, entries: Sequence[Entry], seeds: int) -> list[Pat
     """``ledger.json`` and ``ledger.md``."""
     data, page = folder / "ledger.json", folder / "ledger.md"
     rows = [entry._asdict() for entry in entries]
-    data.write_text(json.dumps({"seeds": seeds, "entries": rows}, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(data, json.dumps({"seeds": seeds, "entries": rows}, indent=1, allow_nan=False) + "\n")
     lines = ["# Ledger", "", f"Wang et al. 2024, sections 5.1 to 5.3, and ours over {seeds} seeds.", ""]
-    page.write_text("\n".join([*lines, *markdown(entries)]), encoding="utf-8")
+    write_text(page, "\n".join([*lines, *markdown(entries)]))
     return [data, page]
 
 
@@ -253,31 +254,51 @@ def read_ledger(path: Path) -> list[Entry]:
     return [Entry(**row) for row in json.loads(path.read_text(encoding="utf-8"))["entries"]]
 
 
-def markdown(entries: Sequence[Entry]) -> list[str]:
-    """A table for each kind of row."""
+def markdown(entries: Sequence[Entry], heading: str = "##") -> list[str]:
+    """A table for each kind of row, under headings of this level; what is too long for a cell follows as a list."""
     titles = {
-        "number": "Numbers (interquartile mean over seeds [95 % bootstrap interval]; worst seed)",
-        "claim": "Sentences, each with what is measured in its stead",
+        "number": "Numbers",
+        "claim": "Sentences",
         "given": "What the paper sets",
-        "assumption": "What the paper leaves open",
+        "assumption": "What we assume where the paper is silent",
     }
     lines: list[str] = []
     for kind, title in titles.items():
-        lines += [f"## {title}", "", *_table(kind, [entry for entry in entries if entry.kind == kind]), ""]
+        chosen = [entry for entry in entries if entry.kind == kind]
+        lines += [f"{heading} {title}", "", _table(kind, chosen), *_notes(kind, chosen)]
     return lines
 
 
-def _table(kind: str, entries: Sequence[Entry]) -> list[str]:
+def _table(kind: str, entries: Sequence[Entry]) -> str:
     if kind == "given":
         rows = [(e.section, e.quantity, e.unit, e.paper, str(e.ours), e.verdict) for e in entries]
         head = ("section", "quantity", "unit", "paper", "ours", "verdict")
     elif kind == "assumption":
         rows = [(e.quantity, str(e.ours), e.verdict.removeprefix("in view: ")) for e in entries]
         head = ("what", "taken", "the paper's numbers in view when it was chosen")
+    elif kind == "number":
+        rows = [(e.section, e.quantity, e.unit, e.paper, *_cells(e), e.verdict) for e in entries]
+        head = ("section", "quantity", "unit", "paper", "ours", "worst", "difference", "verdict")
     else:
-        rows = [(e.section, e.quantity, e.unit, e.paper, *_cells(e), e.verdict, e.why) for e in entries]
-        head = ("section", "quantity", "unit", "paper", "ours", "worst", "difference", "verdict", "why")
-    return [f"| {' | '.join(cells)} |" for cells in [head, ("---",) * len(head), *rows]]
+        rows = [
+            (f"{k}", e.section, e.quantity.rpartition(": ")[0], e.paper[len("holds ") :], *_cells(e)[:2], e.verdict)
+            for k, e in enumerate(entries, start=1)
+        ]
+        head = ("no.", "section", "the paper says", "holds", "ours", "worst", "verdict")
+    return markdown_table(head, rows)
+
+
+def _notes(kind: str, entries: Sequence[Entry]) -> list[str]:
+    """How each claim is measured, and why ours differs."""
+    if kind == "claim":
+        notes = [
+            f"{k}. Measured: {e.quantity.rpartition(': ')[2]} [{e.unit}]." + (f" *Reason*: {e.why}." if e.why else "")
+            for k, e in enumerate(entries, start=1)
+        ]
+    else:
+        whys = {e.why: [f"{o.section}, {o.quantity}" for o in entries if o.why == e.why] for e in entries if e.why}
+        notes = [f"- **{'; '.join(names)}**: {why}." for why, names in whys.items()]
+    return [*notes, ""] if notes else []
 
 
 def _cells(e: Entry) -> tuple[str, str, str]:

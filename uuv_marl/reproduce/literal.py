@@ -9,12 +9,10 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
-from uuv_marl.reproduce.assumptions import ASSUMPTIONS, FORWARD_ONLY, ONCE_PER_CENTRE, Alternative
-from uuv_marl.reproduce.cases import SINGLE, TRACKING, Case, Report, Study
-from uuv_marl.reproduce.columns import Columns
-from uuv_marl.reproduce.drawing import BLACK, BLUE, GREY, ORANGE, against_time, letter, panels
-from uuv_marl.reproduce.parts import Part, Tables
-from uuv_marl.reproduce.sensitivity import case_of
+from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, legend, panels
+from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
+from uuv_marl.reproduce.drawing import against_time
+from uuv_marl.reproduce.study import SINGLE, TRACKING, Columns, Part, Report, Study, Tables
 from uuv_marl.scenario_files import load_scenario
 from uuv_marl.sim.vehicle import Plant, advance, plant
 
@@ -71,13 +69,17 @@ def _travel(step: Callable[[State, float, Plant], State], h: float, p: Plant) ->
     return state
 
 
-def _case(alternative: Alternative, scenario: str) -> Case:
-    """The sensitivity's own case of this reading."""
-    (assumption,) = (a for a in ASSUMPTIONS if alternative in a.alternatives)
-    return case_of(assumption, alternative, scenario)
-
-
-AHEAD, INSIDE = _case(FORWARD_ONLY, "tracking"), _case(ONCE_PER_CENTRE, "single_obstacle")
+AHEAD, INSIDE = (
+    case_of(assumption.name, other, scenario)
+    for label, scenario in (
+        ("both sectors ahead (as printed)", "tracking"),
+        ("centre, once per obstacle (as printed)", "single_obstacle"),
+    )
+    for assumption in ASSUMPTIONS
+    for other in assumption.alternatives
+    if other.label == label
+)
+"""The literal readings of Table 1 and of Eq. 21, as the sensitivity runs them."""
 
 
 def tables(study: Study, _report: Report) -> Tables:
@@ -100,44 +102,35 @@ def tables(study: Study, _report: Report) -> Tables:
 
 def draw(made: Tables) -> Figure:
     """One panel for each reading."""
-    figure, axes = panels(3, 4.6, 4.2)
-    contact = {"literal-forward-only": 2.0, "literal-centre-once": 1.0}
-    words = {
-        "literal-forward-only": ("(a) both sectors ahead: tracking", "smallest spacing [m]"),
-        "literal-centre-once": (
-            "(b) centre, once per obstacle: single obstacle",
-            "smallest distance to its surface [m]",
-        ),
-    }
-    for ax, (name, (heading, what)) in zip(axes, words.items(), strict=False):
+    figure, axes = panels(3, size=(4.6, 4.4))
+    hull_m = load_scenario("tracking").contact.hull_radius_m
+    for ax, (name, heading, what, contact_m) in zip(
+        axes,
+        (
+            ("literal-forward-only", "(a) both sectors ahead: tracking", "smallest spacing [m]", 2 * hull_m),
+            ("literal-centre-once", "(b) centre, once per obstacle: single obstacle",
+             "smallest distance to its surface [m]", hull_m),
+        ), strict=False,
+    ):  # fmt: skip
         table = made[name]
-        ax.plot(table["time_s"], table["as_taken_m"], color=BLUE, label="as taken", linewidth=1.2)
-        ax.plot(table["time_s"], table["as_printed_m"], "--", color=ORANGE, label="as printed", linewidth=1.0)
-        ax.axhline(contact[name], color=BLACK, linestyle=":", linewidth=1.0, label="collision")
+        ax.plot(table["time_s"], table["as_taken_m"], color=BLUE, label="as we take it")
+        ax.plot(table["time_s"], table["as_printed_m"], "--", color=ORANGE, label="as printed")
+        ax.axhline(contact_m, color=BLACK, linestyle=":", linewidth=1.0, label="collision")
         against_time(ax, what)
-        letter(ax, heading)
-        ax.legend(fontsize=8)
+        ax.set_title(heading)
     axes[1].set_ylim(-15.0, 60.0)
     table, ax = made["literal-eq-24"], axes[2]
     for name, colour, mark in (("as printed", ORANGE, "s--"), ("classical", BLUE, "o-")):
         own = table["reading"] == name
-        ax.loglog(table["step_s"][own], table["position_error_m"][own], mark, color=colour, label=name)
+        ax.loglog(table["step_s"][own], table["position_error_m"][own], mark, color=colour)
     ax.axvline(0.1, color=GREY, linestyle=":", label="t_r = 0.1 s")
-    ax.set_xticks(STEPS_S, [f"{step:g}" for step in STEPS_S], fontsize=8)
+    ax.set_xticks(STEPS_S, [f"{step:g}" for step in STEPS_S])
     ax.set_xticks([], minor=True)
     ax.set_xlabel("integration step [s]")
     ax.set_ylabel(f"position error after {DURATION_S:g} s [m]")
-    letter(ax, "(c) Eq. 24: a lone vehicle's turn")
-    ax.legend(fontsize=8)
+    ax.set_title("(c) Eq. 24: a lone vehicle's turn")
+    legend(figure)
     return figure
 
 
-PART = Part(
-    name="literal-readings",
-    title="Three readings as printed, and how they fail",
-    cases=(TRACKING, SINGLE, AHEAD, INSIDE),
-    tables=tables,
-    draw=draw,
-    caption="bio_inspired, n = 54, seed 0; (c) from rest under 1500 N and 150 N m; V(t + t_r / 2) read as a mean",
-    seeds=range(1),
-)
+PART = Part("literal-readings", (TRACKING, SINGLE, AHEAD, INSIDE), tables, draw, seeds=range(1))

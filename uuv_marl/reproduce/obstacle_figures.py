@@ -3,14 +3,17 @@
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uuv_marl.baselines.bio_inspired import Gains
-from uuv_marl.benchmark.figures import COLOURS
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.reproduce.cases import (
+from uuv_marl.benchmark.style import BLACK, BLUE, COLOURS, GREEN, ORANGE, legend, panels
+from uuv_marl.reproduce.drawing import against_time, draw_routes, plan, route_table
+from uuv_marl.reproduce.study import (
     COMPARATORS,
     DELTA_LARGE,
     DELTA_SMALL,
@@ -19,23 +22,13 @@ from uuv_marl.reproduce.cases import (
     ZETA_LARGE,
     ZETA_SMALL,
     Case,
+    Columns,
+    Part,
     Report,
     Study,
+    Tables,
+    stack,
 )
-from uuv_marl.reproduce.columns import Columns, stack
-from uuv_marl.reproduce.drawing import (
-    BLACK,
-    BLUE,
-    GREEN,
-    ORANGE,
-    against_time,
-    draw_routes,
-    letter,
-    panels,
-    plan,
-    route_table,
-)
-from uuv_marl.reproduce.parts import Part, Tables
 
 
 def distances(study: Study, case: Case) -> Columns:
@@ -45,19 +38,24 @@ def distances(study: Study, case: Case) -> Columns:
     return {"time_s": trace["time_s"][::5], **columns}
 
 
-def draw_distances(ax: Axes, table: Columns, paper: tuple[float, ...] = ()) -> None:
-    """All obstacles' curves."""
+def draw_distances(axes: Sequence[Axes], table: Columns, case: Case) -> None:
+    """All obstacles' curves: the whole range, and the part below 40 m with the paper's numbers and the bounds."""
     names = [name for name in table if name != "time_s"]
-    for k, name in enumerate(names):
-        label = f"obstacle {k + 1}" if len(names) > 1 else "ours"
-        ax.plot(
-            table["time_s"], table[name], color=COLOURS[k], linestyle=("-", "--")[k % 2], label=label, linewidth=1.3
-        )
-    for value in paper:
-        ax.axhline(value, color=BLACK, linestyle=":", linewidth=1.2, label=f"paper's smallest: {value:g} m")
-    ax.axhline(0.0, color="0.45", linewidth=1.0)
-    against_time(ax, "smallest distance to the obstacle's surface [m]")
-    ax.legend(fontsize=8)
+    scenario, stated = case.load(), PAPER[case.scenario, "bio_inspired"].min_obstacle_distance_m or ()
+    for ax, words in zip(axes, ("the whole range", "below 40 m"), strict=True):
+        for k, name in enumerate(names):
+            label = f"obstacle {k + 1}" if len(names) > 1 else "ours"
+            ax.plot(table["time_s"], table[name], color=COLOURS[k], linestyle=("-", "--")[k % 2], label=label)
+        against_time(ax, "smallest distance to the obstacle's surface [m]")
+        ax.set_title(f"distance to the obstacle{'s' * (len(names) > 1)}: {words}")
+    for value, style in zip(stated, ("-.", (0, (1, 1))), strict=False):
+        axes[1].axhline(value, color=BLACK, linestyle=style, linewidth=1.2, label=f"paper's smallest: {value:g} m")
+    for value, style, label in (
+        (scenario.constraints.s_o_m, ":", "keep clear (s_o)"),
+        (scenario.contact.hull_radius_m, "--", "collision"),
+    ):
+        axes[1].axhline(value, color=ORANGE, linestyle=style, linewidth=1.0, label=f"{label}: {value:g} m")
+    axes[1].set_ylim(-2.0, 40.0)
 
 
 def single(study: Study, _report: Report) -> Tables:
@@ -67,12 +65,12 @@ def single(study: Study, _report: Report) -> Tables:
 
 def draw_single(made: Tables) -> Figure:
     """Routes, and the distance over time."""
-    figure, (left, right) = panels(2)
-    draw_routes(left, made["figure-11a"])
-    plan(left, SINGLE)
-    letter(left, "(a) routes; dots: end; colour: group at the start")
-    draw_distances(right, made["figure-11b"], PAPER["single_obstacle", "bio_inspired"].min_obstacle_distance_m or ())
-    letter(right, "(b) distance to the obstacle")
+    figure, axes = panels(3, size=(4.6, 4.6))
+    draw_routes(axes[0], made["figure-11a"])
+    plan(axes[0], SINGLE)
+    axes[0].set_title("routes")
+    draw_distances(axes[1:], made["figure-11b"], SINGLE)
+    legend(figure, columns=6)
     return figure
 
 
@@ -87,11 +85,11 @@ def gains_part(name: str, symbol: str, small: Case, large: Case) -> Part:
         for ax, key, case, words in zip(axes, "ab", (small, large), ("too small", "too large"), strict=True):
             draw_routes(ax, made[f"{name}{key}"])
             plan(ax, case)
-            letter(ax, f"({key}) {symbol} {words}: {_gain(case, symbol):g} (Table 1: {_gain(SINGLE, symbol):g})")
+            ax.set_title(f"({key}) {symbol} {words}: {_gain(case, symbol):g} (Table 1: {_gain(SINGLE, symbol):g})")
+        legend(figure, columns=4)
         return figure
 
-    caption = f"{small.label(0)}; {large.label(0)}. The paper names no values: these are assumed"
-    return Part(name, f"Effect of {symbol} on obstacle avoidance", (small, large, SINGLE), tables, draw, caption)
+    return Part(name, (small, large, SINGLE), tables, draw)
 
 
 def _gain(case: Case, symbol: str) -> float:
@@ -106,10 +104,10 @@ def multiple(study: Study, _report: Report) -> Tables:
 
 def draw_multiple(made: Tables) -> Figure:
     """Routes among four obstacles."""
-    figure, (ax,) = panels(1, 7.0, 6.4)
+    figure, (ax,) = panels(1, size=(7.0, 6.8))
     draw_routes(ax, made["figure-14"])
     plan(ax, MULTI)
-    letter(ax, "routes; dots: end; colour: group at the start")
+    legend(figure, columns=4)
     return figure
 
 
@@ -121,11 +119,8 @@ def each_obstacle(study: Study, _report: Report) -> Tables:
 def draw_each_obstacle(made: Tables) -> Figure:
     """The whole range, and the part below 40 m."""
     figure, axes = panels(2)
-    paper = PAPER["multi_obstacle", "bio_inspired"].min_obstacle_distance_m or ()
-    for ax, words in zip(axes, ("smallest distance from each obstacle", "the same, below 40 m"), strict=True):
-        draw_distances(ax, made["figure-15"], paper)
-        letter(ax, words)
-    axes[1].set_ylim(-2.0, 40.0)
+    draw_distances(axes, made["figure-15"], MULTI)
+    legend(figure, columns=4)
     return figure
 
 
@@ -150,7 +145,7 @@ def comparison(study: Study, _report: Report) -> Tables:
 
 
 def draw_comparison(made: Tables) -> Figure:
-    """Every seed, and the paper's value."""
+    """Every seed, side by side so that all can be seen, and the paper's value."""
     table = made["table-2"]
     policies = list(dict.fromkeys(table["policy"].tolist()))
     figure, axes = panels(2)
@@ -158,35 +153,23 @@ def draw_comparison(made: Tables) -> Figure:
     for ax, (name, words) in zip(axes, heads, strict=True):
         for k, policy in enumerate(policies):
             own = table["policy"] == policy
-            ax.plot(
-                np.full(own.sum(), k), table[name][own], "o", color=BLUE, markersize=5, alpha=0.4, label="ours, a seed"
-            )
-            ax.plot(k, table[f"paper_{name}"][own][0], "D", color=ORANGE, markersize=7, label="paper, Table 2")
-        if name.startswith("min"):
-            stated = PAPER["single_obstacle", "bio_inspired"].min_obstacle_distance_m or (np.nan,)
-            ax.plot(len(policies) - 1, stated[-1], "s", color=GREEN, markersize=7, label="paper, section 5.2.1")
-        handles, labels = ax.get_legend_handles_labels()
-        once = dict(zip(labels, handles, strict=True))
-        ax.legend(once.values(), once.keys(), fontsize=8)
+            place = k + np.linspace(-0.25, 0.25, int(own.sum()))
+            ax.plot(place, table[name][own], "o", color=BLUE, mec="none", alpha=0.6, label="ours: one seed")
+            ax.plot(k, table[f"paper_{name}"][own][0], "D", color=ORANGE, ms=7, ls="", label="paper, Table 2")
         ax.set_xticks(range(len(policies)), policies, rotation=20, ha="right")
         ax.set_ylabel(words)
+    stated = PAPER["single_obstacle", "bio_inspired"].min_obstacle_distance_m or (np.nan,)
+    axes[1].plot(len(policies) - 1, stated[-1], "s", color=GREEN, ms=7, ls="", label="paper, section 5.2.1")
+    axes[1].set_ylim(bottom=0.0)
+    legend(figure)
     return figure
 
 
 PARTS = (
-    Part("figure-11", "Routes past a single obstacle", (SINGLE,), single, draw_single, SINGLE.label(0)),
+    Part("figure-11", (SINGLE,), single, draw_single),
     gains_part("figure-12", "zeta_o", ZETA_SMALL, ZETA_LARGE),
     gains_part("figure-13", "delta_o", DELTA_SMALL, DELTA_LARGE),
-    Part("figure-14", "Routes past four obstacles", (MULTI,), multiple, draw_multiple, MULTI.label(0)),
-    Part(
-        "figure-15", "Distance from each of four obstacles", (MULTI,), each_obstacle, draw_each_obstacle, MULTI.label(0)
-    ),
-    Part(
-        "table-2",
-        "Task time and smallest distance of the three methods",
-        (*COMPARATORS.values(), SINGLE),
-        comparison,
-        draw_comparison,
-        "single_obstacle v1, n = 54, all seeds; SFF and SDC are reconstructions",
-    ),
+    Part("figure-14", (MULTI,), multiple, draw_multiple),
+    Part("figure-15", (MULTI,), each_obstacle, draw_each_obstacle),
+    Part("table-2", (*COMPARATORS.values(), SINGLE), comparison, draw_comparison),
 )

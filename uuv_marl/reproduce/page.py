@@ -8,11 +8,11 @@ from string import Template
 
 import numpy as np
 
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.atomic import write_text
+from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.reproduce import identify
-from uuv_marl.reproduce.columns import Columns, read_columns
 from uuv_marl.reproduce.ledger import Entry, markdown, read_ledger
-from uuv_marl.reproduce.parts import Part
+from uuv_marl.reproduce.study import Columns, Part, read_columns
 from uuv_marl.reproduce.unknowns import OBJECTIVES
 
 NEEDED = ("identification", "margins", "rest", "critical")
@@ -22,7 +22,7 @@ NEEDED = ("identification", "margins", "rest", "critical")
 def write_page(folder: Path, parts: Sequence[Part]) -> Path:
     """``report.md`` in the folder of a reproduction, from what lies there."""
     path = folder / "report.md"
-    path.write_text(page(folder, parts), encoding="utf-8")
+    write_text(path, page(folder, parts))
     return path
 
 
@@ -39,14 +39,14 @@ def page(folder: Path, parts: Sequence[Part]) -> str:
         **search_errors(),
         prediction=prediction(tables["identification"]),
         rest_table=rest_table(tables["rest"]),
-        ledger="\n".join(markdown(entries)).strip(),
+        ledger="\n".join(markdown(entries, "###")).strip(),
         **growth_rates(tables["margins"], tables["critical"]),
     )
 
 
 def picture(part: Part) -> str:
-    """A part's picture with its caption."""
-    return f"![{part.title}](figures/{part.name}.png)\n\n*{part.name}. {part.title}. {part.caption}.*"
+    """A part's picture with its caption, which does not say again what the picture's title says."""
+    return f"![{part.title}](figures/{part.name}.png)\n\n*{part.caption}.*"
 
 
 def summary(entries: Sequence[Entry]) -> str:
@@ -55,13 +55,13 @@ def summary(entries: Sequence[Entry]) -> str:
     claims = [entry for entry in entries if entry.kind == "claim"]
     lines = [
         f"- Of {len(numbers)} numbers, {_count(numbers, 'matches within 5 %')} match within 5 %, "
-        f"{_count(numbers, 'matches within 15 %')} more within 15 %, {_count(numbers, 'differs')} differ:",
+        f"{_count(numbers, 'matches within 15 %')} more match within 15 %, and {_count(numbers, 'differs')} differ:",
         *(
             f"  - {e.section}, {e.quantity}: paper {e.paper} {e.unit}, ours {e.ours:.4g} [{e.low:.4g}, {e.high:.4g}]"
             for e in numbers
             if e.verdict == "differs" and isinstance(e.ours, float)
         ),
-        f"- Of {len(claims)} sentences, {_count(claims, 'holds')} hold in every seed; these do not:",
+        f"- Of {len(claims)} sentences, {_count(claims, 'holds')} hold in every seed. These do not:",
         *(f"  - {e.section}, {e.quantity.partition(':')[0]}: {e.verdict}" for e in claims if e.verdict != "holds"),
     ]
     return "\n".join(lines)
@@ -82,13 +82,12 @@ def search_errors() -> dict[str, str]:
 def prediction(table: Columns) -> str:
     """Every set of parameters, scenario by scenario."""
     names = [name for name in table if name not in ("parameters", "scenario", "seed")]
-    lines = [f"| scenario | parameters | {' | '.join(names)} |", f"| {' | '.join(['---'] * (len(names) + 2))} |"]
+    rows: list[tuple[str, ...]] = []
     for scenario in dict.fromkeys(table["scenario"].tolist()):
         for parameters in dict.fromkeys(table["parameters"].tolist()):
             own = (table["scenario"] == scenario) & (table["parameters"] == parameters)
-            cells = [_estimate(table[name][own].tolist()) for name in names]
-            lines.append(f"| {scenario} | {parameters} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+            rows.append((scenario, parameters, *(_estimate(table[name][own].tolist()) for name in names)))
+    return markdown_table(("scenario", "parameters", *names), rows).rstrip("\n")
 
 
 def _estimate(values: Sequence[float]) -> str:
@@ -119,14 +118,14 @@ def growth_rates(margins: Columns, critical: Columns) -> dict[str, str]:
 
 def rest_table(rest: Columns) -> str:
     """What the swarm does once l(t) rests: means over seeds."""
-    lines = [
-        "| variant | t_r [s] | yaw damping [N m s] | yaw rate rms [rad/s] | speed rms [m/s] | exponents [1/s] |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
+    headers = (
+        "variant", "t_r [s]", "yaw damping [N m s]", "yaw rate rms [rad/s]", "speed rms [m/s]", "exponents [1/s]",
+    )  # fmt: skip
+    lines: list[tuple[str, ...]] = []
     rows = zip(rest["variant"].tolist(), rest["t_r_s"].tolist(), rest["yaw_damping_nms"].tolist(), strict=True)
     for variant, hold, damping in dict.fromkeys(rows):
         own = (rest["variant"] == variant) & (rest["t_r_s"] == hold) & (rest["yaw_damping_nms"] == damping)
         names = ("yaw_rate_rms_rad_per_s", "speed_rms_mps", "exponent_per_s", "small_exponent_per_s")
         yaw, speed, large, small = (f"{rest[name][own].mean():.2g}" for name in names)
-        lines.append(f"| {variant} | {hold:g} | {damping:g} | {yaw} | {speed} | {large}, {small} |")
-    return "\n".join(lines)
+        lines.append((variant, f"{hold:g}", f"{damping:g}", yaw, speed, f"{large}, {small}"))
+    return markdown_table(headers, lines).rstrip("\n")

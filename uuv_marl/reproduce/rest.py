@@ -9,21 +9,17 @@ amplitudes, and the largest Lyapunov exponent after Benettin, Galgani, Giorgilli
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
-from typing import cast
+from collections.abc import Callable
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import BioInspired, Gains
 from uuv_marl.baselines.policy import Policy
-from uuv_marl.benchmark.figures import COLOURS
-from uuv_marl.reproduce.cases import Report, Study
-from uuv_marl.reproduce.columns import Columns, stack
-from uuv_marl.reproduce.parts import Part
+from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, SKY, legend, panels
 from uuv_marl.reproduce.softening import PAPER, Softened, Softening
+from uuv_marl.reproduce.study import Columns, Part, Report, Study, Tables, stack
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
 from uuv_marl.sim.swarm import Swarm
@@ -76,10 +72,10 @@ class Variant:
 
     def policy(self, scenario: Scenario, num_worlds: int) -> Policy:
         """The law for this scenario: the paper's own code where nothing is softened."""
-        base = BioInspired if self.softening == PAPER else Softened
-        declared = {"yaw_damping_nms": self.yaw_damping_nms, "softening": self.softening}
-        made = cast(type[BioInspired], type(base.__name__, (base,), declared))
-        return made(scenario, num_worlds, gains=self.gains)
+        undamped = load_scenario(scenario, overrides={"actuators.yaw_damping_nms": 0.0})  # as the law was made
+        if self.softening == PAPER:
+            return BioInspired(undamped, num_worlds, gains=self.gains)
+        return Softened(undamped, num_worlds, gains=self.gains, softening=self.softening)
 
 
 SMOOTH = Softening(near_m=14.0, far_m=20.0)
@@ -229,47 +225,33 @@ def tables(_study: Study, report: Report) -> dict[str, Columns]:
     return {"rest": stack(rows)}
 
 
-def draw(tables: Mapping[str, Columns]) -> Figure:
+def draw(made: Tables) -> Figure:
     """Amplitudes and exponents by variant: all seeds as points, their mean as a bar; from the table alone."""
-    table = tables["rest"]
+    table = made["rest"]
     names = [
         f"{name}, $t_r$ = {hold:g} s" + (f", yaw damping {c:g} N m s" if c else "")
         for name, hold, c in zip(table["variant"], table["t_r_s"], table["yaw_damping_nms"], strict=True)
     ]
     rows = list(dict.fromkeys(names))
-    figure = Figure(figsize=(13.0, 0.36 * len(rows) + 1.6), layout="constrained")
-    axes = figure.subplots(1, 3, sharey=True)
     place = np.array([float(rows.index(name)) for name in names])
-    _points(axes[0], place, table["yaw_rate_rms_rad_per_s"], "o", COLOURS[0])
-    _points(axes[1], place, table["speed_rms_mps"], "o", COLOURS[2])
-    _points(axes[2], place - 0.15, table["exponent_per_s"], "o", COLOURS[1], f"displaced by {DISPLACEMENT:g}")
-    small = table["small_exponent_per_s"]
-    _points(axes[2], place + 0.15, small, "s", COLOURS[5], f"displaced by {SMALL_DISPLACEMENT:g}")
-    axes[2].legend(fontsize=8, loc="lower right")
-    axes[0].set_yticks(range(len(rows)), labels=rows, fontsize=8)
+    figure, axes = panels(3, size=(4.4, 0.36 * len(rows) + 1.6), sharey=True)
+    for ax, column, shift, mark, colour, label in (
+        (axes[0], "yaw_rate_rms_rad_per_s", 0.0, "o", BLUE, "one seed"),
+        (axes[1], "speed_rms_mps", 0.0, "o", BLUE, "one seed"),
+        (axes[2], "exponent_per_s", -0.15, "o", ORANGE, f"one seed, copy displaced by {DISPLACEMENT:g}"),
+        (axes[2], "small_exponent_per_s", 0.15, "s", SKY, f"one seed, copy displaced by {SMALL_DISPLACEMENT:g}"),
+    ):
+        ax.plot(table[column], place + shift, mark, color=colour, alpha=0.7, label=label)
+        means = [table[column][place == row].mean() for row in range(len(rows))]
+        ax.plot(means, np.arange(len(rows)) + shift, "|", color=BLACK, ms=14, mew=1.2, label="mean of seeds 0 to 3")
+        ax.axvline(0.0, color=BLACK, linewidth=0.8)
+    axes[0].set_yticks(range(len(rows)), labels=rows)
     axes[0].invert_yaxis()
     axes[0].set_xlabel("yaw rate, rms [rad/s]")
     axes[1].set_xlabel("speed relative to the reference, rms [m/s]")
     axes[2].set_xlabel("largest Lyapunov exponent [1/s]")
+    legend(figure)
     return figure
 
 
-def _points(ax: Axes, place: Float64, values: Float64, marker: str, colour: str, label: str = "") -> None:
-    for row in np.unique(place):
-        of = values[place == row]
-        ax.plot([of.mean()] * 2, [row - 0.3, row + 0.3], color="black", linewidth=1.2)
-        ax.plot(of, np.full(len(of), row), marker, color=colour, markersize=4, alpha=0.7, label=label or None)
-        label = ""
-    ax.axvline(0.0, color="black", linewidth=0.8)
-    ax.grid(alpha=0.25)
-
-
-PART = Part(
-    name="rest",
-    title="Motion long after the reference point has stopped (first row: while it moves)",
-    cases=(),
-    tables=tables,
-    draw=draw,
-    caption="n = 54, Table 1 but for what is named; points: seeds 0-3, bars: means; exponents for two displacements",
-    seconds=60.0,
-)
+PART = Part("rest", (), tables, draw, seconds=60.0)

@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from uuv_marl.reproduce.assumptions import ASSUMPTIONS, Alternative, Assumption
-from uuv_marl.reproduce.cases import MULTI, SINGLE, TRACKING, Case, Report, Study, folder_name
-from uuv_marl.reproduce.columns import Columns
+from uuv_marl.benchmark.style import panels
+from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
 from uuv_marl.reproduce.ledger import CLOSE, Number, difference, numbers
-from uuv_marl.reproduce.parts import Part, Tables
+from uuv_marl.reproduce.study import MULTI, SINGLE, TRACKING, Case, Columns, Part, Report, Study, Tables
 
 SEEDS = range(6)
 _NAMES = {"tracking": TRACKING, "single_obstacle": SINGLE, "multi_obstacle": MULTI}
@@ -25,17 +24,16 @@ OWN = tuple(
 """The six numbers that the paper states for its own controller, once each."""
 
 
-def case_of(assumption: Assumption, alternative: Alternative, scenario: str) -> Case:
-    """A scenario under one alternative."""
-    name = folder_name(f"{assumption.name} {alternative.label} {scenario}")
-    return Case(name, scenario, overrides=alternative.overrides, parameters=alternative.parameters)
-
-
 def cases() -> tuple[Case, ...]:
     """All of them, after the defaults."""
     return (
         *_NAMES.values(),
-        *(case_of(a, other, scenario) for a in ASSUMPTIONS for other in a.alternatives for scenario in other.scenarios),
+        *(
+            case_of(a.name, other, scenario)
+            for a in ASSUMPTIONS
+            for other in a.alternatives
+            for scenario in other.scenarios
+        ),
     )
 
 
@@ -49,7 +47,7 @@ def tables(study: Study, _report: Report) -> Tables:
         for other in assumption.alternatives:
             for number in OWN:
                 if number.case.scenario in other.scenarios:
-                    case = case_of(assumption, other, number.case.scenario)
+                    case = case_of(assumption.name, other, number.case.scenario)
                     row = _measured(study, case, number.case, number)
                     rows.append({"assumption": assumption.name, "alternative": other.label, **row})
     return {"sensitivity": {name: np.array([row[name] for row in rows]) for name in rows[0]}}
@@ -77,25 +75,26 @@ def draw(made: Tables) -> Figure:
     table = made["sensitivity"]
     rows = list(dict.fromkeys(zip(table["assumption"].tolist(), table["alternative"].tolist(), strict=True)))
     heads = list(dict.fromkeys(zip(table["section"].tolist(), table["quantity"].tolist(), strict=True)))
-    figure = Figure(figsize=(11.5, 0.27 * len(rows) + 2.4), layout="constrained")
-    ax = figure.subplots()
+    figure, (ax,) = panels(1, size=(11.5, 0.27 * len(rows) + 2.4))
     change: NDArray[np.float64] = np.full((len(rows), len(heads)), np.nan)
     for k in range(len(table["value"])):
         i = rows.index((str(table["assumption"][k]), str(table["alternative"][k])))
         j = heads.index((str(table["section"][k]), str(table["quantity"][k])))
         change[i, j] = table["relative_change"][k]
         ax.text(j, i, _cell(table, k), ha="center", va="center", fontsize=8,
+                color="white" if abs(change[i, j]) > 0.28 else "black",
                 fontweight="bold" if abs(table["relative_difference"][k]) <= CLOSE else "normal")  # fmt: skip
-    image = ax.imshow(np.clip(change, -0.5, 0.5), cmap="PuOr", vmin=-0.5, vmax=0.5, aspect="auto", alpha=0.7)
+    image = ax.imshow(np.clip(change, -0.5, 0.5), cmap="PuOr", vmin=-0.5, vmax=0.5, aspect="auto")
     ax.set_facecolor("0.93")
+    ax.grid(visible=False)
     papers = [_paper(head) for head in heads]
     labels = [
         f"{section}\n{textwrap.fill(quantity, 15)}\npaper:\n{paper}"
         for (section, quantity), paper in zip(heads, papers, strict=True)
     ]
-    ax.set_xticks(range(len(heads)), labels, fontsize=8)
+    ax.set_xticks(range(len(heads)), labels)
     ax.xaxis.tick_top()
-    ax.set_yticks(range(len(rows)), [" = ".join(part for part in row if part) for row in rows], fontsize=8)
+    ax.set_yticks(range(len(rows)), [" = ".join(part for part in row if part) for row in rows])
     figure.colorbar(image, ax=ax, shrink=0.5, label="change against what we took (clipped at half)")
     return figure
 
@@ -117,13 +116,4 @@ def _stated(number: Number) -> str:
     return "-".join(f"{value:g}" for value in number.paper)
 
 
-PART = Part(
-    name="sensitivity",
-    title="Sensitivity of the paper's numbers to what it leaves open, one assumption at a time",
-    cases=cases(),
-    tables=tables,
-    draw=draw,
-    caption=f"bio_inspired, mean over seeds 0-{SEEDS[-1]}; bold: within 5 % of the paper; *: collisions; "
-    "never: no seed arrives",
-    seeds=SEEDS,
-)
+PART = Part("sensitivity", cases(), tables, draw, seeds=SEEDS)

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspired
+from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspired, Gains
 from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -35,7 +36,11 @@ PAPER = Softening()
 class Softened(BioInspired):
     """The paper's law with a ``Softening``, in NumPy; without one it is ``BioInspired`` with an echo per beam."""
 
-    softening: Softening = PAPER
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, softening: Softening = PAPER
+    ) -> None:
+        super().__init__(scenario, num_worlds, gains=gains)
+        self.softening = softening
 
     def act(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""

@@ -7,7 +7,7 @@ x ahead and y to starboard; a vehicle's state is (x, y, psi, u, v, r). Formation
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -19,11 +19,9 @@ from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
 
 from uuv_marl.baselines.bio_inspired import Gains
-from uuv_marl.benchmark.figures import COLOURS
-from uuv_marl.reproduce.cases import Report, Study
-from uuv_marl.reproduce.columns import Columns
+from uuv_marl.benchmark.style import BLACK, BLUE, COLOURS, GREY, ORANGE, panels
 from uuv_marl.reproduce.formation import Formation, drag_n, formations, stiffness, straight_leg
-from uuv_marl.reproduce.parts import Part
+from uuv_marl.reproduce.study import Columns, Part, Report, Study, Tables
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.vehicle import derivative, plant
 
@@ -47,6 +45,7 @@ SWEEPS: dict[str, tuple[float, ...]] = {
 """Other parameters swept, one at a time."""
 CRITICAL_DAMPING_NMS = (0.0, 60.0, 200.0)
 """Yaw dampings whose critical control hold is tabled."""
+_HOLD_COLOURS = {"continuous": BLUE, "t_r = 0.1 s": ORANGE, "control hold on the axis": BLACK}
 NEUTRAL_PER_S = 1e-6
 """Growth rates smaller than this are none: a formation in balance may be turned about its centre for nothing."""
 WEAVING_RAD_PER_S = 1.0
@@ -213,72 +212,59 @@ def _margins(parameter: str, value: float, nominal: Sequence[Formation]) -> Iter
             }  # fmt: skip
 
 
-def draw(tables: Mapping[str, Columns]) -> Figure:
+def draw(made: Tables) -> Figure:
     """Eigenvalues of the nominal swarm, and growth rates over each parameter; from the tables alone."""
-    figure = Figure(figsize=(13.0, 8.0), layout="constrained")
-    axes = figure.subplots(2, 3)
-    _draw_eigenvalues(axes[0, 0], tables["eigenvalues"])
-    panels = (
-        ("t_r", "control hold $t_r$ [s]"),
-        ("yaw_damping_nms", "yaw damping [N m s]"),
-        ("zeta_n", "weight of neighbours $\\zeta_n$ [N/m]"),
-        ("delta_n", "distance of neighbours $\\delta_n$ [m]"),
-        ("num_vehicles", "vehicles"),
-    )
-    for ax, (parameter, label) in zip(axes.flat[1:], panels, strict=True):
-        _draw_sweep(ax, tables["margins"], parameter)
-        ax.set_xlabel(label)
-    axes[1, 2].set_xscale("log")
-    return figure
-
-
-def _draw_eigenvalues(ax: Axes, table: Columns) -> None:
-    for k, name in enumerate(dict.fromkeys(table["loop"].tolist())):
-        of = table["loop"] == name
-        ax.plot(
-            table["real_per_s"][of], table["imaginary_rad_per_s"][of], ".", color=COLOURS[k], markersize=4, label=name
+    figure, axes = panels(6, 3, (4.3, 4.0))
+    for k, name in enumerate(dict.fromkeys(made["eigenvalues"]["loop"].tolist())):
+        real, imaginary = (
+            made["eigenvalues"][part][made["eigenvalues"]["loop"] == name]
+            for part in ("real_per_s", "imaginary_rad_per_s")
         )
-    ax.axvline(0.0, color="black", linewidth=0.8)
-    ax.set_xlim(-2.0, 1.5)
-    ax.set_ylim(0.0)
-    ax.set_title("eigenvalues of the nominal swarm, first seed", fontsize=10)
-    ax.set_xlabel("growth rate [1/s]")
-    ax.set_ylabel("angular rate [rad/s]")
-    ax.grid(alpha=0.25)
-    ax.legend(fontsize=8)
+        axes[0].plot(real, imaginary, ".", color=COLOURS[k], label=name)
+    axes[0].axvline(0.0, color=BLACK, linewidth=0.8)
+    axes[0].set_xlim(-2.0, 1.5)
+    axes[0].set_ylim(0.0)
+    axes[0].set_title("eigenvalues of the nominal swarm, first seed")
+    axes[0].set_xlabel("growth rate [1/s]")
+    axes[0].set_ylabel("angular rate [rad/s]")
+    axes[0].legend(title="control hold")
+    for ax, (parameter, label) in zip(
+        axes[1:],
+        (
+            ("t_r", "control hold $t_r$ [s]"),
+            ("yaw_damping_nms", "yaw damping [N m s]"),
+            ("zeta_n", "weight of neighbours $\\zeta_n$ [N/m]"),
+            ("delta_n", "distance of neighbours $\\delta_n$ [m]"),
+            ("num_vehicles", "vehicles"),
+        ),
+        strict=True,
+    ):
+        _draw_sweep(ax, made["margins"], parameter)
+        ax.set_xlabel(label)
+    axes[5].set_xscale("log")
+    for which, colour in _HOLD_COLOURS.items():
+        for whose, style in (("swarm", "-"), ("one vehicle", ":")):
+            axes[1].plot([], [], style, color=colour, label=f"{whose}, {which}")
+    for fill, words in (("full", "forces balance"), ("none", "no balance found")):
+        axes[1].plot([], [], "o", color=GREY, fillstyle=fill, label=f"one seed: {words}")
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
 
 
 def _draw_sweep(ax: Axes, table: Columns, parameter: str) -> None:
     """Growth rates over one parameter, of the swarm and of a vehicle alone."""
     of = table["parameter"] == parameter
-    over_hold = parameter == "t_r"
-    holds: list[float | None] = [None] if over_hold else list(dict.fromkeys(table["t_r_s"][of].tolist()))
-    curves = (("growth_per_s", "swarm", "-"), ("lone_growth_per_s", "one vehicle", ":"))
-    for hold_s, colour in zip(holds, COLOURS[6:] if over_hold else COLOURS, strict=False):
-        rows = of if hold_s is None else of & (table["t_r_s"] == hold_s)
-        values, settled = table["value"][rows], table["settled"][rows] > 0
+    names = ["control hold on the axis"] * len(of) if parameter == "t_r" else list(map(loop_name, table["t_r_s"]))
+    for name in dict.fromkeys(np.array(names)[of].tolist()):
+        rows, colour = of & (np.array(names) == name), _HOLD_COLOURS[name]
+        values, settled, growth = table["value"][rows], table["settled"][rows] > 0, table["growth_per_s"][rows]
         at = np.unique(values)
-        for column, name, style in curves:
-            growth = table[column][rows]
-            mean = [growth[values == value].mean() for value in at]
-            label = name if hold_s is None else f"{name}, {loop_name(hold_s)}"
-            ax.plot(at, mean, style, color=colour, linewidth=1.3, label=label)
-        growth = table["growth_per_s"][rows]
-        ax.plot(values[settled], growth[settled], "o", color=colour, markersize=4)
-        ax.plot(values[~settled], growth[~settled], "o", color=colour, markersize=4, fillstyle="none")
-    ax.axhline(0.0, color="black", linewidth=0.8)
+        for rate, style in ((growth, "-"), (table["lone_growth_per_s"][rows], ":")):
+            ax.plot(at, [rate[values == value].mean() for value in at], style, color=colour)
+        for own, fill in ((settled, "full"), (~settled, "none")):
+            ax.plot(values[own], growth[own], "o", color=colour, fillstyle=fill)
+    ax.axhline(0.0, color=BLACK, linewidth=0.8)
     ax.set_ylabel("growth rate [1/s]")
-    ax.grid(alpha=0.25)
-    if parameter in ("t_r", "yaw_damping_nms"):  # the other panels share the latter's
-        ax.legend(fontsize=8)
 
 
-PART = Part(
-    name="stability",
-    title="Steady tracking, linearised with frozen neighbour sets: above 0 it grows",
-    cases=(),
-    tables=tables,
-    draw=draw,
-    caption="bio_inspired, Table 1 but for what varies; points: seeds 0-3, filled where forces balance; lines: means",
-    seconds=40.0,
-)
+PART = Part("stability", (), tables, draw, seconds=40.0)

@@ -4,30 +4,14 @@
 # Matplotlib leaves the types of its keyword arguments open.
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.reproduce.cases import TRACKING, Report, Study
-from uuv_marl.reproduce.columns import Columns
-from uuv_marl.reproduce.drawing import (
-    BLACK,
-    BLUE,
-    GREEN,
-    ORANGE,
-    against_time,
-    draw_routes,
-    letter,
-    mark_corners,
-    panels,
-    plan,
-    route_table,
-    start_groups,
-)
-from uuv_marl.reproduce.motion import path_distance
-from uuv_marl.reproduce.parts import Part, Tables
+from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, PINK, legend, panels
+from uuv_marl.reproduce.drawing import against_time, draw_routes, mark_corners, plan, route_table, start_groups
+from uuv_marl.reproduce.measures import SPEED_MPS, corner_times, mean_heading, path_distance
+from uuv_marl.reproduce.study import TRACKING, Columns, Part, Report, Study, Tables
 
-CAPTION = TRACKING.label(0)
 LAW = PAPER["tracking", "bio_inspired"]
 
 
@@ -52,22 +36,25 @@ def states(study: Study, _report: Report) -> Tables:
 
 
 def draw_states(made: Tables) -> Figure:
-    """Circles, and arrows for the velocities."""
+    """Circles, and arrows for the velocities; an arrow of the fastest is 25 m long in each panel."""
     figure, axes = panels(2)
     for ax, name, words in zip(axes, ("figure-7a", "figure-7b"), ("start", "end"), strict=True):
         table = made[name]
         plan(ax, TRACKING)
-        colours = np.where(table["group"] == 0, BLUE, ORANGE).tolist()
-        ax.scatter(table["x_m"], table["y_m"], s=18, facecolors="none", edgecolors=colours)
-        arrows = ax.quiver(
-            table["x_m"], table["y_m"], table["velocity_x_mps"], table["velocity_y_mps"],
-            color=colours, angles="xy", scale_units="xy", scale=0.2, width=0.003,
-        )  # fmt: skip
-        ax.quiverkey(arrows, 0.82, 1.03, 4.0, "4 m/s", labelpos="E", coordinates="axes", color=BLACK)
-        for low, high, values in ((ax.set_xlim, 0, table["x_m"]), (ax.set_ylim, 0, table["y_m"])):
-            middle = float(values.min() + values.max()) / 2 + high
-            low(middle - 125.0, middle + 125.0)
-        letter(ax, f"({name[-1]}) {words}, t = {float(table['time_s'][0]):g} s")
+        for group, colour, label in ((0, BLUE, "starts to port"), (1, ORANGE, "starts to starboard")):
+            x, y, u, v = (
+                table[column][table["group"] == group] for column in ("x_m", "y_m", "velocity_x_mps", "velocity_y_mps")
+            )
+            ax.plot(x, y, "o", color=colour, mfc="none", label=label)
+            fastest = float(f"{np.hypot(table['velocity_x_mps'], table['velocity_y_mps']).max():.1g}")
+            arrows = ax.quiver(x, y, u, v, color=colour, angles="xy", scale_units="xy", scale=fastest / 25, width=0.006)
+            if not group:
+                ax.quiverkey(arrows, 0.8, 1.04, fastest, f"{fastest:g} m/s", labelpos="E", color=BLACK)
+        for limits, values in ((ax.set_xlim, table["x_m"]), (ax.set_ylim, table["y_m"])):
+            middle = float(values.min() + values.max()) / 2
+            limits(middle - 125.0, middle + 125.0)
+        ax.set_title(f"({name[-1]}) {words}, t = {float(table['time_s'][0]):g} s")
+    legend(figure)
     return figure
 
 
@@ -86,12 +73,12 @@ def draw_all_routes(made: Tables) -> Figure:
     figure, (left, right) = panels(2)
     draw_routes(left, made["figure-8a"])
     plan(left, TRACKING)
-    letter(left, "(a) routes; dots: end; colour: group at the start")
+    left.set_title("(a) every vehicle")
     plan(right, TRACKING)
     centre = made["figure-8b"]
-    right.plot(centre["centre_x_m"], centre["centre_y_m"], color=BLUE, linewidth=1.4, label="swarm's centre")
-    right.legend(fontsize=8)
-    letter(right, "(b) centre of the swarm")
+    right.plot(centre["centre_x_m"], centre["centre_y_m"], color=GREEN, label="route of the swarm's centre")
+    right.set_title("(b) centre of the swarm")
+    legend(figure, columns=4)
     return figure
 
 
@@ -100,6 +87,8 @@ def headings(study: Study, _report: Report) -> Tables:
     trace = study.trace(TRACKING, 0)
     heading, time = trace["route_heading"], trace["route_time_s"]
     vehicles = int(heading.shape[1])
+    legs = np.diff(trace["waypoints"], axis=0)
+    leg = np.searchsorted(corner_times(trace["waypoints"], SPEED_MPS)[:-1], time, side="right")
     distance = np.interp(trace["time_s"], time, path_distance(trace["route_position"].mean(axis=1), trace["waypoints"]))
     return {
         "figure-9a": {
@@ -111,27 +100,41 @@ def headings(study: Study, _report: Report) -> Tables:
             "time_s": trace["time_s"][::5],
             "from_l_m": trace["centre_error_m"][::5],
             "from_path_m": distance[::5],
+            "order_parameter": trace["order_parameter"][::5],
+        },
+        "figure-9c": {
+            "time_s": time,
+            "mean_heading_deg": np.degrees(mean_heading(heading)),
+            "leg_deg": np.degrees(np.arctan2(legs[leg, 1], legs[leg, 0])),
         },
     }
 
 
 def draw_headings(made: Tables) -> Figure:
-    """Figure 9."""
-    figure, (left, right) = panels(2)
-    table = made["figure-9a"]
-    left.plot(table["time_s"], table["heading_deg"], ",", color=BLUE, alpha=0.6)
-    mark_corners(left, TRACKING)
-    left.set_ylim(-180, 180)
-    left.set_yticks(range(-180, 181, 60))
-    against_time(left, "heading psi, clockwise from north [deg]")
-    letter(left, "(a) heading of every vehicle")
-    deviation = made["figure-9b"]
-    right.plot(deviation["time_s"], deviation["from_l_m"], color=BLUE, label="from l(t)")
-    right.plot(deviation["time_s"], deviation["from_path_m"], "--", color=ORANGE, label="from the path")
-    mark_corners(right, TRACKING)
-    right.legend(fontsize=8)
-    against_time(right, "deviation of the swarm's centre [m]")
-    letter(right, "(b) centre and given trajectory")
+    """Every heading and their mean, how far they agree, and the centre's deviation."""
+    figure, axes = panels(3, size=(4.4, 4.4))
+    every, mean, deviation = (made[f"figure-9{letter}"] for letter in "acb")
+    axes[0].plot(every["time_s"], every["heading_deg"], ",", color=BLUE, alpha=0.25)
+    axes[0].plot([], [], ".", color=BLUE, label="heading of a vehicle")
+    axes[0].plot(mean["time_s"], mean["mean_heading_deg"], color=ORANGE, label="mean heading")
+    axes[0].plot(mean["time_s"], mean["leg_deg"], "--", color=BLACK, linewidth=1.0, label="direction of l(t)'s leg")
+    axes[0].set_ylim(-180, 180)
+    axes[0].set_yticks(range(-180, 181, 60))
+    against_time(axes[0], "heading psi, clockwise from north [deg]")
+    axes[0].set_title("(a) headings")
+    axes[1].plot(deviation["time_s"], deviation["from_l_m"], color=GREEN, label="from l(t)")
+    axes[1].plot(deviation["time_s"], deviation["from_path_m"], color=PINK, label="from the path")
+    against_time(axes[1], "deviation of the swarm's centre [m]")
+    axes[1].set_title("(b) centre and given trajectory")
+    axes[2].plot(
+        deviation["time_s"], deviation["order_parameter"], color=BLUE, label="length of the mean heading vector"
+    )
+    axes[2].set_ylim(0.0, 1.02)
+    against_time(axes[2], "order parameter, 1 where all are aligned [1]")
+    axes[2].set_title("(c) how far headings agree")
+    for ax in axes:
+        mark_corners(ax, TRACKING)
+    legend(figure, columns=7)
     return figure
 
 
@@ -142,33 +145,30 @@ def spacing(study: Study, _report: Report) -> Tables:
 
 
 def draw_spacing(made: Tables) -> Figure:
-    """Both in one panel, and the smallest by itself, where its changes can be seen."""
+    """Each by itself, so that its changes can be seen, with the paper's numbers and the bounds."""
     figure, axes = panels(2)
-    table = made["figure-10"]
-    for ax, names in zip(axes, (("max_spacing_m", "min_spacing_m"), ("min_spacing_m",)), strict=True):
-        for name in names:
-            colour, label = (ORANGE, "largest") if name.startswith("max") else (BLUE, "smallest")
-            ax.plot(table["time_s"], table[name], color=colour, label=label, linewidth=1.2)
+    table, scenario = made["figure-10"], TRACKING.load()
+    for ax, name, words in zip(axes, ("max_spacing_m", "min_spacing_m"), ("largest", "smallest"), strict=True):
+        ax.plot(table["time_s"], table[name], color=BLUE, label="ours")
         mark_corners(ax, TRACKING)
-        against_time(ax, "distance between vehicles [m]")
-        ax.set_ylim(bottom=0.0)
-    _paper_line(axes[1], LAW.min_spacing_m, "paper, smallest")
-    _paper_line(axes[1], LAW.mean_min_spacing_m, "paper, time mean")
-    letter(axes[0], "largest and smallest")
-    letter(axes[1], "the smallest alone")
-    for ax in axes:
-        ax.legend(fontsize=8)
+        against_time(ax, f"{words} distance between two vehicles [m]")
+        ax.set_title(f"({'ab'[words == 'smallest']}) {words}")
+        ax.set_ylim(0.0, 1.05 * float(table[name].max()))
+    for value, style, colour, label in (
+        (LAW.mean_min_spacing_m, "--", GREEN, "paper, time mean of the smallest"),
+        (LAW.min_spacing_m, "-.", GREEN, "paper, smallest"),
+        (scenario.constraints.s_u_m, ":", ORANGE, "keep apart (s_u)"),
+        (2.0 * scenario.contact.hull_radius_m, "--", ORANGE, "collision"),
+    ):
+        if value is not None:
+            axes[1].axhline(value, color=colour, linestyle=style, linewidth=1.0, label=f"{label}: {value:g} m")
+    legend(figure, columns=3)
     return figure
 
 
-def _paper_line(ax: Axes, value: float | None, label: str) -> None:
-    if value is not None:
-        ax.axhline(value, color=GREEN, linestyle="--" if "mean" in label else "-.", label=f"{label}: {value:g} m")
-
-
 PARTS = (
-    Part("figure-7", "Start and end of the swarm's tracking", (TRACKING,), states, draw_states, CAPTION),
-    Part("figure-8", "Routes of the swarm and of its centre", (TRACKING,), routes, draw_all_routes, CAPTION),
-    Part("figure-9", "Headings, and the centre's deviation", (TRACKING,), headings, draw_headings, CAPTION),
-    Part("figure-10", "Largest and smallest distance between vehicles", (TRACKING,), spacing, draw_spacing, CAPTION),
+    Part("figure-7", (TRACKING,), states, draw_states),
+    Part("figure-8", (TRACKING,), routes, draw_all_routes),
+    Part("figure-9", (TRACKING,), headings, draw_headings),
+    Part("figure-10", (TRACKING,), spacing, draw_spacing),
 )

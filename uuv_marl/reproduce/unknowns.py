@@ -4,8 +4,10 @@ Only sections 5.1 and 5.2.1 (with Table 2) are looked at here; section 5.2.2 sta
 """
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from importlib import resources
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,37 +39,20 @@ class Unknown(NamedTuple):
     low: float = 0.0
     high: float = 0.0
     log: bool = False
-    choices: tuple[Value, ...] = ()
+    choices: Sequence[Value] = ()
     """Instead of a range."""
+    fields: Sequence[str] = ()
+    """Of the scenario; a field of the vehicle is multiplied."""
 
 
-UNKNOWNS: dict[str, Unknown] = {
-    "sub_sectors": Unknown(7, "sub-sectors of each of the three arrays, k_a (Eq. 12)", "", 4, 12),
-    "flank_mounting": Unknown(120.0, "flank arrays' axis from the bow; 120 closes the circle", "deg", 100.0, 150.0),
-    "surge_resistance": Unknown(1.0, "factor on X_u and X_u|u| of the literature's vehicle", "1", 0.6, 1.6, log=True),
-    "yaw_resistance": Unknown(1.0, "factor on N_r and N_r|r|", "1", 0.5, 4.0, log=True),
-    "inertia": Unknown(1.0, "factor on mass, moment of inertia and added masses", "1", 0.5, 3.0, log=True),
-    "max_force": Unknown(3000.0, "limit of the surge force", "N", 1000.0, 10000.0, log=True),
-    "max_torque": Unknown(3000.0, "limit of the yaw torque", "N m", 1000.0, 10000.0, log=True),
-    "start_spacing": Unknown(13.0, "smallest distance between vehicles at the start", "m", 10.0, 16.0),
-    "start_gap": Unknown(20.0, "between the two groups at the start, which together stay 200 m wide", "m", 16.0, 60.0),
-    "arrival_radius": Unknown(2.0, "the swarm's centre this close to the end", "m", 1.0, 20.0, log=True),
-    "arrival_dwell": Unknown(5.0, "for so long", "s", 0.0, 10.0),
-    "arrival_spread": Unknown(80.0, "with every vehicle this close", "m", 50.0, 120.0),
-    "bow_range": Unknown(
-        default=100.0,
-        meaning="how near a surface must be for an echo; Eq. 11 measures to the centre: 75 for these discs",
-        unit="m",
-        choices=(75.0, 100.0),
-    ),
-    "echo_reports": Unknown(
-        default="centre",
-        meaning="O_j of Eq. 21: the centre, or the nearest point in the beam",
-        choices=("centre", "surface"),
-    ),
-    "obstacle_term": Unknown(default="per_echo", meaning="what Eq. 21 sums over", choices=("per_echo", "per_obstacle")),
-}
-"""The space. Not in it: both sonar sectors ahead, with which the swarm collides (docs/reproduction)."""
+def _read() -> dict[str, Unknown]:
+    text = resources.files("uuv_marl.reproduce").joinpath("unknowns.toml").read_text(encoding="utf-8")
+    tables: dict[str, dict[str, Any]] = tomllib.loads(text)
+    return {name: Unknown(**table) for name, table in tables.items()}
+
+
+UNKNOWNS = _read()
+"""The space, as ``unknowns.toml`` lists it."""
 
 DEFAULTS: dict[str, Value] = {name: unknown.default for name, unknown in UNKNOWNS.items()}
 
@@ -99,31 +84,13 @@ class Numbers(NamedTuple):
 def setting(values: Mapping[str, Value]) -> Setting:
     """What a choice of the unknowns means for the scenarios and the policy; ``DEFAULTS`` change nothing."""
     vehicle = load_scenario("tracking").vehicle
-    scaled = {
-        "surge_resistance": ("X_u", "X_uu"),
-        "yaw_resistance": ("N_r", "N_rr"),
-        "inertia": ("m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"),
-    }
-    overrides: dict[str, object] = {
-        f"vehicle.{field}": getattr(vehicle, field) * float(values[name])
-        for name, fields in scaled.items()
-        for field in fields
-    }
-    overrides |= {f"sonar.arrays.{array}.sub_sectors": values["sub_sectors"] for array in ("bow", "port", "starboard")}
-    overrides |= {
-        "sonar.arrays.port.mounting_deg": -float(values["flank_mounting"]),
-        "sonar.arrays.starboard.mounting_deg": values["flank_mounting"],
-        "sonar.arrays.bow.range_m": values["bow_range"],
-        "sonar.echo_reports": values["echo_reports"],
-        "actuators.max_force_n": values["max_force"],
-        "actuators.max_torque_nm": values["max_torque"],
-        "start.spacing_m": values["start_spacing"],
-        "start.gap_m": values["start_gap"],
-        "start.width_m": (_START_WIDTH_M - float(values["start_gap"])) / 2,
-        "arrival.radius_m": values["arrival_radius"],
-        "arrival.dwell_s": values["arrival_dwell"],
-        "arrival.spread_m": values["arrival_spread"],
-    }
+    overrides: dict[str, object] = {}
+    for name, unknown in UNKNOWNS.items():
+        for field in unknown.fields:
+            section, _, own = field.partition(".")
+            overrides[field] = getattr(vehicle, own) * float(values[name]) if section == "vehicle" else values[name]
+    overrides["sonar.arrays.port.mounting_deg"] = -float(values["flank_mounting"])
+    overrides["start.width_m"] = (_START_WIDTH_M - float(values["start_gap"])) / 2
     return Setting(overrides, {"obstacle_term": values["obstacle_term"]})
 
 
@@ -196,7 +163,7 @@ def _fails(metrics: Metrics) -> bool:
     return bool(metrics["collisions"]) or metrics["task_time_s"] is None
 
 
-def _numbers(metrics: Mapping[str, Sequence[Metrics]], failed: float) -> Numbers:
+def _numbers(metrics: Mapping[str, Sequence[Mapping[str, object]]], failed: float) -> Numbers:
     def mean(scenario: str, name: str) -> float:
         found = [value for m in metrics.get(scenario, ()) if isinstance(value := m[name], float)]
         return sum(found) / len(found) if found else math.nan

@@ -11,10 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.reproduce.cases import Case, Report, Study, folder_name
-from uuv_marl.reproduce.columns import Columns
-from uuv_marl.reproduce.drawing import BLACK, BLUE, ORANGE
-from uuv_marl.reproduce.parts import Part, Tables
+from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, legend, panels
+from uuv_marl.reproduce.study import Case, Columns, Part, Report, Study, Tables, folder_name
 
 SEEDS = range(6)
 
@@ -52,7 +50,7 @@ LOSSES = (
 )
 
 
-def variation(name: str, title: str, axis: str, variants: Sequence[Variant], quantities: Sequence[Quantity]) -> Part:
+def variation(name: str, axis: str, variants: Sequence[Variant], quantities: Sequence[Quantity]) -> Part:
     """A part that runs the paper's controller on every variant and shows every seed."""
     scenarios = list(dict.fromkeys(quantity.scenario for quantity in quantities))
 
@@ -73,46 +71,37 @@ def variation(name: str, title: str, axis: str, variants: Sequence[Variant], qua
         return {name: {head: np.array(column) for head, column in zip(heads, zip(*rows, strict=True), strict=True)}}
 
     def draw(made: Tables) -> Figure:
-        columns = min(4, len(quantities))
-        figure = Figure(figsize=(3.6 * columns, 3.1 * -(-len(quantities) // columns)), layout="constrained")
-        for k, quantity in enumerate(quantities):
-            ax = figure.add_subplot(-(-len(quantities) // columns), columns, k + 1)
+        figure, axes = panels(len(quantities), size=(3.6, 3.1))
+        for ax, quantity in zip(axes, quantities, strict=True):
             _panel(ax, made[name], quantity, [variant.label for variant in variants])
-            ax.set_xlabel(axis, fontsize=8)
+            ax.set_xlabel(axis)
+        legend(figure)
         return figure
 
-    return Part(
-        name=name,
-        title=title,
-        cases=tuple(case(variant, scenario) for variant in variants for scenario in scenarios),
-        tables=tables,
-        draw=draw,
-        caption=f"bio_inspired, seeds 0-{SEEDS[-1]}: points; line: mean of those that have a value; dashed: the paper",
-        seeds=SEEDS,
-    )
+    cases = tuple(case(variant, scenario) for variant in variants for scenario in scenarios)
+    return Part(name, cases, tables, draw, seeds=SEEDS)
 
 
 def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) -> None:
-    means: list[float] = []
-    for k, label in enumerate(labels):
-        own = table["variant"] == label
-        own &= (table["scenario"] == quantity.scenario) & (table["metric"] == quantity.metric)
-        values = table["value"][own].astype(np.float64)
-        found = values[np.isfinite(values)]
-        ax.plot(np.full(len(found), k), found, "o", color=BLUE, markersize=4, alpha=0.5)
-        means.append(float(found.mean()) if found.size else np.nan)
-        if found.size < values.size:
-            ax.annotate(f"{values.size - found.size} none", (k, 1.0), xycoords=("data", "axes fraction"), ha="center",
-                        va="top", fontsize=8, color=ORANGE)  # fmt: skip
-    ax.plot(range(len(labels)), means, "-", color=BLUE, linewidth=1.0)
-    for value in _stated(quantity):
-        ax.axhline(value, color=BLACK, linestyle="--", linewidth=1.0)
-    ax.set_xticks(range(len(labels)), labels, fontsize=8)
-    ax.set_title(quantity.words, fontsize=9, loc="left")
+    ax.set_title(quantity.words)
+    ax.set_xticks(range(len(labels)), labels)
     ax.margins(x=0.1, y=0.15)
-    if quantity.metric == "collisions":
-        ax.set_ylim(-0.5, max(5.0, ax.get_ylim()[1]))
-    ax.grid(alpha=0.25)
+    own = (table["scenario"] == quantity.scenario) & (table["metric"] == quantity.metric)
+    if quantity.metric == "collisions" and not table["value"][own].any():
+        ax.text(0.5, 0.5, "none in any run", ha="center", transform=ax.transAxes)
+        ax.set_yticks([])
+        ax.set_xlim(-0.5, len(labels) - 0.5)
+        return
+    by_label = [table["value"][own & (table["variant"] == label)].astype(np.float64) for label in labels]
+    for k, values in enumerate(by_label):
+        ax.plot(np.full(len(values), k), values, "o", color=BLUE, alpha=0.5, label="one seed")
+        if missing := int(np.isnan(values).sum()):
+            ax.annotate(f"{missing} none", (k, 1.0), xycoords=("data", "axes fraction"), ha="center",
+                        va="top", fontsize=8, color=ORANGE)  # fmt: skip
+    means = [float(np.nanmean(values)) if np.isfinite(values).any() else np.nan for values in by_label]
+    ax.plot(range(len(labels)), means, "-", color=BLUE, linewidth=1.0, label="mean of the seeds that have a value")
+    for value in _stated(quantity):
+        ax.axhline(value, color=BLACK, linestyle="--", linewidth=1.0, label="paper")
 
 
 def _stated(quantity: Quantity) -> tuple[float, ...]:
@@ -136,26 +125,10 @@ def losses(num: int) -> Variant:
     return Variant(f"{num}", {"disturbance.loss_times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, num)]})
 
 
+CLOCKS = ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))
+SIZES = [Variant(f"{n}", {"swarm.num_vehicles": n}) for n in (10, 20, 54, 100, 200)]
 PARTS = (
-    variation(
-        "time-steps",
-        "Control hold and integration step, separately",
-        "control hold [s] over integration step [s]",
-        [clocks(*pair) for pair in ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))],
-        OWN,
-    ),
-    variation(
-        "swarm-size",
-        "The paper's figures for other swarm sizes",
-        "vehicles",
-        [Variant(f"{n}", {"swarm.num_vehicles": n}) for n in (10, 20, 54, 100, 200)],
-        OWN,
-    ),
-    variation(
-        "losses",
-        "Vehicles lost on the way",
-        "vehicles lost of 54",
-        [losses(n) for n in (0, 6, 12, 24, 36)],
-        LOSSES,
-    ),
+    variation("time-steps", "control hold [s] over integration step [s]", [clocks(*pair) for pair in CLOCKS], OWN),
+    variation("swarm-size", "vehicles", SIZES, OWN),
+    variation("losses", "vehicles lost of 54", [losses(n) for n in (0, 6, 12, 24, 36)], LOSSES),
 )

@@ -63,36 +63,42 @@ class Senses(NamedTuple):
 
 
 class Facts(NamedTuple):
-    """What is true of the latest step; smallest values and counts are over all its control holds. Lengths in m."""
+    """What is true of the latest step; smallest values and counts are over all its control holds. Lengths in m.
+
+    Attributes:
+        time_s: time since the reset, shape (world,).
+        reference: position (north, east) and velocity of l(t), shape (world, 4).
+        centre: mean position of the living, shape (world, 2).
+        spacing: each vehicle's smallest distance to another, shape (world, vehicle); infinite for the lost.
+        min_spacing: the smallest of them, shape (world,).
+        max_spacing: largest distance between two vehicles at the end of the step, shape (world,).
+        clearance: each vehicle's smallest distance to an obstacle's surface, shape (world, vehicle); negative inside.
+        obstacle_clearance: each obstacle's smallest distance from its surface to a vehicle, shape (world, obstacle);
+            infinite in the padding.
+        contacts: contact episodes that began in this step, for each vehicle, shape (world, vehicle).
+        collisions: contact episodes that began in this step, shape (world,).
+        lost: vehicles lost in this step, shape (world, vehicle).
+        effort: mean squared action (share of full force), shape (world, vehicle).
+        saturated: share of actions at the actuators' limit, shape (world,).
+        arrival_s: when the swarm arrived, by ``Rules.arrival_radii``; NaN before, shape (world, radius).
+        diverged: the first vehicle whose speed the integration step let run away, -1 while there is none, (world,).
+    """
 
     time_s: Float64
-    """Since the reset, shape (world,)."""
     reference: Float64
-    """Position and velocity of l(t), shape (world, 4)."""
     centre: Float64
-    """Mean position of the living, shape (world, 2)."""
     spacing: Float64
-    """Each vehicle's smallest distance to another, shape (world, vehicle); infinite for the lost."""
     min_spacing: Float64
-    """Smallest of them, shape (world,)."""
     max_spacing: Float64
-    """Largest distance between two vehicles at the end of the step, shape (world,)."""
     clearance: Float64
-    """Each vehicle's smallest distance to an obstacle's surface, shape (world, vehicle); negative inside."""
     obstacle_clearance: Float64
-    """The same for each obstacle, shape (world, obstacle); infinite in the padding."""
     contacts: Int64
-    """Contact episodes that began, for each vehicle, shape (world, vehicle)."""
     collisions: Int64
-    """Contact episodes that began, shape (world,)."""
     lost: Bool
-    """Vehicles lost in this step, shape (world, vehicle)."""
     effort: Float64
-    """Mean squared action (share of full force), shape (world, vehicle)."""
     saturated: Float64
-    """Share of actions at the actuators' limit, shape (world,)."""
     arrival_s: Float64
-    """When the swarm arrived, by ``Rules.arrival_radii``; NaN before, shape (world, radius)."""
+    diverged: Int64
 
 
 class Rules(NamedTuple):

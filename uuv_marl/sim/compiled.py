@@ -25,7 +25,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _log = logging.getLogger("uuv_marl")
 _UNUSED_S = 30 * 86400.0
 """Compiled code that nobody loaded for so long is deleted."""
-_QUIET_S = 10.0
+_QUIET_S = 60.0
 """One message is enough for functions that are compiled closer together than this."""
 _settings, caching = cast(Any, _config), cast(Any, _caching)
 _last_compiled = -_QUIET_S
@@ -88,7 +88,7 @@ class _Cache(caching.FunctionCache):
         """What was compiled for these types, or None."""
         index = Path(self._cache_file._index_path)
         try:
-            found: Any = super().load_overload(sig, target_context)
+            found: Any = caching.FunctionCache.load_overload(self, sig, target_context)
         except Exception:  # a file cut off by a power cut raises whatever unpickling meets
             found = None
             with contextlib.suppress(OSError):
@@ -102,7 +102,7 @@ class _Cache(caching.FunctionCache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
         try:
-            super().save_overload(sig, data)
+            caching.FunctionCache.save_overload(self, sig, data)
         except OSError as error:
             _log.warning("%s can't be kept (%s), so the next start compiles anew.", self.cache_path, error.strerror)
             self.disable()

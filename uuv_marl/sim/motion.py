@@ -47,6 +47,14 @@ def load(w: int, eta: Float64, nu: Float64, now: Columns) -> None:
 
 
 @compiled
+def load_one(w: int, i: int, eta: Float64, nu: Float64, now: Columns) -> None:
+    """The same for vehicle i alone, whose latest motion is thrown away."""
+    now.x[i], now.y[i], now.psi[i] = eta[w, i, 0], eta[w, i, 1], eta[w, i, 2]
+    now.u[i], now.v[i], now.r[i] = nu[w, i, 0], nu[w, i, 1], nu[w, i, 2]
+    now.cos[i], now.sin[i] = cos_sin(now.psi[i])
+
+
+@compiled
 def aim(w: int, action: Float32, now: Columns) -> None:
     """Project the actions of world w, shape (world, vehicle, 2), onto the unit disc."""
     for i in range(action.shape[1]):

@@ -20,8 +20,10 @@ def packed(streams: Sequence[np.random.Generator | None]) -> UInt64:
     return rows
 
 
-def unpacked(rows: UInt64) -> list[np.random.Generator | None]:
-    """Generators that go on from ``packed`` states."""
+def unpacked(rows: UInt64, num: int) -> list[np.random.Generator | None]:
+    """``num`` generators that go on from ``packed`` states. Raises ValueError where there are others."""
+    if rows.shape != (num, 6) or rows.dtype != np.uint64:
+        raise ValueError(f"streams must be uint64 of shape ({num}, 6), got {rows.dtype} of shape {rows.shape}")
     streams: list[np.random.Generator | None] = []
     for low, high, inc_low, inc_high, has_half, half in rows.tolist():
         stream = np.random.default_rng(0)

@@ -1,6 +1,6 @@
 """Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
 
-import operator
+import logging
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
@@ -8,13 +8,15 @@ from typing import Any, cast
 import numpy as np
 from numba import config, get_num_threads
 from numba.np.ufunc.parallel import threading_layer
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario, growth
+from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
 from uuv_marl.sim.disturbance import draw_losses, loss_ticks
 from uuv_marl.sim.field import draw_field
+from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
@@ -30,6 +32,7 @@ ends on the scenario's own, so that the time within a smaller radius is often mi
 _CELL_SPACINGS = 1.25
 """Side of a cell, in spacings of the start, for swarms that are searched by cells (perf/, docs/speed.md)."""
 
+_log = logging.getLogger("uuv_marl")
 _threads_of_parent = False
 
 
@@ -58,9 +61,7 @@ class Swarm:
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
-        self.num_worlds = operator.index(num_worlds)
-        if num_worlds < 1:
-            raise ValueError(f"num_worlds must be at least 1, got {num_worlds}")
+        self.num_worlds = num_worlds = whole_number("num_worlds", num_worlds, 1)
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
@@ -68,8 +69,10 @@ class Swarm:
         self._suite = suite(scenario)
         self._rules = _rules(scenario)
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
-        self._ready = np.zeros(num_worlds, np.bool_)
+        self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
         self._duration_s = np.zeros(num_worlds)
+        self.keys = np.zeros(num_worlds, np.uint64)
+        """Of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
         self._allocate(num_worlds, self.num_vehicles, max(scenario.max_obstacles, 1))
         self._scratch = scratch(
             min(num_worlds, cast(Any, config).NUMBA_NUM_THREADS), self.num_vehicles, scenario.sonar.num_sectors
@@ -110,6 +113,7 @@ class Swarm:
             lost=np.zeros((worlds, n), np.bool_),
             effort=np.zeros((worlds, n)),
             saturated=np.zeros(worlds),
+            diverged=np.full(worlds, -1, np.int64),
             arrival_s=np.full((worlds, radii), np.nan),
         )
         self._senses = Senses(
@@ -150,30 +154,46 @@ class Swarm:
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
     @property
-    def timed_out(self) -> NDArray[np.bool_]:
-        """Worlds at or past their time limit, shape (world,)."""
-        return self.facts.time_s >= self.time_limit_s - 1e-9
+    def terminated(self) -> NDArray[np.bool_]:
+        """Worlds whose episode ended by what happened: the swarm arrived, or all of it is lost. Shape (world,)."""
+        return self.arrived | ~self.state.alive.any(axis=1)
 
-    def reset(
-        self, seed: int | Sequence[int] | NDArray[np.integer] | None = None, worlds: Sequence[int] | None = None
-    ) -> Percept:
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """Worlds whose episode was cut off: by the time limit, or because it diverged. Shape (world,)."""
+        late = self.facts.time_s >= self.time_limit_s - 1e-9
+        return (late | (self.facts.diverged >= 0)) & ~self.terminated
+
+    @property
+    def ended(self) -> NDArray[np.bool_]:
+        """Worlds whose episode is over, shape (world,)."""
+        return self.terminated | self.truncated
+
+    def divergence(self, world: int) -> str:
+        """What went wrong in a world that diverged, and the remedy."""
+        timing = self.scenario.timing
+        return (
+            f"vehicle {self.facts.diverged[world]} of world {world} diverged before {self.facts.time_s[world]:g} s: "
+            f"its speed ran away, because timing.integration_step_s = {timing.integration_step_s:g} is too long for "
+            "this vehicle; use a smaller step, or weaker actuators"
+        )
+
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> Percept:
         """Start worlds anew.
 
         Args:
-            seed: world w starts from ``seed + w``; or one seed for each of ``worlds``; without a seed each world's
-                own stream goes on, from fresh entropy where it has none.
+            seed: world w starts from ``seed + w``; or a seed, or None, for each of ``worlds``; without a seed a
+                world's own stream goes on, from fresh entropy where it has none.
             worlds: which ones, default all.
         """
         chosen = range(self.num_worlds) if worlds is None else worlds
-        seeds = [] if seed is None else world_seeds(seed, chosen)
-        for k, w in enumerate(chosen):
-            if seed is not None:
-                self._rngs[w] = np.random.default_rng(seeds[k])
-            self._reset_world(w, self._rngs[w] or np.random.default_rng())
+        for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
+            stream = self._rngs[w] if own is None else np.random.default_rng(own)
+            self._reset_world(w, stream or np.random.default_rng())
         return self.percept
 
     def _reset_world(self, w: int, rng: np.random.Generator) -> None:
-        self._rngs[w] = rng
+        self._rngs[w], self.keys[w] = rng, episode_key(rng)
         field = draw_field(self.scenario, rng)
         state, course = self.state, self.course
         points, m = len(field.waypoints), len(field.obstacles)
@@ -188,11 +208,12 @@ class Swarm:
         state.before[w] = state.eta[w, :, :2]
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
-        self._ready[w] = True
+        self._ready[w], self._warned[w] = True, False
         self._observe(w)
 
     def observe(self) -> Percept:
         """Facts and percepts anew, as after a reset, where ``state`` or ``course`` was changed by hand."""
+        self._check_indices(self._arrays())
         for w in range(self.num_worlds):
             self._observe(w)
         return self.percept
@@ -208,34 +229,63 @@ class Swarm:
         return {name: array.copy() for name, array in self._arrays().items()} | {"streams": packed(self._rngs)}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Percept:
-        """Go on from a snapshot of a swarm of the same scenario and number of worlds."""
-        for name, array in self._arrays().items():
+        """Go on from a snapshot of a swarm of the same scenario and number of worlds.
+
+        Raises:
+            ValueError: an array is missing, has another shape or type, or holds an index beyond its array.
+        """
+        arrays = self._arrays()
+        for name, (shape, kind) in {name: (a.shape, a.dtype) for name, a in arrays.items()}.items():
+            given = snapshot.get(name)
+            if given is None or given.shape != shape or given.dtype != kind:
+                got = "nothing" if given is None else f"{given.dtype} of shape {given.shape}"
+                raise ValueError(f"the snapshot's {name} must be {kind} of shape {shape}, got {got}")
+        self._check_indices(snapshot)
+        self._rngs = unpacked(snapshot.get("streams", np.zeros(0)), self.num_worlds)
+        for name, array in arrays.items():
             array[...] = snapshot[name]
-        self._rngs = unpacked(snapshot["streams"])
         self._ready[:] = True
         return self.percept
+
+    def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
+        course, n = self.course, self.num_vehicles
+        bounds = {
+            "last": (1, course.waypoints.shape[1] - 1),
+            "num_obstacles": (0, course.obstacles.shape[1]),
+            "losses": (0, n - 1),
+            "heard": (-1, n - 1),
+            "diverged": (-1, n - 1),
+            "times": (0.0, np.finfo(np.float64).max),
+        }
+        for name, (low, high) in bounds.items():
+            if not ((arrays[name] >= low) & (arrays[name] <= high)).all():
+                raise ValueError(f"{name} must lie within {low} and {high}, got {np.unique(arrays[name])[[0, -1]]}")
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         groups = (self.state, self.course, self.facts, self._senses)
         return {
             "duration_s": self._duration_s,
+            "keys": self.keys,
             **{k: array for group in groups for k, array in group._asdict().items()},
         }
 
-    def step(self, action: Float32, active: NDArray[np.bool_] | None = None) -> Percept:
+    def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:
         """Advance by one decision period.
 
         Args:
-            action: shares of full surge force and yaw torque, float32, shape (world, vehicle, 2); projected onto the
-                unit disc. Entries of lost vehicles are ignored.
+            action: shares of full surge force and yaw torque, shape (world, vehicle, 2), rounded to float32 and
+                projected onto the unit disc. Entries of lost vehicles are ignored.
             active: worlds to step, shape (world,); the others stay as they are. Default all.
         """
-        expected = (self.num_worlds, self.num_vehicles, 2)
-        if action.shape != expected or action.dtype != np.float32:
-            raise ValueError(f"action must be float32 of shape {expected}, got {action.dtype} of shape {action.shape}")
+        action = action_array(action, (self.num_worlds, self.num_vehicles, 2), "action")
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
             w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")
+        if active is not None and (active.shape != (self.num_worlds,) or active.dtype != np.bool_):
+            raise ValueError(
+                f"active must be bool of shape ({self.num_worlds},), got {active.dtype} of shape {active.shape}"
+            )
         if not (self._ready if active is None else self._ready | ~active).all():
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
         arrays = (
@@ -243,8 +293,7 @@ class Swarm:
             self._suite, self.layout.offsets, self._scratch,
         )  # fmt: skip
         if self.num_worlds == 1:
-            if active is None or active[0]:
-                step_alone(*arrays)
+            diverged = (active is None or active[0]) and step_alone(*arrays)
         else:
             if _threads_of_parent:
                 raise RuntimeError(
@@ -252,18 +301,12 @@ class Swarm:
                     "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
                 )
             running = np.ones(self.num_worlds, np.bool_) if active is None else active
-            step_worlds(min(get_num_threads(), len(self._scratch.reals)), running, *arrays)
+            diverged = step_worlds(min(get_num_threads(), len(self._scratch.reals)), running, *arrays)
+        if diverged:
+            for w in np.flatnonzero((self.facts.diverged >= 0) & ~self._warned):
+                _log.warning(self.divergence(int(w)))
+                self._warned[w] = True
         return self.percept
-
-
-def world_seeds(seed: int | Sequence[int] | NDArray[np.integer], worlds: Sequence[int]) -> list[int]:
-    """A seed for each of these worlds: ``seed + w``, or the given ones."""
-    if np.ndim(seed) == 0:
-        return [int(cast(int, seed)) + w for w in worlds]
-    seeds = [int(value) for value in cast(Sequence[int], seed)]
-    if len(seeds) != len(worlds):
-        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
-    return seeds
 
 
 def _rules(scenario: Scenario) -> Rules:

@@ -15,7 +15,7 @@ from uuv_marl.sim.arrays import Course, Facts, Rules, Scratch, Senses, State, de
 from uuv_marl.sim.cells import Cells, Grid, sort
 from uuv_marl.sim.compiled import compiled, compiled_parallel
 from uuv_marl.sim.hearing import Ear, hear
-from uuv_marl.sim.motion import Columns, aim, load, move, push
+from uuv_marl.sim.motion import Columns, aim, load, load_one, move, push
 from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sonar import Suite
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
@@ -30,6 +30,11 @@ Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 
+RUNAWAY = 1000.0
+"""A vehicle whose velocities (surge, sway [m/s], yaw rate [rad/s]) add up to this has diverged. Assumed: no vehicle
+under water is a hundredth as fast."""
+
+
 @compiled
 def hold(w: int, first: bool, state: State, facts: Facts, plant: Plant, rules: Rules, now: Columns) -> None:
     """Actions become forces, forces become motion. Eq. 1-4, 22-24."""
@@ -38,6 +43,11 @@ def hold(w: int, first: bool, state: State, facts: Facts, plant: Plant, rules: R
     for i in range(state.eta.shape[1]):
         state.before[w, i, 0], state.before[w, i, 1] = state.eta[w, i, 0], state.eta[w, i, 1]
         if not state.alive[w, i]:
+            continue
+        if not abs(now.u[i]) + abs(now.v[i]) + abs(now.r[i]) < RUNAWAY:  # so asked, NaN counts as too fast
+            if facts.diverged[w] < 0:
+                facts.diverged[w] = i
+            load_one(w, i, state.eta, state.nu, now)
             continue
         state.eta[w, i, 0], state.eta[w, i, 1], state.eta[w, i, 2] = now.x[i], now.y[i], now.psi[i]
         state.nu[w, i, 0], state.nu[w, i, 1], state.nu[w, i, 2] = now.u[i], now.v[i], now.r[i]
@@ -159,6 +169,7 @@ def observe_world(
     clear(w, facts)
     state.dwell[w] = 0
     facts.arrival_s[w] = math.nan
+    facts.diverged[w] = -1
     load(w, state.eta, state.nu, now)
     grid = arrange(w, state, rules, now, cells)
     measure(w, state, course, facts, rules, cells, grid)
@@ -191,7 +202,12 @@ def step_world(
     w: int, action: Float32, state: State, course: Course, facts: Facts, senses: Senses, plant: Plant, rules: Rules,
     suite: Suite, at: Offsets, now: Columns, cells: Cells, ear: Ear,
 ) -> None:  # fmt: skip
-    """One decision period of a world. ``action`` (world, vehicle, 2) holds shares of full force, body frame."""
+    """One decision period of a world. ``action`` (world, vehicle, 2) holds shares of full force, body frame.
+
+    A world that has diverged stays as it is.
+    """
+    if facts.diverged[w] >= 0:
+        return
     clear(w, facts)
     num_alive = 0
     for i in range(action.shape[1]):
@@ -209,21 +225,26 @@ def step_world(
 def step_alone(
     action: Float32, state: State, course: Course, facts: Facts, senses: Senses, plant: Plant, rules: Rules,
     suite: Suite, at: Offsets, room: Scratch,
-) -> None:  # fmt: skip
-    """One decision period of the only world."""
+) -> bool:  # fmt: skip
+    """One decision period of the only world; whether it has diverged."""
     now, cells, ear = desk(room, 0)
     step_world(0, action, state, course, facts, senses, plant, rules, suite, at, now, cells, ear)
+    return facts.diverged[0] >= 0
 
 
 @compiled_parallel
 def step_worlds(
     threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
     plant: Plant, rules: Rules, suite: Suite, at: Offsets, room: Scratch,
-) -> None:  # fmt: skip
-    """One decision period of every active world; each thread takes a run of worlds."""
+) -> bool:  # fmt: skip
+    """One decision period of every active world, a run of worlds for each thread; whether any has diverged."""
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
         now, cells, ear = desk(room, t)
         for w in range(t * share, min((t + 1) * share, action.shape[0])):
             if active[w]:
                 step_world(w, action, state, course, facts, senses, plant, rules, suite, at, now, cells, ear)
+    diverged = False
+    for w in range(action.shape[0]):
+        diverged = diverged or facts.diverged[w] >= 0
+    return diverged

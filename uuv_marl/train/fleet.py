@@ -1,12 +1,13 @@
 """Fleet: several ``Swarm``s of different sizes, stepped as one flat array of vehicles, ended worlds started anew."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.learned import BARRIER, Eyes
+from uuv_marl.envs.task import refuse_losses
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
 from uuv_marl.sim.swarm import Swarm
@@ -15,6 +16,8 @@ from uuv_marl.train.shaping import VIEW_SIZE, Weights, shaped, view
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 Arrays = Mapping[str, NDArray[Any]]
+Seeds = Callable[[int], Sequence[int] | NDArray[np.integer] | None]
+"""Seeds for so many worlds that start, or None for each to go on with its own stream."""
 
 TRAINING_SEEDS = (100_000, 900_000)
 """Worlds are drawn from these; 900,000-999,999 are for validation."""
@@ -54,20 +57,24 @@ class Episodes(NamedTuple):
 class Fleet:
     """Vehicles of many worlds as rows; ``seen`` (row, ``size``) is what the critic sees of each now.
 
-    The first ``features`` entries are the actor's. Rows run over swarms, their worlds, and vehicles. Worlds are seeded
-    from the generator, so that it and a snapshot determine all that follows.
+    The first ``features`` entries are the actor's. Rows run over swarms, their worlds, and vehicles. An episode ends as
+    everywhere (``Swarm.ended``), but waits no longer than ``PATIENCE_S`` for stragglers.
 
     Args:
         scenario: what to simulate.
         sizes: number of vehicles and of worlds of each swarm.
         weights: of the reward.
-        rng: draws the worlds.
+        seeds: asked for seeds whenever worlds start; a snapshot and what it draws from determine all that follows.
+
+    Raises:
+        ScenarioError: vehicles can be lost in this scenario: their rows would be learned from.
     """
 
-    def __init__(
-        self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, rng: np.random.Generator
-    ) -> None:
-        self._rng, self._weights = rng, weights
+    def __init__(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seeds: Seeds) -> None:
+        refuse_losses(scenario, "training")
+        self._seeds, self._weights = seeds, weights
+        patience = min(scenario.time_limit.extra_s, PATIENCE_S)
+        scenario = load_scenario(scenario, overrides={"time_limit.factor": 1.0, "time_limit.extra_s": patience})
         self._swarms = [Swarm(load_scenario(scenario, num_vehicles=n), worlds) for n, worlds in sizes]
         self._eyes = Eyes(scenario, BARRIER)
         self.features = self._eyes.size
@@ -78,9 +85,14 @@ class Fleet:
         self._barrier = np.zeros((self.rows, 2), np.float32)
         self._sums = [np.zeros((worlds, 3)) for _, worlds in sizes]
         self.episodes = Episodes()
+        self.reset()
+
+    def reset(self) -> None:
+        """Start all worlds."""
         for k, swarm in enumerate(self._swarms):
             self._restart(k, list(range(swarm.num_worlds)))
             self._look(k)
+            self._sums[k][...] = 0.0
 
     def step(self, action: Float32) -> Moment:
         """One decision; ``action`` (row, 2) is what the actor adds to the barrier [full force]."""
@@ -95,14 +107,13 @@ class Fleet:
             rows, shape = self._rows(k), (swarm.num_worlds, swarm.num_vehicles)
             swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
             reward = shaped(swarm, self._weights)
-            arrived = swarm.arrived
-            late = (swarm.timed_out | (swarm.facts.time_s >= swarm.duration_s + PATIENCE_S)) & ~arrived
-            for flags, values in ((moment.terminated, arrived), (moment.truncated, late)):
+            over, arrived = swarm.ended, swarm.arrived
+            for flags, values in ((moment.terminated, swarm.terminated), (moment.truncated, swarm.truncated)):
                 flags[rows] = np.repeat(values, shape[1])
             moment.reward[rows] = reward.reshape(-1)
             self._sums[k] += np.stack([reward.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
             self._look(k)
-            if (over := arrived | late).any():
+            if over.any():
                 last.append(self.seen[rows][moment.truncated[rows]])
                 self._count(k, over, arrived)
                 self._restart(k, [int(w) for w in np.flatnonzero(over)])
@@ -141,7 +152,7 @@ class Fleet:
         view(swarm, seen[:, :, self.features :])
 
     def _restart(self, k: int, worlds: Sequence[int]) -> None:
-        self._swarms[k].reset(self._rng.integers(*TRAINING_SEEDS, len(worlds)), worlds)
+        self._swarms[k].reset(self._seeds(len(worlds)), worlds)
 
     def _count(self, k: int, over: Bool, arrived: Bool) -> None:
         returns, collisions, decisions = self._sums[k][over].sum(axis=0)

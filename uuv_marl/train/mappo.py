@@ -12,24 +12,26 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
 
 from uuv_marl.baselines.learned import Layer
+from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.train.fleet import Fleet, Moment
+from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
 from uuv_marl.train.shaping import Weights
+
+with extra("train", "training with MAPPO"):
+    import torch
+    from torch import Tensor, nn
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperparameters:
-    """Of the algorithm; see ``Learner`` and ``gae``."""
+class Proximal:
+    """Numbers that every PPO has, for a network that all vehicles share."""
 
-    name: str = "mappo"
     hidden: tuple[int, ...] = (96, 96)
     """Units of the actor's and of the critic's layers, tanh."""
     gamma: float = 0.98
@@ -37,10 +39,8 @@ class Hyperparameters:
     gae_lambda: float = 0.95
     horizon: int = 48
     """Decisions between updates."""
-    actor_epochs: int = 3
-    critic_epochs: int = 2
     minibatch: int = 2048
-    """Rows of a gradient step."""
+    """Rows of a gradient step, at most."""
     clip: float = 0.2
     """Of PPO's ratio."""
     kl_stop: float = 0.02
@@ -48,6 +48,21 @@ class Hyperparameters:
     learning_rate: tuple[float, float] = (1.5e-3, 1.5e-4)
     """The actor's, at the start and at the end. Where noise is small, so is the share of a return that it caused, and
     steps must be small too."""
+
+    def __post_init__(self) -> None:
+        for name in ("learning_rate", "noise"):
+            value = getattr(self, name, 1.0)
+            if not all(0.0 < number < math.inf for number in np.atleast_1d(value)):
+                raise ValueError(f"{name} must be positive and finite, got {value}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hyperparameters(Proximal):
+    """Of the algorithm; see ``Learner`` and ``gae``."""
+
+    name: str = "mappo"
+    actor_epochs: int = 3
+    critic_epochs: int = 2
     critic_rate: float = 1.0
     """The critic's learning rate, in the actor's."""
     noise: tuple[float, float] = (0.4, 0.08)
@@ -291,7 +306,7 @@ class Mappo:
     ) -> None:
         self._by = by
         self._rng = np.random.default_rng(seed)
-        self.fleet = Fleet(scenario, sizes, weights, self._rng)
+        self.fleet = Fleet(scenario, sizes, weights, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
         self.learner = Learner(self.fleet.features, self.fleet.size, by, self._rng)
         self.agent_steps = by.horizon * self.fleet.rows
         """Of an iteration."""

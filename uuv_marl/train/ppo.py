@@ -7,46 +7,35 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from stable_baselines3 import PPO
-from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecNormalize
-from torch import nn
 
 from uuv_marl.baselines.learned import Layer
+from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
 from uuv_marl.train.crew import Crew
-from uuv_marl.train.fleet import PATIENCE_S, TRAINING_SEEDS, Episodes
-from uuv_marl.train.mappo import Update, adam_arrays, annealed, restore_adam
-from uuv_marl.train.shaping import Weights, shaped
+from uuv_marl.train.fleet import TRAINING_SEEDS, Episodes
+from uuv_marl.train.mappo import Proximal, Update, adam_arrays, annealed, restore_adam
+from uuv_marl.train.shaping import Weights
+
+with extra("train", "training with Stable-Baselines3"):
+    import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.logger import Logger
+    from stable_baselines3.common.vec_env import VecNormalize
+    from torch import nn
 
 Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperparameters:
-    """Of Stable-Baselines3's PPO; those that MAPPO has too are MAPPO's."""
+class Hyperparameters(Proximal):
+    """Of Stable-Baselines3's PPO; ``minibatch`` becomes the largest factor of the batch below it, as SB3 asks for."""
 
     name: str = "ppo"
-    hidden: tuple[int, ...] = (96, 96)
-    """Units of the actor's and of the critic's layers, tanh."""
-    gamma: float = 0.98
-    gae_lambda: float = 0.95
-    horizon: int = 48
-    """Decisions between updates."""
     epochs: int = 3
-    minibatch: int = 1990
-    """Rows of a gradient step; SB3 asks for a factor of the batch, 48 decisions of 995 vehicles."""
-    clip: float = 0.2
-    kl_stop: float = 0.02
-    learning_rate: tuple[float, float] = (1.5e-3, 1.5e-4)
-    """At the start and at the end."""
     noise: float = 0.4
     """Standard deviation of actions at the start [full force]; then it is learned."""
 
@@ -78,17 +67,15 @@ class Ppo:
         seed: int,
     ) -> None:
         self._by, self._share = by, 0.0
-        patience = min(scenario.time_limit.extra_s, PATIENCE_S)
-        cut_off = load_scenario(scenario, overrides={"time_limit.factor": 1.0, "time_limit.extra_s": patience})
-        self._crew = Crew(cut_off, sizes, partial(shaped, by=weights))
+        self._crew = Crew(scenario, sizes, weights)
         self._env = VecNormalize(self._crew, norm_obs=False, gamma=by.gamma)
         first = int(np.random.default_rng(seed).integers(*TRAINING_SEEDS))
+        self.agent_steps = by.horizon * self._crew.num_envs
+        """Of an iteration."""
         self._random = _global_random()
         with self._own_random():
             self.model = self._make(first)
             self.model.set_logger(Logger(None, []))
-        self.agent_steps = by.horizon * self._crew.num_envs
-        """Of an iteration."""
 
     def _make(self, seed: int) -> PPO:
         by = self._by
@@ -97,7 +84,7 @@ class Ppo:
             self._env,
             learning_rate=lambda _: annealed(by.learning_rate, self._share),
             n_steps=by.horizon,
-            batch_size=by.minibatch,
+            batch_size=max(k for k in range(1, by.minibatch + 1) if self.agent_steps % k == 0),
             n_epochs=by.epochs,
             gamma=by.gamma,
             gae_lambda=by.gae_lambda,
@@ -126,9 +113,8 @@ class Ppo:
         return [Layer(weight.T.copy(), bias.copy()) for weight, bias in weights]
 
     def take_episodes(self) -> Episodes:
-        """Sums over the episodes that ended since the last call; collisions as they come."""
-        taken, self._crew.episodes = self._crew.episodes, Episodes()
-        return taken
+        """Sums over the episodes that ended since the last call."""
+        return self._crew.fleet.take_episodes()
 
     def arrays(self) -> Arrays:
         """Weights, optimiser and the scale of returns, for ``restore``."""
@@ -155,12 +141,13 @@ class Ppo:
         """The worlds, for ``put_back``."""
         starts = self.model._last_episode_starts
         assert starts is not None  # noqa: S101
-        return {**self._crew.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
+        return {**self._crew.fleet.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
 
     def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a ``snapshot``."""
         model: Any = self.model
-        self._crew.restore(snapshot)
+        self._crew.fleet.restore(snapshot)
+        self._crew.seed()  # or the next worlds that end would start from the seeds of a new training
         self._env.returns[...] = snapshot["discounted"]
         model._last_obs, model._last_episode_starts = self._crew.seen.copy(), snapshot["starts"] > 0
 

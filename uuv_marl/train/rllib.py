@@ -2,32 +2,35 @@
 
 import logging
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import ray  # pyright: ignore[reportMissingImports]
-from ray.rllib.algorithms.ppo import PPOConfig  # pyright: ignore[reportMissingImports]
-from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig  # pyright: ignore[reportMissingImports]
 
-from uuv_marl import __version__
 from uuv_marl.benchmark.distributed import connected
-from uuv_marl.benchmark.runner import ClusterError
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
+from uuv_marl.errors import ClusterError
+from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
-from uuv_marl.train.folder import Record, TrainingFolder
+from uuv_marl.train.fleet import TRAINING_SEEDS
+from uuv_marl.train.folder import Record, Say, opened, quiet
+from uuv_marl.train.shaping import OVERRIDES
+
+with extra("distributed", "training with RLlib"):
+    import ray  # pyright: ignore[reportMissingImports]
+    from ray.rllib.algorithms.ppo import PPOConfig  # pyright: ignore[reportMissingImports]
+    from ray.rllib.core.rl_module.default_model_config import (  # pyright: ignore[reportMissingImports]
+        DefaultModelConfig,
+    )
 
 POLICY = "shared"
 """RLlib's name of the one policy."""
-OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
-"""What training changes in a scenario: a fifth of the decisions, and an inner loop, as our tuned policies have it, so
-that noise on the torque does not spin a vehicle."""
-_TRAINING_SEEDS = (100_000, 999_000)
+_MOST_RUNNERS = 1000
+"""Their worlds are counted on from the first one's, and must be training seeds too."""
 _PATIENCE_S = 600.0
 """RLlib throws samples away that take longer; its 60 s are short where the first run compiles, or for large swarms."""
 _LIBRARIES = ("ray", "torch", "gymnasium", "numpy", "numba")
@@ -63,7 +66,7 @@ class Settings:
         return load_scenario(self.scenario, num_vehicles=self.num_vehicles, overrides=self.overrides)
 
 
-def ppo_config(settings: Settings, num_env_runners: int = 2, world_seed: int = _TRAINING_SEEDS[0]) -> PPOConfig:
+def ppo_config(settings: Settings, num_env_runners: int = 2, world_seed: int = TRAINING_SEEDS[0]) -> PPOConfig:
     """RLlib's configuration, ready for ``build_algo()``, for changes before it, or for Ray Tune.
 
     Args:
@@ -104,7 +107,7 @@ def ppo_config(settings: Settings, num_env_runners: int = 2, world_seed: int = _
 
 def world_seed(seed: int, agent_steps: int) -> int:
     """Where worlds start, within the training seeds: anew for every seed, and whenever a training goes on."""
-    low, high = _TRAINING_SEEDS
+    low, high = TRAINING_SEEDS[0], TRAINING_SEEDS[1] - _MOST_RUNNERS
     return low + int(np.random.SeedSequence([seed, agent_steps]).generate_state(1)[0]) % (high - low)
 
 
@@ -116,6 +119,8 @@ def train(
     num_env_runners: int = 2,
     address: str | None = None,
     resume: bool = False,
+    say: Say = quiet,
+    stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Record]:
     """Train, and keep a checkpoint after every iteration; a record for each.
 
@@ -129,32 +134,37 @@ def train(
         num_env_runners: processes that sample; may change at a resume.
         address: of a Ray cluster, see ``uuv_marl.benchmark.distributed.connected``; None for this machine.
         resume: go on from the last checkpoint.
+        say: told from where a resume goes on.
+        stop: asked after every iteration; where it says so, the training ends.
 
     Raises:
-        ResultsError: the folder is used, or holds no training of these settings.
+        ResultsError: the folder is used, by another process too, holds no training of these settings, or can't be
+            written; the last checkpoint is whole.
         ClusterError: the cluster can't be joined, has fewer cores than runners, or lost all of them.
     """
     settings = settings or Settings()
     scenario = settings.load()
-    folder = TrainingFolder(
-        output, {**asdict(settings), "scenario": scenario.model_dump(mode="json")}, resume, Record()
-    )
-    if folder.record.agent_steps >= steps:
-        return
-    seed = world_seed(settings.seed, folder.record.agent_steps)
-    with connected(address, max(1, num_env_runners)):
-        _need_cores(num_env_runners)
-        algorithm = _algorithm(ppo_config(settings, num_env_runners, seed), on_cluster=address is not None)
-        try:
-            if folder.checkpoint:
-                algorithm.restore_from_path(str(folder.checkpoint.resolve()))
-            folder.begin(_session(folder.record.agent_steps, seed, num_env_runners))
-            while folder.record.agent_steps < steps:
-                record = _iterate(algorithm, folder.record, scenario.swarm.num_vehicles)
-                folder.keep(record, lambda path: algorithm.save_to_path(str(path)))
-                yield record
-        finally:
-            algorithm.stop()
+    described = {**asdict(settings), "scenario": scenario.model_dump(mode="json")}
+    with opened(output, described, resume, Record(), say) as folder:
+        if folder.record.agent_steps >= steps:
+            return
+        seed = world_seed(settings.seed, folder.record.agent_steps)
+        with connected(address, max(1, num_env_runners)):
+            _need_cores(num_env_runners)
+            algorithm = _algorithm(ppo_config(settings, num_env_runners, seed), on_cluster=address is not None)
+            try:
+                if folder.checkpoint:
+                    algorithm.restore_from_path(str(folder.checkpoint.resolve()))
+                folder.begin({"world_seed": seed, "env_runners": num_env_runners}, _LIBRARIES)
+                stopped = False
+                while folder.record.agent_steps < steps and not stopped:
+                    record = _iterate(algorithm, folder.record, scenario.swarm.num_vehicles)
+                    folder.note(record)
+                    folder.keep(record, lambda path: algorithm.save_to_path(str(path)))
+                    stopped = stop()
+                    yield record
+            finally:
+                algorithm.stop()
 
 
 def _shared(*_: Any, **__: Any) -> str:
@@ -175,12 +185,6 @@ def _algorithm(config: PPOConfig, on_cluster: bool) -> Any:
     # A node of a cluster may go away; a process that dies on one machine would only die again.
     config.fault_tolerance(restart_failed_env_runners=on_cluster)
     return config.build_algo()
-
-
-def _session(agent_steps: int, seed: int, num_env_runners: int) -> dict[str, Any]:
-    """How a training came about from these agent-steps on, for ``config.json``."""
-    versions = {"uuv_marl": __version__, **{library: version(library) for library in _LIBRARIES}}
-    return {"agent_steps": agent_steps, "world_seed": seed, "env_runners": num_env_runners, "versions": versions}
 
 
 def _iterate(algorithm: Any, before: Record, num_vehicles: int) -> Record:

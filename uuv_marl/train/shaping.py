@@ -4,6 +4,7 @@ The reward is dense and steeper than the environment's own (``uuv_marl.envs.rewa
 compare. All numbers here are our own.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,9 @@ from uuv_marl.sim.swarm import Swarm
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 
+OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
+"""What training changes in a scenario: a fifth of the decisions, and an inner loop, as our tuned policies have it, so
+that noise on the torque does not spin a vehicle."""
 VIEW_SIZE = 18
 """Entries that the critic sees beyond the actor's features."""
 

@@ -7,83 +7,51 @@ the best validation; ``tensorboard/``. Needs ``train``.
 import json
 import shutil
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import torch
+import numpy as np
+import safetensors.numpy
 from numpy.typing import NDArray
-from safetensors.numpy import load_file, save_file
-from torch.utils.tensorboard.writer import SummaryWriter
 
-from uuv_marl import __version__
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
-from uuv_marl.benchmark.results import ResultsError
+from uuv_marl.atomic import writing
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.errors import ResultsError
+from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
 from uuv_marl.train.fleet import Episodes
-from uuv_marl.train.folder import TrainingFolder
-from uuv_marl.train.mappo import Hyperparameters, Update
-from uuv_marl.train.shaping import Weights
+from uuv_marl.train.folder import Say, opened, quiet, versions
+from uuv_marl.train.mappo import Hyperparameters, Mappo
+from uuv_marl.train.shaping import OVERRIDES, Weights
 from uuv_marl.train.validation import Verdict, validate
+
+with extra("train", "training"):
+    import torch
+    from torch.utils.tensorboard.writer import SummaryWriter
+
+if TYPE_CHECKING:
+    from uuv_marl.train import ppo
+
+Sizes = tuple[tuple[int, int], ...]
 
 _LIBRARIES = ("torch", "stable-baselines3", "numpy", "numba", "safetensors")
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
 
 
-class Algorithm(Protocol):
-    """What a training repeats: ``uuv_marl.train.mappo.Mappo`` or ``uuv_marl.train.ppo.Ppo``."""
-
-    agent_steps: int
-    """Of an iteration."""
-    random: Any
-    """State of the random numbers, as JSON can hold it."""
-
-    def iterate(self, share: float) -> tuple[float, Update]:
-        """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
-        ...
-
-    @property
-    def layers(self) -> list[Layer]:
-        """The policy's, for a checkpoint."""
-        ...
-
-    def take_episodes(self) -> Episodes:
-        """Sums over the episodes that ended since the last call."""
-        ...
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """What was learned, and the optimisers, for ``restore``."""
-        ...
-
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go on with ``arrays``."""
-        ...
-
-    def start_from(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Begin with the policy in the ``arrays`` of another training."""
-        ...
-
-    def snapshot(self) -> dict[str, NDArray[Any]]:
-        """The worlds, for ``put_back``."""
-        ...
-
-    def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a ``snapshot``."""
-        ...
+MIXED: Sizes = ((10, 20), (25, 9), (54, 5), (100, 3))
+"""Vehicles and worlds of each swarm: about as many vehicles of each size."""
+MIXED_VALIDATION: Sizes = ((10, 4), (54, 8), (100, 2))
+"""Vehicles and episodes of each size."""
 
 
-class Recipe(Protocol):
-    """An algorithm's hyperparameters, a dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> Algorithm:
-        """A training that has not begun."""
-        ...
+def own_size(num_vehicles: int) -> Sizes:
+    """Swarms of one size, about as many vehicles in all as ``MIXED`` has."""
+    return ((num_vehicles, max(1, round(sum(n * worlds for n, worlds in MIXED) / num_vehicles))),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,12 +60,11 @@ class Settings:
 
     scenario: str = "random_field"
     """Name or TOML file."""
-    overrides: Mapping[str, object] = field(
-        default_factory=lambda: {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
-    )
-    """Fields of the scenario: a fifth of the decisions, and an inner loop, so that noise does not spin vehicles."""
-    sizes: tuple[tuple[int, int], ...] = ((10, 20), (25, 9), (54, 5), (100, 3))
-    """Vehicles and worlds of each swarm: about as many vehicles of each size."""
+    overrides: Mapping[str, object] = field(default_factory=lambda: dict(OVERRIDES))
+    """Fields of the scenario."""
+    sizes: Sizes = ()
+    """Vehicles and worlds of each swarm. If empty: 10 to 100 vehicles at once (``MIXED``), or only swarms of the
+    scenario's own size where that is another than the shipped ones'."""
     steps: int = 30_000_000
     """Agent-steps: one is one decision of one vehicle. Annealing ends here."""
     seed: int = 0
@@ -105,21 +72,33 @@ class Settings:
     """A folder with a learner to start from: ``best`` or a checkpoint of another training."""
     weights: Weights = field(default_factory=Weights)
     """Of the training's reward."""
-    algorithm: Recipe = field(default_factory=Hyperparameters)
+    algorithm: "Hyperparameters | ppo.Hyperparameters" = field(default_factory=Hyperparameters)
     checkpoint_every: int = 20
     """Iterations."""
     validate_every: int = 20
     """Iterations; a multiple of ``checkpoint_every`` wastes least where a training is cut off."""
-    validation: tuple[tuple[int, int], ...] = ((10, 4), (54, 8), (100, 2))
-    """Vehicles and episodes of each size."""
+    validation: Sizes = ()
+    """Vehicles and episodes of each size. If empty: those of ``MIXED_VALIDATION``, or four of each size trained on."""
+
+    def __post_init__(self) -> None:
+        n = self.load().swarm.num_vehicles
+        sizes = self.sizes or (MIXED if n == load_scenario(type(self).scenario).swarm.num_vehicles else own_size(n))
+        validation = self.validation or (MIXED_VALIDATION if sizes == MIXED else tuple((n, 4) for n, _ in sizes))
+        object.__setattr__(self, "sizes", sizes)
+        object.__setattr__(self, "validation", validation)
 
     def load(self) -> Scenario:
         """The scenario that is trained on."""
         return load_scenario(self.scenario, overrides=self.overrides)
 
+    def load_for_validation(self) -> Scenario:
+        """The same, with the decision period of its own that the benchmark has."""
+        kept = {name: value for name, value in self.overrides.items() if name != "timing.decision_period_s"}
+        return load_scenario(self.scenario, overrides=kept)
+
 
 class Record(NamedTuple):
-    """One iteration; those with a checkpoint are rows of ``progress.csv``."""
+    """One iteration, a row of ``progress.csv``."""
 
     iteration: int = 0
     agent_steps: int = 0
@@ -152,9 +131,13 @@ class Training:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.scenario = settings.load()
-        self.algorithm = settings.algorithm.begin(self.scenario, settings.sizes, settings.weights, settings.seed)
+        self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
+            self.scenario, settings.sizes, settings.weights, settings.seed
+        )
         if settings.start is not None:
-            self.algorithm.start_from(_load(Path(settings.start) / _LEARNER_FILE))
+            remedy = "give a folder best or a checkpoint of the same algorithm and sizes of network"
+            with _reading(Path(settings.start) / _LEARNER_FILE, remedy) as data:
+                self.algorithm.start_from(_learned(data))
 
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
@@ -174,30 +157,42 @@ class Training:
         """All that ``restore`` needs, and the policy."""
         folder.mkdir(parents=True, exist_ok=True)
         self.save_policy(folder, record)
-        save_file(self.algorithm.snapshot(), folder / _WORLDS_FILE)
+        (folder / _WORLDS_FILE).write_bytes(safetensors.numpy.save(self.algorithm.snapshot()))
         (folder / _RANDOM_FILE).write_text(json.dumps(self.algorithm.random) + "\n", encoding="utf-8")
 
     def save_policy(self, folder: Path, record: Record) -> None:
         """The policy, and the learner that a later training may start from."""
-        training = {**asdict(self.settings), "versions": _versions(), "record": record._asdict()}
+        training = {**asdict(self.settings), "versions": versions(_LIBRARIES), "record": record._asdict()}
         card = Card(
             percept=rows_of(PerceptLayout.of(self.scenario)),
             yaw_damping_nms=self.scenario.actuators.yaw_damping_nms,
             channels=self.scenario.sonar.channels,
             barrier=BARRIER,
+            vehicle=vehicle_of(self.scenario),
             training=training,
         )
         save_checkpoint(folder / WEIGHTS_FILE, card, self.algorithm.layers)
-        save_file(self.algorithm.arrays(), folder / _LEARNER_FILE)
+        (folder / _LEARNER_FILE).write_bytes(safetensors.numpy.save(self.algorithm.arrays()))
 
     def restore(self, folder: Path) -> None:
-        """Go on from what ``save`` wrote, as if there had been no break."""
-        self.algorithm.restore(_load(folder / _LEARNER_FILE))
-        self.algorithm.put_back(_load(folder / _WORLDS_FILE))
-        self.algorithm.random = json.loads((folder / _RANDOM_FILE).read_text(encoding="utf-8"))
+        """Go on from what ``save`` wrote, as if there had been no break. Raises ResultsError naming a damaged file."""
+        remedy = "copy the checkpoint again as a whole, or give --start with a policy and another --output"
+        with _reading(folder / _LEARNER_FILE, remedy) as data:
+            self.algorithm.restore(_learned(data))
+        with _reading(folder / _WORLDS_FILE, remedy) as data:
+            self.algorithm.put_back(safetensors.numpy.load(data))
+        with _reading(folder / _RANDOM_FILE, remedy) as data:
+            self.algorithm.random = json.loads(data)
 
 
-def train(output: Path, settings: Settings | None = None, *, resume: bool = False) -> Iterator[Record]:
+def train(
+    output: Path,
+    settings: Settings | None = None,
+    *,
+    resume: bool = False,
+    say: Say = quiet,
+    stop: Callable[[], bool] = lambda: False,
+) -> Iterator[Record]:
     """Train to ``settings.steps``; a record for each iteration.
 
     Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
@@ -207,32 +202,38 @@ def train(output: Path, settings: Settings | None = None, *, resume: bool = Fals
         output: a new or empty folder, or with ``resume`` that of an earlier training.
         settings: the default ones if None; a resume needs the same.
         resume: go on from the last checkpoint.
+        say: told on what is trained, and from where a resume goes on.
+        stop: asked after every iteration; where it says so, the training ends with a checkpoint.
 
     Raises:
-        ResultsError: the folder is used, or holds no training of these settings.
+        ResultsError: the folder is used, by another process too, holds no training of these settings, or can't be
+            written; the last checkpoint is whole.
     """
     settings = settings or Settings()
     scenario = settings.load()
     described = {**asdict(settings), "scenario": scenario.model_dump(mode="json")}
-    folder = TrainingFolder(output, described, resume, Record())
-    record = folder.record
-    if record.agent_steps >= settings.steps:
-        return
-    torch.set_num_threads(1)  # sums in another order give other bits
-    training = Training(settings)
-    if folder.checkpoint:
-        training.restore(folder.checkpoint)
-    folder.begin({"agent_steps": record.agent_steps, "seed": settings.seed, "versions": _versions()})
-    with SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps) as board:
-        while record.agent_steps < settings.steps:
-            record = training.iterate(record)
-            done = record.agent_steps >= settings.steps
-            if done or record.iteration % settings.validate_every == 0:
-                record = _validated(training, record, output)
-            if done or record.iteration % settings.checkpoint_every == 0:
-                folder.keep(record, lambda path, record=record: training.save(path, record))
-            _show(board, record, training.algorithm.take_episodes())
-            yield record
+    with opened(output, described, resume, Record(), say) as folder:
+        record, stopped = folder.record, False
+        if record.agent_steps >= settings.steps:
+            return
+        say(f"Training on swarms of {', '.join(f'{n} vehicles ({worlds} worlds)' for n, worlds in settings.sizes)}.")
+        torch.set_num_threads(1)  # sums in another order give other bits
+        training = Training(settings)
+        if folder.checkpoint:
+            training.restore(folder.checkpoint)
+        folder.begin({"seed": settings.seed}, _LIBRARIES)
+        with writing(output), SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps) as board:
+            while record.agent_steps < settings.steps and not stopped:
+                record = training.iterate(record)
+                done = record.agent_steps >= settings.steps
+                if done or record.iteration % settings.validate_every == 0:
+                    record = _validated(training, record, output)
+                folder.note(record)
+                stopped = stop()
+                if done or stopped or record.iteration % settings.checkpoint_every == 0:
+                    folder.keep(record, lambda path, record=record: training.save(path, record))
+                _show(board, record, training.algorithm.take_episodes())
+                yield record
 
 
 def _validated(training: Training, record: Record, output: Path) -> Record:
@@ -240,7 +241,7 @@ def _validated(training: Training, record: Record, output: Path) -> Record:
     started, settings = time.perf_counter(), training.settings
     candidate, best = output / "candidate", output / "best"
     training.save_policy(candidate, record)
-    verdict: Verdict = validate(candidate, settings.scenario, settings.validation)
+    verdict: Verdict = validate(candidate, settings.load_for_validation(), settings.validation)
     better = record.best is None or verdict.score > record.best
     record = record._replace(
         seconds=record.seconds + time.perf_counter() - started,
@@ -257,29 +258,30 @@ def _validated(training: Training, record: Record, output: Path) -> Record:
 
 
 def _show(board: SummaryWriter, record: Record, episodes: Episodes) -> None:
-    """Numbers for TensorBoard."""
-    names = {"reward": "train", "kl": "train", "explained": "train"}
-    numbers = {f"{names.get(name, 'validation')}/{name}": value for name, value in record._asdict().items()}
-    for name in ("iteration", "agent_steps", "seconds"):
-        del numbers[f"validation/{name}"]
+    """Numbers for TensorBoard; of episodes the means."""
+    numbers = {f"train/{name}": getattr(record, name) for name in ("reward", "kl", "explained")}
+    numbers |= {f"validation/{name}": getattr(record, name) for name in ("best", *Verdict._fields)}
     if episodes.number:
-        numbers |= {
-            "episodes/return": episodes.returns / episodes.number,
-            "episodes/arrived": episodes.arrived / episodes.number,
-            "episodes/collisions": episodes.collisions / episodes.number,
-            "episodes/decisions": episodes.decisions / episodes.number,
-        }
+        names = {"returns": "return", "arrived": "arrived", "collisions": "collisions", "decisions": "decisions"}
+        numbers |= {f"episodes/{tag}": getattr(episodes, name) / episodes.number for name, tag in names.items()}
     for name, value in numbers.items():
         if value is not None:
             board.add_scalar(name, value, record.agent_steps)
 
 
-def _load(path: Path) -> Mapping[str, Any]:
+@contextmanager
+def _reading(path: Path, remedy: str) -> Iterator[bytes]:
+    """Turn whatever data from outside can cause into one message that names the file."""
     try:
-        return load_file(path)
-    except OSError as error:
-        raise ResultsError(f"{path} can't be read ({error}); give a folder best or a checkpoint") from None
+        yield path.read_bytes()
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise ResultsError(f"{path} can't be used ({type(error).__name__}: {reason}); {remedy}") from error
 
 
-def _versions() -> dict[str, str]:
-    return {"uuv_marl": __version__, **{library: version(library) for library in _LIBRARIES}}
+def _learned(data: bytes) -> Mapping[str, NDArray[Any]]:
+    arrays = safetensors.numpy.load(data)
+    spoilt = [name for name, array in arrays.items() if not np.isfinite(array).all()]
+    if spoilt:
+        raise ValueError(f"{spoilt[0]} must hold finite numbers")
+    return arrays

@@ -7,10 +7,12 @@ from typing import NamedTuple
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import load_scenario
+from uuv_marl.train.fleet import TRAINING_SEEDS
 
-VALIDATION_SEEDS = 900_000
-"""The first of the validation seeds: the end of the training range, which training itself does not use."""
+VALIDATION_SEEDS = TRAINING_SEEDS[1]
+"""The first of the validation seeds: up to 999,999, which no training uses."""
 SAFE_OBSTACLE_M = 13.0
 SAFE_SPACING_M = 6.5
 """Distances below these cost: a little more than what we want of the worst seed."""
@@ -33,21 +35,18 @@ class Verdict(NamedTuple):
     """Of the worst episode."""
 
 
-def validate(policy: Path, scenario: str, sizes: Sequence[tuple[int, int]], period_s: float | None = None) -> Verdict:
+def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]]) -> Verdict:
     """Run a checkpoint on a scenario's validation seeds.
 
     Args:
         policy: the checkpoint.
-        scenario: name or TOML file.
+        scenario: with any number of vehicles.
         sizes: number of vehicles, and of episodes with so many.
-        period_s: between decisions; the scenario's own if None.
     """
-    overrides = {} if period_s is None else {"timing.decision_period_s": period_s}
     metrics: list[Metrics] = []
     for n, count in sizes:
-        loaded = load_scenario(scenario, num_vehicles=n, overrides=overrides)
         seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + count)
-        events = evaluate(granted(str(policy), loaded), str(policy), seeds)
+        events = evaluate(granted(str(policy), load_scenario(scenario, num_vehicles=n)), str(policy), seeds)
         metrics += [event.metrics for event in events if isinstance(event, Run)]
     return judge(metrics)
 

@@ -1,14 +1,19 @@
-"""The runs that figures and ledger are made of: a case is one policy on one scenario, with what is changed in both."""
+"""What the reproduction is made of: cases, their runs in a folder, tidy tables, and parts with a picture each."""
 
+import csv
 import hashlib
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import replacing
 from uuv_marl.baselines import granted
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -40,21 +45,6 @@ class Case(NamedTuple):
     def load(self) -> Scenario:
         """The scenario as it is run."""
         return granted(self.policy, load_scenario(self.scenario, overrides=self.overrides))
-
-    def label(self, seed: int) -> str:
-        """Scenario, vehicles, policy, what is changed and seed, for captions."""
-        loaded = self.load()
-        changed = [f"{field.rpartition('.')[2]} = {value}" for field, value in self.overrides.items()]
-        for name, value in self.parameters.items():
-            changed += _gains(value) if isinstance(value, Gains) else [f"{name} = {value}"]
-        parts = [f"{loaded.name} v{loaded.version}", f"n = {loaded.swarm.num_vehicles}", self.policy]
-        return ", ".join([*parts, *changed, f"seed {seed}"])
-
-
-def _gains(gains: Gains) -> list[str]:
-    """The gains that are not Table 1's."""
-    table_1 = Gains()._asdict()
-    return [f"{name} = {value:g}" for name, value in gains._asdict().items() if value != table_1[name]]
 
 
 def folder_name(words: str) -> str:
@@ -110,7 +100,8 @@ class Study:
     def metric(self, case: Case, name: str, seeds: Sequence[int] | None = None) -> Float64:
         """A metric by seed; NaN where there is none."""
         rows = self._results(case).select(case.scenario, case.policy, self.seeds if seeds is None else seeds)
-        values = [row.metrics[name] for row in rows]
+        metrics: list[Mapping[str, object]] = [row.metrics for row in rows]
+        values = [each[name] for each in metrics]
         return np.array([value if isinstance(value, (int, float)) else np.nan for value in values], np.float64)
 
     def trace(self, case: Case, seed: int) -> Trace:
@@ -130,3 +121,69 @@ class Study:
             folder = self.folder / f"{case.name}.{changed.hexdigest()[:8]}"
             self._open[case.name] = Results(folder, [scenario], route_seeds=kept)
         return self._open[case.name]
+
+
+Columns = dict[str, NDArray[Any]]
+"""A table by column, all of one length; numbers or texts. NaN stands for nothing measured."""
+_DIGITS = 6
+
+
+def write_columns(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
+    """A table as CSV, whole or not at all: texts in quotes, numbers with six significant digits."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cells = [[_written(value) for value in values.tolist()] for values in columns.values()]
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC)
+        writer.writerow(columns)
+        writer.writerows(zip(*cells, strict=True))
+
+
+def read_columns(path: Path) -> Columns:
+    """A table that ``write_columns`` wrote."""
+    with path.open(newline="", encoding="utf-8") as file:
+        head, *rows = csv.reader(file, quoting=csv.QUOTE_NONNUMERIC)
+    return {name: np.array([row[k] for row in rows]) for k, name in enumerate(head)}
+
+
+def stack(tables: Sequence[Columns]) -> Columns:
+    """Tables of the same columns, one below the other."""
+    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+
+
+def _written(value: Any) -> str | float | int:
+    if isinstance(value, bool):
+        return int(value)
+    return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) else value
+
+
+Tables = Mapping[str, Columns]
+
+
+_WORDS = tomllib.loads(resources.files("uuv_marl.reproduce").joinpath("parts.toml").read_text(encoding="utf-8"))
+
+
+class Part(NamedTuple):
+    """A figure of the paper, or a study beyond it."""
+
+    name: str
+    """``figure-11``; names the picture, and the option ``--only``."""
+    cases: tuple[Case, ...]
+    """What must have been run."""
+    tables: Callable[[Study, Report], Tables]
+    """From the runs, by name; each becomes ``data/NAME.csv``."""
+    draw: Callable[[Tables], Figure]
+    """From the tables alone."""
+    seeds: Sequence[int] | None = None
+    """What its cases are run on; None for all of the study's."""
+    seconds: float = 1.0
+    """What its tables take besides the cases, roughly."""
+
+    @property
+    def title(self) -> str:
+        """Stands above the picture, see ``parts.toml``."""
+        return _WORDS[self.name]["title"]
+
+    @property
+    def caption(self) -> str:
+        """Stands below the picture, see ``parts.toml``."""
+        return _WORDS[self.name]["caption"]

@@ -1,0 +1,146 @@
+"""A hash of every run that perf/versions.py compares; both versions of the package run this file: python runs.py OTHER.
+
+Uses only what both versions have. Seeds are tuning seeds, so that no reported one is spent.
+"""
+
+import hashlib
+import importlib
+import itertools
+import json
+import sys
+import tempfile
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from onnx.reference import ReferenceEvaluator
+
+import uuv_marl
+from uuv_marl import load_scenario
+from uuv_marl.baselines import POLICIES, granted, make
+from uuv_marl.baselines.export import write_onnx
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.heldout.sets import SETS
+from uuv_marl.percept import PerceptLayout
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.train.shaping import Weights
+
+SEED, MOST_AGENT_STEPS = 10_000, 150_000
+"""The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
+SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
+STATE = ("eta", "nu", "before", "alive", "tick", "dwell")
+FACTS = (
+    "time_s", "reference", "centre", "spacing", "min_spacing", "max_spacing", "clearance", "obstacle_clearance",
+    "contacts", "collisions", "lost", "effort", "saturated", "arrival_s",
+)  # fmt: skip
+
+
+def digest(*values: Any) -> str:
+    """Hash of arrays, or of what JSON can hold."""
+    hashed = hashlib.sha256()
+    for value in values:
+        hashed.update(value.tobytes() if isinstance(value, np.ndarray) else json.dumps(value, sort_keys=True).encode())
+    return hashed.hexdigest()[:16]
+
+
+def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEPS) -> str:
+    """Two episodes stepped together: a hash of each over states, facts, percepts and actions."""
+    scenario = granted(policy, scenario)
+    swarm, actor = Swarm(scenario, 2), make(policy, scenario, 2)
+    percept, active, hashed = swarm.reset(first), np.ones(2, np.bool_), [hashlib.sha256(), hashlib.sha256()]
+    actor.reset(first)
+    for _ in range(most // swarm.num_vehicles):
+        action = actor.act(percept)
+        percept = swarm.step(action, active)
+        arrays = [getattr(swarm.state, name) for name in STATE] + [getattr(swarm.facts, name) for name in FACTS]
+        for w in np.flatnonzero(active):
+            for array in (*arrays, swarm.heard, percept.flat, action, actor.clamps):
+                hashed[w].update(array[w].tobytes())
+        active &= ~(swarm.arrived | (swarm.facts.time_s >= swarm.time_limit_s - 1e-9) | ~swarm.state.alive.any(axis=1))
+        actor.active[:] = active
+        if not active.any():
+            break
+    return " ".join(each.hexdigest()[:16] for each in hashed)
+
+
+def parallel(scenario: str, policy: str, reward: Any) -> str:
+    """An episode, or its first thousand steps, through ``parallel_env``."""
+    env = uuv_marl.parallel_env(granted(policy, load_scenario(scenario)), reward=reward)
+    actor, hashed = make(policy, env), list[str]()
+    (observations, _), _ = env.reset(SEED), actor.reset(SEED)
+    while env.agents and len(hashed) < 1000:
+        observations, *told, _ = env.step(actor(observations))
+        hashed.append(digest(*observations.values(), *told, env.state()))
+    return digest(hashed)
+
+
+def vector(scenario: str) -> str:
+    """Four worlds through ``vector_env``, random actions, with resets in the same step."""
+    envs, rng = uuv_marl.vector_env(4, scenario, max_cycles=40), np.random.default_rng(SEED)
+    hashed = [digest(envs.reset(seed=SEED)[0])]
+    for _ in range(100):
+        *told, infos = envs.step(rng.uniform(-1.0, 1.0, envs.action_space.shape or ()).astype(np.float32))
+        hashed.append(digest(*told, infos["agent_reward"]))
+    return digest(hashed)
+
+
+def reported(policy: str) -> str:
+    """What the benchmark reports of two short episodes: metrics, series, routes."""
+    scenario = granted(policy, load_scenario("single_obstacle", num_vehicles=10))
+    runs = [run for run in evaluate(scenario, policy, [SEED, SEED + 1]) if isinstance(run, Run)]
+    return digest([run.metrics for run in runs], *(a for run in runs for a in (*run.series.values(), *run.routes)))
+
+
+def trained(algorithm: str) -> str:
+    """Weights and progress of five updates on small swarms."""
+    by = importlib.import_module(f"uuv_marl.train.{algorithm}").Hyperparameters(horizon=16, minibatch=64)
+    scenario = load_scenario("random_field", overrides={"actuators.yaw_damping_nms": 600.0})
+    training = by.begin(scenario, [(5, 4), (10, 2)], Weights(), 3)
+    told = [training.iterate(k / 5) for k in range(5)]
+    return digest(*(array for layer in training.layers for array in layer), told)
+
+
+def exported() -> str:
+    """Actions of an exported ONNX model; its file may hold versions."""
+    scenario = granted("mappo", load_scenario("random_field"))
+    with tempfile.TemporaryDirectory() as folder:
+        write_onnx("mappo", scenario, Path(folder) / "policy.onnx")
+        model = ReferenceEvaluator(str(Path(folder) / "policy.onnx"))
+    seen = np.random.default_rng(SEED).uniform(-1.0, 1.0, (50, PerceptLayout.of(scenario).size)).astype(np.float32)
+    return digest(*map(np.asarray, model.run(None, {"observation": seen})))
+
+
+def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any, ...]]]:
+    """Kind, name, maker and its arguments of every hash."""
+    for held, policy in itertools.product(SETS, POLICIES):
+        name = f"{held.name} {policy}"
+        yield "episodes", name, episodes, (held.load(), policy, SEED + zlib.crc32(name.encode()) % 80_000)
+    for name in SCENARIOS:
+        yield "parallel_env", f"{name} bio_inspired", parallel, (name, "bio_inspired", "individual")
+        yield "parallel_env", f"{name} random", parallel, (name, "random", "team")
+        yield "vector_env", name, vector, (name,)
+    for policy in POLICIES:
+        yield "benchmark", policy, reported, (policy,)
+    for algorithm in ("mappo", "ppo"):
+        yield "5 updates", algorithm, trained, (algorithm,)
+    yield "export", "mappo", exported, ()
+    for path in sorted(p for part in ("uuv_marl", "docs") for p in (other / part).rglob("*.safetensors")):
+        small = load_scenario("random_field", num_vehicles=10)
+        yield "checkpoints", str(path.relative_to(other)), episodes, (small, str(path), SEED, 1000)
+
+
+def main(other: Path, only: list[str]) -> None:
+    """Print a line for every hash: kind, name, hash or hashes."""
+    for kind, name, make_hash, arguments in cases(other):
+        if not only or kind in only:
+            try:
+                found = make_hash(*arguments)
+            except Exception as error:  # a version that can't is a result
+                found = f"failed: {type(error).__name__}: {error}"
+            print(json.dumps([kind, name, found]), flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])

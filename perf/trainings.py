@@ -1,0 +1,107 @@
+"""Whole trainings for perf/compare.py: the same task, networks and batch, each in its library's own environment."""
+
+import logging
+import math
+from contextlib import ExitStack
+from typing import Any
+
+import torch
+from worker import Case, Maker, repeated, serve
+
+from uuv_marl import load_scenario, parallel_env
+from uuv_marl.scenario import Scenario
+
+SCENARIO, DECISIONS, SEED = "random_field", 48, 100_000
+OVERRIDES = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
+HIDDEN, EPOCHS, LEARNING_RATE, GAMMA, GAE_LAMBDA, CLIP = (64, 64), 4, 1.5e-3, 0.98, 0.95, 0.2
+MINIBATCH = 2304
+"""A factor of the rows, so that no gradient step has fewer."""
+OURS: dict[str, Any] = {
+    "hidden": HIDDEN, "gamma": GAMMA, "gae_lambda": GAE_LAMBDA, "horizon": DECISIONS, "minibatch": MINIBATCH,
+    "clip": CLIP, "kl_stop": math.inf, "learning_rate": (LEARNING_RATE, LEARNING_RATE),
+}  # fmt: skip
+END = ExitStack()
+"""What is to be done when all is measured."""
+
+
+def scenario(agents: int) -> Scenario:
+    """What all train on."""
+    return load_scenario(SCENARIO, num_vehicles=agents, overrides=OVERRIDES)
+
+
+def recipe(by: Any, agents: int, worlds: int) -> Case:
+    """A training of ours; a unit is an iteration."""
+    from uuv_marl.train.shaping import Weights
+
+    training = by.begin(scenario(agents), [(agents, worlds)], Weights(), SEED)
+    return repeated(lambda _: training.iterate(0.0), training.agent_steps)
+
+
+def mappo(agents: int, worlds: int) -> Case:
+    from uuv_marl.train.mappo import Hyperparameters
+
+    return recipe(Hyperparameters(**OURS, actor_epochs=EPOCHS, critic_epochs=EPOCHS), agents, worlds)
+
+
+def ppo(agents: int, worlds: int) -> Case:
+    from uuv_marl.train.ppo import Hyperparameters
+
+    return recipe(Hyperparameters(**OURS, epochs=EPOCHS), agents, worlds)
+
+
+def sb3_ppo(env: Any, seed: int | None) -> Case:
+    """Stable-Baselines3's PPO on a ``VecEnv``; a unit is an iteration."""
+    from stable_baselines3 import PPO
+
+    model, rows = PPO(
+        "MlpPolicy", env, learning_rate=LEARNING_RATE, n_steps=DECISIONS, batch_size=MINIBATCH, n_epochs=EPOCHS,
+        gamma=GAMMA, gae_lambda=GAE_LAMBDA, clip_range=CLIP, policy_kwargs={"net_arch": list(HIDDEN)}, seed=seed,
+        device="cpu",
+    ), DECISIONS * env.num_envs  # fmt: skip
+    return repeated(lambda _: model.learn(rows, reset_num_timesteps=False), rows)
+
+
+def plain(agents: int, worlds: int) -> Case:
+    """On observations and reward as they come."""
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from uuv_marl.envs.sb3 import SwarmVecEnv
+
+    return sb3_ppo(VecMonitor(SwarmVecEnv(worlds, scenario(agents))), SEED)
+
+
+def supersuit(agents: int, worlds: int) -> Case:
+    """A row per agent of ``parallel_env``, worlds one after the other in this process."""
+    import supersuit as wrappers  # pyright: ignore[reportMissingImports]
+
+    world: Any = wrappers.pettingzoo_env_to_vec_env_v1(parallel_env(scenario(agents)))
+    env = wrappers.concat_vec_envs_v1(world, worlds, num_cpus=1, base_class="stable_baselines3")
+    return sb3_ppo(env, None)  # SuperSuit's rows can't be seeded
+
+
+def rllib(agents: int, worlds: int) -> Case:
+    """PPO as ``uuv-marl train rllib`` has it, sampling and learning in this process."""
+    from uuv_marl.benchmark.distributed import connected
+    from uuv_marl.train.rllib import Settings, ppo_config
+
+    END.enter_context(connected(None))
+    settings = Settings(
+        scenario=SCENARIO, num_vehicles=agents, overrides=OVERRIDES, batch=DECISIONS * agents * worlds,
+        minibatch=MINIBATCH, epochs=EPOCHS, learning_rate=LEARNING_RATE, gamma=GAMMA, gae_lambda=GAE_LAMBDA,
+        hidden=HIDDEN,
+    )  # fmt: skip
+    config = ppo_config(settings, num_env_runners=0, world_seed=SEED)
+    config.env_runners(num_envs_per_env_runner=worlds)
+    logging.getLogger("ray.rllib").setLevel(logging.ERROR)
+    algorithm = config.build_algo()
+    torch.set_num_threads(1)  # Ray has its own mind
+    rows = sum(algorithm.train()["env_runners"]["num_agent_steps_sampled"].values())
+    return repeated(lambda _: algorithm.train(), int(rows))
+
+
+CASES: dict[str, Maker] = {case.__name__: case for case in (mappo, ppo, plain, supersuit, rllib)}
+
+if __name__ == "__main__":
+    torch.set_num_threads(1)  # Numba, OpenMP and BLAS are told by the environment's variables
+    with END:
+        serve(CASES)

@@ -1,0 +1,209 @@
+"""Whatever enters compiled code is checked first: percepts of others, snapshots, masks; and a runaway is named."""
+
+import copy
+
+import numpy as np
+import pytest
+
+import uuv_marl
+from uuv_marl import load_scenario
+from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.errors import DivergenceError
+from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.sim import swarm as swarm_module
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.vehicle import plant
+
+
+def made_for(name, n=5, worlds=2):
+    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=n))
+    swarm = Swarm(scenario, worlds)
+    policy = make(name, scenario, worlds)
+    policy.reset(0)
+    return swarm, policy, swarm.reset(0)
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_percepts_of_others_are_refused(name):
+    """Compiled code would read, and write memory, beyond the ends of the policy's arrays."""
+    _, policy, percept = made_for(name)
+    good = policy.act(percept)
+    assert good.shape == (2, 5, 2)
+    more_worlds = made_for(name, worlds=8)[2]
+    more_vehicles = made_for(name, n=54)[2]
+    other_suite = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.arrays.bow.sub_sectors": 3}))
+    for other in (
+        more_worlds,
+        more_vehicles,
+        Percept(percept.flat[:1], percept.layout),
+        Percept(percept.flat[:, :4], percept.layout),
+        Percept(percept.flat.astype(np.float64), percept.layout),
+        Percept(percept.flat[..., :-1], percept.layout),
+        Percept(np.zeros((2, 5, other_suite.size), np.float32), other_suite),
+        Percept(percept.flat, other_suite),
+    ):
+        with pytest.raises(PolicyError, match="was made for"):
+            policy.act(other)
+    strided = np.zeros((2, 5, 2 * percept.flat.shape[2]), np.float32)[..., ::2]
+    strided[...] = percept.flat
+    assert policy.act(Percept(strided, percept.layout)).shape == good.shape
+
+
+@pytest.mark.parametrize("name", ["sdc", "sdc_informed", "sff", "sff_informed"])
+def test_no_number_of_an_observation_is_an_index(name):
+    """An identity beyond the swarm, a fraction or NaN is nobody's, never another vehicle's place in memory."""
+    _, policy, percept = made_for(name)
+    policy.act(percept)
+    identity = percept["link_identity"]
+    percept["heard"][...] = 1.0
+    for ghost in (0.0, -3.0, 6.0, 16384.0, 1e30, np.inf, np.nan):
+        identity[...] = ghost
+        assert np.isfinite(policy.act(percept)).all(), ghost
+
+
+def test_a_ghost_is_nobody_to_the_lattice():
+    """A neighbour without identity moves a vehicle of sdc by its short repulsion alone."""
+    _, policy, percept = made_for("sdc")
+    policy.act(percept)
+    percept["heard"][...] = 0.0
+    percept["heard"][0, 1, 0], percept["neighbour"][0, 1, 0] = 1.0, (60.0, 0.0)
+    actions = []
+    for identity in (0.0, 77.0):
+        percept["link_identity"][0, 1, 0] = identity
+        fresh = copy.deepcopy(policy)
+        actions.append(fresh.act(percept)[0, 1].tolist())
+    percept["heard"][0, 1, 0] = 0.0
+    assert actions[0] == actions[1] == copy.deepcopy(policy).act(percept)[0, 1].tolist()
+
+
+@pytest.mark.parametrize("active", [[True], np.ones(8), np.ones((8, 1), bool), np.ones(9, bool)])
+def test_a_mask_of_other_worlds_is_refused(active):
+    swarm = Swarm(load_scenario("tracking", num_vehicles=2), 8)
+    swarm.reset(0)
+    with pytest.raises(ValueError, match="active must be bool of shape"):
+        swarm.step(np.zeros((8, 2, 2), np.float32), np.asarray(active))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("last", 9),
+        ("last", 0),
+        ("num_obstacles", -1),
+        ("num_obstacles", 1000),
+        ("losses", 1 << 40),
+        ("losses", -1),
+        ("heard", 6),
+        ("diverged", 77),
+        ("times", np.nan),
+    ],
+)
+def test_a_snapshot_holds_no_index_out_of_range(name, value):
+    scenario = load_scenario("lossy", num_vehicles=6, overrides={"disturbance.loss_times_s": [1.0]})
+    swarm = Swarm(scenario, 2)
+    swarm.reset(0)
+    before, snapshot = swarm.snapshot(), swarm.snapshot()
+    snapshot[name][0] = value
+    snapshot["eta"][...] = 5.0
+    with pytest.raises(ValueError, match=name):
+        swarm.restore(snapshot)
+    assert np.array_equal(swarm.snapshot()["eta"], before["eta"]), "half a snapshot was taken"
+
+
+@pytest.mark.parametrize("change", ["missing", "shape", "type"])
+@pytest.mark.parametrize("name", ["eta", "tick", "streams", "keys", "percept"])
+def test_a_snapshot_of_another_swarm_is_refused(name, change):
+    swarm = Swarm(load_scenario("tracking", num_vehicles=3), 2)
+    swarm.reset(0)
+    snapshot = swarm.snapshot()
+    array = snapshot.pop(name)
+    if change == "shape":
+        snapshot[name] = np.concatenate([array, array])
+    if change == "type":
+        snapshot[name] = array.astype(np.complex64)
+    with pytest.raises(ValueError, match=name):
+        swarm.restore(snapshot)
+
+
+def test_state_changed_by_hand_is_checked():
+    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=2))
+    swarm.reset(0)
+    swarm.course.num_obstacles[0] = 50
+    with pytest.raises(ValueError, match="num_obstacles"):
+        swarm.observe()
+
+
+@pytest.mark.parametrize("seed", [1.5, "1", True, [0, 1.5], [0, "1"], (1 + 2j, 0), object()])
+def test_a_seed_is_a_whole_number(seed):
+    swarm = Swarm(load_scenario("tracking", num_vehicles=2), 2)
+    for reset in (swarm.reset, make("random", swarm.scenario, 2).reset):
+        with pytest.raises(TypeError, match="seed must be a whole number from 0"):
+            reset(seed)
+        with pytest.raises(ValueError, match="seed must be a whole number from 0"):
+            reset([-1, 2])
+        with pytest.raises(ValueError, match="one seed for each of 2 worlds"):
+            reset([1, 2, 3])
+
+
+@pytest.fixture
+def runaway(monkeypatch):
+    """A vehicle that Runge-Kutta can't follow, as if the scenario's check had missed it: no damping but a pump."""
+
+    def pumped(scenario):
+        return plant(scenario)._replace(X_u=-2000.0, X_uu=0.0)
+
+    monkeypatch.setattr(swarm_module, "plant", pumped)
+    return load_scenario("single_obstacle", num_vehicles=4)
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+def test_divergence_is_named_where_it_happens_and_ends_the_world(runaway, worlds, caplog):
+    swarm = Swarm(runaway, worlds)
+    swarm.reset(0)
+    assert not swarm.ended.any()
+    action = np.zeros((worlds, 4, 2), np.float32)
+    action[0, 2] = 1.0, 0.0  # one vehicle of one world is the first
+    swarm.state.nu[...] = 0.0
+    for _ in range(100):
+        swarm.step(action)
+        assert np.isfinite(swarm.percept.flat).all()
+        assert np.isfinite(swarm.state.eta).all()
+    assert swarm.facts.diverged.tolist() == [2] + [-1] * (worlds - 1)
+    assert swarm.truncated.tolist() == swarm.ended.tolist() == [True] + [False] * (worlds - 1)
+    assert caplog.text.count("vehicle 2 of world 0 diverged") == 1
+    assert "integration_step_s" in caplog.text
+    time = swarm.facts.time_s.copy()
+    swarm.step(action)
+    assert (swarm.facts.time_s > time).tolist() == [False] + [True] * (worlds - 1), "a diverged world stays as it is"
+    swarm.reset(0)
+    assert (swarm.facts.diverged == -1).all()
+
+
+def test_divergence_truncates_an_episode_with_finite_numbers(runaway):
+    env = uuv_marl.parallel_env(runaway)
+    env.reset(seed=0)
+    rewards = []
+    while env.agents:
+        observations, reward, terminated, truncated, _ = env.step({agent: [1.0, 0.0] for agent in env.agents})
+        rewards += list(reward.values())
+        assert all(np.isfinite(observation).all() for observation in observations.values())
+    assert all(truncated.values())
+    assert not any(terminated.values())
+    assert np.isfinite(rewards).all()
+
+
+def test_divergence_never_becomes_a_row_of_results(runaway):
+    events = evaluate(runaway, "bio_inspired", range(3))
+    with pytest.raises(DivergenceError, match="seed 0: vehicle"):
+        assert not [event for event in events if isinstance(event, Run)]
+
+
+def test_training_refuses_scenarios_in_which_vehicles_are_lost():
+    pytest.importorskip("torch")
+    from uuv_marl.scenario_files import ScenarioError
+    from uuv_marl.train.fleet import Fleet
+    from uuv_marl.train.shaping import Weights
+
+    with pytest.raises(ScenarioError, match="training can't show that a vehicle is lost"):
+        Fleet(load_scenario("lossy"), [(6, 2)], Weights(), lambda num: None)

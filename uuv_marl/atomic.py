@@ -1,0 +1,86 @@
+"""Files that are whole at any time, and folders that one command at a time writes to."""
+
+import os
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from uuv_marl.errors import ResultsError
+
+_LOCK, _OWNER = ".lock", ".owner"
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn an OSError of the block (a full disk, missing rights) into an ResultsError that names ``path``."""
+    try:
+        yield
+    except OSError as error:
+        raise ResultsError(
+            f"{path} can't be written ({error.strerror or error}). What was finished before is safe; make room there, "
+            "permit writing or give another --output, and go on"
+        ) from error
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path to write a file to, which takes the place of ``path`` once the block ends well.
+
+    A crash, a full disk or an exception at any moment leaves the file as it was before. The path given lies in the same
+    folder, which must exist, and has the same suffix.
+
+    Raises:
+        ResultsError: it can't be written.
+    """
+    partial = path.with_name(f"{path.stem}.partial{path.suffix}")
+    with writing(path):
+        try:
+            yield partial
+            with partial.open("rb+") as file:
+                os.fsync(file)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file in UTF-8, whole or not at all; line ends stay as they are. Raises ResultsError."""
+    with replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="")
+
+
+@contextmanager
+def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
+    """Keep a folder for the block alone, and make it where it is missing.
+
+    The operating system holds the lock and frees it when the process ends, however it ends. Two hidden files stay in
+    the folder: ``.lock``, and while it is held ``.owner``, which says by whom.
+
+    Args:
+        folder: that only this block may write to.
+        wait_s: how long to wait for another's block to end [s].
+
+    Raises:
+        ResultsError: another block has the folder, in this process or another, or it can't be written.
+    """
+    lock, owner = FileLock(folder / _LOCK), folder / _OWNER
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            lock.acquire(timeout=wait_s)
+        except Timeout:
+            by = owner.read_text(encoding="utf-8") if owner.exists() else "another command"
+            raise ResultsError(
+                f"{folder} is in use by {by}; wait until it has ended, or give another --output"
+            ) from None
+    try:
+        since = time.strftime("%Y-%m-%d %H:%M:%S")
+        write_text(owner, f"process {os.getpid()} on {socket.gethostname()} since {since}")
+        yield
+    finally:
+        owner.unlink(missing_ok=True)
+        lock.release()

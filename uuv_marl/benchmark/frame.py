@@ -1,0 +1,35 @@
+"""Results as a table for analysis. Needs the extra ``analysis``."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from uuv_marl.benchmark.results import FILE, read_content, trace_path
+from uuv_marl.extras import extra
+
+
+def load(path: str | Path) -> Any:
+    """The runs of a ``results.json`` as a pandas data frame, a row for each, by scenario, policy and seed.
+
+    Columns are ``scenario``, ``policy``, ``seed``, every metric (``constraint_share`` as ``constraint_share_all``,
+    ``constraint_share_s_l`` and so on), and ``trace``, the path of the run's time series for ``load_trace``. NaN stands
+    where there was nothing to measure. No policy is imported.
+
+    Args:
+        path: of the file, or of the folder that holds it.
+
+    Raises:
+        MissingExtraError: pandas is not installed.
+        ResultsError: it is no results.json of this version.
+    """
+    with extra("analysis", "uuv_marl.benchmark.load"):
+        pandas: Any = importlib.import_module("pandas")
+    path = Path(path)
+    file = path / FILE if path.is_dir() else path
+    records: list[dict[str, Any]] = []
+    for row in sorted(read_content(file)["runs"], key=lambda row: row[:3]):
+        metrics: dict[str, Any] = {**row.metrics}
+        shares = {f"constraint_share_{name}": share for name, share in metrics.pop("constraint_share").items()}
+        key = {"scenario": row.scenario, "policy": row.policy, "seed": row.seed}
+        records.append({**key, **metrics, **shares, "trace": str(trace_path(file.parent, *row[:3]))})
+    return pandas.DataFrame.from_records(records)

@@ -1,0 +1,72 @@
+"""What all pictures share: the house style, panels with one legend, obstacles and courses, and how they are saved."""
+
+# pyright: reportUnknownMemberType=false
+# Matplotlib leaves the types of its keyword arguments open.
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib.style
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+"""Okabe and Ito's palette, as ``house.mplstyle`` has it."""
+BLUE, ORANGE, GREEN, PINK, AMBER, SKY, BLACK, GREY = COLOURS
+
+
+@contextmanager
+def house_style() -> Generator[None]:
+    """Whatever is drawn inside has the house style (``house.mplstyle``); Matplotlib's settings come back after it."""
+    with matplotlib.style.context(["default", "uuv_marl.benchmark.house"]):
+        yield
+
+
+def panels(
+    num: int, columns: int = 4, size: tuple[float, float] = (5.2, 4.4), **options: Any
+) -> tuple[Figure, list[Axes]]:
+    """A figure with at least ``num`` panels of this size [inch], by row; those beyond ``num`` are empty.
+
+    ``columns`` is the most that stand side by side; ``options`` go to ``Figure.subplots``.
+    """
+    rows = -(-num // columns)
+    across = -(-num // rows)
+    figure = Figure(figsize=(size[0] * across, size[1] * rows))
+    axes: list[Axes] = figure.subplots(rows, across, squeeze=False, **options).ravel().tolist()
+    for ax in axes[num:]:
+        ax.set_axis_off()
+    return figure, axes
+
+
+def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> None:
+    """One legend for all panels, each label once: below them, or in an empty panel."""
+    found: dict[str, Artist] = {}
+    for ax in figure.axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    if into is None:
+        figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns)
+    else:
+        into.legend(found.values(), found.keys(), loc="center", fontsize=9)
+
+
+def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Sequence[Sequence[float]] | NDArray[Any]) -> None:
+    """Trajectory with its goal, and obstacles (across, up, radius), in the picture's own coordinates [m]."""
+    ax.plot(*waypoints.T, "--", color=BLACK, linewidth=1.0, zorder=3, label="trajectory of l(t)")
+    ax.plot(*waypoints[-1], "*", color=AMBER, mec=BLACK, mew=0.6, markersize=11, zorder=5, ls="", label="goal")
+    for k, (across, up, radius) in enumerate(obstacles):
+        ax.add_patch(Circle((across, up), radius, color="0.45", zorder=2, label="" if k else "obstacle"))
+    ax.set_aspect("equal")
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """As PNG, the same bytes for the same picture."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    FigureCanvasAgg(figure).print_png(str(path), metadata={"Software": None})
+    return path

@@ -1,0 +1,25 @@
+"""Errors that a user can mend; every message names what is wrong and what to do."""
+
+
+class ScenarioError(ValueError):
+    """A scenario that can't be used; the message says which field, what it is and what to do."""
+
+
+class PolicyError(ValueError):
+    """A policy that can't drive this scenario; the message names the remedy."""
+
+
+class DivergenceError(RuntimeError):
+    """The integration step is too long for the vehicle, so that its speed ran away."""
+
+
+class ResultsError(RuntimeError):
+    """A file or folder that can't be written, or that can't take these results."""
+
+
+class ClusterError(RuntimeError):
+    """A cluster that can't do the work; the message says what to do."""
+
+
+class MissingExtraError(ModuleNotFoundError):
+    """A library is missing that one of the package's extras would install; the message says how."""

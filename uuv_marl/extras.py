@@ -1,0 +1,29 @@
+"""Optional libraries: where one is missing, the message names the extra that brings it."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from uuv_marl.errors import MissingExtraError
+
+
+@contextmanager
+def extra(name: str, what: str | None = None) -> Iterator[None]:
+    """Imports of an extra's libraries belong into this block.
+
+    Args:
+        name: of the extra, as in ``pip install 'uuv_marl[train]'``.
+        what: what needs the library, as the message names it; by default the import itself.
+
+    Raises:
+        MissingExtraError: one of the libraries is missing.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        library = (error.name or "").partition(".")[0]
+        if isinstance(error, MissingExtraError) or library == "uuv_marl":
+            raise
+        raise MissingExtraError(
+            f"{what or 'this'} needs {library}, which comes with the extra {name!r}: pip install 'uuv_marl[{name}]'",
+            name=library,
+        ) from None

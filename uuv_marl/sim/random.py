@@ -1,0 +1,104 @@
+"""Random numbers as a function of where they are used: episode key, purpose, time, vehicle, slot. Nothing is stored.
+
+A disturbance that draws here moves no other draw, and gives the same numbers whatever the batch, the threads or the
+API. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11): the key is its
+key, the four others are its counter. The logarithm is our own, since a C library's may differ in the last bit between
+machines.
+"""
+
+import hashlib
+import math
+
+import numpy as np
+
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.streams import packed
+from uuv_marl.sim.trigonometry import cos_sin
+
+Block = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
+
+# Typed, since Numba turns the sum of a signed and an unsigned 64-bit number into a float.
+_LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
+_MULTIPLIER_0, _MULTIPLIER_1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
+_WEYL_0, _WEYL_1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
+_HIGH_SHIFT, _LOW_SHIFT, _HIGH_BITS = np.uint64(5), np.uint64(6), np.uint64(26)
+
+_LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+_L1, _L2, _L3 = 6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01
+_L4, _L5, _L6, _L7 = (
+    2.222219843214978396e-01,
+    1.818357216161805012e-01,
+    1.531383769920937332e-01,
+    1.479819860511658591e-01,
+)
+
+
+def episode_key(stream: np.random.Generator) -> np.uint64:
+    """The key of the episode that a reset draws from this stream: a hash of its state before the draws."""
+    return np.uint64(int.from_bytes(hashlib.blake2b(packed([stream]).tobytes(), digest_size=8).digest(), "little"))
+
+
+@compiled
+def philox(key: np.uint64, c_0: np.uint64, c_1: np.uint64, c_2: np.uint64, c_3: np.uint64) -> Block:
+    """Four random words of 32 bits for a key of 64 bits and a counter of four words."""
+    k_0, k_1 = key & _LOW, key >> _HALF
+    for _ in range(10):
+        p_0, p_1 = _MULTIPLIER_0 * c_0, _MULTIPLIER_1 * c_2
+        c_0, c_1, c_2, c_3 = (p_1 >> _HALF) ^ c_1 ^ k_0, p_1 & _LOW, (p_0 >> _HALF) ^ c_3 ^ k_1, p_0 & _LOW
+        k_0, k_1 = (k_0 + _WEYL_0) & _LOW, (k_1 + _WEYL_1) & _LOW
+    return c_0, c_1, c_2, c_3
+
+
+@compiled
+def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> tuple[float, float]:
+    """Two independent numbers, uniform in [0, 1), multiples of 2^-53."""
+    w_0, w_1, w_2, w_3 = philox(
+        key, np.uint64(purpose) & _LOW, np.uint64(time) & _LOW, np.uint64(vehicle) & _LOW, np.uint64(slot) & _LOW
+    )
+    first = ((w_0 >> _HIGH_SHIFT) << _HIGH_BITS) | (w_1 >> _LOW_SHIFT)
+    second = ((w_2 >> _HIGH_SHIFT) << _HIGH_BITS) | (w_3 >> _LOW_SHIFT)
+    return np.float64(first) * 2.0**-53, np.float64(second) * 2.0**-53
+
+
+@compiled
+def uniform(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> float:
+    """A number uniform in [0, 1).
+
+    Args:
+        key: of the episode (``Swarm.keys``).
+        purpose: what it is for, one number for each disturbance.
+        time: control hold, ping or decision at which it is used, below 2^32.
+        vehicle: whose it is.
+        slot: which of the vehicle's numbers at this time.
+    """
+    return uniforms(key, purpose, time, vehicle, slot)[0]
+
+
+@compiled
+def normals(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> tuple[float, float]:
+    """Two independent standard normal numbers (Box and Muller 1958); arguments as for ``uniform``."""
+    first, second = uniforms(key, purpose, time, vehicle, slot)
+    radius = math.sqrt(-2.0 * log(1.0 - first))
+    c, s = cos_sin(2.0 * math.pi * second)
+    return radius * c, radius * s
+
+
+@compiled
+def normal(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> float:
+    """A standard normal number; arguments as for ``uniform``."""
+    return normals(key, purpose, time, vehicle, slot)[0]
+
+
+@compiled
+def log(x: float) -> float:
+    """Natural logarithm of a positive, finite number, within 1 ulp: the method of Sun's fdlibm (e_log.c)."""
+    share, power = math.frexp(x)
+    if share < math.sqrt(0.5):
+        share, power = 2.0 * share, power - 1
+    f, k = share - 1.0, float(power)
+    s = f / (2.0 + f)
+    z = s * s
+    w = z * z
+    rest = z * (_L1 + w * (_L3 + w * (_L5 + w * _L7))) + w * (_L2 + w * (_L4 + w * _L6))
+    half = 0.5 * f * f
+    return k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f)
