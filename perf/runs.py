@@ -27,7 +27,7 @@ from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.shaping import Weights
 
-SEED, MOST_AGENT_STEPS = 10_000, 150_000
+SEED, MOST_AGENT_STEPS = 10_000, 30_000
 """The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
 STATE = ("eta", "nu", "before", "alive", "tick", "dwell")

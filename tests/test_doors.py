@@ -62,6 +62,11 @@ def test_no_number_of_an_observation_is_an_index(name):
         assert np.isfinite(policy.act(percept)).all(), ghost
 
 
+def test_a_swarm_too_large_to_assign_slots_is_refused_at_once():
+    with pytest.raises(PolicyError, match="at most 2000 vehicles"):
+        make("sdc", granted("sdc", load_scenario("tracking", num_vehicles=2001)))
+
+
 def test_a_ghost_is_nobody_to_the_lattice():
     """A neighbour without identity moves a vehicle of sdc by its short repulsion alone."""
     _, policy, percept = made_for("sdc")

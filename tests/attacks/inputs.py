@@ -244,18 +244,18 @@ def actions(rng, folder):
     elif how == 1:
         envs = uuv_marl.vector_env(2, "starter", num_vehicles=n)
         envs.reset(seed=0)
-        observations, rewards, *_ = envs.step(np.stack([given, given]) if rng.random() < 0.5 else given)
+        observations, rewards, *_ = envs.step([given, given] if rng.random() < 0.5 else given)
         finite(observations, rewards)
     elif how == 2:
         swarm = Swarm(load_scenario("starter", num_vehicles=n))
         swarm.reset(0)
-        finite(swarm.step(np.asarray(given)[None] if rng.random() < 0.5 else given).flat)
+        finite(swarm.step([given] if rng.random() < 0.5 else given).flat)
     else:
         import gymnasium
 
         env = gymnasium.make("uuv_marl/Solo-v0", scenario="starter", num_vehicles=n, disable_env_checker=True).unwrapped
         env.reset(seed=0)
-        observation, reward, *_ = env.step(given[0] if isinstance(given, np.ndarray) and given.ndim else given)
+        observation, reward, *_ = env.step(given[0] if isinstance(given, np.ndarray) and given.size > 1 else given)
         finite(observation, reward)
 
 

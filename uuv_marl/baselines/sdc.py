@@ -16,6 +16,7 @@ from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Offsets, Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -27,6 +28,8 @@ Int64 = NDArray[np.int64]
 SLOT_PITCH_M = 12.0
 """Distance between neighbouring slots."""
 _MAX_XI = 0.99
+_MOST_VEHICLES = 2000
+"""Slots are assigned in a time that grows with the cube of the swarm: 1.5 s here, a quarter of an hour for 16,384."""
 
 
 class Gains(NamedTuple):
@@ -79,6 +82,11 @@ class Sdc(Policy):
         super().__init__(scenario, num_worlds)
         self.gains = gains or Gains(**tuned(self.tuned_as))
         n = scenario.swarm.num_vehicles
+        if n > _MOST_VEHICLES:
+            raise PolicyError(
+                f"{self.name} assigns slots to at most {_MOST_VEHICLES} vehicles, since more would take minutes; "
+                f"scenario {scenario.name!r} has {n}; use fewer, or another policy"
+            )
         self._lattice = hexagonal_slots(n)
         self._slots = np.zeros((num_worlds, n, 2))
         self._depth = np.zeros((num_worlds, n))
