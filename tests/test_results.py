@@ -226,9 +226,10 @@ def every_command(group=None, path=()):
 
 @pytest.mark.parametrize(("path", "one"), list(every_command()))
 def test_help_prints_every_word_of_its_texts(path, one):
-    shown = CliRunner().invoke(app, [*path, "-h"], env={"COLUMNS": "10000", "TERMINAL_WIDTH": "10000"})
+    wide = {"COLUMNS": "10000", "TERMINAL_WIDTH": "10000"}
+    shown = CliRunner().invoke(app, [*path, "-h"], env=wide)
     assert shown.exit_code == 0
-    assert shown.output == CliRunner().invoke(app, [*path, "--help"], env={"TERMINAL_WIDTH": "10000"}).output
+    assert shown.output == CliRunner().invoke(app, [*path, "--help"], env=wide).output
     texts = [one.help or "", *(getattr(parameter, "help", "") or "" for parameter in one.params)]
     for word in " ".join(texts).replace("`", "").split():
         assert word in shown.output, word

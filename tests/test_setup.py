@@ -72,7 +72,7 @@ def test_every_environment_has_its_extras_and_the_same_torch(setup):
 def test_the_oldest_libraries_that_are_tested_are_the_oldest_that_are_allowed():
     """So that no bound is moved in pyproject.toml alone."""
     tested = pins(ROOT / "constraints-lowest.txt")
-    extras = (PROJECT["optional-dependencies"][extra] for extra in ("onnx", "render", "test", "tune"))
+    extras = (PROJECT["optional-dependencies"][extra] for extra in ("analysis", "onnx", "render", "test", "tune"))
     for line in sum(extras, PROJECT["dependencies"]):
         wanted = Requirement(line)
         (low,) = (Version(one.version) for one in wanted.specifier if one.operator == ">=")

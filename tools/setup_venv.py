@@ -15,8 +15,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 WANTED = {
     "base": ("-e", "."),
     "dev": ("-e", ".[dev]"),
-    "light": ("-e", ".[onnx,render,test,tune]"),
-    "lowest": ("-e", ".[onnx,render,test,tune]"),
+    "light": ("-e", ".[analysis,onnx,render,test,tune]"),
+    "lowest": ("-e", ".[analysis,onnx,render,test,tune]"),
     "benchmarl": ("-e", ".[benchmarl,test]"),
     "rllib": ("-e", ".[distributed,render,test]"),
     "perf-mpe2": ("mpe2", "stable-baselines3"),

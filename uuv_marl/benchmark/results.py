@@ -164,7 +164,7 @@ class Results:
         if run.seed in self._route_seeds:
             arrays |= {f"route_{name}": values for name, values in run.routes._asdict().items()}
         with replacing(self.trace_path(scenario, policy, run.seed)) as partial:
-            np.savez_compressed(partial, allow_pickle=False, **arrays)
+            np.savez_compressed(partial, **arrays)
         self._runs[scenario, policy, run.seed] = run.metrics
         content = Content(
             schema=1,
