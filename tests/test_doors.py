@@ -175,7 +175,7 @@ def test_divergence_is_named_where_it_happens_and_ends_the_world(runaway, worlds
         assert np.isfinite(swarm.percept.flat).all()
         assert np.isfinite(swarm.state.eta).all()
     assert swarm.facts.diverged.tolist() == [2] + [-1] * (worlds - 1)
-    assert swarm.truncated.tolist() == swarm.ended.tolist() == [True] + [False] * (worlds - 1)
+    assert swarm.endings()[1].tolist() == swarm.ended.tolist() == [True] + [False] * (worlds - 1)
     assert caplog.text.count("vehicle 2 of world 0 diverged") == 1
     assert "integration_step_s" in caplog.text
     time = swarm.facts.time_s.copy()

@@ -120,13 +120,14 @@ class Task:
         """
         self.need_reset("step")
         swarm = self.swarm
-        before = swarm.state.alive.copy()
-        swarm.step(action, ~self._over)
-        self.collisions += swarm.facts.collisions * ~self._over
+        before, running = swarm.state.alive.copy(), ~self._over
+        swarm.step(action, running)
+        np.add(self.collisions, swarm.facts.collisions, out=self.collisions, where=running)
         alive = swarm.state.alive
-        reward, world_reward, terms = self._rewards(before & ~self._over[:, None])
-        world_terminated = swarm.terminated
-        world_truncated = (swarm.truncated | (swarm.state.tick >= self._last_tick)) & ~world_terminated
+        reward, world_reward, terms = self._rewards(before & running[:, None])
+        world_terminated, world_truncated = swarm.endings()
+        if self._max_cycles is not None:
+            world_truncated |= (swarm.state.tick >= self._last_tick) & ~world_terminated
         self._over = world_terminated | world_truncated
         return Outcome(
             observation=observe(swarm),

@@ -153,21 +153,22 @@ class Swarm:
         """Worlds whose task is done, shape (world,)."""
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
-    @property
-    def terminated(self) -> NDArray[np.bool_]:
-        """Worlds whose episode ended by what happened: the swarm arrived, or all of it is lost. Shape (world,)."""
-        return self.arrived | ~self.state.alive.any(axis=1)
+    def endings(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """How episodes ended, shape (world,) each; both False for those that go on.
 
-    @property
-    def truncated(self) -> NDArray[np.bool_]:
-        """Worlds whose episode was cut off: by the time limit, or because it diverged. Shape (world,)."""
+        Returns:
+            Terminated, by what happened: the swarm arrived, or all of it is lost. Truncated, that is cut off: by the
+            time limit, or because the world diverged.
+        """
+        terminated = self.arrived | ~self.state.alive.any(axis=1)
         late = self.facts.time_s >= self.time_limit_s - 1e-9
-        return (late | (self.facts.diverged >= 0)) & ~self.terminated
+        return terminated, (late | (self.facts.diverged >= 0)) & ~terminated
 
     @property
     def ended(self) -> NDArray[np.bool_]:
         """Worlds whose episode is over, shape (world,)."""
-        return self.terminated | self.truncated
+        terminated, truncated = self.endings()
+        return terminated | truncated
 
     def divergence(self, world: int) -> str:
         """What went wrong in a world that diverged, and the remedy."""

@@ -107,9 +107,10 @@ class Fleet:
             rows, shape = self._rows(k), (swarm.num_worlds, swarm.num_vehicles)
             swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
             reward = shaped(swarm, self._weights)
-            over, arrived = swarm.ended, swarm.arrived
-            for flags, values in ((moment.terminated, swarm.terminated), (moment.truncated, swarm.truncated)):
+            ends, arrived = swarm.endings(), swarm.arrived
+            for flags, values in zip((moment.terminated, moment.truncated), ends, strict=True):
                 flags[rows] = np.repeat(values, shape[1])
+            over = ends[0] | ends[1]
             moment.reward[rows] = reward.reshape(-1)
             self._sums[k] += np.stack([reward.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
             self._look(k)
