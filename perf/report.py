@@ -17,6 +17,8 @@ from compare import ADAPTERS, AGENTS, CEILINGS, FLOOR_CELLS, HERE, PARTS, RESULT
 from floor import least_seconds, work
 from matplotlib.figure import Figure
 
+from uuv_marl.benchmark.style import house_style
+
 SPEED, PICTURE = ROOT / "docs" / "speed.md", ROOT / "docs" / "figures" / "speed.png"
 # Names and styles; Okabe and Ito's colours are told apart by the colour-blind, markers without colour.
 COLUMNS = {
@@ -24,7 +26,7 @@ COLUMNS = {
     "vmas": "VMAS", "jaxmarl": "JaxMARL",
 }  # fmt: skip
 STYLES = {
-    "core": ("#0072B2", "o"), "idle": ("#0072B2", "o"), "bio_inspired": ("#56B4E9", "s"), "mpe2": ("#D55E00", "D"),
+    "core": ("#0072B2", "o"), "idle": ("#999999", "*"), "bio_inspired": ("#56B4E9", "s"), "mpe2": ("#D55E00", "D"),
     "vector_env": ("#009E73", "^"), "parallel_env": ("#000000", "v"), "vmas": ("#E69F00", "P"),
     "jaxmarl": ("#CC79A7", "X"),
 }  # fmt: skip
@@ -236,6 +238,7 @@ def filled(page: str, cases: Cases) -> str:
     return marked.sub(lambda found: f"{found[1]}{TABLES[found[2]](cases)}\n{found[3]}", page)
 
 
+@house_style()
 def draw(cases: Cases) -> Figure:
     """Cost over vehicles, and rate over worlds."""
     figure = Figure((11.0, 5.2), dpi=120, layout="constrained")
@@ -253,7 +256,6 @@ def draw(cases: Cases) -> Figure:
     once: dict[str, Any] = {}
     for axes in (left, right):
         axes.set(xscale="log", yscale="log")
-        axes.grid(visible=True, which="major", alpha=0.3)
         once |= {name: handle for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=4)
     return figure
