@@ -160,7 +160,7 @@ class Results:
     def add(self, scenario: str, policy: str, run: Run) -> None:
         """Keep a run, on disk at once; refused where the policy's file has changed, so that no table mixes two."""
         self.use(policy)
-        arrays = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
+        arrays: dict[str, Any] = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
         if run.seed in self._route_seeds:
             arrays |= {f"route_{name}": values for name, values in run.routes._asdict().items()}
         with replacing(self.trace_path(scenario, policy, run.seed)) as partial:
