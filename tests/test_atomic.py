@@ -102,3 +102,16 @@ def test_modules_of_optional_libraries_name_their_extra(module, library, name):
     code = f"import sys; sys.modules[{library!r}] = None; import uuv_marl.{module}"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
     assert f"pip install 'uuv_marl[{name}]'" in done.stderr
+
+
+def test_a_folder_in_which_nothing_was_written_goes_again(tmp_path):
+    with pytest.raises(RuntimeError, match="before"), locked(tmp_path / "new"):
+        raise RuntimeError("before anything was written")
+    assert not (tmp_path / "new").exists()
+    (tmp_path / "old").mkdir()
+    with locked(tmp_path / "old"):
+        pass
+    with locked(tmp_path / "used"):
+        (tmp_path / "used" / "a.txt").write_text("a")
+    assert (tmp_path / "old").exists()
+    assert (tmp_path / "used" / "a.txt").exists()

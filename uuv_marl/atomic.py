@@ -58,7 +58,8 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
     """Keep a folder for the block alone, and make it where it is missing.
 
     The operating system holds the lock and frees it when the process ends, however it ends. Two hidden files stay in
-    the folder: ``.lock``, and while it is held ``.owner``, which says by whom.
+    the folder: ``.lock``, and while it is held ``.owner``, which says by whom. A folder that was made here and stays empty
+    goes again.
 
     Args:
         folder: that only this block may write to.
@@ -67,7 +68,7 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
     Raises:
         ResultsError: another block has the folder, in this process or another, or it can't be written.
     """
-    lock, owner = FileLock(folder / _LOCK), folder / _OWNER
+    lock, owner, made = FileLock(folder / _LOCK), folder / _OWNER, not folder.exists()
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -84,3 +85,6 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
     finally:
         owner.unlink(missing_ok=True)
         lock.release()
+        if made and {path.name for path in folder.iterdir()} <= {_LOCK}:  # the block failed before it wrote anything
+            (folder / _LOCK).unlink(missing_ok=True)
+            folder.rmdir()
