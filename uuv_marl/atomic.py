@@ -58,8 +58,8 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
     """Keep a folder for the block alone, and make it where it is missing.
 
     The operating system holds the lock and frees it when the process ends, however it ends. Two hidden files stay in
-    the folder: ``.lock``, and while it is held ``.owner``, which says by whom. A folder that was made here and stays empty
-    goes again.
+    the folder: ``.lock``, and while it is held ``.owner``, which says by whom. A folder that was made here and stays
+    empty goes again.
 
     Args:
         folder: that only this block may write to.
