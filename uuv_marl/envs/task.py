@@ -127,7 +127,8 @@ class Task:
         reward, world_reward, terms = self._rewards(before & running[:, None])
         world_terminated, world_truncated = swarm.endings()
         if self._max_cycles is not None:
-            world_truncated |= (swarm.state.tick >= self._last_tick) & ~world_terminated
+            last_tick = self._max_cycles * swarm.scenario.timing.holds_per_decision
+            world_truncated |= (swarm.state.tick >= last_tick) & ~world_terminated
         self._over = world_terminated | world_truncated
         return Outcome(
             observation=observe(swarm),
@@ -168,10 +169,6 @@ class Task:
                 "(facts.spacing of a lone vehicle) or nothing is there (facts.clearance without obstacles)"
             )
         return reward
-
-    @property
-    def _last_tick(self) -> float:
-        return np.inf if self.max_cycles is None else self.max_cycles * self.swarm.scenario.timing.holds_per_decision
 
 
 class Changes(TypedDict, total=False):
