@@ -1,0 +1,74 @@
+"""A recording: one episode as it is replayed in a browser and filmed."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.scenario import Scenario
+
+Float32 = NDArray[np.float32]
+Int32 = NDArray[np.int32]
+
+
+class Event(NamedTuple):
+    """Something that happened to one or two vehicles."""
+
+    time_s: float
+    kind: str
+    """``collision`` of two vehicles, ``obstacle`` for a vehicle that hit one, ``near`` and ``near_obstacle`` where
+    spacing fell below s_u or clearance below s_o, ``lost``, or ``arrived`` for the whole swarm."""
+    vehicles: tuple[int, ...]
+    """Whom it concerns, empty for the whole swarm."""
+
+
+class Inspection(NamedTuple):
+    """What one vehicle's sonar told it and what it did, at each sample; positions in its body frame (x forward, y
+    starboard) [m]."""
+
+    heard: Int32
+    """Index of the vehicle heard in each sub-sector, -1 for none, shape (time, sector)."""
+    neighbour: Float32
+    """Position of that vehicle, shape (time, sector, 2)."""
+    echo_range: Float32
+    """Range to the nearest obstacle in each active sub-sector, 0 for none, shape (time, active)."""
+    echo_position: Float32
+    """Position that the echo reports, shape (time, active, 2)."""
+    action: Float32
+    """Shares of full surge force and yaw torque that the policy asked for until the next sample, shape (time, 2)."""
+
+
+class Recording(NamedTuple):
+    """One episode: what was simulated, and where everybody was at each sample.
+
+    Frame north, east [m]; NaN once a vehicle is lost. Arrays that a saved trace does not hold are None.
+    """
+
+    scenario: Scenario
+    policy: str
+    seed: int
+    metrics: Metrics
+    waypoints: Float32
+    """Corners of the trajectory, shape (point, 2)."""
+    obstacles: Float32
+    """Centre north, east and radius, shape (obstacle, 3)."""
+    time_s: Float32
+    """Shape (time,)."""
+    reference: Float32
+    """Position of l(t), shape (time, 2)."""
+    position: Float32
+    """Shape (time, vehicle, 2)."""
+    heading: Float32
+    """In [-pi, pi), clockwise from north [rad], shape (time, vehicle)."""
+    speed: Float32
+    """Over ground [m/s], shape (time, vehicle)."""
+    series: dict[str, Float32]
+    """``min_spacing_m``, ``obstacle_clearance_m``, ``centre_error_m`` and ``collisions`` so far, shape (time,) each."""
+    events: list[Event]
+    force: Float32 | None
+    """Length of the action since the sample before, as a share of full force, shape (time, vehicle)."""
+    spacing: Float32 | None
+    """Smallest distance to another vehicle since the sample before [m], shape (time, vehicle)."""
+    inspections: dict[int, Inspection]
+    """By index of the vehicle."""
