@@ -24,8 +24,10 @@ class Event(NamedTuple):
 
 
 class Inspection(NamedTuple):
-    """What one vehicle's sonar told it and what it did, at each sample; positions in its body frame (x forward, y
-    starboard) [m]."""
+    """What one vehicle's sonar told it, and what it did.
+
+    Positions are in its body frame, x forward and y starboard [m].
+    """
 
     heard: Int32
     """Index of the vehicle heard in each sub-sector, -1 for none, shape (time, sector)."""
