@@ -2,18 +2,14 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from uuv_marl.percept import MAX_SPEED, Offsets
+from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import MAX_RANGE_M
-from uuv_marl.sim.cells import Cells
+from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inline
-from uuv_marl.sim.hearing import Ear
-from uuv_marl.sim.sonar import Suite, cross
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.sim.desk import Desk
+from uuv_marl.sim.hearing import Pose
+from uuv_marl.sim.model import Model
+from uuv_marl.sim.sonar import cross
 
 
 @compiled
@@ -48,20 +44,10 @@ def saturate(value: float, limit: float) -> float:
 
 
 @compiled_inline
-def write_percept(
-    p: int,
-    w: int,
-    nu: Float64,
-    reference: Float64,
-    obstacles: Float64,
-    num_obstacles: int,
-    cells: Cells,
-    suite: Suite,
-    ear: Ear,
-    at: Offsets,
-    out: Float32,
-) -> None:
-    """What entry p of ``cells`` knows in world w, as a flat vector in physical units. Eq. 11, 14-17."""
+def write_percept(p: int, w: int, world: World, model: Model, desk: Desk) -> None:
+    """What entry p of the cells knows in world w, as a flat vector in physical units. Eq. 11, 14-17."""
+    cells, ear, suite, at = desk.cells, desk.ear, model.suite, model.at
+    nu, reference, obstacles, out = world.state.nu, world.facts.reference, world.course.obstacles, world.senses.percept
     i = cells.vehicle[p]
     x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(out.shape[2]):
@@ -89,23 +75,22 @@ def write_percept(
             out[w, i, at.link_velocity + 2 * k + 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     if at.compass >= 0:
         out[w, i, at.compass], out[w, i, at.compass + 1] = c, s
-    for m in range(num_obstacles):
+    for m in range(world.course.num_obstacles[w]):
         dx, dy = obstacles[w, m, 0] - x, obstacles[w, m, 1] - y
         if math.sqrt(dx * dx + dy * dy) - obstacles[w, m, 2] < suite.reach:
-            write_echoes(i, w, x, y, c, s, obstacles, num_obstacles, suite, at, out)
+            write_echoes(i, w, (x, y, c, s), world, model)
             break
 
 
 @compiled
-def write_echoes(
-    i: int, w: int, x: float, y: float, c: float, s: float, obstacles: Float64, num_obstacles: int, suite: Suite,
-    at: Offsets, out: Float32,
-) -> None:  # fmt: skip
+def write_echoes(i: int, w: int, pose: Pose, world: World, model: Model) -> None:
     """What vehicle i hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17."""
+    suite, at, obstacles, out = model.suite, model.at, world.course.obstacles, world.senses.percept
+    x, y, c, s = pose
     for a in range(suite.active.shape[0]):
         k = suite.active[a]
         best = suite.active_range[a]
-        for m in range(num_obstacles):
+        for m in range(world.course.num_obstacles[w]):
             dx, dy, radius = obstacles[w, m, 0] - x, obstacles[w, m, 1] - y, obstacles[w, m, 2]
             if math.sqrt(dx * dx + dy * dy) - radius >= best:
                 continue
