@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.percept import Offsets, PerceptLayout
+from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, growth
 from uuv_marl.sim.disturbance import loss_ticks
 from uuv_marl.sim.sonar import Suite, suite
 from uuv_marl.sim.vehicle import Plant, plant
+from uuv_marl.sim.views import Starts
 
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
 """Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
@@ -49,8 +50,7 @@ class Model(NamedTuple):
     plant: Plant
     suite: Suite
     rules: Rules
-    at: Offsets
-    """Where each field of a percept starts."""
+    at: Starts
 
 
 def model(scenario: Scenario) -> Model:

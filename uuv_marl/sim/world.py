@@ -10,7 +10,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.percept import Offsets
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled, compiled_parallel
@@ -24,6 +23,7 @@ from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
+from uuv_marl.sim.views import Starts, fields
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -123,6 +123,7 @@ def judge(w: int, world: World, rules: Rules) -> None:
 def perceive(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> None:
     """What the living hear, and everybody's percept."""
     state, senses, now = world.state, world.senses, desk.now
+    see = fields(senses.percept, model.at)
     for i in range(state.alive.shape[1]):
         senses.heading[w, i, 0], senses.heading[w, i, 1] = now.cos[i], now.sin[i]
         if not state.alive[w, i]:  # its columns have moved on, its state has not
@@ -134,7 +135,7 @@ def perceive(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> None
         i = desk.cells.vehicle[p]
         for k in range(model.suite.lower.shape[0]):
             senses.heard[w, i, k] = desk.ear.heard[k]
-        write_percept(p, w, world, model, desk)
+        write_percept(p, w, world, model, desk, see)
 
 
 @compiled
@@ -215,7 +216,7 @@ def step_alone(action: Float32, world: World, model: Model, room: Scratch) -> bo
 @compiled_parallel
 def step_worlds(
     threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
-    plant: Plant, suite: Suite, rules: Rules, at: Offsets, room: Scratch,
+    plant: Plant, suite: Suite, rules: Rules, at: Starts, room: Scratch,
 ) -> bool:  # fmt: skip
     """One decision period of every active world, a run of worlds for each thread; whether any has diverged.
 
