@@ -11,10 +11,10 @@ import pytest
 
 from tests.conftest import SCENARIOS as LARGE
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.scenario_checks import warn_of_speed
-from uuv_marl.scenario_files import ScenarioError, parse_override, show, to_toml
+from uuv_marl.scenario import ScenarioError, parse_override, show, to_toml
+from uuv_marl.scenario.scenario import warn_of_speed
 
-FOLDER = resources.files("uuv_marl") / "scenarios"
+FOLDER = resources.files("uuv_marl.scenario")
 BASE = "single_obstacle"
 SCENARIOS = (*LARGE, "starter")
 

@@ -14,9 +14,9 @@ from tomlkit.container import Container
 from tomlkit.items import AbstractTable
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.scenario import Scenario
 
-_FOLDER = Path(__file__).resolve().parent / "scenarios"
+_FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
 _MAX_BYTES = 1_000_000
 _SHOWN = 80
