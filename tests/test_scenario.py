@@ -221,6 +221,11 @@ def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
 
 
+@pytest.mark.parametrize("linear", ["X_u", "Y_v", "N_r"])
+def test_damping_may_be_quadratic_alone(linear):
+    assert getattr(load_scenario(BASE, overrides={f"vehicle.{linear}": 0.0}).vehicle, linear) == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

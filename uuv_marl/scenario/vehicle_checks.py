@@ -57,7 +57,7 @@ def top_speed(vehicle: Vehicle, actuators: Actuators) -> float:
 
 def _terminal(linear: float, quadratic: float, force: float) -> float:
     """Speed at which linear plus quadratic resistance equals the force, with its sign."""
-    return 2 * force / (linear + math.sqrt(linear**2 + 4 * quadratic * abs(force)))
+    return 2 * force / (linear + math.sqrt(linear**2 + 4 * quadratic * abs(force))) if force else 0.0
 
 
 def _inertia(p: Vehicle) -> Float64:
