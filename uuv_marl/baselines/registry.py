@@ -17,8 +17,7 @@ from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
 from uuv_marl.percept import Percept
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 
 Float32 = NDArray[np.float32]
 

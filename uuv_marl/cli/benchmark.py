@@ -58,7 +58,7 @@ def benchmark(
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import rich_table
-        from uuv_marl.scenario_files import ScenarioError, load_scenario, parse_override
+        from uuv_marl.scenario import ScenarioError, load_scenario, parse_override
 
         changes = dict(parse_override(text) for text in overrides or [])
         for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
