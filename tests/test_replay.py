@@ -126,20 +126,17 @@ def test_every_contact_is_an_event(changes):
 
 
 def test_contacts_find_their_partners():
-    # 0 hits 1 from one side and 2 from the other; 1 and 2 are nearest to each other, and have touched before.
-    position = np.array(
-        [
-            [[0, 5], [0.5, 0], [-0.5, 0], [50, 0], [80, 0], [84, 0]],
-            [[0, 1.5], [0.5, 0], [-0.5, 0], [50, 0], [80, 0], [81, 0]],
-        ],
-        np.float32,
-    )
-    began = np.array([[0] * 6, [2, 1, 1, 1, 1, 1]], np.int32)
-    clearance = np.full((2, 6), 9.0, np.float32)
+    """0 hits 1 and 2, which touched before; 3 a rock; 4 and 5 each other; 6 and 7, which touched before, 8 and 9."""
+    now = [[0, 1.5], [0.5, 0], [-0.5, 0], [50, 0], [80, 0], [81, 0], [100, 0], [100.5, 0], [100, 1.5], [100.5, -1.5]]
+    before = np.array(now, np.float32)
+    before[[0, 5, 8, 9]] += [[0, 4], [4, 0], [0, 4], [0, -4]]
+    position = np.array([before, now], np.float32)
+    began = np.array([[0] * 10, [2] + [1] * 9], np.int32)
+    clearance = np.full((2, 10), 9.0, np.float32)
     clearance[1, 3] = 0.5
     found = contacts(np.array([0, 0.1], np.float32), began, clearance, position, 1.0)
-    assert {event.vehicles for event in found} == {(0, 1), (0, 2), (4, 5), (3,)}
-    assert [event.kind for event in found if event.vehicles == (3,)] == ["obstacle"]
+    assert sorted(event.vehicles for event in found) == [(0, 1), (0, 2), (3,), (4, 5), (6, 8), (7, 9)]
+    assert {event.kind for event in found if len(event.vehicles) == 1} == {"obstacle"}
 
 
 def test_who_stays_too_near_makes_one_mark():
@@ -281,8 +278,8 @@ def test_a_saved_trace_is_shown_as_far_as_it_goes(tmp_path):
     assert recording.force is None
     assert recording.spacing is None
     for name in ("min_spacing_m", "obstacle_clearance_m"):
-        assert recording.series[name].min() == whole.series[name].min()
-        assert len(recording.series[name]) == len(recording.time_s)
+        since = [whole.series[name][first:end].min() for first, end in zip([0, *at[:-1] + 1], at + 1, strict=True)]
+        np.testing.assert_array_equal(recording.series[name], since)
     lost = [event.vehicles for event in whole.events if event.kind == "lost"]
     assert [event.vehicles for event in recording.events if event.kind == "lost"] == lost
     shown = from_folder(tmp_path, None, "random", 0)
