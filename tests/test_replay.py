@@ -382,7 +382,7 @@ def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written)
     assert [(recording.policy, recording.seed) for recording in recordings] == [("idle", 3), ("sdc", 3)]
     assert [list(recording.inspections) for recording in recordings] == [[2], [2]]
     assert recordings[1].scenario.sonar.channels == ("compass", "link")
-    assert path == Path("results/replay/single_obstacle.idle%2Bsdc.3.html")
+    assert path == Path("results/replay/single_obstacle.idle-sdc.3.html")
     assert f"Replay: {path}" in text
 
 
