@@ -364,6 +364,7 @@ def written(monkeypatch):
     for module, name in (("page", "write_page"), ("film", "write_film")):
         stand_in = types.ModuleType(f"uuv_marl.replay.{module}")
         setattr(stand_in, name, write)
+        stand_in.check_format = lambda path: None
         monkeypatch.setitem(sys.modules, stand_in.__name__, stand_in)
         monkeypatch.setattr(f"uuv_marl.replay.{module}", stand_in, raising=False)
     return calls
