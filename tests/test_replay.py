@@ -505,3 +505,17 @@ def test_the_command_is_quoted_for_a_shell():
     text = command("my waters/mine.toml", "runs/a b/best", 3, ["obstacles=[]", 'sonar.echo_reports="surface"'])
     assert shlex.split(text)[:5] == ["uuv-marl", "replay", "--scenario", "my waters/mine.toml", "--policy"]
     assert shlex.split(text)[-4:] == ["--set", "obstacles=[]", "--set", 'sonar.echo_reports="surface"']
+
+
+@pytest.mark.docs
+def test_the_page_states_the_resolutions():
+    text = (Path(__file__).resolve().parent.parent / "docs" / "replay.md").read_text()
+    cells = {name: cells for name, *cells in re.findall(r"^\| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", text, flags=re.M)}
+    turn = 180 / np.pi
+    for name, coding, scale in (
+        ("position", CODINGS["position"], 100), ("heading", CODINGS["heading"], turn), ("speed", CODINGS["speed"], 1),
+        ("force", CODINGS["force"], 1), ("a vehicle's spacing", CODINGS["spacing"], 1),
+    ):  # fmt: skip
+        for cell, number in zip(cells[name], (coding.unit * scale, coding.resolution * scale), strict=True):
+            assert float(re.match(r"[\d.]+", cell)[0]) == pytest.approx(number, abs=0.06 if scale == turn else 1e-9)
+    assert f"{CODINGS['inspected_heading'].resolution * turn:.1f}°" in cells["heading"][1]
