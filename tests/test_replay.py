@@ -307,8 +307,9 @@ def edited(path, change):
     ("change", "message"),
     [
         (lambda a: a.pop("route_position"), "route_position is missing; run the benchmark again"),
-        (lambda a: a.update(route_heading=a["route_heading"][:, :3]), r"route_heading has the shape \(\d+, 3\)"),
-        (lambda a: a.update(time_s=a["time_s"][:-1]), "min_spacing_m has the shape"),
+        (lambda a: a.update(route_heading=a["route_heading"][:, :3]), r"route_heading is float32 of shape \(\d+, 3\)"),
+        (lambda a: a.update(waypoints=a["waypoints"].astype(str)), "waypoints is <U32 of shape"),
+        (lambda a: a.update(time_s=a["time_s"][:-1]), "min_spacing_m is float32 of shape"),
         (lambda a: a.update(route_time_s=a["route_time_s"] + 0.03), "must be times of time_s"),
     ],
 )

@@ -172,9 +172,9 @@ def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:
     """Raise ReplayError where the arrays are not those of a trace of so many vehicles."""
     sizes: dict[str | int, int] = {2: 2, 3: 3, "vehicle": num_vehicles}
     for name, axes in _SHAPES.items():
-        shape = trace[name].shape if name in trace else ()
+        shape = trace[name].shape if name in trace and trace[name].dtype == np.float32 else ()
         if len(shape) != len(axes) or any(sizes.setdefault(a, n) != n for a, n in zip(axes, shape, strict=True)):
-            got = f"has the shape {shape}" if name in trace else "is missing"
+            got = f"is {trace[name].dtype} of shape {trace[name].shape}" if name in trace else "is missing"
             raise ReplayError(f"{path} is no trace of this version of uuv_marl: {name} {got}; run the benchmark again")
     if not len(trace["route_time_s"]) or not np.isin(trace["route_time_s"], trace["time_s"]).all():
         raise ReplayError(f"{path}: route_time_s must be times of time_s; run the benchmark again")
