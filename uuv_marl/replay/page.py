@@ -6,13 +6,14 @@ they are; inlined, they are one module, without their imports and exports.
 
 import base64
 import html
+import json
 import re
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 from uuv_marl.atomic import write_text
-from uuv_marl.replay.encode import dumps
+from uuv_marl.replay.encode import payload
 from uuv_marl.replay.recording import Recording
 
 MOST_EPISODES = 4
@@ -41,7 +42,7 @@ def page_html(recordings: Sequence[Recording]) -> str:
         "title": html.escape(f"{recordings[0].scenario.name}: {policies}"),
         "style": _asset("uPlot.min.css") + "\n" + _asset("page.css"),
         "licence": html.escape(_asset("uPlot.LICENSE")),
-        "episodes": dumps(recordings),
+        "episodes": json.dumps(payload(recordings), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         "uplot": _deflated(_asset("uPlot.iife.min.js")),
         "scripts": _scripts(),
     }

@@ -177,12 +177,13 @@ class App {
 
   #legend() {
     if (!this.scale || !this.palette) return;
-    const { low, high, unit, smallStandsOut } = this.scale;
+    const { unit, factor, smallStandsOut } = this.scale;
+    const [low, high] = [this.scale.low, this.scale.high].map((value) => Number((factor * value).toFixed(1)));
     const steps = smallStandsOut ? [...this.palette.scale].reverse() : this.palette.scale;
     at("legend").querySelector("i").style.background = `linear-gradient(90deg, ${steps.join(", ")})`;
-    at("legend-low").textContent = `${Number(low.toFixed(1))}`;
-    at("legend-high").textContent = `${Number(high.toFixed(1))} ${unit}`;
-    at("legend").setAttribute("aria-label", `from ${low.toFixed(1)} to ${high.toFixed(1)} ${unit}`);
+    at("legend-low").textContent = low;
+    at("legend-high").textContent = `${high} ${unit}`;
+    at("legend").setAttribute("aria-label", `from ${low} to ${high} ${unit}`);
   }
 
   #listen() {

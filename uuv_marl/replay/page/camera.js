@@ -20,7 +20,7 @@ export class Camera {
   /** How an episode is seen now, on a picture of this size [px]; `poses` as of `Episode.poses`. */
   view(episode, time, poses, selected, width, height) {
     const { low, high } = this.course;
-    const fit = Math.min(height / (high[0] - low[0]), width / (high[1] - low[1]));
+    const fit = Math.min((height - 50) / (high[0] - low[0]), width / (high[1] - low[1]));
     const close = Math.min(width, height) / (this.follow === "vehicle" ? 0.7 * this.width : this.width);
     let at = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
     if (this.follow === "swarm") at = episode.centre(time, poses);
@@ -73,6 +73,7 @@ function bounds(episodes) {
     const discs = episode.values("obstacles");
     const start = episode.poses(0);
     for (let k = 0; k < corners.length; k += 2) hold(corners[k], corners[k + 1], 40);
+    hold(corners.at(-2), corners.at(-1), episode.arrival.spread_m);
     for (let k = 0; k < discs.length; k += 3) hold(discs[k], discs[k + 1], discs[k + 2] + 20);
     for (let k = 0; k < start.length; k += 3) hold(start[k], start[k + 1], 15);
   }

@@ -4,9 +4,9 @@ const STEPS = 24;
 
 /** What colours can show. Small spacings stand out, as do large speeds and forces. */
 export const QUANTITIES = {
-  spacing: { label: "Spacing", unit: "m", smallStandsOut: true },
-  speed: { label: "Speed", unit: "m/s", smallStandsOut: false },
-  force: { label: "Force", unit: "of full force", smallStandsOut: false },
+  spacing: { label: "Spacing", unit: "m", factor: 1, smallStandsOut: true },
+  speed: { label: "Speed", unit: "m/s", factor: 1, smallStandsOut: false },
+  force: { label: "Force", unit: "%", factor: 100, smallStandsOut: false },
 };
 
 /** The quantities that these episodes hold. */

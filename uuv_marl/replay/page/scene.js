@@ -166,16 +166,32 @@ function dart(context, x, y, heading, size) {
   context.closePath();
 }
 
+/** A cross where a vehicle was lost. */
+function cross(context, x, y, size) {
+  context.moveTo(x - size, y - size);
+  context.lineTo(x + size, y + size);
+  context.moveTo(x - size, y + size);
+  context.lineTo(x + size, y - size);
+}
+
 /** Everybody, one path for each step of the colour scale. */
 function drawVehicles(context, episode, sample, poses, view, size, look) {
   const values = look.scale && episode.values(look.scale.quantity);
   const paths = new Map();
+  context.beginPath();
   for (let i = 0; i < episode.vehicles; i++) {
+    if (episode.isLost(i, sample)) {
+      cross(context, view.x(poses[3 * i + 1]), view.y(poses[3 * i]), 0.35 * size);
+      continue;
+    }
     const value = values ? values[sample * episode.vehicles + i] : NaN;
-    const colour = episode.isLost(i, sample) ? look.palette.lost : look.palette.scale[look.scale?.step(value) ?? 0];
+    const colour = look.palette.scale[look.scale?.step(value) ?? 0];
     if (!paths.has(colour)) paths.set(colour, []);
     paths.get(colour).push(i);
   }
+  context.lineWidth = 2;
+  context.strokeStyle = look.palette.lost;
+  context.stroke();
   for (const [colour, vehicles] of paths) {
     context.beginPath();
     for (const i of vehicles) dart(context, view.x(poses[3 * i + 1]), view.y(poses[3 * i]), poses[3 * i + 2], size);

@@ -97,6 +97,8 @@ export class Timeline {
     const context = this.canvas.getContext("2d");
     context.scale(ratio, ratio);
     this.episodes.forEach((episode, row) => {
+      context.fillStyle = palette[`series-${row}`];
+      context.fillRect(0, ROW_PX * row + 2, 5, 4);
       for (const event of [...episode.events].sort((a, b) => WEIGHT[a.kind] - WEIGHT[b.kind])) {
         const x = INSET_PX + (event.time_s / this.end) * (width - 2 * INSET_PX);
         const light = event.kind.startsWith("near");
