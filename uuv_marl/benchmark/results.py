@@ -71,8 +71,8 @@ class Content(TypedDict):
 _CONTENT = TypeAdapter(Content)
 
 
-def read_content(path: Path) -> Content:
-    """What a ``results.json`` holds. Raises ResultsError where it is none of this version's."""
+def read_content(path: Path, remedy: str = "move it away or give another --output") -> Content:
+    """What a ``results.json`` holds. Raises ResultsError with the remedy where it is none of this version's."""
     try:
         content = _CONTENT.validate_json(path.read_bytes())
     except OSError as error:
@@ -86,7 +86,7 @@ def read_content(path: Path) -> Content:
         if not unknown:
             return content
         reason = f"runs name {min(unknown)!r}, which is not described"
-    raise ResultsError(f"{path} can't be read ({reason}); move it away or give another --output")
+    raise ResultsError(f"{path} can't be read ({reason}); {remedy}")
 
 
 class Results:
@@ -213,7 +213,9 @@ def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-        raise ResultsError(f"{path} can't be read ({error}); delete it, and the same command makes it again") from error
+        raise ResultsError(
+            f"{path} can't be read ({error}); delete it, and the benchmark's command makes it again"
+        ) from error
 
 
 def knowledge(policy: str) -> Knowledge:

@@ -5,12 +5,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from uuv_marl.atomic import write_text, writing
-from uuv_marl.baselines import POLICIES, granted
-from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
-from uuv_marl.errors import PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario_files import differences, scenario_names
 
@@ -39,17 +38,13 @@ def run_missing(
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
             done, fresh = len(seeds) - len(missing), 0
             report(scenario.name, policy, done / len(seeds))
-            try:
+            with blaming(policy):
                 for event in evaluator(granted(policy, scenario), policy, missing):
                     if isinstance(event, Run):
                         results.add(scenario.name, policy, event)
                         fresh += 1
                     share = event.share if isinstance(event, Progress) else fresh / len(missing)
                     report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
-            except (TypeError, ValueError) as error:
-                if policy in POLICIES or isinstance(error, PolicyError):
-                    raise
-                raise PolicyError(f"policy {policy!r}: {error}") from error
             report(scenario.name, policy, 1.0)
 
 

@@ -14,14 +14,13 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from uuv_marl.atomic import locked
-from uuv_marl.errors import ClusterError, DivergenceError, MissingExtraError, PolicyError, ResultsError, ScenarioError
+from uuv_marl.errors import MENDABLE
 from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
 
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
 errors = Console(stderr=True)
 
-_MENDABLE = (ScenarioError, PolicyError, DivergenceError, ResultsError, ClusterError, MissingExtraError)
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 _NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")))
@@ -35,7 +34,7 @@ def explained() -> Iterator[None]:
         yield
     except Exception as error:
         frames = _own_frames(error) or _own_frames(error.__cause__)
-        if isinstance(error, _MENDABLE):
+        if isinstance(error, MENDABLE):
             message = str(error)
         elif frames:
             message = f"{type(error).__name__}: {error}"
