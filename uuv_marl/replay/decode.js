@@ -36,7 +36,8 @@ async function decodeArray({ shape, dtype, scale, stride, order, missing, data }
   return { shape, data: values };
 }
 
-async function inflate(text) {
+/** The bytes that were packed as text: deflated, in base64. */
+export async function inflate(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
   return new Uint8Array(await new Response(stream).arrayBuffer());

@@ -21,12 +21,7 @@ MOST_EPISODES = 4
 
 _ASSETS = Path(__file__).parent / "page"
 _DECODER = Path(__file__).parent / "decode.js"
-_MODULE_WORDS = re.compile(r"^(?:import .*? from \"[^\"]+\";\n|export )", re.MULTILINE)
-
-
-def write_page(recordings: Sequence[Recording], path: Path) -> None:
-    """Write ``page_html`` to a file, whole or not at all. Raises ResultsError where it can't be written."""
-    write_text(path, page_html(recordings))
+_MODULE_WORDS = re.compile(r"^(?:import [^;]*;\n|export )", re.MULTILINE)
 
 
 def page_html(recordings: Sequence[Recording]) -> str:
@@ -37,16 +32,45 @@ def page_html(recordings: Sequence[Recording]) -> str:
     """
     if not 1 <= len(recordings) <= MOST_EPISODES:
         raise ValueError(f"a page shows 1 to {MOST_EPISODES} episodes, got {len(recordings)}; make several pages")
-    policies = ", ".join(recording.policy for recording in recordings)
+    data = json.dumps(payload(recordings), allow_nan=False, separators=(",", ":"))
     parts = {
-        "title": html.escape(f"{recordings[0].scenario.name}: {policies}"),
-        "style": _asset("uPlot.min.css") + "\n" + _asset("page.css"),
+        "title": html.escape(_title(recordings)),
+        "style": f"{_asset('uPlot.min.css')}\n{_asset('page.css')}",
         "licence": html.escape(_asset("uPlot.LICENSE")),
-        "episodes": json.dumps(payload(recordings), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "episodes": data.replace("<", "\\u003c"),
         "uplot": _deflated(_asset("uPlot.iife.min.js")),
         "scripts": _scripts(),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _asset("page.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("page.html"))
+
+
+def write_page(recordings: Sequence[Recording], path: Path) -> None:
+    """Write ``page_html`` to a file, whole or not at all. Raises ResultsError where it can't be written."""
+    write_text(path, page_html(recordings))
+
+
+class Replay:
+    """Episodes that a notebook shows where this object is a cell's value: the page, in a frame of its own.
+
+    Args:
+        recordings: one to four.
+        height_px: of the frame.
+    """
+
+    def __init__(self, recordings: Sequence[Recording], height_px: int = 640) -> None:
+        self._page = page_html(recordings)
+        self._title = _title(recordings)
+        self._height_px = height_px
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe title="{html.escape(self._title)}" sandbox="allow-scripts" width="100%" '
+            f'height="{self._height_px}" style="border: 0" srcdoc="{html.escape(self._page)}"></iframe>'
+        )
+
+
+def _title(recordings: Sequence[Recording]) -> str:
+    return f"{recordings[0].scenario.name}: {', '.join(recording.policy for recording in recordings)}"
 
 
 def _asset(name: str) -> str:
@@ -61,6 +85,6 @@ def _deflated(text: str) -> str:
 
 def _scripts() -> str:
     """The page's own modules as one; ``app.js`` comes last, for it runs what the others define."""
-    modules = sorted(_ASSETS.glob("*.js"), key=lambda path: path.name == "app.js")
-    own = [path for path in modules if not path.name.startswith("uPlot")]
-    return "\n".join(_MODULE_WORDS.sub("", path.read_text(encoding="utf-8")) for path in [_DECODER, *own])
+    own = [path for path in sorted(_ASSETS.glob("*.js")) if not path.name.startswith(("app", "uPlot"))]
+    modules = [_DECODER, *own, _ASSETS / "app.js"]
+    return "\n".join(_MODULE_WORDS.sub("", path.read_text(encoding="utf-8")) for path in modules)
