@@ -271,6 +271,7 @@ async function open() {
     select: (episode, vehicle) => app.select(episode, vehicle),
     setColour: (quantity) => app.setColour(quantity),
     follow: (what) => app.follow(what),
+    place: (episode, vehicle) => app.panels[episode].place(vehicle),
     play: () => app.play(),
     pause: () => app.pause(),
     drawTimes: app.drawTimes,

@@ -94,6 +94,12 @@ export class Panel {
     this.chips.forEach((chip) => chip.setAttribute("aria-pressed", String(Number(chip.dataset.vehicle) === selected)));
   }
 
+  /** Where a vehicle is drawn in the window [px]. */
+  place(vehicle) {
+    const { left, top } = this.canvas.getBoundingClientRect();
+    return [left + this.view.x(this.poses[3 * vehicle + 1]), top + this.view.y(this.poses[3 * vehicle])];
+  }
+
   /** The vehicle that is drawn at most 18 px from a place of the picture, or null. */
   vehicleAt(x, y) {
     let [best, distance] = [null, 18];

@@ -291,7 +291,7 @@ function drawMap(context, episode, time, poses, view, look) {
   context.beginPath();
   context.roundRect(0, 0, map.width, map.height, 6);
   context.fillStyle = look.palette.panel;
-  context.globalAlpha = 0.9;
+  context.globalAlpha = 0.8;
   context.fill();
   context.globalAlpha = 1;
   context.clip();
@@ -313,7 +313,7 @@ function drawMap(context, episode, time, poses, view, look) {
 /** The frame of the small map in a picture's corner, or null where the picture has no room or shows it all. */
 export function mapView(course, view) {
   const [tall, wide] = [course.high[0] - course.low[0], course.high[1] - course.low[1]];
-  const most = Math.min(150, 0.3 * view.width, 0.34 * view.height);
+  const most = Math.min(140, 0.22 * view.width, 0.3 * view.height);
   const scale = most / Math.max(tall, wide);
   if (most < 60 || scale > 0.75 * view.scale) return null;
   const [north, east] = [(course.low[0] + course.high[0]) / 2, (course.low[1] + course.high[1]) / 2];
