@@ -1,7 +1,7 @@
 """Run a policy on a scenario over seeds."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -65,12 +65,12 @@ Watch = Callable[[Swarm, Float32 | None], None]
 
 
 def evaluate(
-    scenario: Scenario, policy: str, seeds: Sequence[int], *, watch: Watch | None = None, **parameters: object
+    scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None = None, /, **parameters: object
 ) -> Iterator[Run | Progress]:
     """Episodes of a policy on a scenario, each as soon as it ends, with progress in between.
 
     The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed
-    alone, not on the seeds beside it. ``parameters`` go to the policy.
+    alone, not on the seeds beside it. ``watch`` sees every step, and ``parameters`` go to the policy.
 
     Raises:
         DivergenceError: the integration step could not follow a vehicle. Such a run has no metrics; those of the seeds
@@ -86,7 +86,7 @@ def evaluate(
 
 
 @contextmanager
-def blaming(policy: str) -> Iterator[None]:
+def blaming(policy: str) -> Generator[None]:
     """Turn what a user's own policy makes ``evaluate`` raise into a PolicyError that names it."""
     try:
         yield

@@ -34,7 +34,7 @@ _SOURCES = (
 )  # fmt: skip
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
 _LONGEST_NAME = 200
-"""Bytes of a trace's name, which file systems limit to 255."""
+"""Bytes of a run's name, of which file systems allow 255."""
 
 
 class Row(NamedTuple):
@@ -193,11 +193,16 @@ class Results:
 
 
 def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
-    """Where the time series of a run are, in the folder of its ``results.json``; a long name ends in a hash."""
+    """Where the time series of a run are, in the folder of its ``results.json``."""
+    return folder / "traces" / f"{run_name(scenario, policy, seed)}.npz"
+
+
+def run_name(scenario: str, policy: str, seed: int) -> str:
+    """A name of a run for files, without a suffix; a long one ends in a hash."""
     name = f"{scenario}.{quote(policy, safe='')}.{seed}"
     if len(name.encode()) > _LONGEST_NAME:
         name = f"{name.encode()[: _LONGEST_NAME - 17].decode(errors='ignore')}-{_hash(name.encode())}"
-    return folder / "traces" / f"{name}.npz"
+    return name
 
 
 def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:

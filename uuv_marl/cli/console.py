@@ -4,7 +4,7 @@ import errno
 import sys
 import sysconfig
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from uuv_marl.atomic import locked
-from uuv_marl.errors import MENDABLE
+from uuv_marl.errors import MENDABLE, PolicyError
 from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
 
 # Piped output keeps a width at which tables are legible.
@@ -79,3 +79,19 @@ def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
     except KeyboardInterrupt:
         console.print(f"Stopped. {kept}; the same command goes on.")
         raise typer.Exit(130) from None
+
+
+def changes_of(overrides: Sequence[str]) -> dict[str, object]:
+    """The fields that ``--set`` changes in scenarios that policies run on. Raises ScenarioError, PolicyError."""
+    from uuv_marl.scenario_files import parse_override
+
+    changes = dict(parse_override(text) for text in overrides)
+    for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
+        raise PolicyError(f"{field} can't be set here: every policy brings its own, see 'uuv-marl policies'")
+    return changes
+
+
+def find_modules(policies: Sequence[str]) -> None:
+    """Let ``module:Class`` be looked for in the current folder too."""
+    if any(":" in name for name in policies):
+        sys.path.append("")  # last, so that no file of this folder takes the place of an installed module

@@ -62,7 +62,7 @@ def _nearest_pairs(position: Float32, left: Int32) -> list[tuple[int, int]]:
     """Pairs of vehicles, nearest first, until each has as many as it has contacts ``left`` or is without a partner."""
     these = np.flatnonzero(left > 0).tolist()
     away = {(i, j): float(np.hypot(*(position[i] - position[j]))) for i in these for j in these if i < j}
-    count, pairs = left.copy(), []
+    count, pairs = left.copy(), list[tuple[int, int]]()
     for i, j in sorted(away, key=lambda pair: away[pair]):
         if count[i] > 0 and count[j] > 0:
             pairs.append((i, j))

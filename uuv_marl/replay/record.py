@@ -1,9 +1,10 @@
 """Recording an episode while it is simulated, by the loop and with the numbers of the benchmark."""
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
@@ -42,7 +43,7 @@ def record(
     scenario = granted(policy, scenario)
     tape = _Tape(watched)
     with blaming(policy):
-        for event in evaluate(scenario, policy, [seed], watch=tape):
+        for event in evaluate(scenario, policy, [seed], tape):
             if isinstance(event, Run):
                 return tape.recording(scenario, policy, event)
             if report:
@@ -68,7 +69,7 @@ class _Tape:
 
     def __init__(self, inspect: Sequence[int]) -> None:
         self._inspect = inspect
-        self._samples: dict[str, list[NDArray[np.generic]]] = {}
+        self._samples: dict[str, list[NDArray[Any]]] = {}
         self._actions: list[Float32] = []
 
     def __call__(self, swarm: Swarm, action: Float32 | None) -> None:
@@ -93,8 +94,9 @@ class _Tape:
         if action is not None:
             self._actions.append(np.array(action[0, seen], np.float32))
 
-    def _add(self, name: str, values: object, kind: type = np.float32) -> None:
-        self._samples.setdefault(name, []).append(np.array(values, kind))
+    def _add(self, name: str, values: ArrayLike, kind: DTypeLike = np.float32) -> None:
+        copy: NDArray[Any] = np.array(values, kind)
+        self._samples.setdefault(name, []).append(copy)
 
     def recording(self, scenario: Scenario, policy: str, run: Run) -> Recording:
         """The recording of the run that was watched."""
@@ -124,7 +126,7 @@ class _Tape:
             inspections=self._inspections(tape),
         )
 
-    def _inspections(self, tape: dict[str, NDArray[np.generic]]) -> dict[int, Inspection]:
+    def _inspections(self, tape: dict[str, NDArray[Any]]) -> dict[int, Inspection]:
         steps = len(self._actions)
         asked = np.full((steps + 1, len(self._inspect), 2), np.nan, np.float32)
         asked[:steps] = self._actions
@@ -138,7 +140,7 @@ class _Tape:
         }
 
 
-def _events(scenario: Scenario, tape: dict[str, NDArray[np.generic]], run: Run) -> list[Event]:
+def _events(scenario: Scenario, tape: dict[str, NDArray[Any]], run: Run) -> list[Event]:
     """All events in the order of time."""
     time, limits = tape["time_s"], scenario.constraints
     events = [
@@ -151,7 +153,7 @@ def _events(scenario: Scenario, tape: dict[str, NDArray[np.generic]], run: Run) 
     return sorted(events, key=lambda event: event.time_s)
 
 
-def _where(there: NDArray[np.bool_], values: Float32) -> Float32:
+def _where(there: NDArray[Any], values: NDArray[Any]) -> Float32:
     """The values, NaN where they are not ``there``, whose axes are the first ones of the values."""
     return np.where(there.reshape(there.shape + (1,) * (values.ndim - there.ndim)), values, np.float32(np.nan))
 

@@ -1,8 +1,9 @@
 """Recordings of what a benchmark has saved: less than a simulation shows, but at once and without the policy."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -19,6 +20,7 @@ from uuv_marl.scenario_files import load_scenario
 from uuv_marl.sim.trajectory import arrival_times, reference
 
 _ELSE = "give the folder of a benchmark or a file of its folder traces, or simulate with --scenario and --policy"
+_MOST_LISTED = 10
 _SHAPES: dict[str, tuple[str | int, ...]] = {
     "time_s": ("time",),
     "min_spacing_m": ("time",),
@@ -67,24 +69,47 @@ def from_trace(path: str | Path) -> Recording:
     raise ReplayError(f"{path} is no trace of a run in {saved.folder / FILE}; {_ELSE}")
 
 
-def from_folder(folder: str | Path, scenario: str, policy: str, seed: int) -> Recording:
+def from_folder(folder: str | Path, scenario: str | None, policy: str | None, seed: int) -> Recording:
     """The recording of a run in a benchmark's folder, as ``from_trace`` gives it.
+
+    Args:
+        folder: that holds the results.json.
+        scenario: its name; None for the only one there.
+        policy: its name; None for the only one of that scenario.
+        seed: of the run.
 
     Raises:
         ReplayError: the run is not there, or its trace holds no routes.
         ResultsError: results.json or the trace can't be read.
     """
     saved = Saved.at(Path(folder))
-    keys = {row[:3]: row.metrics for row in saved.content["runs"]}
-    if (scenario, policy, seed) not in keys:
-        near = [key for key in keys if key[:2] == (scenario, policy)] or list(keys)
-        held = ", ".join(f"{s}: {p} with seed {k}" for s, p, k in near[:10]) or "no run"
+    rows = saved.content["runs"]
+    scenario = _chosen(folder, "--scenario", scenario, {row.scenario for row in rows})
+    rows = [row for row in rows if row.scenario == scenario]
+    policy = _chosen(folder, "--policy", policy, {row.policy for row in rows})
+    metrics = {row.seed: row.metrics for row in rows if row.policy == policy}
+    if seed not in metrics:
         raise ReplayError(
-            f"{folder} holds no run of {policy} on {scenario} with seed {seed}; it holds {held}"
-            f"{' and others' if len(near) > 10 else ''}. Give one of these, or simulate yours: "
-            f"{command(scenario, policy, seed)}"
+            f"{folder} holds no run of {policy} on {scenario} with seed {seed}, only {_listed(metrics)}; give one of "
+            f"these, or simulate it: {command(scenario, policy, seed)}"
         )
-    return _recording(saved, scenario, policy, seed, keys[scenario, policy, seed])
+    return _recording(saved, scenario, policy, seed, metrics[seed])
+
+
+def _chosen(folder: str | Path, option: str, wanted: str | None, held: set[str]) -> str:
+    """What is wanted, or the only one that is held."""
+    if wanted in held:
+        return wanted
+    if wanted is None and len(held) == 1:
+        return next(iter(held))
+    missing = "" if wanted is None else f" no {wanted!r} but"
+    raise ReplayError(f"{folder} holds{missing} {_listed(held) or 'no runs'}; choose with {option}")
+
+
+def _listed(held: Iterable[Any]) -> str:
+    """The first of them, for a message."""
+    names = [str(name) for name in sorted(held)]
+    return ", ".join(names[:_MOST_LISTED]) + (" and others" if len(names) > _MOST_LISTED else "")
 
 
 def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics) -> Recording:
@@ -176,6 +201,6 @@ def _events(scenario: Scenario, trace: dict[str, Float32], metrics: Metrics) -> 
         )
         for event in near_misses(kind, time, low[:, None])
     ]
-    alive = np.isfinite(trace["route_position"]).all(axis=2)
+    alive = np.isfinite(trace["route_heading"])
     events = [*(event._replace(vehicles=()) for event in marks), *losses(trace["route_time_s"], alive)]
     return sorted([*events, *arrival(metrics["task_time_s"])], key=lambda event: event.time_s)
