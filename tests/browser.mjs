@@ -1,6 +1,6 @@
 // Drives a Chromium without a network. On stdin JSON {chromium, folder, views: [{page, width, height, scheme, steps}]},
-// a step being ["js", expression], ["clickOn", expression of [x, y]], ["key", name] or ["picture", path, and the bytes
-// that it has once all is drawn]; on stdout JSON, a view each: {values: of its expressions, errors, requests}.
+// a step being ["js", expression, name of its value], ["clickOn", expression of [x, y]], ["key", name] or ["picture", path, and the bytes
+// that it has once all is drawn]; on stdout JSON, a view each: {values: by name, errors, requests}.
 import { spawn } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 
@@ -45,7 +45,7 @@ async function show({ page, width, height, scheme, steps }) {
   const { targetId } = await send("Target.createTarget", { url: "about:blank" });
   const { sessionId } = await send("Target.attachToTarget", { targetId, flatten: true });
   const tab = (method, params) => send(method, params, sessionId);
-  const seen = { values: [], errors: [], requests: [] };
+  const seen = { values: {}, errors: [], requests: [] };
   let loaded;
   const load = new Promise((done) => (loaded = done));
   heard = ({ method, params }) => {
@@ -70,7 +70,9 @@ async function show({ page, width, height, scheme, steps }) {
   };
   const mouse = (type, x, y) => tab("Input.dispatchMouseEvent", { type, x, y, button: "left", clickCount: 1 });
   const act = {
-    js: async (expression) => seen.values.push(await js(expression)),
+    js: async (expression, name) => {
+      seen.values[name] = await js(expression);
+    },
     click: async (x, y) => {
       await mouse("mousePressed", x, y);
       await mouse("mouseReleased", x, y);

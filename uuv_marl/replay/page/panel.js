@@ -22,7 +22,7 @@ export class Panel {
   constructor(episode, index, select) {
     this.episode = episode;
     this.select = select;
-    this.canvas = make("canvas", { tabIndex: 0 });
+    this.canvas = make("canvas");
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `${episode.policy}: ${episode.vehicles} vehicles in the water`);
     this.context = this.canvas.getContext("2d", { alpha: false });

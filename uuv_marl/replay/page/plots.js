@@ -17,6 +17,7 @@ export class Plots {
     this.seek = seek;
     this.place = document.getElementById("plots");
     this.plots = [];
+    this.time = 0;
   }
 
   /** Make the plots anew, in the palette's colours and the place's width. */
@@ -27,7 +28,6 @@ export class Plots {
       this.episodes.some((episode) => episode.values(array)?.some(Number.isFinite)),
     );
     this.plots = shown.map((plot) => this.#plot(plot, palette));
-    this.show(this.time ?? 0);
   }
 
   show(time) {
@@ -52,7 +52,9 @@ export class Plots {
         scales: { x: { time: false }, y: { range: (_, low, high) => range(kind, low, high) } },
         axes: [{ ...axis, size: 22, gap: 2 }, { ...axis, size: 34, gap: 4 }],
         series: [{}, ...this.episodes.map((_, k) => line(k, palette))],
-        hooks: { draw: [(drawn) => drawBound(drawn, kind, this.episodes[0], palette)] },
+        hooks: {
+          draw: [(drawn) => drawBound(drawn, kind, this.episodes[0], palette), () => this.show(this.time)],
+        },
       },
       uPlot.join(this.episodes.map((episode) => [Array.from(episode.time), finite(episode, kind.array)])),
       place,

@@ -174,7 +174,7 @@ function cross(context, x, y, size) {
   context.lineTo(x + size, y - size);
 }
 
-/** Everybody, one path for each step of the colour scale. */
+/** Everybody, colour by colour. Small paths one by one are filled faster than one path that spans the picture. */
 function drawVehicles(context, episode, sample, poses, view, size, look) {
   const values = look.scale && episode.values(look.scale.quantity);
   const paths = new Map();
@@ -193,10 +193,12 @@ function drawVehicles(context, episode, sample, poses, view, size, look) {
   context.strokeStyle = look.palette.lost;
   context.stroke();
   for (const [colour, vehicles] of paths) {
-    context.beginPath();
-    for (const i of vehicles) dart(context, view.x(poses[3 * i + 1]), view.y(poses[3 * i]), poses[3 * i + 2], size);
     context.fillStyle = colour;
-    context.fill();
+    for (const i of vehicles) {
+      context.beginPath();
+      dart(context, view.x(poses[3 * i + 1]), view.y(poses[3 * i]), poses[3 * i + 2], size);
+      context.fill();
+    }
   }
 }
 
