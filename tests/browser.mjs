@@ -1,6 +1,7 @@
 // Drives a Chromium without a network. On stdin JSON {chromium, folder, views: [{page, width, height, scheme, steps}]},
-// a step being ["js", expression, name of its value], ["clickOn", expression of [x, y]], ["key", name] or ["picture", path, and the bytes
-// that it has once all is drawn]; on stdout JSON, a view each: {values: by name, errors, requests}.
+// a step being ["js", expression, name of its value], ["clickOn", expression of [x, y]], ["wheelOn", the same, turn],
+// ["key", name] or ["picture", path, and the bytes that it has once all is drawn]; on stdout JSON, a view each:
+// {values: by name, errors, requests}.
 import { spawn } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 
@@ -78,6 +79,10 @@ async function show({ page, width, height, scheme, steps }) {
       await mouse("mouseReleased", x, y);
     },
     clickOn: async (expression) => act.click(...(await js(expression))),
+    wheelOn: async (expression, deltaY) => {
+      const [x, y] = await js(expression);
+      await tab("Input.dispatchMouseEvent", { type: "mouseWheel", x, y, deltaX: 0, deltaY });
+    },
     key: async (key) => {
       const text = key.length === 1 ? key : undefined;
       const codes = { Tab: 9, ArrowRight: 39, " ": 32 };

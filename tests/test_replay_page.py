@@ -159,6 +159,7 @@ DRAWN_BYTES = 30_000
 """Of a notebook's picture; an empty frame has half as many."""
 VIEWS = [(1280, 800, "dark"), (1280, 800, "light"), (390, 844, "dark"), (390, 844, "light")]
 SHOWN_TIME = "Number(document.getElementById('scrubber').value)"
+PLACES = "new Promise((drawn) => setTimeout(() => drawn([replay.place(0, 20), replay.place(0, 30)]), 100))"
 NOW_LINES = "[...document.querySelectorAll('.now')].map((line) => line.getBoundingClientRect().x)"
 """Where the plots mark the present time."""
 COLOURS = """
@@ -186,6 +187,12 @@ def steps(picture):
         ["js", "document.getElementById('status').textContent", "event"],
         ["key", "ArrowRight"],
         ["js", SHOWN_TIME, "stepped"],
+        ["js", "document.getElementById('help-button').focus()", "focus"],
+        ["key", "Tab"],
+        ["js", "document.getElementById('vehicle-number').value", "tabbed"],
+        ["js", PLACES, "before the wheel"],
+        ["wheelOn", "replay.place(0, 20)", -300],
+        ["js", PLACES, "after the wheel"],
         ["js", "document.documentElement.scrollWidth", "width"],
         ["js", COLOURS, "colours"],
         ["js", "replay.setColour('speed'); document.getElementById('legend').textContent", "legend"],
@@ -245,7 +252,15 @@ def test_a_browser_selects_and_steps(view, seen, recordings):
     assert values["jumped"] == pytest.approx(next(time for time in times if time > 90.05), abs=0.5)
     assert re.match(rf"{values['jumped']:.1f} s: ({'|'.join(POLICIES)}): ", values["event"])
     assert values["stepped"] == pytest.approx(values["jumped"] + recordings[0].scenario.timing.decision_period_s)
+    assert values["tabbed"] == str(INSPECTED[0])
     assert values["help"]
+
+
+@each_view
+def test_the_wheel_magnifies_around_the_pointer(view, seen):
+    before, after = (np.array(seen[0][view]["values"][f"{when} the wheel"]) for when in ("before", "after"))
+    assert after[0] == pytest.approx(before[0], abs=1.0)
+    assert np.hypot(*(after[1] - after[0])) > 1.3 * np.hypot(*(before[1] - before[0]))
 
 
 @each_view
