@@ -1,15 +1,15 @@
 /** The page: what is shown now, and what keys and buttons change. `window.replay` offers the same to a script. */
-import { Camera, FOLLOW } from "./camera.js";
+import { Camera } from "./camera.js";
 import { QUANTITIES, Scale, resolvePalette, shownQuantities } from "./colours.js";
 import { decodeEpisodes, inflate } from "../decode.js";
 import { Episode } from "./episode.js";
 import { listen } from "./gestures.js";
+import { SPEEDS, listenToKeys } from "./keys.js";
 import { Panel, make } from "./panel.js";
 import { Plots } from "./plots.js";
 import { Timeline, jumpText } from "./timeline.js";
 import { showVehicle } from "./vehicle.js";
 
-const SPEEDS = [0.5, 1, 2, 4, 8, 16, 32];
 const PALETTE = [
   "water", "grid", "track", "obstacle", "keepout", "goal", "trail", "reference", "hit", "near", "lost", "active",
   "passive", "heard", "echo", "force", "ink", "muted", "line", "panel", "series-0", "series-1", "series-2", "series-3",
@@ -77,7 +77,7 @@ class App {
     else this.play();
   }
 
-  /** Go to the next event or the one before, say what it was, and select whom it concerns. */
+  /** Go to the next event or the one before, and say what it is. */
   jump(forward) {
     const jump = this.timeline.jump(this.time, forward);
     if (!jump) return;
@@ -115,13 +115,25 @@ class App {
     this.render();
   }
 
+  /** Shift all pictures by so many pixels of a panel. */
+  pan(right, down, panel) {
+    this.camera.pan(right, down, panel.view);
+    this.render();
+  }
+
+  /** Magnify all pictures, around a pixel of a panel, by default around its middle. */
+  magnify(factor, panel = this.panels[0], x = undefined, y = undefined) {
+    this.camera.magnify(factor, panel.view, x, y);
+    this.render();
+  }
+
   setTrails(shown) {
     this.trails = shown;
     at("trails").setAttribute("aria-pressed", String(shown));
     this.render();
   }
 
-  /** Everything that depends on the colours and on the size of the page. */
+  /** Bring up to date what depends on the colours and on the size of the page. */
   restyle() {
     this.palette = resolvePalette(PALETTE);
     this.resize();
@@ -197,15 +209,11 @@ class App {
     at("help-button").addEventListener("click", () => at("help").showModal());
     at("theme").addEventListener("click", () => this.#theme());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.restyle());
-    addEventListener("keydown", (event) => this.#key(event));
+    listenToKeys(this);
     this.panels.forEach((panel, k) => {
-      const move = (change) => {
-        change();
-        this.render();
-      };
       listen(panel.canvas, {
-        pan: (right, down) => move(() => this.camera.pan(right, down, panel.view)),
-        magnify: (factor, x, y) => move(() => this.camera.magnify(factor, panel.view, x, y)),
+        pan: (right, down) => this.pan(right, down, panel),
+        magnify: (factor, x, y) => this.magnify(factor, panel, x, y),
         click: (x, y) => this.select(k, panel.vehicleAt(x, y)),
       });
     });
@@ -217,40 +225,6 @@ class App {
       (root.style.colorScheme === "" && matchMedia("(prefers-color-scheme: dark)").matches);
     root.style.colorScheme = dark ? "light" : "dark";
     this.restyle();
-  }
-
-  #key(event) {
-    const typing = event.target.matches("select, input[type=number]") || at("help").open;
-    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-    const sample = this.episodes[0].period_s;
-    const magnify = (factor) => {
-      this.camera.magnify(factor, this.panels[0].view);
-      this.render();
-    };
-    const next = (all, now, step = 1) => all[(all.indexOf(now) + step + all.length) % all.length];
-    const faster = (step) => SPEEDS[Math.min(Math.max(SPEEDS.indexOf(this.speed) + step, 0), SPEEDS.length - 1)];
-    const keys = {
-      " ": () => this.toggle(),
-      ArrowRight: () => this.seek(this.time + (event.shiftKey ? 10 : sample)),
-      ArrowLeft: () => this.seek(this.time - (event.shiftKey ? 10 : sample)),
-      ArrowUp: () => this.setSpeed(faster(1)),
-      ArrowDown: () => this.setSpeed(faster(-1)),
-      Home: () => this.seek(0),
-      End: () => this.seek(this.end),
-      "+": () => magnify(1.25),
-      "=": () => magnify(1.25),
-      "-": () => magnify(0.8),
-      f: () => this.follow(next(FOLLOW, this.camera.follow)),
-      t: () => this.setTrails(!this.trails),
-      c: () => this.setColour(next(this.quantities, this.scale?.quantity)),
-      n: () => this.jump(true),
-      p: () => this.jump(false),
-      Escape: () => this.select(this.selectedEpisode, null),
-      "?": () => at("help").showModal(),
-    };
-    if (!keys[event.key] || (event.key === " " && event.target.matches("button"))) return;
-    event.preventDefault();
-    keys[event.key]();
   }
 }
 

@@ -1,5 +1,6 @@
 /** One episode's part of the page: its name and state, its water, and the numbers of the present time. */
-import { mapView, drawScene } from "./scene.js";
+import { mapView } from "./course.js";
+import { drawScene } from "./scene.js";
 
 const NUMBERS = [
   { name: "min_spacing_m", label: "spacing", unit: "m", lowest: "lowest_spacing_m", bound: "s_u_m" },

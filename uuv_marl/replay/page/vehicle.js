@@ -6,6 +6,7 @@ import { hearing } from "./sonar.js";
 export function showVehicle(place, episode, vehicle, time, choose) {
   const input = place.querySelector("input") ?? numberField(place, episode, choose);
   if (document.activeElement !== input) input.value = vehicle ?? "";
+  place.querySelector(".badge").textContent = episode.policy;
   const body = place.querySelector("div");
   body.replaceChildren(...(vehicle === null ? [hint()] : details(episode, vehicle, episode.sampleAt(time))));
 }
@@ -15,7 +16,7 @@ function numberField(place, episode, choose) {
   input.addEventListener("change", () => choose(input.value === "" ? null : Number(input.value)));
   const label = make("label", { htmlFor: "vehicle-number" }, make("h2", {}, "UUV"));
   place.replaceChildren(make("div", {}), "");
-  place.prepend(make("header", { className: "row" }, label, input));
+  place.prepend(make("header", { className: "row" }, label, input, make("span", { className: "badge" })));
   place.querySelector("header").style.padding = "0";
   return input;
 }
