@@ -14,7 +14,7 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.errors import ResultsError
+from uuv_marl.errors import ReplayError, ResultsError
 from uuv_marl.replay.encode import CODINGS
 from uuv_marl.replay.page import Replay, page_html, write_page
 from uuv_marl.replay.record import record
@@ -149,7 +149,7 @@ def test_a_name_stays_text(recordings):
 
 def test_too_many_episodes_and_unwritable_paths_are_refused(recordings, tmp_path):
     for number in (0, 5):
-        with pytest.raises(ValueError, match=f"1 to 4 episodes, got {number}"):
+        with pytest.raises(ReplayError, match=f"1 to 4 episodes, got {number}"):
             page_html(recordings[:1] * number)
     with pytest.raises(ResultsError, match="can't be written"):
         write_page(recordings, tmp_path / "nowhere" / "replay.html")

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uuv_marl.atomic import write_text
+from uuv_marl.errors import ReplayError
 from uuv_marl.replay.encode import payload
 from uuv_marl.replay.recording import Recording
 
@@ -28,10 +29,10 @@ def page_html(recordings: Sequence[Recording]) -> str:
     """One to four episodes side by side, as a page that requests nothing.
 
     Raises:
-        ValueError: there are none, or more than four.
+        ReplayError: there are none, or more than four.
     """
     if not 1 <= len(recordings) <= MOST_EPISODES:
-        raise ValueError(f"a page shows 1 to {MOST_EPISODES} episodes, got {len(recordings)}; make several pages")
+        raise ReplayError(f"a page shows 1 to {MOST_EPISODES} episodes, got {len(recordings)}; make several pages")
     data = json.dumps(payload(recordings), allow_nan=False, separators=(",", ":"))
     parts = {
         "title": html.escape(_title(recordings)),
