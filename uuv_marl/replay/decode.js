@@ -29,57 +29,64 @@ async function decodeArray({ shape, dtype, scale, stride, order, missing, data }
   const whole = integers(await inflate(data), rows, columns, stride, order);
   if (dtype === "int32") return { shape, data: whole };
   if (scale === null) return { shape, data: new Float32Array(whole.buffer) };
-  const values = Float32Array.from(whole, (number) => number * scale);
+  const values = new Float32Array(whole.length);
+  for (let k = 0; k < values.length; k++) values[k] = whole[k] * scale;
   if (missing !== null) {
     integers(await inflate(missing), rows, columns, 1, 1).forEach((gone, k) => { if (gone) values[k] = NaN; });
   }
   return { shape, data: values };
 }
 
-async function inflate(text) {
-  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+/** The bytes that were packed as text: deflated, in base64. */
+export async function inflate(text) {
+  const letters = atob(text);
+  const packed = new Uint8Array(letters.length);
+  for (let k = 0; k < packed.length; k++) packed[k] = letters.charCodeAt(k);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 /** Whole numbers, time by time, from their differences: column by column, every stride-th row first. */
 function integers(bytes, rows, columns, stride, order) {
+  const differences = signed(bytes, rows * columns);
   const whole = new Int32Array(rows * columns);
-  const next = reader(bytes, whole.length);
-  for (let column = 0; column < columns; column++) {
+  const column = new Int32Array(rows);
+  for (let c = 0; c < columns; c++) {
     const sums = [0, 0, 0];
-    for (let row = 0; row < rows; row += stride) {
-      sums[order] = next();
-      for (let k = order; k > 0; k--) sums[k - 1] = (sums[k - 1] + sums[k]) | 0;
-      whole[row * columns + column] = sums[0];
+    const coarse = Math.ceil(rows / stride);
+    for (let row = 0, k = c * coarse; row < rows; row += stride) {
+      sums[order] = differences[k++];
+      for (let j = order; j > 0; j--) sums[j - 1] = (sums[j - 1] + sums[j]) | 0;
+      column[row] = sums[0];
     }
-  }
-  for (let half = stride >> 1; half > 0; half >>= 1) {
-    for (let column = 0; column < columns; column++) {
-      for (let row = half; row < rows; row += 2 * half) {
-        whole[row * columns + column] = between(whole, row, column, half, rows, columns) + next();
+    let begin = coarse * columns;
+    for (let half = stride >> 1; half > 0; half >>= 1) {
+      const finer = Math.max(0, Math.ceil((rows - half) / (2 * half)));
+      for (let row = half, k = begin + c * finer; row < rows; row += 2 * half) {
+        column[row] = between(column, row, half) + differences[k++];
       }
+      begin += finer * columns;
     }
+    for (let row = 0; row < rows; row++) whole[row * columns + c] = column[row];
   }
   return whole;
 }
 
-/** The signed numbers one by one; their lowest bytes come first, then the next ones. */
-function reader(bytes, count) {
-  const planes = count ? bytes.length / count : 0;
-  let k = 0;
-  return () => {
-    let unsigned = 0;
-    for (let plane = 0; plane < planes; plane++) unsigned |= bytes[plane * count + k] << (8 * plane);
-    k++;
-    return (unsigned >>> 1) ^ -(unsigned & 1);
-  };
+/** The signed numbers, of which the lowest bytes come first, then the next ones. */
+function signed(bytes, count) {
+  const numbers = new Int32Array(count);
+  for (let shift = 0, first = 0; first < bytes.length; shift += 8, first += count) {
+    for (let k = 0; k < count; k++) numbers[k] |= bytes[first + k] << shift;
+  }
+  for (let k = 0; k < count; k++) numbers[k] = (numbers[k] >>> 1) ^ -(numbers[k] & 1);
+  return numbers;
 }
 
-/** What samples before and after a row say of it. */
-function between(whole, row, column, half, rows, columns) {
-  const at = (step) => whole[(row + step * half) * columns + column];
-  if (row + half >= rows) return at(-1);
-  if (row < 3 * half || row + 3 * half >= rows) return (at(-1) + at(1)) >> 1;
-  return (9 * (at(-1) + at(1)) - at(-3) - at(3) + 8) >> 4;
+/** What the samples of a column before and after a row say of it. */
+function between(column, row, half) {
+  const before = column[row - half];
+  const after = column[row + half];
+  if (row + half >= column.length) return before;
+  if (row < 3 * half || row + 3 * half >= column.length) return (before + after) >> 1;
+  return (9 * (before + after) - column[row - 3 * half] - column[row + 3 * half] + 8) >> 4;
 }
