@@ -179,7 +179,7 @@ class App {
     const names = this.episodes.map((episode) => episode.policy);
     at("title").textContent = `${first.scenario}: ${names.join(", ")}`;
     at("subtitle").textContent =
-      `${first.vehicles} vehicles, seed ${first.seed}, scenario version ${first.version}, uuv_marl`;
+      `${first.vehicles} vehicles, seed ${first.seed}, scenario version ${first.version}`;
     at("waters").dataset.episodes = this.episodes.length;
     at("waters").append(...this.panels.map((panel) => panel.element));
     at("colour").append(...this.quantities.map((name) => new Option(QUANTITIES[name].label, name)));
@@ -239,6 +239,7 @@ async function open() {
   const payload = JSON.parse(at("episodes").textContent);
   const episodes = (await decodeEpisodes(payload)).map((decoded) => new Episode(decoded));
   const app = new App(episodes);
+  at("subtitle").textContent += `, uuv_marl ${payload.uuv_marl}`;
   Object.assign(window.replay, {
     seek: (time) => app.seek(time),
     numbers: (episode) => episodes[episode].numbers(app.time),
