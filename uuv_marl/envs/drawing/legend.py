@@ -1,6 +1,5 @@
 """The legend of a frame: a sign and a word for everything that is drawn."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -18,8 +17,7 @@ Sign = Callable[[pygame.Surface, float], object]
 WIDE, HIGH = 24, 16
 
 
-def signs(scene: Scene) -> list[tuple[str, Sign]]:
-    """What a scene's legend explains."""
+def _water(scene: Scene) -> list[tuple[str, Sign]]:
     limits = scene.scenario.constraints
     found = [("vehicle", _dart(ink.BLUE)), (f"last {TRAIL_S:g} s", _trail)]
     near = f"nearer than {limits.s_u_m:g} m"
@@ -29,25 +27,42 @@ def signs(scene: Scene) -> list[tuple[str, Sign]]:
     found += [(near, _dart(ink.AMBER)), ("collision", _hit)]
     if scene.scenario.disturbance.loss_times_s or scene.scenario.contact.ends_vehicle:
         found.append(("lost", _lost))
-    if scene.sonar:
-        found += [("hears", _heard), ("active sonar", _patch(ink.ACTIVE)), ("passive", _patch(ink.PASSIVE))]
-        found += [("echo", _echo)] if scene.obstacles.size else []
     return found
 
 
+def _sonar(scene: Scene) -> list[tuple[str, Sign]]:
+    if scene.sonar is None:
+        return []
+    found = [("active sonar", _patch(ink.ACTIVE)), ("passive sonar", _patch(ink.PASSIVE)), ("hears", _heard)]
+    return [*found, ("echo", _echo)] if scene.obstacles.size else found
+
+
+def rows(width: int, scene: Scene, height: int) -> int:
+    """How many rows a scene's legend takes in this width, with letters of this height [px]."""
+    return 1 + max(row for row, *_ in _flow(width, scene, height))
+
+
 def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height: int) -> None:
-    """Fill an area row by row; what has no room there is left out. ``height`` is that of the letters [px]."""
+    """Draw a scene's legend into an area with room for its ``rows``."""
     unit = height / 12.0
-    x, y = area.left + 8 * unit, area.top + 3 * unit
-    for words, sign in signs(scene):
-        wide = (WIDE + 16) * unit + ink.text(words, height).get_width()
-        if x + wide > area.right and x > area.left + 8 * unit:
-            x, y = area.left + 8 * unit, y + 1.6 * height
-        if y + height > area.bottom:
-            return
-        surface.blit(_drawn(sign, unit), (round(x), round(y)))
-        ink.write(surface, words, (x + (WIDE + 4) * unit, y), height)
-        x += wide
+    for row, x, words, sign in _flow(area.width, scene, height):
+        y = area.top + (3 + 20 * row) * unit
+        surface.blit(_drawn(sign, unit), (area.left + round(x), round(y)))
+        ink.write(surface, words, (area.left + x + (WIDE + 4) * unit, y), height)
+
+
+def _flow(width: int, scene: Scene, height: int) -> list[tuple[int, float, str, Sign]]:
+    """Row, left end, word and sign; where one row is not enough, the sonar has its own."""
+    unit, signs = height / 12.0, [*_water(scene), *_sonar(scene)]
+    wide = [(WIDE + 18) * unit + ink.text(words, height).get_width() for words, _ in signs]
+    breaks = {len(_water(scene))} if sum(wide) > width - 8 * unit else set[int]()
+    row, x, flown = 0, 8 * unit, list[tuple[int, float, str, Sign]]()
+    for k, (words, sign) in enumerate(signs):
+        if x > 8 * unit and (k in breaks or x + wide[k] > width):
+            row, x = row + 1, 8 * unit
+        flown.append((row, x, words, sign))
+        x += wide[k]
+    return flown
 
 
 def _drawn(sign: Sign, unit: float) -> pygame.Surface:
@@ -92,10 +107,3 @@ def _echo(fine: pygame.Surface, unit: float) -> None:
 
 def _patch(colour: ink.Colour) -> Sign:
     return lambda fine, _: fine.fill(colour)
-
-
-def rows(width: int, scene: Scene, height: int) -> int:
-    """How many rows the legend of a scene takes, at least."""
-    unit = height / 12.0
-    total = sum((WIDE + 16) * unit + ink.text(words, height).get_width() for words, _ in signs(scene))
-    return math.ceil(total / max(width - 16 * unit, 1.0))

@@ -99,7 +99,7 @@ class Painter:
             passed += length
         pygame.draw.circle(self._fine, ink.WHITE, points[0].tolist(), 5.0 * unit)
         pygame.draw.circle(self._fine, ink.TRACK, points[0].tolist(), 5.0 * unit, round(1.5 * unit))
-        self._goal(points[-1], 10.0 * unit)
+        self._goal(points[-1], 11.0 * unit)
 
     def _discs(self, scene: Scene, view: Camera) -> None:
         for middle, radius in zip(view.pixels(scene.obstacles[:, :2]).tolist(), scene.obstacles[:, 2], strict=True):
@@ -148,9 +148,9 @@ class Painter:
 
     def _reference(self, scene: Scene, view: Camera) -> None:
         at, unit = view.pixels(scene.reference).tolist(), self._unit
-        for colour, wider in ((ink.WHITE, 1.5), (ink.GREEN, 0.0)):
-            pygame.draw.circle(self._fine, colour, at, (9.0 + wider) * unit, round((2.5 + 2.0 * wider) * unit))
-            pygame.draw.circle(self._fine, colour, at, (2.8 + wider) * unit)
+        for colour, wider in ((ink.WHITE, 1.2), (ink.GREEN, 0.0)):
+            pygame.draw.circle(self._fine, colour, at, (12.0 + wider) * unit, round((2.6 + 2.0 * wider) * unit))
+            pygame.draw.circle(self._fine, colour, at, (2.4 + wider) * unit)
 
     def _bar(self, view: Camera, cell: float) -> None:
         """The scale bar, as long as a cell of the grid, and the arrow to the north above its end."""
@@ -165,13 +165,12 @@ class Painter:
     def _words(self, scene: Scene, camera: Camera, cell: float) -> None:
         unit = self._unit / FINE
         height = round(12 * unit)
-        for words, point, colour in (
-            ("start", scene.waypoints[0], ink.TEXT),
-            ("goal", scene.waypoints[-1], ink.TEXT),
-            ("l(t)", scene.reference, ink.GREEN),
-        ):
+        for words, point in (("start", scene.waypoints[0]), ("goal", scene.waypoints[-1])):
             x, y = camera.pixels(point).tolist()
-            ink.write(self._shown, words, (x + 12 * unit, y - 7 * unit), height, colour, bold=True, halo=True)
+            left = x - ink.text(words, height, bold=True).get_width() / 2
+            ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)
+        x, y = camera.pixels(scene.reference).tolist()
+        ink.write(self._shown, "l(t)", (x + 15 * unit, y - 7 * unit), height, ink.GREEN, bold=True, halo=True)
         bar = (16 * unit, self.size[1] - 14 * unit - 1.3 * height)
         ink.write(self._shown, f"{cell:g} m", bar, height, halo=True)
         ink.write(self._shown, "N", (self.size[0] - 20 * unit, 25 * unit), height, bold=True)
