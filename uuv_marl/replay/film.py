@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from uuv_marl.atomic import replacing, writing
+from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
 from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
 from uuv_marl.errors import ResultsError
@@ -23,11 +24,9 @@ Picture = NDArray[np.uint8]
 SUFFIXES = (".mp4", ".gif", ".png")
 MOST = 4
 """Recordings side by side."""
-_LENGTH_S, _HOLD_S = 12.0, 2.0
+_LENGTH_S, _HOLD_S = {".mp4": 20.0, ".gif": 10.0}, 2.0
 """How long a film lasts where no speed is given, and how long it stays at its last picture [s]."""
-_FPS = {".mp4": 30, ".gif": 10}
-_COLOURS = 48
-"""Of a GIF."""
+_FPS = {".mp4": 20, ".gif": 8}
 _MOMENTS = 4
 """Of a still, side by side."""
 
@@ -38,6 +37,8 @@ class Format(NamedTuple):
     size: tuple[int, int]
     """Width and height [px]."""
     fps: int
+    plain: bool
+    """Without trails and grid."""
     speed: float
     """Seconds of the episode in a second of the film."""
 
@@ -49,12 +50,14 @@ def write_film(
 ) -> None:  # fmt: skip
     """Write a film of episodes side by side, on one clock; or as PNG a still with moments of them.
 
+    A GIF has neither trails nor a grid, which would double its size.
+
     Args:
         recordings: one to four.
         path: ends in ``.mp4``, ``.gif`` or ``.png``. It is written whole or not at all.
         camera: ``follow`` or ``map``.
         sonar_of: index of a vehicle whose sonar is shown; the recordings must hold its inspection.
-        speed: seconds of the episode in a second of the film; None for a film of about 12 s.
+        speed: seconds of the episode in a second of the film; None for a film of 20 s, or a GIF of 10 s.
         size: width and height [px]; None for what suits the format.
         progress: is called with the share that is done, 0 to 1.
 
@@ -72,9 +75,14 @@ def write_film(
         raise ValueError(f"camera must be one of {list(CAMERAS)}, got {camera!r}")
     if speed is not None and not speed > 0.0:
         raise ValueError(f"speed must be positive, got {speed}")
-    scenes = [Scenes(recording, sonar_of) for recording in recordings]
+    scenes = [Scenes(recording, sonar_of, trails=suffix != ".gif") for recording in recordings]
     longest = max(float(recording.time_s[-1]) for recording in recordings)
-    form = Format(size or _size(suffix, len(recordings)), _FPS.get(suffix, 1), speed or max(1.0, longest / _LENGTH_S))
+    form = Format(
+        size or _size(suffix, len(recordings)),
+        _FPS.get(suffix, 1),
+        suffix == ".gif",
+        speed or max(1.0, longest / _LENGTH_S.get(suffix, longest)),
+    )
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as partial:
@@ -108,7 +116,7 @@ def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
 def _pictures(
     scenes: Sequence[Scenes], form: Format, camera: str, longest: float, progress: Callable[[float], object]
 ) -> Iterator[Picture]:
-    frame, (common, names) = Frame(form.size, len(scenes)), _names(scenes)
+    frame, (common, names) = Frame(form.size, len(scenes), grid=not form.plain), _names(scenes)
     heading = f"{common}, {form.speed:.3g} times as fast" if form.speed != 1.0 else common
     num = int(np.ceil(longest / form.speed * form.fps)) + 1
     for k in range(num):
@@ -131,13 +139,12 @@ def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) 
 
 
 def _write_gif(path: Path, pictures: Iterator[Picture], form: Format) -> None:
-    """In few colours, one palette for all frames, so that only what moves takes room."""
-    frames = [Image.fromarray(picture) for picture in pictures]
-    sample = np.concatenate([np.asarray(frame) for frame in frames[:: max(1, len(frames) // 8)]])
-    palette = Image.fromarray(sample).quantize(_COLOURS, dither=Image.Dither.NONE)
-    few = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    durations = [round(1000 / form.fps)] * (len(few) - 1) + [round(1000 * _HOLD_S)]
-    few[0].save(path, save_all=True, append_images=few[1:], duration=durations, loop=0, optimize=True)
+    """In few colours, the same for all frames, so that what stands still takes no room."""
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for colour in ink.palette() for part in colour])
+    frames = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    durations = [round(1000 / form.fps)] * (len(frames) - 1) + [round(1000 * _HOLD_S)]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=True)
 
 
 def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
@@ -146,7 +153,7 @@ def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
         import av  # noqa: PLC0415
 
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
-        stream = container.add_stream("libx264", rate=form.fps, options={"crf": "20"})
+        stream = container.add_stream("libx264", rate=form.fps, options={"crf": "23", "preset": "veryfast"})
         stream.width, stream.height, stream.pix_fmt = *form.size, "yuv420p"
         picture = np.zeros((*form.size[::-1], 3), np.uint8)
         for picture in pictures:

@@ -6,17 +6,15 @@ from numpy.typing import NDArray
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, Sonar
 from uuv_marl.replay.recording import Inspection, Recording
 
-_TRAIL_SAMPLES = 20
-
 
 class Scenes:
-    """Gives the scene of a recording at any time, with the sonar of one inspected vehicle if asked.
+    """Gives the scene of a recording at any time, with trails and the sonar of one inspected vehicle if asked.
 
     Raises:
         ValueError: nothing was recorded of that vehicle's sonar.
     """
 
-    def __init__(self, recording: Recording, sonar_of: int | None = None) -> None:
+    def __init__(self, recording: Recording, sonar_of: int | None = None, *, trails: bool = True) -> None:
         self.recording = recording
         if sonar_of is not None and sonar_of not in recording.inspections:
             held = ", ".join(map(str, sorted(recording.inspections))) or "none"
@@ -24,7 +22,7 @@ class Scenes:
                 f"the recording holds no sonar of vehicle {sonar_of}, only of: {held}; "
                 "name the vehicle when you record the episode"
             )
-        self._sonar_of = sonar_of
+        self._sonar_of, self._back_s = sonar_of, np.linspace(TRAIL_S, 1.0, round(TRAIL_S)) if trails else np.zeros(0)
         self._alive = np.isfinite(recording.position[:, :, 0])
         last = np.maximum.accumulate(np.where(self._alive, np.arange(len(recording.time_s))[:, None], 0), axis=0)
         vehicles = np.arange(self._alive.shape[1])
@@ -37,7 +35,7 @@ class Scenes:
         recording = self.recording
         k = max(int(np.searchsorted(recording.time_s, time_s + 1e-6, side="right")) - 1, 0)
         now, alive = float(recording.time_s[k]), self._alive[k]
-        past = np.searchsorted(recording.time_s, now - np.linspace(TRAIL_S, TRAIL_S / _TRAIL_SAMPLES, _TRAIL_SAMPLES))
+        past = np.unique(np.searchsorted(recording.time_s, now - self._back_s))
         series = {name: float(values[k]) for name, values in recording.series.items()}
         arrival_s = recording.metrics["task_time_s"]
         return Scene(
@@ -50,7 +48,7 @@ class Scenes:
             heading=self._heading[k],
             alive=alive,
             near=alive & self._near(k),
-            trail=self._position[np.unique(past)],
+            trail=self._position[past],
             hits=self._hits[self._hits[:, 2] <= now],
             arrival_s=arrival_s if arrival_s is not None and arrival_s <= now else None,
             collisions=round(series["collisions"]),

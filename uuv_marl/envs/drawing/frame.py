@@ -32,8 +32,8 @@ class Panel(NamedTuple):
 class Frame:
     """Draws panels into a picture of this size [px], so many of them side by side."""
 
-    def __init__(self, size: tuple[int, int], columns: int = 1) -> None:
-        self.size, self._columns = size, columns
+    def __init__(self, size: tuple[int, int], columns: int = 1, *, grid: bool = True) -> None:
+        self.size, self._columns, self._grid = size, columns, grid
         self._surface = pygame.Surface(size, depth=32)
         self._unit = max(1.0, min(size[0] / columns, size[1]) / 800.0)
         self._text = round(12 * self._unit)
@@ -76,7 +76,7 @@ class Frame:
         self._cell = (self.size[0] // self._columns, high)
         self._title, self._header = round((17 if self._cell[0] >= 480 else 14) * self._unit), round(94 * self._unit)
         self._glimpse = Painter((self._header - _PAD,) * 2)
-        self._painter = Painter((self._cell[0] - (2 if self._columns > 1 else 0), high - self._header))
+        self._painter = Painter((self._cell[0] - (2 if self._columns > 1 else 0), high - self._header), grid=self._grid)
 
     def _head(self, panel: Panel, at: tuple[int, int], room: int) -> None:
         """The title, and the numbers in two rows."""

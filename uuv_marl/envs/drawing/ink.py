@@ -24,6 +24,15 @@ TRAILS: tuple[Colour, ...] = ((222, 234, 243), (200, 221, 236), (174, 207, 228),
 """From the oldest to the newest part."""
 
 
+def palette() -> list[Colour]:
+    """Colours that a picture can do with: all but trails, and how strong ones fade into the water."""
+    strong = (BLUE, ORANGE, GREEN, PINK, AMBER, TEXT, QUIET, DISC)
+    mixed = [
+        tuple(round(c + (w - c) * k / 3) for c, w in zip(one, WATER, strict=True)) for one in strong for k in range(3)
+    ]
+    return [WHITE, WATER, GRID, PASSIVE, ACTIVE, EDGE, KEEP_OUT, LOST, *mixed]
+
+
 @functools.cache
 def _font(height: int, bold: bool) -> pygame.font.Font:
     """DejaVu Sans, which Matplotlib brings and the figures use."""

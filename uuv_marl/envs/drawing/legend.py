@@ -19,7 +19,9 @@ WIDE, HIGH = 24, 16
 
 def _water(scene: Scene) -> list[tuple[str, Sign]]:
     limits = scene.scenario.constraints
-    found = [("vehicle", _dart(ink.BLUE)), (f"last {TRAIL_S:g} s", _trail)]
+    found = [("vehicle", _dart(ink.BLUE))]
+    if scene.trail.size:
+        found.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
     if scene.obstacles.size:
         found.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))

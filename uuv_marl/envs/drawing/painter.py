@@ -27,10 +27,10 @@ DART = np.array([[0.6, 0.0], [-0.4, 0.34], [-0.2, 0.0], [-0.4, -0.34]])
 
 
 class Painter:
-    """Paints water of this size [px]."""
+    """Paints water of this size [px], with a grid of lines that tell how the view moves unless it is left out."""
 
-    def __init__(self, size: tuple[int, int]) -> None:
-        self.size = size
+    def __init__(self, size: tuple[int, int], *, grid: bool = True) -> None:
+        self.size, self._lines = size, grid
         self._fine = pygame.Surface((size[0] * FINE, size[1] * FINE), depth=32)
         self._shown = pygame.Surface(size, depth=32)
         self._unit = FINE * max(1.0, min(size) / 800.0)
@@ -43,7 +43,8 @@ class Painter:
         if scene.sonar:
             paint_arrays(self._fine, scene, scene.sonar, view)
         cell = nice(_GRID_PX / camera.scale * self._unit / FINE)
-        self._grid(view, cell)
+        if self._lines:
+            self._grid(view, cell)
         self._course(scene, view)
         self._trails(scene, view)
         if scene.sonar:
@@ -73,12 +74,13 @@ class Painter:
         return pygame.transform.smoothscale(self._fine, self.size, self._shown)
 
     def _grid(self, view: Camera, cell: float) -> None:
+        """Lines of one shown pixel, which scaling down leaves crisp."""
         low, high = view.centre - view.reach, view.centre + view.reach
+        width, height = view.size
         for axis in (0, 1):
-            for line in np.arange(math.ceil(low[axis] / cell), high[axis] / cell) * cell:
-                ends = np.array([low, high])
-                ends[:, axis] = line
-                pygame.draw.line(self._fine, ink.GRID, *view.pixels(ends).tolist(), width=FINE // 2)
+            lines = np.arange(math.ceil(low[axis] / cell), high[axis] / cell) * cell
+            for at in view.pixels(np.repeat(lines[:, None], 2, axis=1))[:, 1 - axis] // FINE * FINE:
+                self._fine.fill(ink.GRID, (0, at, width, FINE) if axis == 0 else (at, 0, FINE, height))
 
     def _course(self, scene: Scene, view: Camera) -> None:
         """Obstacles, the trajectory with its direction, start and goal."""
