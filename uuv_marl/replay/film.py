@@ -1,11 +1,9 @@
 """Films and stills of recorded episodes, drawn as the environments draw: MP4, GIF and PNG, without a display."""
 
-# pyright: reportUnknownMemberType=false
-# PyAV leaves the types of its keyword arguments open.
-
+import importlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +13,7 @@ from uuv_marl.atomic import replacing, writing
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
 from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
-from uuv_marl.errors import ResultsError
+from uuv_marl.errors import ReplayError
 from uuv_marl.extras import extra
 from uuv_marl.replay.recording import Recording
 from uuv_marl.replay.scenes import Scenes
@@ -62,26 +60,26 @@ def write_film(
         progress: is called with the share that is done, 0 to 1.
 
     Raises:
-        ResultsError: the file can't be written, or has another suffix.
+        ReplayError: an argument can't be used.
+        ResultsError: the file can't be written.
         MissingExtraError: the extra ``render`` is not installed.
-        ValueError: an argument can't be used.
     """
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ResultsError(f"{path} has no known format; give an --output that ends in {', '.join(SUFFIXES)}")
+    suffix = check_format(path)
     if not 1 <= len(recordings) <= MOST:
-        raise ValueError(f"a film shows 1 to {MOST} recordings side by side, got {len(recordings)}")
+        raise ReplayError(f"a film shows 1 to {MOST} recordings side by side, got {len(recordings)}")
     if camera not in CAMERAS:
-        raise ValueError(f"camera must be one of {list(CAMERAS)}, got {camera!r}")
+        raise ReplayError(f"camera must be one of {list(CAMERAS)}, got {camera!r}")
     if speed is not None and not speed > 0.0:
-        raise ValueError(f"speed must be positive, got {speed}")
+        raise ReplayError(f"speed must be positive, got {speed}")
+    if size is not None and not all(320 <= side <= 4096 and side % 2 == 0 for side in size):
+        raise ReplayError(f"size must be width and height, even numbers of pixels from 320 to 4096, got {size}")
     scenes = [Scenes(recording, sonar_of, trails=suffix != ".gif") for recording in recordings]
     longest = max(float(recording.time_s[-1]) for recording in recordings)
     form = Format(
         size or _size(suffix, len(recordings)),
         _FPS.get(suffix, 1),
         suffix == ".gif",
-        speed or max(1.0, longest / _LENGTH_S.get(suffix, longest)),
+        speed or max(1.0, round(longest / _LENGTH_S.get(suffix, longest))),
     )
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -93,12 +91,22 @@ def write_film(
             write(partial, _pictures(scenes, form, camera, longest, progress or (lambda share: share)), form)
 
 
+def check_format(path: Path) -> str:
+    """The format that a path's suffix names. Raises ReplayError or MissingExtraError where it can't be written."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ReplayError(f"{path} must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+    if suffix == ".mp4":
+        _av()
+    return suffix
+
+
 def _size(suffix: str, num: int) -> tuple[int, int]:
     """Of the whole picture; a GIF fits a page of GitHub."""
     if suffix == ".png":
         return 1320, 450 * num
-    across = min((800, 640, 480, 400)[num - 1], 828 // num if suffix == ".gif" else 800)
-    return across * num // 2 * 2, (across + 140) // 2 * 2
+    across = ((560, 414, 276, 206) if suffix == ".gif" else (800, 640, 480, 400))[num - 1]
+    return across * num, across + 140
 
 
 def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
@@ -149,9 +157,7 @@ def _write_gif(path: Path, pictures: Iterator[Picture], form: Format) -> None:
 
 def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
     """H.264, as every browser and slide program plays it."""
-    with extra("render", "an .mp4"):
-        import av  # noqa: PLC0415
-
+    av = _av()
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("libx264", rate=form.fps, options={"crf": "23", "preset": "veryfast"})
         stream.width, stream.height, stream.pix_fmt = *form.size, "yuv420p"
@@ -161,3 +167,9 @@ def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
         for _ in range(round(_HOLD_S * form.fps)):
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode())
+
+
+def _av() -> Any:
+    """PyAV, the encoder."""
+    with extra("render", "an .mp4"):
+        return importlib.import_module("av")

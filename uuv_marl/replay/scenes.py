@@ -4,21 +4,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, Sonar
-from uuv_marl.replay.recording import Inspection, Recording
+from uuv_marl.errors import ReplayError
+from uuv_marl.replay.recording import Event, Inspection, Recording
 
 
 class Scenes:
     """Gives the scene of a recording at any time, with trails and the sonar of one inspected vehicle if asked.
 
     Raises:
-        ValueError: nothing was recorded of that vehicle's sonar.
+        ReplayError: nothing was recorded of that vehicle's sonar.
     """
 
     def __init__(self, recording: Recording, sonar_of: int | None = None, *, trails: bool = True) -> None:
         self.recording = recording
         if sonar_of is not None and sonar_of not in recording.inspections:
             held = ", ".join(map(str, sorted(recording.inspections))) or "none"
-            raise ValueError(
+            raise ReplayError(
                 f"the recording holds no sonar of vehicle {sonar_of}, only of: {held}; "
                 "name the vehicle when you record the episode"
             )
@@ -28,7 +29,8 @@ class Scenes:
         vehicles = np.arange(self._alive.shape[1])
         self._position = recording.position[last, vehicles]
         self._heading = recording.heading[last, vehicles]
-        self._hits = self._collisions()
+        self._collisions = [event for event in recording.events if event.kind in ("collision", "obstacle")]
+        self._hits = np.array([self._place(event) for event in self._collisions if event.vehicles]).reshape(-1, 3)
 
     def at(self, time_s: float) -> Scene:
         """The latest sample that is no later; the last one after the end."""
@@ -51,7 +53,7 @@ class Scenes:
             trail=self._position[past],
             hits=self._hits[self._hits[:, 2] <= now],
             arrival_s=arrival_s if arrival_s is not None and arrival_s <= now else None,
-            collisions=round(series["collisions"]),
+            collisions=round(series.get("collisions", sum(event.time_s <= now for event in self._collisions))),
             min_spacing_m=_distance(series["min_spacing_m"]),
             clearance_m=_distance(series["obstacle_clearance_m"]),
             centre_error_m=series["centre_error_m"],
@@ -65,15 +67,11 @@ class Scenes:
         near = (np.hypot(offset[..., 0], offset[..., 1]) - discs[:, 2] < limits.s_o_m).any(axis=1)
         return near if recording.spacing is None else near | (recording.spacing[k] < limits.s_u_m)
 
-    def _collisions(self) -> NDArray[np.float64]:
-        """North, east and time of every collision, shape (hit, 3)."""
-        hits: list[list[float]] = []
-        for event in self.recording.events:
-            if event.kind in ("collision", "obstacle"):
-                k = int(np.abs(self.recording.time_s - event.time_s).argmin())
-                north, east = self._position[k, list(event.vehicles)].mean(axis=0).tolist()
-                hits.append([north, east, event.time_s])
-        return np.array(hits, np.float64).reshape(-1, 3)
+    def _place(self, event: Event) -> list[float]:
+        """North, east and time of a collision."""
+        k = int(np.searchsorted(self.recording.time_s, event.time_s))
+        north, east = self._position[min(k, len(self._position) - 1), list(event.vehicles)].mean(axis=0).tolist()
+        return [north, east, event.time_s]
 
     def _sonar(self, k: int) -> Sonar | None:
         i = self._sonar_of

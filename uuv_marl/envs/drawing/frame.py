@@ -90,7 +90,8 @@ class Frame:
             row, column = divmod(k, 3)
             left, top = x + column * min(room // 3, 190 * self._unit), y + (28 + 32 * row) * self._unit
             ink.write(self._surface, label if roomy else short, (left, top), round(11 * self._unit), ink.QUIET)
-            ink.write(self._surface, value, (left, top + 12 * self._unit), round(13 * self._unit), colour, bold=True)
+            high = round((13 if roomy else 12) * self._unit)
+            ink.write(self._surface, value, (left, top + 12 * self._unit), high, colour, bold=True)
 
 
 def pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
@@ -105,7 +106,7 @@ def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
 
     def distance(value: float, least: float, touching: float) -> tuple[str, ink.Colour]:
         colour = ink.ORANGE if value < touching else ink.AMBER if value < least else ink.TEXT
-        return ("–", ink.TEXT) if not math.isfinite(value) else (f"{value:.1f} m", colour)
+        return ("–", ink.TEXT) if not math.isfinite(value) else (_metres(value), colour)
 
     alive, n, arrived = int(scene.alive.sum()), len(scene.alive), scene.arrival_s is not None
     return [
@@ -116,5 +117,9 @@ def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
         ("smallest obstacle distance", "clearance", *distance(scene.clearance_m, limits.s_o_m, contact)),
         ("vehicles", "vehicles", f"{alive}" if alive == n else f"{alive} of {n}", ink.TEXT),
         ("collisions", "collisions", f"{scene.collisions}", ink.ORANGE if scene.collisions else ink.TEXT),
-        ("swarm's centre to l(t)", "to l(t)", f"{scene.centre_error_m:.1f} m", ink.TEXT),
+        ("swarm's centre to l(t)", "to l(t)", _metres(scene.centre_error_m), ink.TEXT),
     ]
+
+
+def _metres(value: float) -> str:
+    return f"{value:.1f} m" if value < 100.0 else f"{value:.0f} m"

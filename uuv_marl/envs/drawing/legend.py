@@ -19,12 +19,12 @@ WIDE, HIGH = 24, 16
 
 def _water(scene: Scene) -> list[tuple[str, Sign]]:
     limits = scene.scenario.constraints
-    found = [("vehicle", _dart(ink.BLUE))]
+    found = [("vehicle", _dart(ink.BLUE)), ("l(t), to be followed", _target)]
     if scene.trail.size:
         found.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
     if scene.obstacles.size:
-        found.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))
+        found.append((f"obstacle, ring at {limits.s_o_m:g} m (s_o)", _disc))
         near += "" if limits.s_o_m == limits.s_u_m else f", obstacle {limits.s_o_m:g} m"
     found += [(near, _dart(ink.AMBER)), ("collision", _hit)]
     if scene.scenario.disturbance.loss_times_s or scene.scenario.contact.ends_vehicle:
@@ -86,6 +86,11 @@ def _trail(fine: pygame.Surface, unit: float) -> None:
 def _disc(fine: pygame.Surface, unit: float) -> None:
     pygame.draw.circle(fine, ink.KEEP_OUT, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(unit / 2))
     pygame.draw.circle(fine, ink.DISC, (12.0 * unit, 8.0 * unit), 5.0 * unit)
+
+
+def _target(fine: pygame.Surface, unit: float) -> None:
+    pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(2.0 * unit))
+    pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 2.0 * unit)
 
 
 def _hit(fine: pygame.Surface, unit: float) -> None:

@@ -125,7 +125,7 @@ class Painter:
     def _vehicles(self, scene: Scene, view: Camera) -> None:
         """Darts as long as s_u, so that two that overlap are too near; longer only where they would be specks."""
         unit = self._unit
-        length = min(max(scene.scenario.constraints.s_u_m * view.scale, 5.0 * unit), 22.0 * unit)
+        length = min(max(scene.scenario.constraints.s_u_m * view.scale, 6.0 * unit), 22.0 * unit)
         turned = np.stack([np.sin(scene.heading), -np.cos(scene.heading)], axis=-1)
         ahead, aside = turned, np.stack([-turned[:, 1], turned[:, 0]], axis=-1)
         places = view.pixels(scene.position)
@@ -155,12 +155,12 @@ class Painter:
             pygame.draw.circle(self._fine, colour, at, (2.4 + wider) * unit)
 
     def _bar(self, view: Camera, cell: float) -> None:
-        """The scale bar, as long as a cell of the grid, and the arrow to the north above its end."""
+        """The scale bar, as long as a cell of the grid, and beside it the arrow to the north."""
         unit = self._unit
-        left, low, long = 12.0 * unit, view.size[1] - 12.0 * unit, cell * view.scale
-        ticks = [(left, low - 5 * unit), (left, low), (left + long, low), (left + long, low - 5 * unit)]
+        right, low, long = view.size[0] - 34.0 * unit, view.size[1] - 10.0 * unit, cell * view.scale
+        ticks = [(right - long, low - 5 * unit), (right - long, low), (right, low), (right, low - 5 * unit)]
         pygame.draw.lines(self._fine, ink.TEXT, False, ticks, round(1.5 * unit))
-        x, y = view.size[0] - 16.0 * unit, 24.0 * unit
+        x, y = view.size[0] - 15.0 * unit, low - 13 * unit
         arrow = [(x, y - 14 * unit), (x - 5 * unit, y), (x, y - 3 * unit), (x + 5 * unit, y)]
         pygame.draw.polygon(self._fine, ink.TEXT, arrow)
 
@@ -173,9 +173,11 @@ class Painter:
             ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)
         x, y = camera.pixels(scene.reference).tolist()
         ink.write(self._shown, "l(t)", (x + 15 * unit, y - 7 * unit), height, ink.GREEN, bold=True, halo=True)
-        bar = (16 * unit, self.size[1] - 14 * unit - 1.3 * height)
-        ink.write(self._shown, f"{cell:g} m", bar, height, halo=True)
-        ink.write(self._shown, "N", (self.size[0] - 20 * unit, 25 * unit), height, bold=True)
+        right, low = self.size[0], self.size[1] - 9 * unit - height
+        words = f"{cell:g} m"
+        left = right - 34 * unit - (cell * camera.scale + ink.text(words, height).get_width()) / 2
+        ink.write(self._shown, words, (left, low - 5 * unit), height, halo=True)
+        ink.write(self._shown, "N", (right - 19 * unit, low), height, bold=True, halo=True)
 
 
 def cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:
