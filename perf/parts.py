@@ -3,7 +3,7 @@
 A part that needs another's result repeats that too; perf/report.py takes the difference.
 """
 
-from typing import Any
+from typing import Any, cast
 from unittest.mock import patch
 
 import numba
@@ -11,7 +11,10 @@ import numpy as np
 from worker import Case, Maker, repeated, serve
 
 from uuv_marl import load_scenario
-from uuv_marl.sim import arrays, hearing, motion, swarm, world
+from uuv_marl.sim import hearing, motion, swarm, world
+from uuv_marl.sim.arrays import World
+from uuv_marl.sim.desk import desk
+from uuv_marl.sim.model import Model
 
 PARTS = {
     "part_moved": (True, False, False, False, False),
@@ -32,30 +35,30 @@ def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> A
     """These parts of ``world.step_world``, compiled, over many worlds."""
 
     @compiled
-    def run(num, action, state, course, facts, senses, plant, rules, suite, at, desk):
+    def run(num, action, water, model, desk):
         for w in range(num):
-            motion.load(w, state.eta, state.nu, desk[0])
+            motion.load(w, water.state, desk.now)
             if move:
-                motion.aim(w, action, desk[0])
-                world.hold(w, True, state, facts, plant, rules, desk[0])
+                motion.aim(w, action, desk.now)
+                world.hold(w, True, water, model, desk.now)
             if sort:
-                grid = world.arrange(w, state, rules, desk[0], desk[1])
+                grid = world.arrange(w, water, model, desk)
                 if measure:
-                    world.measure(w, state, course, facts, rules, desk[1], grid)
+                    world.measure(w, water, model, desk, grid)
                 if hear:
                     for p in range(grid.living):
-                        hearing.hear(p, w, course.obstacles, course.num_obstacles[w], desk[1], grid, suite, desk[2])
+                        hearing.hear(p, w, water.course, model.suite, desk, grid)
                 if perceive:
-                    world.perceive(w, state, course, facts, suite, at, senses, desk[0], desk[1], grid, desk[2])
+                    world.perceive(w, water, model, desk, grid)
 
     return run
 
 
 @compiled
-def stepped(num, action, state, course, facts, senses, plant, rules, suite, at, desk):
+def stepped(num, action, water, model, desk):
     """The whole step."""
     for w in range(num):
-        world.step_world(w, action, state, course, facts, senses, plant, rules, suite, at, desk[0], desk[1], desk[2])
+        world.step_world(w, action, water, model, desk)
 
 
 def part(name: str) -> Maker:
@@ -66,11 +69,11 @@ def part(name: str) -> Maker:
         water.reset(0)
         with patch.object(swarm, "step_worlds") as step_worlds:  # what a step gives to compiled code
             water.step(np.zeros((worlds, agents, 2), np.float32))
-        *given, scratch = step_worlds.call_args.args[2:]
-        python: Any = arrays.desk
-        desk = python.py_func(scratch, 0)
+        _, _, action, *parts, scratch = step_worlds.call_args.args
+        given = action, World(*parts[:4]), Model(*parts[4:])
+        own = cast(Any, desk).py_func(scratch, 0)
         kernel = loop(*PARTS[name]) if name in PARTS else stepped
-        case = repeated(lambda _: kernel(worlds, *given, desk), agents * worlds)
+        case = repeated(lambda _: kernel(worlds, *given, own), agents * worlds)
         case.run(1)
         return case
 

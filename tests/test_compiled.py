@@ -24,7 +24,8 @@ import sys
 import numpy as np
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.sim.motion import Columns, move
+from uuv_marl.sim.desk import Columns
+from uuv_marl.sim.motion import move
 from uuv_marl.sim.vehicle import plant
 assert uuv_marl.__file__.startswith(sys.argv[1]), uuv_marl.__file__
 now = Columns(*np.ones((len(Columns._fields), 2)))
@@ -68,6 +69,7 @@ def test_an_edit_compiles_what_uses_it_and_nothing_else(copy, tmp_path):
     edit(package / "sim" / "vehicle.py", '"""Nu\' = M^-1', '"""Another wording of: Nu\' = M^-1')
     with (package / "envs" / "vector_env.py").open("a") as file:
         file.write("# a comment\n")
+    edit(package / "sim" / "desk.py", "Squared length of the action as pushed.", "Another wording.")
     with (package / "sim" / "motion.py").open("a") as file:
         file.write("\n\n_SOMETHING_ELSE = 1\n")
     assert "Compiling" not in run(copy, cache).stderr, "a docstring, a comment or a neighbour was compiled"

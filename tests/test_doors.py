@@ -11,7 +11,7 @@ from uuv_marl.baselines import POLICIES, PolicyError, granted, make
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.errors import DivergenceError
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.sim import swarm as swarm_module
+from uuv_marl.sim import model as model_module
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import plant
 
@@ -158,7 +158,7 @@ def runaway(monkeypatch):
     def pumped(scenario):
         return plant(scenario)._replace(X_u=-2000.0, X_uu=0.0)
 
-    monkeypatch.setattr(swarm_module, "plant", pumped)
+    monkeypatch.setattr(model_module, "plant", pumped)
     return load_scenario("single_obstacle", num_vehicles=4)
 
 

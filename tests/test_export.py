@@ -102,8 +102,8 @@ def test_hostile_percepts(arrays, barrier, scale, tmp_path):
     percept = Percept(np.zeros((400, policy.layout.size), np.float32), policy.layout)
     for row in policy.layout.table:
         # Magnitudes from a millionth of the bound on, so that distances lie on either side of every bound.
-        size = row.high * 10.0 ** rng.uniform(-6.0, 0.0, (400, *row.shape[:1], *(1 for _ in row.shape[1:])))
-        percept[row.name][:] = size * rng.uniform(row.low / row.high, 1.0, (400, *row.shape))
+        size = row.kind.high * 10.0 ** rng.uniform(-6.0, 0.0, (400, *row.shape[:1], *(1 for _ in row.shape[1:])))
+        percept[row.name][:] = size * rng.uniform(row.kind.low / row.kind.high, 1.0, (400, *row.shape))
     for flag in ("heard", "echo"):
         percept[flag][:] = rng.random(percept[flag].shape) < rng.random((400, 1)) ** 3
     percept.flat[0] = 0.0

@@ -217,7 +217,7 @@ def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
     rng, state = np.random.default_rng(0), (0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
     for _ in range(2000):
         angle = rng.uniform(0, 2 * np.pi)
-        state = advance(*state, 3000 * np.cos(angle), 3000 * np.sin(angle), 0.1, p)
+        state = advance(state, (3000 * np.cos(angle), 3000 * np.sin(angle)), 0.1, p)
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
 
 
@@ -321,7 +321,7 @@ def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
         for hold in (1, 10, 100, 600):
             state = (0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
             for angle in np.repeat(rng.uniform(0.0, 2 * np.pi, 600 // hold), hold):
-                state = advance(*state, force * np.cos(angle), torque * np.sin(angle), 0.1, p)
+                state = advance(state, (force * np.cos(angle), torque * np.sin(angle)), 0.1, p)
             assert np.isfinite(state).all(), changes
     assert accepted > 5
 

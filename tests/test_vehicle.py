@@ -69,19 +69,19 @@ def test_acceleration_is_equation_2_with_all_its_terms(u, v, r, tau_u, tau_r):
     nu = np.array([u, v, r])
     m, c, d = matrices(scenario, nu)
     expected = np.linalg.solve(m, np.array([tau_u, 0.0, tau_r]) - c @ nu - d @ nu)
-    np.testing.assert_allclose(vehicle.acceleration(u, v, r, tau_u, tau_r, FULL), expected, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(vehicle.acceleration((u, v, r), (tau_u, tau_r), FULL), expected, rtol=1e-9, atol=1e-9)
 
 
 @given(speed, speed, speed, plants())
 def test_coriolis_forces_do_no_work(u, v, r, p):
-    c = vehicle.coriolis(u, v, r, p)
+    c = vehicle.coriolis((u, v, r), p)
     scale = sum(abs(a * b) for a, b in zip((u, v, r), c, strict=True))
     assert abs(u * c[0] + v * c[1] + r * c[2]) <= 1e-12 * scale + 1e-12
 
 
 @given(speed, speed, speed, plants())
 def test_damping_never_adds_energy(u, v, r, p):
-    d = vehicle.damping(u, v, r, p)
+    d = vehicle.damping((u, v, r), p)
     scale = sum(abs(a * b) for a, b in zip((u, v, r), d, strict=True))
     assert u * d[0] + v * d[1] + r * d[2] >= -1e-12 * scale
 
@@ -91,7 +91,7 @@ def test_energy_falls_by_what_damping_takes(u, v, r):
     scenario = load_scenario("tracking", overrides=COUPLED)
     nu = np.array([u, v, r])
     m, _, d = matrices(scenario, nu)
-    power = nu @ m @ np.array(vehicle.acceleration(u, v, r, 0.0, 0.0, FULL))
+    power = nu @ m @ np.array(vehicle.acceleration((u, v, r), (0.0, 0.0), FULL))
     assert power == pytest.approx(-nu @ d @ nu, rel=1e-9, abs=1e-6)
 
 
@@ -102,7 +102,7 @@ def test_runge_kutta_converges_at_order_4():
     def end(steps):
         state = start
         for _ in range(steps):
-            state = vehicle.advance(*state, *tau, time / steps, FULL)
+            state = vehicle.advance(state, tau, time / steps, FULL)
         return np.array(state)
 
     exact = end(4096)
@@ -115,8 +115,8 @@ def test_runge_kutta_converges_at_order_4():
 @given(speed, speed, speed, st.floats(-3, 3), st.floats(-3, 3), st.floats(-500, 500), st.floats(-500, 500))
 def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
     tau = (700.0, -300.0)
-    a = np.array(vehicle.advance(0.0, 0.0, psi, u, v, r, *tau, 0.1, FULL))
-    b = np.array(vehicle.advance(x, y, psi + turn, u, v, r, *tau, 0.1, FULL))
+    a = np.array(vehicle.advance((0.0, 0.0, psi, u, v, r), tau, 0.1, FULL))
+    b = np.array(vehicle.advance((x, y, psi + turn, u, v, r), tau, 0.1, FULL))
     c, s = math.cos(turn), math.sin(turn)
     moved = np.array([x + c * a[0] - s * a[1], y + s * a[0] + c * a[1], a[2] + turn])
     np.testing.assert_allclose(b[:3], moved, atol=1e-9)
@@ -124,15 +124,15 @@ def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
 
 
 def test_mirrored_vehicle_moves_as_the_mirror_image():
-    a = vehicle.advance(0.0, 0.0, 0.4, 2.0, 0.6, 0.9, 500.0, 200.0, 0.1, PLAIN)
-    b = vehicle.advance(0.0, 0.0, -0.4, 2.0, -0.6, -0.9, 500.0, -200.0, 0.1, PLAIN)
+    a = vehicle.advance((0.0, 0.0, 0.4, 2.0, 0.6, 0.9), (500.0, 200.0), 0.1, PLAIN)
+    b = vehicle.advance((0.0, 0.0, -0.4, 2.0, -0.6, -0.9), (500.0, -200.0), 0.1, PLAIN)
     np.testing.assert_allclose(b, np.array(a) * [1, -1, -1, 1, -1, -1], atol=1e-12)
 
 
 def test_full_thrust_reaches_the_speed_whose_drag_equals_it():
     state = (0.0,) * 6
     for _ in range(2000):
-        state = vehicle.advance(*state, 3000.0, 0.0, 0.1, PLAIN)
+        state = vehicle.advance(state, (3000.0, 0.0), 0.1, PLAIN)
     u = state[3]
     assert (PLAIN.X_u + PLAIN.X_uu * u) * u == pytest.approx(3000.0, rel=1e-9)
 

@@ -25,9 +25,10 @@ def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:
     """A table of fields with the index range of each."""
     lines: list[tuple[str, ...]] = []
     for field in layout:
+        kind = field.kind
         entries = f"{start}" if field.size == 1 else f"{start}-{start + field.size - 1}"
-        bounds = f"{field.low / field.scale:g} to {field.high / field.scale:g}"
-        lines.append((entries, f"`{field.name}`", field.meaning, field.unit, f"{field.scale:g}", bounds))
+        bounds = f"{kind.low / kind.scale:g} to {kind.high / kind.scale:g}"
+        lines.append((entries, f"`{field.name}`", field.meaning, kind.unit, f"{kind.scale:g}", bounds))
         start += field.size
     return table(("entries", "name", "meaning", "unit", "scale", "bounds (scaled)"), lines)
 

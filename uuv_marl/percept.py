@@ -17,22 +17,35 @@ from uuv_marl.scenario import MAX_RANGE_M, Scenario
 
 Float32 = NDArray[np.float32]
 
-_POSITION_SCALE_M = 64.0
-_SPEED_SCALE_MPS = 4.0
 MAX_SPEED = 64.0
 """Velocities in a percept saturate here [m/s, rad/s], so that observation bounds are finite."""
 _MAX_VEHICLES = 16384.0
 
 
-class PerceptField(NamedTuple):
-    """One row of the table. ``low`` and ``high`` are bounds in the field's unit; values saturate there."""
+class Kind(NamedTuple):
+    """What numbers of a field are: their unit, the scale of an observation, and bounds at which they saturate."""
 
-    name: str
-    shape: tuple[int, ...]
     unit: str
     scale: float
     low: float
     high: float
+
+
+POSITION = Kind("m", 64.0, -MAX_RANGE_M, MAX_RANGE_M)
+LENGTH = Kind("m", 64.0, 0.0, MAX_RANGE_M)
+SPEED = Kind("m/s", 4.0, -MAX_SPEED, MAX_SPEED)
+YAW_RATE = Kind("rad/s", 1.0, -MAX_SPEED, MAX_SPEED)
+FLAG = Kind("1", 1.0, 0.0, 1.0)
+DIRECTION = Kind("1", 1.0, -1.0, 1.0)
+IDENTITY = Kind("1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES)
+
+
+class PerceptField(NamedTuple):
+    """One row of the table."""
+
+    name: str
+    shape: tuple[int, ...]
+    kind: Kind
     meaning: str
 
     @property
@@ -41,57 +54,49 @@ class PerceptField(NamedTuple):
         return math.prod(self.shape)
 
 
-class Offsets(NamedTuple):
-    """Where each field starts in the flat vector, for compiled code; -1 where the field is absent."""
-
-    velocity: int
-    yaw_rate: int
-    reference: int
-    reference_velocity: int
-    heard: int
-    neighbour: int
-    echo: int
-    echo_range: int
-    echo_position: int
-    compass: int
-    link_identity: int
-    link_velocity: int
+Table = tuple[PerceptField, ...]
 
 
-@functools.cache
-def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = ()) -> tuple[PerceptField, ...]:
-    """The fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
-    position = ("m", _POSITION_SCALE_M, -MAX_RANGE_M, MAX_RANGE_M)
-    speed = ("m/s", _SPEED_SCALE_MPS, -MAX_SPEED, MAX_SPEED)
-    flag = ("1", 1.0, 0.0, 1.0)
-    table = [
-        PerceptField("velocity", (2,), *speed, "own surge and sway velocity"),
-        PerceptField("yaw_rate", (1,), "rad/s", 1.0, -MAX_SPEED, MAX_SPEED, "own yaw rate"),
-        PerceptField("reference", (2,), *position, "vector to the reference point l(t); a longer one is cut to 4096 m"),
-        PerceptField("reference_velocity", (2,), *speed, "velocity of the reference point"),
-        PerceptField("heard", (num_sectors,), *flag, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
-        PerceptField("neighbour", (num_sectors, 2), *position, "per sub-sector: that vehicle's position, else 0"),
-        PerceptField("echo", (num_active,), *flag, "per active sub-sector: 1 if an obstacle returns an echo, else 0"),
+def _sonar(sectors: int, active: int) -> Table:
+    return (
+        PerceptField("velocity", (2,), SPEED, "own surge and sway velocity"),
+        PerceptField("yaw_rate", (1,), YAW_RATE, "own yaw rate"),
+        PerceptField("reference", (2,), POSITION, "vector to the reference point l(t); a longer one is cut to 4096 m"),
+        PerceptField("reference_velocity", (2,), SPEED, "velocity of the reference point"),
+        PerceptField("heard", (sectors,), FLAG, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
+        PerceptField("neighbour", (sectors, 2), POSITION, "per sub-sector: that vehicle's position, else 0"),
+        PerceptField("echo", (active,), FLAG, "per active sub-sector: 1 if an obstacle returns an echo, else 0"),
         PerceptField(
-            "echo_range", (num_active,), "m", _POSITION_SCALE_M, 0.0, MAX_RANGE_M,
+            "echo_range", (active,), LENGTH,
             "per active sub-sector: range to the nearest obstacle's surface in it, else 0",
         ),
         PerceptField(
-            "echo_position", (num_active, 2), *position,
+            "echo_position", (active, 2), POSITION,
             "per active sub-sector: position of its centre, or of that surface point (sonar.echo_reports), else 0",
         ),
-    ]  # fmt: skip
-    if "compass" in channels:
-        table.append(PerceptField("compass", (2,), "1", 1.0, -1.0, 1.0, "cosine and sine of the heading from north"))
-    if "link" in channels:
-        table += [
-            PerceptField(
-                "link_identity", (num_sectors,), "1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES,
-                "per sub-sector: 1 + index of the vehicle heard, else 0",
-            ),
-            PerceptField("link_velocity", (num_sectors, 2), *speed, "per sub-sector: velocity of that vehicle, else 0"),
-        ]  # fmt: skip
-    return tuple(table)
+    )  # fmt: skip
+
+
+def _compass(_sectors: int, _active: int) -> Table:
+    return (PerceptField("compass", (2,), DIRECTION, "cosine and sine of the heading from north"),)
+
+
+def _link(sectors: int, _active: int) -> Table:
+    return (
+        PerceptField("link_identity", (sectors,), IDENTITY, "per sub-sector: 1 + index of the vehicle heard, else 0"),
+        PerceptField("link_velocity", (sectors, 2), SPEED, "per sub-sector: velocity of that vehicle, else 0"),
+    )
+
+
+CHANNELS = {"compass": _compass, "link": _link}
+"""Rows that a channel adds, by its name in ``sonar.channels``, in the order of the table."""
+
+
+@functools.cache
+def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = tuple(CHANNELS)) -> Table:
+    """The fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
+    granted = (rows(num_sectors, num_active) for name, rows in CHANNELS.items() if name in channels)
+    return sum(granted, _sonar(num_sectors, num_active))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,24 +123,24 @@ class PerceptLayout:
         return {field.name: int(end) - field.size for field, end in zip(self.table, ends, strict=True)}
 
     @functools.cached_property
-    def offsets(self) -> Offsets:
-        """First index of every possible field, -1 where absent."""
-        return Offsets(*(self.starts.get(name, -1) for name in Offsets._fields))
+    def offsets(self) -> tuple[int, ...]:
+        """First index of every field that there can be, in the order of ``percept_table``; -1 where absent."""
+        return tuple(self.starts.get(field.name, -1) for field in percept_table(0, 0))
 
     @functools.cached_property
     def scale(self) -> Float32:
         """Unit of each observation entry, in physical units; powers of two. Shape (size,)."""
-        return self._spread([field.scale for field in self.table])
+        return self._spread([field.kind.scale for field in self.table])
 
     @functools.cached_property
     def low(self) -> Float32:
         """Lower bound of each observation entry (scaled). Shape (size,)."""
-        return self._spread([field.low / field.scale for field in self.table])
+        return self._spread([field.kind.low / field.kind.scale for field in self.table])
 
     @functools.cached_property
     def high(self) -> Float32:
         """Upper bound of each observation entry (scaled). Shape (size,)."""
-        return self._spread([field.high / field.scale for field in self.table])
+        return self._spread([field.kind.high / field.kind.scale for field in self.table])
 
     def _spread(self, values: list[float]) -> Float32:
         return np.repeat(np.array(values, np.float32), [field.size for field in self.table])

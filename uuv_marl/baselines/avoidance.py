@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.policy import Limits
-from uuv_marl.percept import Offsets
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields
 
 Float32 = NDArray[np.float32]
 
@@ -22,7 +22,7 @@ def bump(share: float) -> float:
 
 @compiled
 def pass_obstacle(
-    row: Float32, at: Offsets, repulsion: float, repulsion_range: float, tangential: float, tangential_range: float
+    w: int, i: int, see: Fields, repulsion: float, repulsion_range: float, tangential: float, tangential_range: float
 ) -> tuple[float, float]:
     """Force [N] from the nearest echo: away from it, and sideways while the vehicle moves towards it.
 
@@ -30,15 +30,15 @@ def pass_obstacle(
     vehicle already passes, port if dead ahead. Strengths in N, ranges in m.
     """
     nearest, reach = -1, math.inf
-    for a in range(at.echo_range - at.echo):
-        if row[at.echo + a] > 0.0 and row[at.echo_range + a] < reach:
-            nearest, reach = a, float(row[at.echo_range + a])
+    for a in range(see.echo.shape[2]):
+        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach:
+            nearest, reach = a, float(see.echo_range[w, i, a])
     if nearest < 0:
         return 0.0, 0.0
-    n_x, n_y = float(row[at.echo_position + 2 * nearest]), float(row[at.echo_position + 2 * nearest + 1])
+    n_x, n_y = float(see.echo_position[w, i, nearest, 0]), float(see.echo_position[w, i, nearest, 1])
     distance = math.hypot(n_x, n_y)
     n_x, n_y = (n_x / distance, n_y / distance) if distance > 0.0 else (1.0, 0.0)
-    g_x, g_y = float(row[at.velocity]), float(row[at.velocity + 1])
+    g_x, g_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     speed = math.hypot(g_x, g_y)
     g_x, g_y = (g_x / speed, g_y / speed) if speed > 0.1 else (1.0, 0.0)
     towards = max(g_x * n_x + g_y * n_y, 0.0)
@@ -49,7 +49,6 @@ def pass_obstacle(
 
 
 @compiled
-def own_drag(row: Float32, at: Offsets, limits: Limits) -> float:
-    """Surge resistance at the vehicle's own speed [N]."""
-    u = float(row[at.velocity])
+def own_drag(u: float, limits: Limits) -> float:
+    """Surge resistance at a vehicle's own surge velocity [m/s], in N."""
     return (limits.X_u + limits.X_uu * abs(u)) * u

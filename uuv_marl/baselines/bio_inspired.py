@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.percept import Offsets, Percept
+from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields, Starts, fields
 
 Float32 = NDArray[np.float32]
 Int64 = NDArray[np.int64]
@@ -110,18 +111,15 @@ def obstacle_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]
 
 
 @compiled
-def counts_once(row: Float32, a: int, num_active: int, at: Offsets, centres: bool) -> bool:
+def counts_once(w: int, i: int, a: int, see: Fields, centres: bool) -> bool:
     """Whether active sub-sector a holds the echo that stands for its whole obstacle: the nearest, first of equals."""
-    reach = row[at.echo_range + a]
+    reach, position = see.echo_range[w, i, a], see.echo_position[w, i]
     for side in (-1, 1):
         other = a + side
-        while 0 <= other < num_active and row[at.echo + other] > 0.0:
-            if centres and (
-                row[at.echo_position + 2 * other] != row[at.echo_position + 2 * a]
-                or row[at.echo_position + 2 * other + 1] != row[at.echo_position + 2 * a + 1]
-            ):
+        while 0 <= other < see.echo.shape[2] and see.echo[w, i, other] > 0.0:
+            if centres and (position[other, 0] != position[a, 0] or position[other, 1] != position[a, 1]):
                 break
-            theirs = row[at.echo_range + other]
+            theirs = see.echo_range[w, i, other]
             if theirs < reach or (theirs == reach and side < 0):
                 return False
             other += side
@@ -130,25 +128,23 @@ def counts_once(row: Float32, a: int, num_active: int, at: Offsets, centres: boo
 
 @compiled
 def _act(
-    flat: Float32, at: Offsets, g: Gains, limits: Limits, once: bool, centres: bool, action: Float32, clamps: Int64
+    flat: Float32, at: Starts, g: Gains, limits: Limits, once: bool, centres: bool, action: Float32, clamps: Int64
 ) -> None:
-    sectors = at.neighbour - at.heard
-    num_active = at.echo_range - at.echo
+    see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            row = flat[w, i]
-            v_x, v_y = row[at.reference_velocity], row[at.reference_velocity + 1]
+            v_x, v_y = see.reference_velocity[w, i, 0], see.reference_velocity[w, i, 1]
             drag = g.feed_forward * (limits.X_u + limits.X_uu * math.hypot(v_x, v_y))
-            f_x = g.zeta_l * row[at.reference] + drag * v_x
-            f_y = g.zeta_l * row[at.reference + 1] + drag * v_y
-            for k in range(sectors):
-                if row[at.heard + k] > 0.0:
-                    d_x, d_y, c = neighbour_force(row[at.neighbour + 2 * k], row[at.neighbour + 2 * k + 1], g)
+            f_x = g.zeta_l * see.reference[w, i, 0] + drag * v_x
+            f_y = g.zeta_l * see.reference[w, i, 1] + drag * v_y
+            for k in range(see.heard.shape[2]):
+                if see.heard[w, i, k] > 0.0:
+                    d_x, d_y, c = neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
                     f_x, f_y = f_x + d_x, f_y + d_y
                     clamps[w] += c
-            for a in range(num_active):
-                if row[at.echo + a] > 0.0 and (not once or counts_once(row, a, num_active, at, centres)):
-                    d_x, d_y, c = obstacle_force(row[at.echo_position + 2 * a], row[at.echo_position + 2 * a + 1], g)
+            for a in range(see.echo.shape[2]):
+                if see.echo[w, i, a] > 0.0 and (not once or counts_once(w, i, a, see, centres)):
+                    d_x, d_y, c = obstacle_force(see.echo_position[w, i, a, 0], see.echo_position[w, i, a, 1], g)
                     f_x, f_y = f_x + d_x, f_y + d_y
                     clamps[w] += c
             write_action(f_x, f_y, limits, action[w, i])

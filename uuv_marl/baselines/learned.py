@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import replacing
 from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits, Policy, PolicyError
-from uuv_marl.percept import Offsets, Percept, PerceptLayout
+from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
+from uuv_marl.sim.views import Starts, fields
 
 Float32 = NDArray[np.float32]
 Int64 = NDArray[np.int64]
@@ -193,7 +194,7 @@ def forward(layers: Sequence[Layer], x: Float32) -> Float32:
 
 def rows_of(layout: PerceptLayout) -> tuple[Row, ...]:
     """A percept's table as a card keeps it."""
-    return tuple((field.name, field.size, field.unit, field.scale) for field in layout.table)
+    return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in layout.table)
 
 
 def is_checkpoint(name: str) -> bool:
@@ -332,32 +333,32 @@ def _put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
 
 @compiled
 def _look(
-    flat: Float32, at: Offsets, gains: Gains, limits: Limits, features: Float32, barrier: Float32, clamps: Int64
+    flat: Float32, at: Starts, gains: Gains, limits: Limits, features: Float32, barrier: Float32, clamps: Int64
 ) -> None:
     """``Eyes.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do."""
-    sectors, active = at.neighbour - at.heard, at.echo_range - at.echo
+    see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            row, out = flat[w, i], features[w, i]
+            out = features[w, i]
             out[:] = 0.0
-            out[0], out[1], out[2] = row[at.velocity] / 4.0, row[at.velocity + 1], row[at.yaw_rate]
-            out[3], out[4] = row[at.reference_velocity] / 4.0, row[at.reference_velocity + 1] / 4.0
-            l_x, l_y = row[at.reference], row[at.reference + 1]
+            out[0], out[1], out[2] = see.velocity[w, i, 0] / 4.0, see.velocity[w, i, 1], see.yaw_rate[w, i, 0]
+            out[3], out[4] = see.reference_velocity[w, i, 0] / 4.0, see.reference_velocity[w, i, 1] / 4.0
+            l_x, l_y = see.reference[w, i, 0], see.reference[w, i, 1]
             length = np.sqrt(l_x * l_x + l_y * l_y)
             out[5], out[6] = l_x / max(64.0, 0.5 * length), l_y / max(64.0, 0.5 * length)
             out[7], out[8] = l_x / (length + 8.0), l_y / (length + 8.0)
             f_x, f_y, k = 0.0, 0.0, 9
-            for s in range(sectors):
-                if row[at.heard + s] > 0.0:
-                    p_x, p_y = row[at.neighbour + 2 * s], row[at.neighbour + 2 * s + 1]
+            for s in range(see.heard.shape[2]):
+                if see.heard[w, i, s] > 0.0:
+                    p_x, p_y = see.neighbour[w, i, s, 0], see.neighbour[w, i, s, 1]
                     _put(p_x, p_y, 10.0, out, k)
                     d_x, d_y, clamped = neighbour_force(p_x, p_y, gains)
                     f_x, f_y, clamps[w] = f_x + d_x, f_y + d_y, clamps[w] + clamped
                 k += 4
-            for a in range(active):
-                if row[at.echo + a] > 0.0:
-                    p_x, p_y = row[at.echo_position + 2 * a], row[at.echo_position + 2 * a + 1]
-                    reach = row[at.echo_range + a]
+            for a in range(see.echo.shape[2]):
+                if see.echo[w, i, a] > 0.0:
+                    p_x, p_y = see.echo_position[w, i, a, 0], see.echo_position[w, i, a, 1]
+                    reach = see.echo_range[w, i, a]
                     away = max(np.sqrt(p_x * p_x + p_y * p_y), 1e-3)
                     out[k], out[k + 1] = 20.0 / (reach + 10.0), reach / 64.0
                     out[k + 2], out[k + 3] = out[k] * p_x / away, out[k] * p_y / away

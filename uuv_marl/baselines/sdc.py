@@ -17,9 +17,10 @@ from scipy.optimize import linear_sum_assignment
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.errors import PolicyError
-from uuv_marl.percept import Offsets, Percept
+from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields, Starts, fields
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -150,7 +151,7 @@ def hexagonal_slots(n: int) -> Float64:
 @compiled
 def _act(
     flat: Float32,
-    at: Offsets,
+    at: Starts,
     g: Gains,
     limits: Limits,
     slots: Float64,
@@ -160,10 +161,11 @@ def _act(
     action: Float32,
     clamps: Int64,
 ) -> None:
+    see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
             informed = all_informed or depth[w, i] == 0.0
-            f_x, f_y, clamped = _force(flat[w, i], at, g, limits, slots[w], depth[w], i, informed, rho[w])
+            f_x, f_y, clamped = _force(w, i, see, g, limits, slots[w], depth[w], informed, rho[w])
             clamps[w] += clamped
             write_action(f_x, f_y, limits, action[w, i])
 
@@ -176,45 +178,45 @@ def _index(identity: float, num: int) -> int:
 
 @compiled
 def _force(
-    row: Float32,
-    at: Offsets,
+    w: int,
+    i: int,
+    see: Fields,
     g: Gains,
     limits: Limits,
     slots: Float64,
     depth: Float64,
-    i: int,
     informed: bool,
     rho: float,
 ) -> tuple[float, float, int]:
-    u, v = float(row[at.velocity]), float(row[at.velocity + 1])
-    c, s = float(row[at.compass]), float(row[at.compass + 1])
+    u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
+    c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])
     # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.
     follows = False
-    for k in range(at.neighbour - at.heard):
-        j = _index(row[at.link_identity + k], depth.shape[0])
-        follows = follows or (row[at.heard + k] > 0.0 and j >= 0 and depth[j] < depth[i])
+    for k in range(see.heard.shape[2]):
+        j = _index(see.link_identity[w, i, k], depth.shape[0])
+        follows = follows or (see.heard[w, i, k] > 0.0 and j >= 0 and depth[j] < depth[i])
     z_x, z_y, w_x, w_y, near_x, near_y, num = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
-    for k in range(at.neighbour - at.heard):
-        if row[at.heard + k] == 0.0:
+    for k in range(see.heard.shape[2]):
+        if see.heard[w, i, k] == 0.0:
             continue
-        p_x, p_y = float(row[at.neighbour + 2 * k]), float(row[at.neighbour + 2 * k + 1])
+        p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         distance = max(math.hypot(p_x, p_y), 0.1)
         away = g.short * bump(distance / g.short_range) / distance
         near_x, near_y = near_x - away * p_x, near_y - away * p_y
-        j = _index(row[at.link_identity + k], depth.shape[0])
+        j = _index(see.link_identity[w, i, k], depth.shape[0])
         if j >= 0 and (depth[j] < depth[i] or not follows):
             d_x, d_y = slots[j, 0] - slots[i, 0], slots[j, 1] - slots[i, 1]
             z_x, z_y = z_x + c * d_x + s * d_y - p_x, z_y + c * d_y - s * d_x - p_y
-            w_x, w_y = w_x + row[at.link_velocity + 2 * k] - u, w_y + row[at.link_velocity + 2 * k + 1] - v
+            w_x, w_y = w_x + see.link_velocity[w, i, k, 0] - u, w_y + see.link_velocity[w, i, k, 1] - v
             num += 1
     weight = 0.0
     if num > 0:
         z_x, z_y, w_x, w_y, weight = z_x / num, z_y / num, w_x / num, w_y / num, 1.0
     if informed:
-        e_x = -c * slots[i, 0] - s * slots[i, 1] - row[at.reference]
-        e_y = -c * slots[i, 1] + s * slots[i, 0] - row[at.reference + 1]
+        e_x = -c * slots[i, 0] - s * slots[i, 1] - see.reference[w, i, 0]
+        e_y = -c * slots[i, 1] + s * slots[i, 0] - see.reference[w, i, 1]
         z_x, z_y, weight = z_x + g.reference * e_x, z_y + g.reference * e_y, weight + g.reference
-    f_x, f_y, clamped = g.drag * own_drag(row, at, limits), 0.0, 0
+    f_x, f_y, clamped = g.drag * own_drag(u, limits), 0.0, 0
     if weight > 0.0:
         size = math.hypot(z_x, z_y) / weight
         xi = size / rho
@@ -226,7 +228,7 @@ def _force(
     f_x += g.velocity * w_x + near_x
     f_y += g.velocity * w_y + near_y
     if informed:
-        f_x += g.reference_velocity * (row[at.reference_velocity] - u)
-        f_y += g.reference_velocity * (row[at.reference_velocity + 1] - v)
-    o_x, o_y = pass_obstacle(row, at, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
+        f_x += g.reference_velocity * (see.reference_velocity[w, i, 0] - u)
+        f_y += g.reference_velocity * (see.reference_velocity[w, i, 1] - v)
+    o_x, o_y = pass_obstacle(w, i, see, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
     return f_x + o_x, f_y + o_y, clamped

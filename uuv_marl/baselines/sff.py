@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.percept import Offsets, Percept
+from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields, Starts, fields
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -122,34 +123,31 @@ def _recall(identity: float, known: Float32) -> int:
 
 
 @compiled
-def _act(flat: Float32, at: Offsets, g: Gains, limits: Limits, period: float, memory: Memory, action: Float32) -> None:
+def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, period: float, memory: Memory, action: Float32) -> None:
+    see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            f_x, f_y = _force(
-                flat[w, i], at, g, limits, period, memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
-            )
+            f_x, f_y = _force(w, i, see, g, limits, period, memory)
             write_action(f_x, f_y, limits, action[w, i])
 
 
 @compiled
-def _force(
-    row: Float32, at: Offsets, g: Gains, limits: Limits, period: float, who: Float32, where: Float64, moved: Float64
-) -> tuple[float, float]:
-    sectors = at.neighbour - at.heard
-    u, v, r = float(row[at.velocity]), float(row[at.velocity + 1]), float(row[at.yaw_rate])
+def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, period: float, memory: Memory) -> tuple[float, float]:
+    who, where, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
+    u, v, r = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), float(see.yaw_rate[w, i, 0])
     c, s = math.cos(r * period), math.sin(r * period)
-    l_x, l_y = float(row[at.reference]), float(row[at.reference + 1])
+    l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
-    f_x, f_y = pull * l_x + g.drag * own_drag(row, at, limits), pull * l_y
+    f_x, f_y = pull * l_x + g.drag * own_drag(u, limits), pull * l_y
     mean_x, mean_y, num = 0.0, 0.0, 0
     change, leader_x, leader_y = -1.0, 0.0, 0.0
-    for k in range(sectors):
-        if row[at.heard + k] == 0.0:
+    for k in range(see.heard.shape[2]):
+        if see.heard[w, i, k] == 0.0:
             continue
-        p_x, p_y = float(row[at.neighbour + 2 * k]), float(row[at.neighbour + 2 * k + 1])
-        v_x, v_y = float(row[at.link_velocity + 2 * k]), float(row[at.link_velocity + 2 * k + 1])
+        p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
+        v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
         q_x, q_y = p_x, p_y
-        old = _recall(row[at.link_identity + k], who)
+        old = _recall(see.link_identity[w, i, k], who)
         if old >= 0:
             # The frame has turned by r * period since then.
             rate_x = (p_x - c * where[old, 0] - s * where[old, 1]) / period
@@ -165,17 +163,17 @@ def _force(
         f_x, f_y = f_x + attraction * q_x / distance, f_y + attraction * q_y / distance
         mean_x, mean_y, num = mean_x + v_x, mean_y + v_y, num + 1
     echoes = False
-    for a in range(at.echo_range - at.echo):
-        echoes = echoes or row[at.echo + a] > 0.0
+    for a in range(see.echo.shape[2]):
+        echoes = echoes or see.echo[w, i, a] > 0.0
     if num > 0:
         share = g.blend if echoes and change >= 0.0 else 0.0
         f_x += g.velocity * ((1.0 - share) * mean_x / num + share * leader_x - u)
         f_y += g.velocity * ((1.0 - share) * mean_y / num + share * leader_y - v)
-    f_x += g.reference_velocity * (row[at.reference_velocity] - u)
-    f_y += g.reference_velocity * (row[at.reference_velocity + 1] - v)
-    o_x, o_y = pass_obstacle(row, at, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
-    for k in range(sectors):
-        who[k] = row[at.link_identity + k]
-        where[k, 0], where[k, 1] = row[at.neighbour + 2 * k], row[at.neighbour + 2 * k + 1]
-        moved[k, 0], moved[k, 1] = row[at.link_velocity + 2 * k], row[at.link_velocity + 2 * k + 1]
+    f_x += g.reference_velocity * (see.reference_velocity[w, i, 0] - u)
+    f_y += g.reference_velocity * (see.reference_velocity[w, i, 1] - v)
+    o_x, o_y = pass_obstacle(w, i, see, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
+    for k in range(see.heard.shape[2]):
+        who[k] = see.link_identity[w, i, k]
+        where[k, 0], where[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
+        moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
     return f_x + o_x, f_y + o_y

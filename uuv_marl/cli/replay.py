@@ -132,7 +132,7 @@ def _ready(output: Path) -> Path:
 def _default(recordings: "Sequence[Recording]") -> Path:
     from uuv_marl.benchmark.results import run_name
 
-    first, policies = recordings[0], "+".join(recording.policy for recording in recordings)
+    first, policies = recordings[0], "-".join(recording.policy for recording in recordings)
     return Path("results/replay") / f"{run_name(first.scenario.name, policies, first.seed)}.html"
 
 

@@ -3,31 +3,39 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.percept import PerceptField, PerceptLayout
-from uuv_marl.scenario import MAX_RANGE_M, Scenario
+from uuv_marl.percept import (
+    DIRECTION,
+    FLAG,
+    LENGTH,
+    POSITION,
+    SPEED,
+    YAW_RATE,
+    Kind,
+    PerceptField,
+    PerceptLayout,
+)
+from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
-_FAR = ("m", 64.0, -MAX_RANGE_M, MAX_RANGE_M)
-_SPEED = ("m/s", 4.0, -64.0, 64.0)
-_UNIT = ("1", 1.0, -1.0, 1.0)
+_TIME = Kind("1", 1.0, 0.0, 2.0)
 
 
 def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     """The fields in order. Positions are relative to l(t), north and east; vehicles come in the order of agents."""
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
     return (
-        PerceptField("alive", (n,), "1", 1.0, 0.0, 1.0, "per vehicle: 1, or 0 once it is lost"),
-        PerceptField("position", (n, 2), *_FAR, "per vehicle: position relative to l(t), north and east"),
-        PerceptField("heading", (n, 2), *_UNIT, "per vehicle: cosine and sine of the heading from north"),
-        PerceptField("velocity", (n, 2), *_SPEED, "per vehicle: surge and sway velocity"),
-        PerceptField("yaw_rate", (n,), "rad/s", 1.0, -64.0, 64.0, "per vehicle: yaw rate"),
-        PerceptField("reference_velocity", (2,), *_SPEED, "velocity of l(t), north and east"),
-        PerceptField("end", (2,), *_FAR, "end of the trajectory relative to l(t), north and east"),
-        PerceptField("time", (1,), "1", 1.0, 0.0, 2.0, "share of the time limit that has passed"),
-        PerceptField("obstacle", (m,), "1", 1.0, 0.0, 1.0, "per obstacle: 1, or 0 for an unused row"),
-        PerceptField("obstacle_position", (m, 2), *_FAR, "per obstacle: centre relative to l(t), north and east"),
-        PerceptField("obstacle_radius", (m,), "m", 64.0, 0.0, MAX_RANGE_M, "per obstacle: radius"),
+        PerceptField("alive", (n,), FLAG, "per vehicle: 1, or 0 once it is lost"),
+        PerceptField("position", (n, 2), POSITION, "per vehicle: position relative to l(t), north and east"),
+        PerceptField("heading", (n, 2), DIRECTION, "per vehicle: cosine and sine of the heading from north"),
+        PerceptField("velocity", (n, 2), SPEED, "per vehicle: surge and sway velocity"),
+        PerceptField("yaw_rate", (n,), YAW_RATE, "per vehicle: yaw rate"),
+        PerceptField("reference_velocity", (2,), SPEED, "velocity of l(t), north and east"),
+        PerceptField("end", (2,), POSITION, "end of the trajectory relative to l(t), north and east"),
+        PerceptField("time", (1,), _TIME, "share of the time limit that has passed"),
+        PerceptField("obstacle", (m,), FLAG, "per obstacle: 1, or 0 for an unused row"),
+        PerceptField("obstacle_position", (m, 2), POSITION, "per obstacle: centre relative to l(t), north and east"),
+        PerceptField("obstacle_radius", (m,), LENGTH, "per obstacle: radius"),
     )
 
 

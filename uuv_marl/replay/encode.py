@@ -182,7 +182,7 @@ def _differences(values: Int32, order: int) -> Int32:
     """Differences in time of this order, modulo 2^32, in the order of the vehicles, then of time. Shape (value,)."""
     for _ in range(order):
         values = np.diff(values, axis=0, prepend=np.zeros_like(values[:1]))
-    return values.reshape(len(values), -1).T.ravel()
+    return np.moveaxis(values, 0, -1).ravel()
 
 
 def _smooth(scaled: NDArray[np.float64], coding: Coding) -> str:

@@ -35,39 +35,39 @@ def contacts(time_s: Float32, began: Int32, clearance: Float32, position: Float3
     """An event for each contact that the engine counted.
 
     The engine counts contacts for each vehicle, not with whom: a vehicle whose hull begins to overlap an obstacle has
-    hit that, and the others have hit each other, nearest pairs first.
+    hit that, and the others have hit each other.
 
     Args:
         time_s: shape (time,).
         began: contacts that began since the sample before, shape (time, vehicle).
         clearance: smallest distance to an obstacle's surface since the sample before [m], shape (time, vehicle).
         position: also of those who are lost by the contact [m], shape (time, vehicle, 2).
-        hull_radius_m: an obstacle's surface nearer than this is a contact.
+        hull_radius_m: an obstacle's surface nearer than this is a contact, and a vehicle nearer than twice this.
     """
     events: list[Event] = []
+    inside = clearance < hull_radius_m
     for t in np.flatnonzero(began.any(axis=1)).tolist():
         now, left = float(time_s[t]), began[t].copy()
-        inside, before = clearance[t] < hull_radius_m, clearance[max(t - 1, 0)] < hull_radius_m
-        hit = np.flatnonzero((left > 0) & inside & ~before).tolist()
+        hit = np.flatnonzero((left > 0) & inside[t] & ~inside[t - 1]).tolist()
         left[hit] -= 1
-        for i, j in _nearest_pairs(position[t], left):
-            events.append(Event(now, "collision", (i, j)))
-            left[[i, j]] -= 1
-        hit += np.repeat(np.arange(len(left)), left).tolist()
+        while left.any():
+            i = int(left.argmax())
+            j = _partner(i, left, position[t - 1 : t + 1], 2 * hull_radius_m)
+            if j is None:
+                hit += [i] * int(left[i])
+                left[i] = 0
+            else:
+                events.append(Event(now, "collision", (min(i, j), max(i, j))))
+                left[[i, j]] -= 1
         events += [Event(now, "obstacle", (i,)) for i in hit]
     return events
 
 
-def _nearest_pairs(position: Float32, left: Int32) -> list[tuple[int, int]]:
-    """Pairs of vehicles, nearest first, until each has as many as it has contacts ``left`` or is without a partner."""
-    these = np.flatnonzero(left > 0).tolist()
-    away = {(i, j): float(np.hypot(*(position[i] - position[j]))) for i in these for j in these if i < j}
-    count, pairs = left.copy(), list[tuple[int, int]]()
-    for i, j in sorted(away, key=lambda pair: away[pair]):
-        if count[i] > 0 and count[j] > 0:
-            pairs.append((i, j))
-            count[[i, j]] -= 1
-    return pairs
+def _partner(i: int, left: Int32, position: Float32, touch_m: float) -> int | None:
+    """Whom vehicle i hit between two samples: of those with contacts ``left`` who were apart from it, the nearest."""
+    before, now = np.hypot(*np.moveaxis(position - position[:, i : i + 1], -1, 0))
+    others = np.flatnonzero((left > 0) & (np.arange(len(left)) != i)).tolist()
+    return min(others, key=lambda j: (before[j] < touch_m, now[j]), default=None)
 
 
 def losses(time_s: Float32, alive: Bool) -> list[Event]:

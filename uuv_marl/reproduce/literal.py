@@ -14,22 +14,21 @@ from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
 from uuv_marl.reproduce.drawing import against_time
 from uuv_marl.reproduce.study import SINGLE, TRACKING, Columns, Part, Report, Study, Tables
 from uuv_marl.scenario_files import load_scenario
-from uuv_marl.sim.vehicle import Plant, advance, plant
+from uuv_marl.sim.vehicle import Plant, State6, advance, plant
 
 FORCE = (1500.0, 150.0)
 """Held surge force [N] and yaw torque [N m] of the lone vehicle: a turning circle, from rest."""
 DURATION_S = 20.0
 STEPS_S = (0.4, 0.2, 0.1, 0.05, 0.025, 0.0125)
-State = tuple[float, float, float, float, float, float]
 
 
-def printed_step(state: State, h: float, p: Plant) -> State:
+def printed_step(state: State6, h: float, p: Plant) -> State6:
     """Eq. 23-24 as printed: velocity by Runge-Kutta; then the pose, whose k4 takes V(t), not V(t + t_r).
 
     V(t + t_r / 2) is defined nowhere; the mean of V(t) and V(t + t_r) stands for it.
     """
     x, y, psi, u, v, r = state
-    _, _, _, u_next, v_next, r_next = advance(*state, *FORCE, h, p)
+    _, _, _, u_next, v_next, r_next = advance(state, FORCE, h, p)
     middle = ((u + u_next) / 2, (v + v_next) / 2, (r + r_next) / 2)
 
     def rate(angle: float, nu: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -44,9 +43,9 @@ def printed_step(state: State, h: float, p: Plant) -> State:
     return x + dx, y + dy, psi + dpsi, u_next, v_next, r_next
 
 
-def classical_step(state: State, h: float, p: Plant) -> State:
+def classical_step(state: State6, h: float, p: Plant) -> State6:
     """What we use: Runge-Kutta on pose and velocity together."""
-    return advance(*state, *FORCE, h, p)
+    return advance(state, FORCE, h, p)
 
 
 def convergence() -> Columns:
@@ -62,8 +61,8 @@ def convergence() -> Columns:
     return {head: np.array(column) for head, column in zip(heads, zip(*rows, strict=True), strict=True)}
 
 
-def _travel(step: Callable[[State, float, Plant], State], h: float, p: Plant) -> State:
-    state: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+def _travel(step: Callable[[State6, float, Plant], State6], h: float, p: Plant) -> State6:
+    state: State6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(round(DURATION_S / h)):
         state = step(state, h, p)
     return state

@@ -72,7 +72,7 @@ def vehicle_jacobians(scenario: Scenario) -> tuple[Float64, Float64]:
 
     def rate(at: Float64) -> Float64:
         psi, u, v, r, tau_u, tau_r = at.tolist()
-        return np.array(derivative(psi, u, v, r, tau_u, tau_r, parameters))
+        return np.array(derivative((0.0, 0.0, psi, u, v, r), (tau_u, tau_r), parameters))
 
     slopes = np.array([(rate(point + d) - rate(point - d)) / (2.0 * step) for d in np.eye(6) * step]).T
     return np.hstack([np.zeros((6, 2)), slopes[:, :4]]), slopes[:, 4:]

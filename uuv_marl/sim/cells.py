@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.desk import Cells, Columns
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -21,25 +22,6 @@ ONE_CELL_UP_TO = 250
 _CELLS_PER_VEHICLE = 4
 _CROWDED = 0.85
 """Side of a cell over the mean distance in a swarm so crowded that its cells are made smaller."""
-
-
-class Cells(NamedTuple):
-    """Scratch: the living, sorted by cell and within a cell by index; the first ``Grid.living`` entries count."""
-
-    x: Float64
-    y: Float64
-    cos: Float64
-    sin: Float64
-    vehicle: Int64
-    """Index of each in the swarm, shape (vehicle,)."""
-    entry: Int64
-    """Entry of each vehicle of the swarm, -1 for the lost, shape (vehicle,); while sorting, its cell."""
-    nearest: Float64
-    """Squared distance of the nearest other [m2], shape (vehicle,)."""
-    some: Int64
-    """Room for a choice of entries, shape (vehicle,)."""
-    first: Int64
-    """First entry of each cell, and of the end, shape (cell + 1,)."""
 
 
 class Grid(NamedTuple):
@@ -63,8 +45,9 @@ def max_cells(num_vehicles: int) -> int:
 
 
 @compiled
-def fit(x: Float64, y: Float64, alive: Bool, w: int, side: float) -> Grid:
+def fit(w: int, alive: Bool, side: float, now: Columns) -> Grid:
     """A grid over the living of world w: cells of this side, smaller in a crowd, wider where there were too many."""
+    x, y = now.x, now.y
     living, x_min, x_max, y_min, y_max = 0, math.inf, -math.inf, math.inf, -math.inf
     for i in range(alive.shape[1]):
         if alive[w, i]:
@@ -91,9 +74,9 @@ def place(value: float, low: float, side: float, num: int) -> int:
 
 
 @compiled
-def sort(x: Float64, y: Float64, c: Float64, s: Float64, alive: Bool, w: int, side: float, cells: Cells) -> Grid:
-    """Fill ``cells`` with the living of world w, whose poses are given, shape (vehicle,) each."""
-    grid = fit(x, y, alive, w, side)
+def sort(w: int, alive: Bool, side: float, now: Columns, cells: Cells) -> Grid:
+    """Fill ``cells`` with the living of world w, ``alive`` of shape (world, vehicle), in cells of this side [m]."""
+    grid, x, y, c, s = fit(w, alive, side, now), now.x, now.y, now.cos, now.sin
     num = grid.rows * grid.columns
     cells.first[: num + 1] = 0
     for i in range(alive.shape[1]):

@@ -1,13 +1,14 @@
 """Whom a vehicle hears (Eq. 8-9, 12-15): the nearest in each sub-sector, unless an obstacle is between."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.sim.cells import Cells, Grid, place
+from uuv_marl.sim.arrays import Course
+from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled, compiled_inline
+from uuv_marl.sim.desk import Cells, Desk, Ear
 from uuv_marl.sim.sonar import Suite, cross, diamond
 
 Float64 = NDArray[np.float64]
@@ -15,44 +16,20 @@ Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Box = tuple[float, float, float, float]
 """Northern, southern, eastern and western side [m]."""
+Points = tuple[Float64, Float64, Int64]
+"""North and east [m] and index of vehicles, shape (vehicle,) each."""
+Pose = tuple[float, float, float, float]
+"""North and east [m], cosine and sine of the heading."""
 
 _REACH_CELLS = 5.0
 """Cells searched around a listener before its empty sub-sectors are followed one by one; the fastest of 2.5, 3.5, 5."""
 
 
-class Ear(NamedTuple):
-    """Scratch for one listener: what it hears, shape (sector + 1,), and whom it listens to, shape (vehicle + 1,)."""
-
-    heard: Int64
-    """Index of the vehicle heard, -1 for none."""
-    kept: Float64
-    """Its squared distance, before the squared range [m2]."""
-    kept_ahead: Float64
-    kept_abeam: Float64
-    """Its position in the listener's body frame [m], 0 for none."""
-    nearest: Float64
-    """Smallest squared distance in each sub-sector so far [m2]."""
-    x: Float64
-    y: Float64
-    vehicle: Int64
-    """Position [m] and index of those gathered from a box of cells."""
-    squared: Float64
-    ahead: Float64
-    abeam: Float64
-    """Squared distance [m2] and position in the body frame [m] of those listened to."""
-    bin: Int32
-    """Bin of their directions."""
-    sector: Int64
-    """Their sub-sectors."""
-    some: Int32
-    """Room for a choice of them."""
-
-
 @compiled
-def hidden(x: float, y: float, dx: float, dy: float, w: int, obstacles: Float64, num_obstacles: int) -> bool:
-    """Whether a disc meets the segment from (x, y) to (x + dx, y + dy)."""
-    length2 = dx * dx + dy * dy
-    for k in range(num_obstacles):
+def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> bool:
+    """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy)."""
+    obstacles, length2 = course.obstacles, dx * dx + dy * dy
+    for k in range(course.num_obstacles[w]):
         o_x, o_y = obstacles[w, k, 0] - x, obstacles[w, k, 1] - y
         share = min(max((o_x * dx + o_y * dy) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
         if math.hypot(o_x - share * dx, o_y - share * dy) < obstacles[w, k, 2]:
@@ -61,8 +38,9 @@ def hidden(x: float, y: float, dx: float, dy: float, w: int, obstacles: Float64,
 
 
 @compiled_inline
-def locate(num: int, xs: Float64, ys: Float64, x: float, y: float, c: float, s: float, bins: int, ear: Ear) -> None:
-    """Where the first ``num`` of the points (xs, ys) are for a listener at (x, y), heading (c, s); itself nowhere."""
+def locate(num: int, points: Points, pose: Pose, bins: int, ear: Ear) -> None:
+    """Where the first ``num`` of the points are for a listener with this pose; itself nowhere."""
+    (xs, ys, _), (x, y, c, s) = points, pose
     per_unit, last = 0.25 * bins, np.int32(bins - 1)
     for q in range(num):
         dx, dy = xs[q] - x, ys[q] - y
@@ -111,15 +89,13 @@ def keep_nearest(num: int, vehicles: Int64, ear: Ear) -> None:
 
 
 @compiled_inline
-def listen(
-    num: int, xs: Float64, ys: Float64, vehicles: Int64, x: float, y: float, c: float, s: float, w: int,
-    obstacles: Float64, hiding: int, suite: Suite, ear: Ear,
-) -> None:  # fmt: skip
-    """A listener at (x, y) hears the first ``num`` of these vehicles, unless one of ``hiding`` obstacles is between."""
-    locate(num, xs, ys, x, y, c, s, suite.codes.shape[1], ear)
-    if hiding > 0:
+def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: Suite, ear: Ear) -> None:
+    """A listener with this pose hears the first ``num`` of the points, unless an obstacle is between."""
+    locate(num, points, pose, suite.codes.shape[1], ear)
+    xs, ys, vehicles = points
+    if suite.obstacles_hide and course.num_obstacles[w] > 0:
         for q in range(num):
-            if hidden(x, y, xs[q] - x, ys[q] - y, w, obstacles, hiding):
+            if hidden(pose[0], pose[1], xs[q] - pose[0], ys[q] - pose[1], w, course):
                 ear.squared[q] = math.inf
     for layer in range(suite.codes.shape[0]):
         choose_sectors(num, layer, suite, ear)
@@ -141,35 +117,34 @@ def gather(box: Box, cells: Cells, grid: Grid, ear: Ear) -> int:
 
 
 @compiled_inline
-def hear(
-    p: int, w: int, obstacles: Float64, num_obstacles: int, cells: Cells, grid: Grid, suite: Suite, ear: Ear
-) -> None:
-    """Fill ``ear`` for entry p of ``cells``: from the cells around it, then farther out where a sub-sector is empty."""
-    x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
-    sectors, hiding = suite.lower.shape[0], num_obstacles if suite.obstacles_hide else 0
+def hear(p: int, w: int, course: Course, suite: Suite, desk: Desk, grid: Grid) -> None:
+    """Fill the ear for entry p of the cells: from those around it, then farther out where a sub-sector is empty."""
+    cells, ear, sectors = desk.cells, desk.ear, suite.lower.shape[0]
+    pose = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(sectors + 1):
         ear.nearest[k] = ear.kept[k] = suite.squared_range[k]
         ear.kept_ahead[k] = ear.kept_abeam[k] = 0.0
         ear.heard[k] = -1
     if grid.rows * grid.columns == 1:
-        listen(grid.living, cells.x, cells.y, cells.vehicle, x, y, c, s, w, obstacles, hiding, suite, ear)
+        listen(grid.living, (cells.x, cells.y, cells.vehicle), pose, w, course, suite, ear)
         return
     reach = _REACH_CELLS * grid.side
-    box = x + reach, x - reach, y + reach, y - reach
+    box = pose[0] + reach, pose[0] - reach, pose[1] + reach, pose[1] - reach
     # First all within reach; then sub-sector by sub-sector, farther and farther until nobody nearer can be missed.
     k, near = -1, 0.0
     while k < sectors:
         num = gather(box, cells, grid, ear)
-        listen(num, ear.x, ear.y, ear.vehicle, x, y, c, s, w, obstacles, hiding, suite, ear)
+        listen(num, (ear.x, ear.y, ear.vehicle), pose, w, course, suite, ear)
         near *= 1.5
         while k < sectors and (k < 0 or near * near > ear.nearest[k]):
             k, near = k + 1, reach
-        box = reached(min(k, sectors - 1), near, 1.5 * near, x, y, c, s, suite)
+        box = reached(min(k, sectors - 1), near, 1.5 * near, pose, suite)
 
 
 @compiled
-def reached(k: int, near: float, far: float, x: float, y: float, c: float, s: float, suite: Suite) -> Box:
-    """Rectangle around what sub-sector k of a listener at (x, y) hears between two distances [m]."""
+def reached(k: int, near: float, far: float, pose: Pose, suite: Suite) -> Box:
+    """Rectangle around what sub-sector k of a listener with this pose hears between two distances [m]."""
+    x, y, c, s = pose
     l_x, l_y, u_x, u_y = suite.lower[k, 0], suite.lower[k, 1], suite.upper[k, 0], suite.upper[k, 1]
     # The far edges are lengthened so that their chord clears the arc: by 1 / cos of half the width.
     far *= math.sqrt(2.0 / (1.0 + l_x * u_x + l_y * u_y))

@@ -1,11 +1,11 @@
 """A world's vehicles moved together: their states as columns, over which loops pass on vector registers."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.sim.arrays import State
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.desk import Columns
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant, actuators, advance, project, turned, wrap
 
@@ -13,31 +13,10 @@ Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 
 
-class Columns(NamedTuple):
-    """Scratch, shape (vehicle,) each; the symbols are those of ``uuv_marl.sim.vehicle``."""
-
-    x: Float64
-    y: Float64
-    psi: Float64
-    u: Float64
-    v: Float64
-    r: Float64
-    cos: Float64
-    sin: Float64
-    tau_u: Float64
-    tau_r: Float64
-    a_x: Float64
-    a_y: Float64
-    """The decided action, on the unit disc."""
-    psi_0: Float64
-    """Heading at which it was decided."""
-    effort: Float64
-    """Squared length of the action as pushed."""
-
-
 @compiled
-def load(w: int, eta: Float64, nu: Float64, now: Columns) -> None:
-    """The columns of world w from its states eta and nu, shape (world, vehicle, 3)."""
+def load(w: int, state: State, now: Columns) -> None:
+    """The columns of world w from its state."""
+    eta, nu = state.eta, state.nu
     for i in range(eta.shape[1]):
         now.x[i], now.y[i], now.psi[i] = eta[w, i, 0], eta[w, i, 1], eta[w, i, 2]
         now.u[i], now.v[i], now.r[i] = nu[w, i, 0], nu[w, i, 1], nu[w, i, 2]
@@ -47,8 +26,9 @@ def load(w: int, eta: Float64, nu: Float64, now: Columns) -> None:
 
 
 @compiled
-def load_one(w: int, i: int, eta: Float64, nu: Float64, now: Columns) -> None:
-    """The same for vehicle i alone, whose latest motion is thrown away."""
+def load_one(w: int, i: int, state: State, now: Columns) -> None:
+    """The columns of vehicle i alone, whose latest motion is thrown away."""
+    eta, nu = state.eta, state.nu
     now.x[i], now.y[i], now.psi[i] = eta[w, i, 0], eta[w, i, 1], eta[w, i, 2]
     now.u[i], now.v[i], now.r[i] = nu[w, i, 0], nu[w, i, 1], nu[w, i, 2]
     now.cos[i], now.sin[i] = cos_sin(now.psi[i])
@@ -78,9 +58,9 @@ def move(steps: int, step_s: float, now: Columns, plant: Plant) -> None:
     """One control hold. Eq. 1-4, 23-24."""
     for _ in range(steps):
         for i in range(now.x.shape[0]):
-            now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i] = advance(
-                now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i], now.tau_u[i], now.tau_r[i], step_s, plant
-            )
+            state = now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i]
+            tau = now.tau_u[i], now.tau_r[i]
+            now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i] = advance(state, tau, step_s, plant)
     for i in range(now.x.shape[0]):
         now.psi[i] = wrap(now.psi[i])
         now.cos[i], now.sin[i] = cos_sin(now.psi[i])

@@ -2,18 +2,15 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from uuv_marl.percept import MAX_SPEED, Offsets
+from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import MAX_RANGE_M
-from uuv_marl.sim.cells import Cells
+from uuv_marl.sim.arrays import Course, World
 from uuv_marl.sim.compiled import compiled, compiled_inline
-from uuv_marl.sim.hearing import Ear
+from uuv_marl.sim.desk import Desk
+from uuv_marl.sim.hearing import Pose
+from uuv_marl.sim.model import Model
 from uuv_marl.sim.sonar import Suite, cross
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.sim.views import Fields
 
 
 @compiled
@@ -48,65 +45,51 @@ def saturate(value: float, limit: float) -> float:
 
 
 @compiled_inline
-def write_percept(
-    p: int,
-    w: int,
-    nu: Float64,
-    reference: Float64,
-    obstacles: Float64,
-    num_obstacles: int,
-    cells: Cells,
-    suite: Suite,
-    ear: Ear,
-    at: Offsets,
-    out: Float32,
-) -> None:
-    """What entry p of ``cells`` knows in world w, as a flat vector in physical units. Eq. 11, 14-17."""
-    i = cells.vehicle[p]
+def write_percept(p: int, w: int, world: World, model: Model, desk: Desk, see: Fields) -> None:
+    """What entry p of the cells knows in world w, into the fields of its percept. Eq. 11, 14-17."""
+    cells, ear, course = desk.cells, desk.ear, world.course
+    nu, reference, i = world.state.nu, world.facts.reference, cells.vehicle[p]
     x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
-    for k in range(out.shape[2]):
-        out[w, i, k] = 0.0
-    out[w, i, at.velocity] = saturate(nu[w, i, 0], MAX_SPEED)
-    out[w, i, at.velocity + 1] = saturate(nu[w, i, 1], MAX_SPEED)
-    out[w, i, at.yaw_rate] = saturate(nu[w, i, 2], MAX_SPEED)
+    for k in range(world.senses.percept.shape[2]):
+        world.senses.percept[w, i, k] = 0.0
+    see.velocity[w, i, 0] = saturate(nu[w, i, 0], MAX_SPEED)
+    see.velocity[w, i, 1] = saturate(nu[w, i, 1], MAX_SPEED)
+    see.yaw_rate[w, i, 0] = saturate(nu[w, i, 2], MAX_SPEED)
     dx, dy = reference[w, 0] - x, reference[w, 1] - y
     v_x, v_y = reference[w, 2], reference[w, 3]
     far = max(math.sqrt(dx * dx + dy * dy) / MAX_RANGE_M, 1.0)
-    out[w, i, at.reference] = saturate((c * dx + s * dy) / far, MAX_RANGE_M)
-    out[w, i, at.reference + 1] = saturate((c * dy - s * dx) / far, MAX_RANGE_M)
-    out[w, i, at.reference_velocity] = saturate(c * v_x + s * v_y, MAX_SPEED)
-    out[w, i, at.reference_velocity + 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
-    for k in range(suite.lower.shape[0]):
+    see.reference[w, i, 0] = saturate((c * dx + s * dy) / far, MAX_RANGE_M)
+    see.reference[w, i, 1] = saturate((c * dy - s * dx) / far, MAX_RANGE_M)
+    see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
+    see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+    for k in range(see.heard.shape[2]):
         j = ear.heard[k]
-        out[w, i, at.heard + k] = 1.0 if j >= 0 else 0.0
-        out[w, i, at.neighbour + 2 * k] = ear.kept_ahead[k]
-        out[w, i, at.neighbour + 2 * k + 1] = ear.kept_abeam[k]
-        if at.link_identity >= 0 and j >= 0:
+        see.heard[w, i, k] = 1.0 if j >= 0 else 0.0
+        see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = ear.kept_ahead[k], ear.kept_abeam[k]
+        if see.link_identity.shape[2] > 0 and j >= 0:
             c_j, s_j = cells.cos[cells.entry[j]], cells.sin[cells.entry[j]]
             v_x, v_y = c_j * nu[w, j, 0] - s_j * nu[w, j, 1], s_j * nu[w, j, 0] + c_j * nu[w, j, 1]
-            out[w, i, at.link_identity + k] = j + 1
-            out[w, i, at.link_velocity + 2 * k] = saturate(c * v_x + s * v_y, MAX_SPEED)
-            out[w, i, at.link_velocity + 2 * k + 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
-    if at.compass >= 0:
-        out[w, i, at.compass], out[w, i, at.compass + 1] = c, s
-    for m in range(num_obstacles):
-        dx, dy = obstacles[w, m, 0] - x, obstacles[w, m, 1] - y
-        if math.sqrt(dx * dx + dy * dy) - obstacles[w, m, 2] < suite.reach:
-            write_echoes(i, w, x, y, c, s, obstacles, num_obstacles, suite, at, out)
+            see.link_identity[w, i, k] = j + 1
+            see.link_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
+            see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+    if see.compass.shape[2] > 0:
+        see.compass[w, i, 0], see.compass[w, i, 1] = c, s
+    for m in range(course.num_obstacles[w]):
+        dx, dy = course.obstacles[w, m, 0] - x, course.obstacles[w, m, 1] - y
+        if math.sqrt(dx * dx + dy * dy) - course.obstacles[w, m, 2] < model.suite.reach:
+            write_echoes(i, w, (x, y, c, s), course, model.suite, see)
             break
 
 
 @compiled
-def write_echoes(
-    i: int, w: int, x: float, y: float, c: float, s: float, obstacles: Float64, num_obstacles: int, suite: Suite,
-    at: Offsets, out: Float32,
-) -> None:  # fmt: skip
+def write_echoes(i: int, w: int, pose: Pose, course: Course, suite: Suite, see: Fields) -> None:
     """What vehicle i hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17."""
+    x, y, c, s = pose
     for a in range(suite.active.shape[0]):
         k = suite.active[a]
         best = suite.active_range[a]
-        for m in range(num_obstacles):
-            dx, dy, radius = obstacles[w, m, 0] - x, obstacles[w, m, 1] - y, obstacles[w, m, 2]
+        for m in range(course.num_obstacles[w]):
+            dx, dy, radius = course.obstacles[w, m, 0] - x, course.obstacles[w, m, 1] - y, course.obstacles[w, m, 2]
             if math.sqrt(dx * dx + dy * dy) - radius >= best:
                 continue
             c_x, c_y = c * dx + s * dy, c * dy - s * dx
@@ -117,7 +100,6 @@ def write_echoes(
                 best = reach
                 if not suite.reports_surface:
                     p_x, p_y = c_x, c_y
-                out[w, i, at.echo + a] = 1.0
-                out[w, i, at.echo_range + a] = reach
-                out[w, i, at.echo_position + 2 * a] = saturate(p_x, MAX_RANGE_M)
-                out[w, i, at.echo_position + 2 * a + 1] = saturate(p_y, MAX_RANGE_M)
+                see.echo[w, i, a], see.echo_range[w, i, a] = 1.0, reach
+                see.echo_position[w, i, a, 0] = saturate(p_x, MAX_RANGE_M)
+                see.echo_position[w, i, a, 1] = saturate(p_y, MAX_RANGE_M)

@@ -66,11 +66,16 @@ def _content(module: str, name: str) -> tuple[str, frozenset[str]]:
     """The code of a statement, without decorators, and the names that it uses; of a class the fields alone."""
     statement = _statements(module)[name]
     parts: list[ast.AST] = [statement]
+    annotations: list[ast.AST] = []
     if isinstance(statement, ast.ClassDef):
-        parts = [*statement.bases, *(line for line in statement.body if isinstance(line, ast.AnnAssign))]
+        fields = [line for line in statement.body if isinstance(line, ast.AnnAssign)]
+        parts = [*statement.bases, *(part for line in fields for part in (line.target, line.value) if part)]
+        annotations = [
+            line.annotation for line in fields
+        ]  # values bring their types along; but what is named there counts
     elif isinstance(statement, ast.FunctionDef):
         parts = [statement.args, *(line for line in statement.body if not _is_text(line))]
-    used = {node.id for part in parts for node in ast.walk(part) if isinstance(node, ast.Name)}
+    used = {node.id for part in [*parts, *annotations] for node in ast.walk(part) if isinstance(node, ast.Name)}
     return "; ".join(ast.dump(part) for part in parts), frozenset(used - {name})
 
 

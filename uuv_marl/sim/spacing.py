@@ -5,11 +5,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.sim.cells import Cells, Grid, place
+from uuv_marl.sim.arrays import World
+from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled, compiled_inline
+from uuv_marl.sim.desk import Cells
 
 Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 
 
 @compiled
@@ -83,43 +84,40 @@ def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, gr
 
 
 @compiled
-def measure_vehicles(
-    w: int, hull: float, before: Float64, cells: Cells, grid: Grid, spacing: Float64, contacts: Int64
-) -> int:
-    """Lower ``spacing`` [m] and raise ``contacts``, shape (world, vehicle); how many episodes between vehicles began.
+def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
+    """Lower the spacing of the living and raise their contacts; how many episodes between vehicles began.
 
-    A contact episode begins where two hulls overlap now and did not at ``before``, shape (world, vehicle, 2) [m].
+    A contact episode begins where two hulls of this radius [m] overlap now and did not one control hold ago.
     """
+    before, facts = world.state.before, world.facts
     touch, began = 2.0 * hull, 0
     find_nearest(cells, grid)
     for p in range(grid.living):
         i = cells.vehicle[p]
-        spacing[w, i] = min(spacing[w, i], math.sqrt(cells.nearest[p]))
+        facts.spacing[w, i] = min(facts.spacing[w, i], math.sqrt(cells.nearest[p]))
         if cells.nearest[p] < touch * touch:
             new = new_contacts(w, p, touch, before, cells, grid)
-            contacts[w, i] += new
+            facts.contacts[w, i] += new
             began += new
     return began // 2
 
 
 @compiled
-def measure_obstacles(
-    w: int, hull: float, before: Float64, obstacles: Float64, num_obstacles: int, cells: Cells, grid: Grid,
-    clearance: Float64, obstacle_clearance: Float64, contacts: Int64,
-) -> int:  # fmt: skip
-    """Lower the clearances [m], per vehicle and per obstacle, and raise ``contacts``; how many episodes began."""
+def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
+    """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began."""
+    obstacles, before, facts = world.course.obstacles, world.state.before, world.facts
     began = 0
     for p in range(grid.living):
         i = cells.vehicle[p]
-        for k in range(num_obstacles):
+        for k in range(world.course.num_obstacles[w]):
             x, y, radius = obstacles[w, k, 0], obstacles[w, k, 1], obstacles[w, k, 2]
             dx, dy = x - cells.x[p], y - cells.y[p]
             gap = math.sqrt(dx * dx + dy * dy) - radius
-            clearance[w, i] = min(clearance[w, i], gap)
-            obstacle_clearance[w, k] = min(obstacle_clearance[w, k], gap)
+            facts.clearance[w, i] = min(facts.clearance[w, i], gap)
+            facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], gap)
             was_x, was_y = x - before[w, i, 0], y - before[w, i, 1]
             if gap < hull and math.sqrt(was_x * was_x + was_y * was_y) - radius >= hull:
-                contacts[w, i] += 1
+                facts.contacts[w, i] += 1
                 began += 1
     return began
 

@@ -11,26 +11,22 @@ from numba.np.ufunc.parallel import threading_layer
 from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.scenario import Scenario, growth
+from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
-from uuv_marl.sim.arrays import Course, Facts, Rules, Senses, State, scratch
-from uuv_marl.sim.disturbance import draw_losses, loss_ticks
+from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
+from uuv_marl.sim.cells import max_cells
+from uuv_marl.sim.desk import scratch
+from uuv_marl.sim.disturbance import draw_losses
 from uuv_marl.sim.field import draw_field
+from uuv_marl.sim.model import model
 from uuv_marl.sim.random import episode_key
-from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
+from uuv_marl.sim.tables import allocate, check
 from uuv_marl.sim.trajectory import arrival_times
-from uuv_marl.sim.vehicle import plant
 from uuv_marl.sim.world import observe_world, step_alone, step_worlds
 
 Float32 = NDArray[np.float32]
-ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
-"""Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
-ends on the scenario's own, so that the time within a smaller radius is often missing."""
-
-_CELL_SPACINGS = 1.25
-"""Side of a cell, in spacings of the start, for swarms that are searched by cells (perf/, docs/speed.md)."""
 
 _log = logging.getLogger("uuv_marl")
 _threads_of_parent = False
@@ -49,6 +45,9 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
 
 
+_TABLES = (State, Course, Facts, Senses)
+
+
 class Swarm:
     """Worlds of one scenario, each with its own random stream.
 
@@ -65,61 +64,21 @@ class Swarm:
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
-        self._plant = plant(scenario)
-        self._suite = suite(scenario)
-        self._rules = _rules(scenario)
+        self._model = model(scenario)
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
         self._duration_s = np.zeros(num_worlds)
         self.keys = np.zeros(num_worlds, np.uint64)
         """Of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
-        self._allocate(num_worlds, self.num_vehicles, max(scenario.max_obstacles, 1))
+        self._sizes = _sizes(scenario, num_worlds, len(self._model.rules.arrival_radii), self.layout.size)
+        self._world = World(*(allocate(table, self._sizes) for table in _TABLES))
+        self.state, self.course, self.facts, self._senses = self._world
+        self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
         self._scratch = scratch(
-            min(num_worlds, cast(Any, config).NUMBA_NUM_THREADS), self.num_vehicles, scenario.sonar.num_sectors
-        )
-
-    def _allocate(self, worlds: int, n: int, m: int) -> None:
-        field = self.scenario.random_field
-        points = field.legs[1] + 1 if field else len(self.scenario.trajectory.waypoints_m or ())
-        radii, sectors = len(self._rules.arrival_radii), self.scenario.sonar.num_sectors
-        losses = len(self._rules.loss_ticks)
-        self.state = State(
-            eta=np.zeros((worlds, n, 3)),
-            nu=np.zeros((worlds, n, 3)),
-            before=np.zeros((worlds, n, 2)),
-            alive=np.zeros((worlds, n), np.bool_),
-            tick=np.zeros(worlds, np.int64),
-            dwell=np.zeros((worlds, radii), np.int64),
-        )
-        self.course = Course(
-            waypoints=np.zeros((worlds, points, 2)),
-            times=np.zeros((worlds, points)),
-            last=np.zeros(worlds, np.int64),
-            obstacles=np.zeros((worlds, m, 3)),
-            num_obstacles=np.zeros(worlds, np.int64),
-            losses=np.zeros((worlds, losses), np.int64),
-        )
-        self.facts = Facts(
-            time_s=np.zeros(worlds),
-            reference=np.zeros((worlds, 4)),
-            centre=np.zeros((worlds, 2)),
-            spacing=np.zeros((worlds, n)),
-            min_spacing=np.zeros(worlds),
-            max_spacing=np.zeros(worlds),
-            clearance=np.zeros((worlds, n)),
-            obstacle_clearance=np.zeros((worlds, m)),
-            contacts=np.zeros((worlds, n), np.int64),
-            collisions=np.zeros(worlds, np.int64),
-            lost=np.zeros((worlds, n), np.bool_),
-            effort=np.zeros((worlds, n)),
-            saturated=np.zeros(worlds),
-            diverged=np.full(worlds, -1, np.int64),
-            arrival_s=np.full((worlds, radii), np.nan),
-        )
-        self._senses = Senses(
-            heading=np.zeros((worlds, n, 2)),
-            heard=np.zeros((worlds, n, sectors), np.int32),
-            percept=np.zeros((worlds, n, self.layout.size), np.float32),
+            min(num_worlds, cast(Any, config).NUMBA_NUM_THREADS),
+            self.num_vehicles,
+            scenario.sonar.num_sectors,
+            max_cells(self.num_vehicles),
         )
 
     @property
@@ -220,10 +179,7 @@ class Swarm:
         return self.percept
 
     def _observe(self, w: int) -> None:
-        observe_world(
-            w, self.state, self.course, self.facts, self._senses, self._rules, self._suite, self.layout.offsets,
-            self._scratch,
-        )  # fmt: skip
+        observe_world(w, self._world, self._model, self._scratch)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that a later run depends on, copied, for ``restore``: random streams too."""
@@ -250,25 +206,14 @@ class Swarm:
 
     def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
-        course, n = self.course, self.num_vehicles
-        bounds = {
-            "last": (1, course.waypoints.shape[1] - 1),
-            "num_obstacles": (0, course.obstacles.shape[1]),
-            "losses": (0, n - 1),
-            "heard": (-1, n - 1),
-            "diverged": (-1, n - 1),
-            "times": (0.0, np.finfo(np.float64).max),
-        }
-        for name, (low, high) in bounds.items():
-            if not ((arrays[name] >= low) & (arrays[name] <= high)).all():
-                raise ValueError(f"{name} must lie within {low} and {high}, got {np.unique(arrays[name])[[0, -1]]}")
+        for table in _TABLES:
+            check(table, arrays, self._sizes)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        groups = (self.state, self.course, self.facts, self._senses)
         return {
             "duration_s": self._duration_s,
             "keys": self.keys,
-            **{k: array for group in groups for k, array in group._asdict().items()},
+            **{k: array for table in self._world for k, array in table._asdict().items()},
         }
 
     def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:
@@ -289,39 +234,38 @@ class Swarm:
             )
         if not (self._ready if active is None else self._ready | ~active).all():
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
-        arrays = (
-            np.ascontiguousarray(action), self.state, self.course, self.facts, self._senses, self._plant, self._rules,
-            self._suite, self.layout.offsets, self._scratch,
-        )  # fmt: skip
+        action = np.ascontiguousarray(action)
         if self.num_worlds == 1:
-            diverged = (active is None or active[0]) and step_alone(*arrays)
+            diverged = (active is None or active[0]) and step_alone(action, self._world, self._model, self._scratch)
         else:
-            if _threads_of_parent:
-                raise RuntimeError(
-                    "several worlds can't be stepped in a process forked after Numba's threads had started; "
-                    "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
-                )
-            running = np.ones(self.num_worlds, np.bool_) if active is None else active
-            diverged = step_worlds(min(get_num_threads(), len(self._scratch.reals)), running, *arrays)
+            diverged = self._step_worlds(action, active)
         if diverged:
             for w in np.flatnonzero((self.facts.diverged >= 0) & ~self._warned):
                 _log.warning(self.divergence(int(w)))
                 self._warned[w] = True
         return self.percept
 
+    def _step_worlds(self, action: Float32, active: NDArray[np.bool_] | None) -> bool:
+        if _threads_of_parent:
+            raise RuntimeError(
+                "several worlds can't be stepped in a process forked after Numba's threads had started; "
+                "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
+            )
+        running = np.ones(self.num_worlds, np.bool_) if active is None else active
+        threads = min(get_num_threads(), len(self._scratch.reals))
+        return step_worlds(threads, running, action, *self._world, *self._model, self._scratch)
 
-def _rules(scenario: Scenario) -> Rules:
-    timing = scenario.timing
-    return Rules(
-        hold_s=timing.control_hold_s,
-        step_s=timing.integration_step_s,
-        holds=timing.holds_per_decision,
-        steps=timing.steps_per_hold,
-        hull=scenario.contact.hull_radius_m,
-        contact_ends=scenario.contact.ends_vehicle,
-        dwell_ticks=round(scenario.arrival.dwell_s / timing.control_hold_s),
-        spread=scenario.arrival.spread_m * growth(scenario.swarm.num_vehicles),
-        arrival_radii=np.array([scenario.arrival.radius_m, *ARRIVAL_RADII_M]),
-        loss_ticks=loss_ticks(scenario),
-        cell_side=_CELL_SPACINGS * scenario.start.spacing_m,
-    )
+
+def _sizes(scenario: Scenario, worlds: int, radii: int, entries: int) -> dict[str, int]:
+    """Lengths of the axes of all tables."""
+    field = scenario.random_field
+    return {
+        "world": worlds,
+        "vehicle": scenario.swarm.num_vehicles,
+        "point": field.legs[1] + 1 if field else len(scenario.trajectory.waypoints_m or ()),
+        "obstacle": max(scenario.max_obstacles, 1),
+        "loss": len(scenario.disturbance.loss_times_s),
+        "sector": scenario.sonar.num_sectors,
+        "radius": radii,
+        "entry": entries,
+    }

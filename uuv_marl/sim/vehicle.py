@@ -11,8 +11,10 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline
 from uuv_marl.sim.trigonometry import cos_sin
 
+Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 State6 = tuple[float, float, float, float, float, float]
+"""A vehicle's joint state (x, y, psi, u, v, r)."""
 
 
 class Plant(NamedTuple):
@@ -78,16 +80,18 @@ def plant(scenario: Scenario) -> Plant:
 
 
 @compiled_inline
-def coriolis(u: float, v: float, r: float, p: Plant) -> Vector3:
+def coriolis(nu: Vector3, p: Plant) -> Vector3:
     """C(nu) nu = (C_RB + C_A) nu [N, N, N m]. Eq. 4. Does no work: nu . C nu = 0."""
+    u, v, r = nu
     a = p.m * (p.x_G * r + v) - p.Y_vdot * v - p.Y_rdot * r
     b = p.m * u - p.X_udot * u
     return -a * r, b * r, a * u - b * v
 
 
 @compiled_inline
-def damping(u: float, v: float, r: float, p: Plant) -> Vector3:
+def damping(nu: Vector3, p: Plant) -> Vector3:
     """D(nu) nu = (D_l + D_nl) nu [N, N, N m]. Eq. 4."""
+    u, v, r = nu
     return (
         (p.X_u + p.X_uu * abs(u)) * u,
         (p.Y_v + p.Y_vv * abs(v)) * v - (p.Y_r + p.Y_rr * abs(r)) * r,
@@ -96,11 +100,11 @@ def damping(u: float, v: float, r: float, p: Plant) -> Vector3:
 
 
 @compiled_inline
-def acceleration(u: float, v: float, r: float, tau_u: float, tau_r: float, p: Plant) -> Vector3:
-    """Nu' = M^-1 (tau - C(nu) nu - D(nu) nu) [m/s2, m/s2, rad/s2]. Eq. 2."""
-    c_u, c_v, c_r = coriolis(u, v, r, p)
-    d_u, d_v, d_r = damping(u, v, r, p)
-    f_u, f_v, f_r = tau_u - c_u - d_u, -c_v - d_v, tau_r - c_r - d_r
+def acceleration(nu: Vector3, tau: Vector2, p: Plant) -> Vector3:
+    """Nu' = M^-1 (tau - C(nu) nu - D(nu) nu) [m/s2, m/s2, rad/s2], tau the thrust [N] and torque [N m]. Eq. 2."""
+    c_u, c_v, c_r = coriolis(nu, p)
+    d_u, d_v, d_r = damping(nu, p)
+    f_u, f_v, f_r = tau[0] - c_u - d_u, -c_v - d_v, tau[1] - c_r - d_r
     return (
         p.inverse_11 * f_u,
         p.inverse_22 * f_v + p.inverse_23 * f_r,
@@ -109,31 +113,39 @@ def acceleration(u: float, v: float, r: float, tau_u: float, tau_r: float, p: Pl
 
 
 @compiled_inline
-def derivative(psi: float, u: float, v: float, r: float, tau_u: float, tau_r: float, p: Plant) -> State6:
-    """Rate of the joint state (eta, nu). Eq. 1-2; R(psi) takes body to north-east."""
+def derivative(state: State6, tau: Vector2, p: Plant) -> State6:
+    """Rate of the joint state (eta, nu) under thrust [N] and torque [N m]. Eq. 1-2; R(psi) takes body to north-east."""
+    _, _, psi, u, v, r = state
     c, s = cos_sin(psi)
-    du, dv, dr = acceleration(u, v, r, tau_u, tau_r, p)
+    du, dv, dr = acceleration((u, v, r), tau, p)
     return c * u - s * v, s * u + c * v, r, du, dv, dr
 
 
 @compiled_inline
-def advance(
-    x: float, y: float, psi: float, u: float, v: float, r: float, tau_u: float, tau_r: float, h: float, p: Plant
-) -> State6:
+def ahead(state: State6, h: float, rate: State6) -> State6:
+    """The joint state h [s] later at a constant rate."""
+    x, y, psi, u, v, r = state
+    return (
+        x + h * rate[0], y + h * rate[1], psi + h * rate[2], u + h * rate[3], v + h * rate[4], r + h * rate[5]
+    )  # fmt: skip
+
+
+@compiled_inline
+def advance(state: State6, tau: Vector2, h: float, p: Plant) -> State6:
     """The joint state one step of h [s] later, tau held: the classical fourth-order Runge-Kutta method (Eq. 23-24)."""
-    a0, a1, a2, a3, a4, a5 = derivative(psi, u, v, r, tau_u, tau_r, p)
-    g = 0.5 * h
-    b0, b1, b2, b3, b4, b5 = derivative(psi + g * a2, u + g * a3, v + g * a4, r + g * a5, tau_u, tau_r, p)
-    c0, c1, c2, c3, c4, c5 = derivative(psi + g * b2, u + g * b3, v + g * b4, r + g * b5, tau_u, tau_r, p)
-    d0, d1, d2, d3, d4, d5 = derivative(psi + h * c2, u + h * c3, v + h * c4, r + h * c5, tau_u, tau_r, p)
+    a = derivative(state, tau, p)
+    b = derivative(ahead(state, 0.5 * h, a), tau, p)
+    c = derivative(ahead(state, 0.5 * h, b), tau, p)
+    d = derivative(ahead(state, h, c), tau, p)
+    x, y, psi, u, v, r = state
     w = h / 6.0
     return (
-        x + w * (a0 + 2.0 * b0 + 2.0 * c0 + d0),
-        y + w * (a1 + 2.0 * b1 + 2.0 * c1 + d1),
-        psi + w * (a2 + 2.0 * b2 + 2.0 * c2 + d2),
-        u + w * (a3 + 2.0 * b3 + 2.0 * c3 + d3),
-        v + w * (a4 + 2.0 * b4 + 2.0 * c4 + d4),
-        r + w * (a5 + 2.0 * b5 + 2.0 * c5 + d5),
+        x + w * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]),
+        y + w * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]),
+        psi + w * (a[2] + 2.0 * b[2] + 2.0 * c[2] + d[2]),
+        u + w * (a[3] + 2.0 * b[3] + 2.0 * c[3] + d[3]),
+        v + w * (a[4] + 2.0 * b[4] + 2.0 * c[4] + d[4]),
+        r + w * (a[5] + 2.0 * b[5] + 2.0 * c[5] + d[5]),
     )
 
 

@@ -1,0 +1,83 @@
+"""Arrays are declared once; memory, documentation and checks follow, whatever the scenario."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.sim import world
+from uuv_marl.sim.arrays import Course, Facts, Senses, State
+from uuv_marl.sim.desk import Cells, Columns, Desk, Ear, desk, scratch
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.tables import Bounds, allocate, check, rows
+
+SIZES = {"world": 2, "vehicle": 5, "point": 3, "obstacle": 4, "loss": 1, "sector": 21, "radius": 4, "entry": 98}
+LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5}
+
+
+@pytest.fixture
+def desks():
+    room = scratch(threads=2, num_vehicles=7, num_sectors=21, num_cells=4)
+    return room, [desk.py_func(room, t) for t in range(2)]
+
+
+def test_every_array_of_a_desk_has_room_of_its_own(desks):
+    arrays = [array for own in desks[1] for table in own for array in table]
+    assert len(arrays) == 2 * sum(len(table._fields) for table in (Columns, Cells, Ear))
+    for a, b in itertools.combinations(arrays, 2):
+        assert not np.shares_memory(a, b)
+
+
+def test_a_desk_leaves_no_column_unused_and_has_the_declared_types(desks):
+    room, own = desks
+    for table, arrays in zip((Columns, Cells, Ear), Desk(*own[0]), strict=True):
+        for (name, row), array in zip(rows(table).items(), arrays, strict=True):
+            assert array.dtype == row.dtype, name
+            assert len(array) >= LENGTHS[row.axes[0]], name
+    columns = sum(block.shape[1] for block in room)
+    assert columns == sum(len(table._fields) for table in (Columns, Cells, Ear))
+
+
+def test_a_table_tells_shapes_types_and_meaning():
+    state = allocate(State, SIZES)
+    assert (state.eta.shape, state.eta.dtype, state.alive.dtype) == ((2, 5, 3), np.float64, np.bool_)
+    assert "eta: Pose: north [m], east [m], heading [rad]. Shape (world, vehicle, 3), float64." in State.__doc__
+    for table in (State, Course, Senses, Facts):
+        assert all(f"\n        {name}: " in table.__doc__ for name in table._fields)
+
+
+@pytest.mark.parametrize(
+    ("low", "axis", "beyond", "wrong"), [(0, "vehicle", 0, 5), (-1, "vehicle", 0, -2), (1, "point", 1, 4)]
+)
+def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyond, wrong, monkeypatch):
+    arrays = allocate(Course, SIZES)._asdict()
+    arrays["last"][:] = 1
+    check(Course, arrays, SIZES)
+    monkeypatch.setattr(
+        "uuv_marl.sim.tables.rows",
+        lambda table: {"last": rows(table)["last"]._replace(bounds=Bounds(low, axis, beyond))},
+    )
+    arrays["last"][1] = wrong
+    with pytest.raises(ValueError, match="last must lie within"):
+        check(Course, arrays, SIZES)
+
+
+def test_the_compiled_types_are_the_same_for_all_scenarios():
+    """Otherwise each scenario, hull or disturbance compiles the whole simulation anew."""
+    changes = [
+        ("starter", {}),
+        ("tracking", {"num_vehicles": 1}),
+        ("single_obstacle", {"overrides": {"sonar.arrays.bow.sub_sectors": 3, "sonar.echo_reports": "surface"}}),
+        ("multi_obstacle", {"num_vehicles": 300}),
+        ("lossy", {"overrides": {"sonar.channels": ["compass", "link"]}}),
+        ("random_field", {"overrides": {"vehicle.m_kg": 250.0, "contact.ends_vehicle": True}}),
+    ]
+    for name, change in changes:
+        scenario = load_scenario(name, **change)
+        for worlds in (1, 2):
+            swarm = Swarm(scenario, worlds)
+            swarm.reset(0)
+            swarm.step(np.zeros((worlds, swarm.num_vehicles, 2)))
+    for entry in (world.observe_world, world.step_alone, world.step_worlds):
+        assert len(entry.signatures) == 1, entry

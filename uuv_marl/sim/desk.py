@@ -1,0 +1,121 @@
+"""Room to work in: arrays that a step fills and forgets, one set for each thread."""
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.tables import rows
+
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+Int32 = NDArray[np.int32]
+Column = Annotated[Float64, "vehicle", "See uuv_marl.sim.vehicle."]
+
+
+class Columns(NamedTuple):
+    """The vehicles of a world as columns; the symbols are those of ``uuv_marl.sim.vehicle``."""
+
+    x: Column
+    y: Column
+    psi: Column
+    u: Column
+    v: Column
+    r: Column
+    cos: Column
+    sin: Column
+    tau_u: Column
+    tau_r: Column
+    a_x: Annotated[Float64, "vehicle", "The decided action, on the unit disc."]
+    a_y: Annotated[Float64, "vehicle", "The decided action, on the unit disc."]
+    psi_0: Annotated[Float64, "vehicle", "Heading at which it was decided [rad]."]
+    effort: Annotated[Float64, "vehicle", "Squared length of the action as pushed."]
+
+
+class Cells(NamedTuple):
+    """The living, sorted by cell and within a cell by index; the first ``Grid.living`` entries count."""
+
+    x: Column
+    y: Column
+    cos: Column
+    sin: Column
+    vehicle: Annotated[Int64, "vehicle", "Index of each in the swarm."]
+    entry: Annotated[Int64, "vehicle", "Entry of each vehicle of the swarm, -1 for the lost; while sorting, its cell."]
+    nearest: Annotated[Float64, "vehicle", "Squared distance of the nearest other [m2]."]
+    some: Annotated[Int64, "vehicle", "Room for a choice of entries."]
+    first: Annotated[Int64, "cell", "First entry of each cell, and of the end."]
+
+
+class Ear(NamedTuple):
+    """One listener: what it hears in each sub-sector and beyond all, and whom it listens to."""
+
+    heard: Annotated[Int64, "sector", "Index of the vehicle heard, -1 for none."]
+    kept: Annotated[Float64, "sector", "Its squared distance, before the squared range [m2]."]
+    kept_ahead: Annotated[Float64, "sector", "How far it is ahead [m], 0 for none."]
+    kept_abeam: Annotated[Float64, "sector", "How far it is to starboard [m], 0 for none."]
+    nearest: Annotated[Float64, "sector", "Smallest squared distance so far [m2]."]
+    x: Annotated[Float64, "vehicle", "Position of those gathered from a box of cells, north [m]."]
+    y: Annotated[Float64, "vehicle", "Position of those gathered from a box of cells, east [m]."]
+    vehicle: Annotated[Int64, "vehicle", "Index of those gathered."]
+    squared: Annotated[Float64, "vehicle", "Squared distance of those listened to [m2]."]
+    ahead: Annotated[Float64, "vehicle", "How far they are ahead [m]."]
+    abeam: Annotated[Float64, "vehicle", "How far they are to starboard [m]."]
+    bin: Annotated[Int32, "vehicle", "Bin of their directions."]
+    sector: Annotated[Int64, "vehicle", "Their sub-sectors."]
+    some: Annotated[Int32, "vehicle", "Room for a choice of them."]
+
+
+class Desk(NamedTuple):
+    """What one thread works with."""
+
+    now: Columns
+    cells: Cells
+    ear: Ear
+
+
+class Scratch(NamedTuple):
+    """The desks of all threads, in few arrays, since each that is passed from Python costs time."""
+
+    reals: Float64
+    """Shape (thread, column, vehicle)."""
+    wholes: Int64
+    """Shape (thread, column, vehicle)."""
+    shorts: Int32
+    """Shape (thread, column, vehicle)."""
+    sector_reals: Float64
+    """Shape (thread, column, sector)."""
+    sector_wholes: Int64
+    """Shape (thread, column, sector)."""
+    cell_wholes: Int64
+    """Shape (thread, column, cell)."""
+
+
+def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -> Scratch:
+    """A column for each array of a desk, and a cache line between one thread's and the next's."""
+    lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
+    kinds = [(row.axes, row.dtype) for table in (Columns, Cells, Ear) for row in rows(table).values()]
+
+    def room(axis: str, dtype: type[Any]) -> NDArray[Any]:
+        return np.zeros((threads, kinds.count(((axis,), dtype)), lengths[axis]), dtype)
+
+    return Scratch(
+        reals=room("vehicle", np.float64),
+        wholes=room("vehicle", np.int64),
+        shorts=room("vehicle", np.int32),
+        sector_reals=room("sector", np.float64),
+        sector_wholes=room("sector", np.int64),
+        cell_wholes=room("cell", np.int64),
+    )
+
+
+@compiled
+def desk(room: Scratch, t: int) -> Desk:
+    """Thread t's scratch by name. Every array has a column of its own: tests/test_tables.py."""
+    a, b, c, d = room.reals[t], room.wholes[t], room.shorts[t], room.sector_reals[t]
+    heard, first = room.sector_wholes[t, 0], room.cell_wholes[t, 0]
+    return Desk(
+        Columns(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13]),
+        Cells(a[14], a[15], a[16], a[17], b[0], b[1], a[18], b[2], first),
+        Ear(heard, d[0], d[1], d[2], d[3], a[19], a[20], b[3], a[21], a[22], a[23], c[0], b[4], c[1]),
+    )

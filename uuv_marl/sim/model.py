@@ -1,0 +1,76 @@
+"""A scenario's numbers, as the compiled functions take them: made once, and never changed."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.percept import PerceptLayout
+from uuv_marl.scenario import Scenario, growth
+from uuv_marl.sim.disturbance import loss_ticks
+from uuv_marl.sim.sonar import Suite, suite
+from uuv_marl.sim.vehicle import Plant, plant
+from uuv_marl.sim.views import Starts
+
+ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
+"""Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
+ends on the scenario's own, so that the time within a smaller radius is often missing."""
+
+_CELL_SPACINGS = 1.25
+"""Side of a cell, in spacings of the start, for swarms that are searched by cells (perf/, docs/speed.md)."""
+
+
+class Rules(NamedTuple):
+    """Clocks, thresholds, and the schedule of losses. Lengths in m."""
+
+    hold_s: float
+    step_s: float
+    holds: int
+    """Control holds of a decision."""
+    steps: int
+    """Integration steps of a control hold."""
+    hull: float
+    """Radius of a hull."""
+    contact_ends: bool
+    """Whether a vehicle that touches something is lost."""
+    dwell_ticks: int
+    """Control holds that the swarm must rest to have arrived."""
+    spread: float
+    """Largest distance of a vehicle from the end for arrival."""
+    arrival_radii: NDArray[np.float64]
+    """Of the swarm's centre, the scenario's own first, shape (radius,)."""
+    loss_ticks: NDArray[np.int64]
+    """Control hold at whose end each loss happens, shape (loss,)."""
+    cell_side: float
+
+
+class Model(NamedTuple):
+    """All numbers of a scenario."""
+
+    plant: Plant
+    suite: Suite
+    rules: Rules
+    at: Starts
+
+
+def model(scenario: Scenario) -> Model:
+    """The numbers of a scenario. Their types never depend on it, so that nothing is compiled twice."""
+    return Model(plant(scenario), suite(scenario), rules(scenario), PerceptLayout.of(scenario).offsets)
+
+
+def rules(scenario: Scenario) -> Rules:
+    """Clocks, thresholds and losses of a scenario."""
+    timing = scenario.timing
+    return Rules(
+        hold_s=timing.control_hold_s,
+        step_s=timing.integration_step_s,
+        holds=timing.holds_per_decision,
+        steps=timing.steps_per_hold,
+        hull=scenario.contact.hull_radius_m,
+        contact_ends=scenario.contact.ends_vehicle,
+        dwell_ticks=round(scenario.arrival.dwell_s / timing.control_hold_s),
+        spread=scenario.arrival.spread_m * growth(scenario.swarm.num_vehicles),
+        arrival_radii=np.array([scenario.arrival.radius_m, *ARRIVAL_RADII_M]),
+        loss_ticks=loss_ticks(scenario),
+        cell_side=_CELL_SPACINGS * scenario.start.spacing_m,
+    )

@@ -1,0 +1,78 @@
+"""Arrays declared once, in the NamedTuple that holds them: type, axes and meaning stand beside the name.
+
+``Annotated[Float64, "world vehicle 3", "Pose."]`` is an array of type float64 and shape (world, vehicle, 3). Memory,
+documentation and checks are made from that.
+"""
+
+import functools
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+C = TypeVar("C", bound=type)
+T = TypeVar("T")
+
+
+class Bounds(NamedTuple):
+    """Allowed numbers: finite, from ``low`` to the last index of ``axis`` plus ``beyond``."""
+
+    low: int
+    axis: str = ""
+    beyond: int = 0
+
+    def high(self, sizes: Mapping[str, int]) -> float:
+        """The largest number allowed, with axes of these lengths."""
+        return sizes[self.axis] - 1 + self.beyond if self.axis else float(np.finfo(np.float64).max)
+
+
+class Row(NamedTuple):
+    """One array of a table."""
+
+    dtype: type[np.generic]
+    axes: tuple[str, ...]
+    """Each a name or a number."""
+    meaning: str
+    bounds: Bounds | None
+
+    def shape(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
+        """With axes of these lengths."""
+        return tuple(int(axis) if axis.isdigit() else sizes[axis] for axis in self.axes)
+
+
+@functools.cache
+def rows(table: type[Any]) -> dict[str, Row]:
+    """The arrays of a table by name, in order."""
+    found: dict[str, Row] = {}
+    for name, hint in get_type_hints(table, include_extras=True).items():
+        axes, meaning, *bounds = hint.__metadata__
+        dtype = get_args(get_args(hint.__origin__)[1])[0]
+        found[name] = Row(dtype, tuple(axes.split()), meaning, bounds[0] if bounds else None)
+    return found
+
+
+def allocate(table: type[T], sizes: Mapping[str, int]) -> T:
+    """The table filled with zeros, its axes of these lengths."""
+    return table(**{name: np.zeros(row.shape(sizes), row.dtype) for name, row in rows(table).items()})
+
+
+def described(table: C) -> C:
+    """Write each array's meaning, type and shape into the docstring of a table."""
+    lines = ["Attributes:"]
+    for name, row in rows(table).items():
+        shape = ", ".join(row.axes) + "," * (len(row.axes) == 1)
+        lines.append(f"    {name}: {row.meaning} Shape ({shape}), {row.dtype.__name__}.")
+    table.__doc__ = "\n    ".join([f"{(table.__doc__ or '').strip()}\n", *lines])
+    table.__new__.__annotations__ = {}  # what help() shows as the signature: names alone
+    return table
+
+
+def check(table: type[Any], arrays: Mapping[str, NDArray[Any]], sizes: Mapping[str, int]) -> None:
+    """Raise ValueError where a number that compiled code uses unchecked is out of its ``Bounds``."""
+    for name, row in rows(table).items():
+        if row.bounds is None:
+            continue
+        low, high = row.bounds.low, row.bounds.high(sizes)
+        if not ((arrays[name] >= low) & (arrays[name] <= high)).all():
+            raise ValueError(f"{name} must lie within {low} and {high}, got {np.unique(arrays[name])[[0, -1]]}")
