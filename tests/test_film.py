@@ -181,3 +181,13 @@ def test_a_trace_without_spacing_and_events_can_be_filmed(lossy, tmp_path):
     bare.series.pop("collisions")
     write_film([bare], tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+@pytest.mark.docs
+def test_the_film_of_the_first_screen_is_small_and_fits():
+    path = Path(__file__).parent.parent / "docs" / "figures" / "side_by_side.gif"
+    assert path.stat().st_size < 1_000_000
+    with Image.open(path) as film:
+        assert film.width <= 830
+        assert film.n_frames > 60
+    assert f"--output docs/figures/{path.name}" in (path.parent.parent.parent / "README.md").read_text()

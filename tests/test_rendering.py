@@ -280,7 +280,7 @@ def test_small_and_many_panels_find_their_place():
     for size, columns, count in (((320, 320), 1, 1), ((828, 416), 3, 3), ((1200, 900), 4, 8), ((4000, 2000), 2, 2)):
         surface = Frame(size, columns).draw([Panel("name", scene)] * count, "follow", "heading")
         assert surface.get_size() == size
-        assert len(np.unique(pixels(surface).reshape(-1, 3), axis=0)) > 50
+        assert len(np.unique(pixels(surface)[::3, ::3, 0])) > 30
 
 
 def key(name, **fields):

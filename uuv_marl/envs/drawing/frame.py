@@ -75,7 +75,7 @@ class Frame:
         high = (self.size[1] - self._above - self._below) // -(-len(panels) // self._columns)
         self._cell = (self.size[0] // self._columns, high)
         self._title, self._header = round((17 if self._cell[0] >= 480 else 14) * self._unit), round(94 * self._unit)
-        self._glimpse = Painter((self._header - _PAD,) * 2)
+        self._glimpse = Painter((self._header - _PAD, self._header - _PAD))
         self._painter = Painter((self._cell[0] - (2 if self._columns > 1 else 0), high - self._header), grid=self._grid)
 
     def _head(self, panel: Panel, at: tuple[int, int], room: int) -> None:

@@ -27,10 +27,13 @@ TRAILS: tuple[Colour, ...] = ((222, 234, 243), (200, 221, 236), (174, 207, 228),
 def palette() -> list[Colour]:
     """Colours that a picture can do with: all but trails, and how strong ones fade into the water."""
     strong = (BLUE, ORANGE, GREEN, PINK, AMBER, TEXT, QUIET, DISC)
-    mixed = [
-        tuple(round(c + (w - c) * k / 3) for c, w in zip(one, WATER, strict=True)) for one in strong for k in range(3)
-    ]
-    return [WHITE, WATER, GRID, PASSIVE, ACTIVE, EDGE, KEEP_OUT, LOST, *mixed]
+
+    def mixed(colour: Colour, k: int) -> Colour:
+        red, green, blue = (round(c + (w - c) * k / 3) for c, w in zip(colour, WATER, strict=True))
+        return red, green, blue
+
+    faded = [mixed(colour, k) for colour in strong for k in range(3)]
+    return [WHITE, WATER, GRID, PASSIVE, ACTIVE, EDGE, KEEP_OUT, LOST, *faded]
 
 
 @functools.cache
