@@ -275,6 +275,16 @@ def test_a_picture_follows_the_step_and_is_the_same_in_a_copy():
     env.close()
 
 
+def test_frames_outlive_pygame_quit():
+    env = uuv_marl.parallel_env("starter", render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    pygame.quit()
+    np.testing.assert_array_equal(env.render(), first)
+    env.step(dict.fromkeys(env.agents, np.ones(2)))  # new numbers, new words
+    env.render()
+
+
 def test_small_and_many_panels_find_their_place():
     scene, _, _ = played(seconds=20.0, sonar_of=1)
     for size, columns, count in (((320, 320), 1, 1), ((828, 416), 3, 3), ((1200, 900), 4, 8), ((4000, 2000), 2, 2)):

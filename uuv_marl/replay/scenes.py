@@ -26,7 +26,7 @@ class Scenes:
         self._sonar_of, self._back_s = sonar_of, np.linspace(TRAIL_S, 1.0, round(TRAIL_S)) if trails else np.zeros(0)
         self._alive = np.isfinite(recording.position[:, :, 0])
         last = np.maximum.accumulate(np.where(self._alive, np.arange(len(recording.time_s))[:, None], 0), axis=0)
-        vehicles = np.arange(self._alive.shape[1])
+        vehicles = np.arange(recording.scenario.swarm.num_vehicles)
         self._position = recording.position[last, vehicles]
         self._heading = recording.heading[last, vehicles]
         self._collisions = [event for event in recording.events if event.kind in ("collision", "obstacle")]

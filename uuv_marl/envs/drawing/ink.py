@@ -47,6 +47,8 @@ def _font(height: int, bold: bool) -> pygame.font.Font:
 @functools.lru_cache(maxsize=1024)
 def text(words: str, height: int, colour: Colour = TEXT, bold: bool = False) -> pygame.Surface:
     """Words as a picture, in letters of this height [px]."""
+    if not pygame.font.get_init():  # the user called pygame.quit()
+        _font.cache_clear()
     return _font(height, bold).render(words, True, colour)
 
 
