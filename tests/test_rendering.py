@@ -192,7 +192,7 @@ def test_the_legend_explains_what_can_be_seen_and_nothing_else():
     assert {"vehicle", "collision", "nearer than 5 m"} <= course
     assert not any("obstacle" in word for word in course)
     assert "lost" not in course
-    assert {"lost", "echo", "hears", "active sonar", "obstacle, ring at 5 m (s_o)"} <= lossy
+    assert {"lost", "echo", "hears", "active sonar", "obstacle, s_o = 5 m"} <= lossy
     sonar = played(seconds=1.0, sonar_of=0)[0]
     assert rows(2000, sonar, 12) == 1
     assert rows(800, sonar, 12) == 2

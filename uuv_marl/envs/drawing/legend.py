@@ -19,12 +19,12 @@ WIDE, HIGH = 24, 16
 
 def _water(scene: Scene) -> list[tuple[str, Sign]]:
     limits = scene.scenario.constraints
-    found = [("vehicle", _dart(ink.BLUE)), ("l(t), to be followed", _target)]
+    found = [("vehicle", _dart(ink.BLUE)), ("l(t), to follow", _target)]
     if scene.trail.size:
         found.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
     if scene.obstacles.size:
-        found.append((f"obstacle, ring at {limits.s_o_m:g} m (s_o)", _disc))
+        found.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))
         near += "" if limits.s_o_m == limits.s_u_m else f", obstacle {limits.s_o_m:g} m"
     found += [(near, _dart(ink.AMBER)), ("collision", _hit)]
     if scene.scenario.disturbance.loss_times_s or scene.scenario.contact.ends_vehicle:
@@ -113,4 +113,8 @@ def _echo(fine: pygame.Surface, unit: float) -> None:
 
 
 def _patch(colour: ink.Colour) -> Sign:
-    return lambda fine, _: fine.fill(colour)
+    def draw(fine: pygame.Surface, unit: float) -> None:
+        fine.fill(colour)
+        pygame.draw.rect(fine, ink.EDGE, fine.get_rect(), round(unit))
+
+    return draw

@@ -123,9 +123,10 @@ class Painter:
                 pygame.draw.lines(self._fine, colour, False, line, FINE)
 
     def _vehicles(self, scene: Scene, view: Camera) -> None:
-        """Darts as long as s_u, so that two that overlap are too near; longer only where they would be specks."""
-        unit = self._unit
-        length = min(max(scene.scenario.constraints.s_u_m * view.scale, 6.0 * unit), 22.0 * unit)
+        """Darts as long as s_u, so that two that overlap are too near; longer where they would be specks."""
+        unit, apart = self._unit, scene.scenario.start.spacing_m * view.scale
+        least = max(min(6.0 * unit, 0.75 * apart), 3.0 * unit)
+        length = min(max(scene.scenario.constraints.s_u_m * view.scale, least), 22.0 * unit)
         turned = np.stack([np.sin(scene.heading), -np.cos(scene.heading)], axis=-1)
         ahead, aside = turned, np.stack([-turned[:, 1], turned[:, 0]], axis=-1)
         places = view.pixels(scene.position)
