@@ -280,7 +280,7 @@ def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
     from uuv_marl.benchmark import tuning
 
     monkeypatch.setattr(tuning, "SEEDS", (10_000,))
-    monkeypatch.setattr("uuv_marl.scenario_files.load_scenario", lambda *a, **k: quick())
+    monkeypatch.setattr("uuv_marl.scenario.load_scenario", lambda *a, **k: quick())
     for folder, stops in (("whole", [5]), ("parts", [2, 5])):
         for trials in stops:
             tuning.tune("bio_inspired_plus", tmp_path / folder, trials, lambda *a: None)

@@ -206,7 +206,7 @@ def test_divergence_never_becomes_a_row_of_results(runaway):
 
 def test_training_refuses_scenarios_in_which_vehicles_are_lost():
     pytest.importorskip("torch")
-    from uuv_marl.scenario_files import ScenarioError
+    from uuv_marl.scenario import ScenarioError
     from uuv_marl.train.fleet import Fleet
     from uuv_marl.train.shaping import Weights
 

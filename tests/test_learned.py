@@ -34,7 +34,7 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, ResultsError, knowledge
 from uuv_marl.cli import app
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.scenario_files import scenario_names
+from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.swarm import Swarm
 
 SHORT = {"trajectory.waypoints_m": [[0.0, 0.0], [40.0, 0.0]], "time_limit.extra_s": 1.0, "time_limit.factor": 1.0}

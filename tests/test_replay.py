@@ -307,8 +307,9 @@ def edited(path, change):
     ("change", "message"),
     [
         (lambda a: a.pop("route_position"), "route_position is missing; run the benchmark again"),
-        (lambda a: a.update(route_heading=a["route_heading"][:, :3]), r"route_heading has the shape \(\d+, 3\)"),
-        (lambda a: a.update(time_s=a["time_s"][:-1]), "min_spacing_m has the shape"),
+        (lambda a: a.update(route_heading=a["route_heading"][:, :3]), r"route_heading is float32 of shape \(\d+, 3\)"),
+        (lambda a: a.update(waypoints=a["waypoints"].astype(str)), "waypoints is <U32 of shape"),
+        (lambda a: a.update(time_s=a["time_s"][:-1]), "min_spacing_m is float32 of shape"),
         (lambda a: a.update(route_time_s=a["route_time_s"] + 0.03), "must be times of time_s"),
     ],
 )
@@ -364,6 +365,7 @@ def written(monkeypatch):
     for module, name in (("page", "write_page"), ("film", "write_film")):
         stand_in = types.ModuleType(f"uuv_marl.replay.{module}")
         setattr(stand_in, name, write)
+        stand_in.check_format = lambda path: None
         monkeypatch.setitem(sys.modules, stand_in.__name__, stand_in)
         monkeypatch.setattr(f"uuv_marl.replay.{module}", stand_in, raising=False)
     return calls
@@ -504,3 +506,17 @@ def test_the_command_is_quoted_for_a_shell():
     text = command("my waters/mine.toml", "runs/a b/best", 3, ["obstacles=[]", 'sonar.echo_reports="surface"'])
     assert shlex.split(text)[:5] == ["uuv-marl", "replay", "--scenario", "my waters/mine.toml", "--policy"]
     assert shlex.split(text)[-4:] == ["--set", "obstacles=[]", "--set", 'sonar.echo_reports="surface"']
+
+
+@pytest.mark.docs
+def test_the_page_states_the_resolutions():
+    text = (Path(__file__).resolve().parent.parent / "docs" / "replay.md").read_text()
+    cells = {name: cells for name, *cells in re.findall(r"^\| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", text, flags=re.M)}
+    turn = 180 / np.pi
+    for name, coding, scale in (
+        ("position", CODINGS["position"], 100), ("heading", CODINGS["heading"], turn), ("speed", CODINGS["speed"], 1),
+        ("force", CODINGS["force"], 1), ("a vehicle's spacing", CODINGS["spacing"], 1),
+    ):  # fmt: skip
+        for cell, number in zip(cells[name], (coding.unit * scale, coding.resolution * scale), strict=True):
+            assert float(re.match(r"[\d.]+", cell)[0]) == pytest.approx(number, abs=0.06 if scale == turn else 1e-9)
+    assert f"{CODINGS['inspected_heading'].resolution * turn:.1f}°" in cells["heading"][1]

@@ -62,7 +62,7 @@ def test_scenario_files_differ_in_what_the_papers_text_says_and_nothing_else():
         },
     }
     for name, text in said.items():
-        file = tomllib.loads((ROOT / "uuv_marl" / "scenarios" / f"{name}.toml").read_text())
+        file = tomllib.loads((ROOT / "uuv_marl" / "scenario" / f"{name}.toml").read_text())
         assert {key: value for key, value in file.items() if key not in ("title", "source", "version")} == text
 
 

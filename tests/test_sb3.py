@@ -9,7 +9,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from uuv_marl.envs.sb3 import SwarmVecEnv
-from uuv_marl.scenario_files import ScenarioError
+from uuv_marl.scenario import ScenarioError
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
 QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}

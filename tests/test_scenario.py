@@ -11,10 +11,10 @@ import pytest
 
 from tests.conftest import SCENARIOS as LARGE
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.scenario_checks import warn_of_speed
-from uuv_marl.scenario_files import ScenarioError, parse_override, show, to_toml
+from uuv_marl.scenario import ScenarioError, parse_override, show, to_toml
+from uuv_marl.scenario.scenario import warn_of_speed
 
-FOLDER = resources.files("uuv_marl") / "scenarios"
+FOLDER = resources.files("uuv_marl.scenario")
 BASE = "single_obstacle"
 SCENARIOS = (*LARGE, "starter")
 
@@ -219,6 +219,11 @@ def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
         angle = rng.uniform(0, 2 * np.pi)
         state = advance(state, (3000 * np.cos(angle), 3000 * np.sin(angle)), 0.1, p)
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
+
+
+@pytest.mark.parametrize("linear", ["X_u", "Y_v", "N_r"])
+def test_damping_may_be_quadratic_alone(linear):
+    assert getattr(load_scenario(BASE, overrides={f"vehicle.{linear}": 0.0}).vehicle, linear) == 0
 
 
 @pytest.mark.parametrize(

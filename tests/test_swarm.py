@@ -14,7 +14,6 @@ from scipy.ndimage import label
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
-from uuv_marl.scenario_checks import start_distance
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import advance, plant
@@ -326,7 +325,7 @@ def test_random_fields_are_feasible(seed, n):
     assert len(obstacles) <= scenario.random_field.obstacles[1]
     gap = 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
     for k, (x, y, radius) in enumerate(obstacles):
-        assert start_distance(scenario, tuple(waypoints[0]), tuple(waypoints[1]), (x, y)) >= radius + gap
+        assert scenario.start.distance(n, tuple(waypoints[0]), tuple(waypoints[1]), (x, y)) >= radius + gap
         assert math.hypot(x - waypoints[-1, 0], y - waypoints[-1, 1]) >= radius + gap
         for a, b, other in obstacles[:k]:
             assert math.hypot(x - a, y - b) >= radius + other + gap

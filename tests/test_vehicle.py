@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
-from uuv_marl.scenario_files import ScenarioError
+from uuv_marl.scenario import ScenarioError
 from uuv_marl.sim import vehicle
 from uuv_marl.sim.vehicle import plant
 

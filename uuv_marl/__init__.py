@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from uuv_marl import baselines, uuv_swarm_v0
     from uuv_marl.envs.parallel_env import env, parallel_env
     from uuv_marl.envs.vector_env import vector_env
-    from uuv_marl.scenario_files import load_scenario, scenario_names
+    from uuv_marl.scenario import load_scenario, scenario_names
 
 __all__ = [
     "__version__",
@@ -33,8 +33,8 @@ _HOMES = {
     "env": "uuv_marl.envs.parallel_env",
     "parallel_env": "uuv_marl.envs.parallel_env",
     "vector_env": "uuv_marl.envs.vector_env",
-    "load_scenario": "uuv_marl.scenario_files",
-    "scenario_names": "uuv_marl.scenario_files",
+    "load_scenario": "uuv_marl.scenario",
+    "scenario_names": "uuv_marl.scenario",
 }
 
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from tests import contract
-from uuv_marl.scenario_files import ScenarioError
+from uuv_marl.scenario import ScenarioError
 
 # Others' own: BenchMARL, TorchRL and torch deprecate parts of each other.
 with warnings.catch_warnings():

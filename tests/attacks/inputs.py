@@ -24,7 +24,7 @@ from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
 from uuv_marl.percept import Percept
-from uuv_marl.scenario_files import parse_override
+from uuv_marl.scenario import parse_override
 from uuv_marl.sim.swarm import Swarm
 
 PACKAGE = Path(uuv_marl.__file__).parent
@@ -143,7 +143,7 @@ def scenarios_that_run(rng, folder):
 
 
 def toml_bytes(rng, folder):
-    text = bytearray((PACKAGE / "scenarios" / f"{pick(rng, scenario_names())}.toml").read_bytes())
+    text = bytearray((PACKAGE / "scenario" / f"{pick(rng, scenario_names())}.toml").read_bytes())
     for _ in range(int(rng.integers(1, 6))):
         at = int(rng.integers(len(text)))
         what = rng.integers(3)

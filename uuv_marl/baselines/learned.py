@@ -67,6 +67,10 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """What a checkpoint says of itself."""
 
     format: Literal[1] = 1
+    kind: Literal["mlp"] = "mlp"
+    """What the tensors are: ``mlp``, tanh layers."""
+    features: Literal["percept"] = "percept"
+    """What the first layer is given: ``percept``, what ``Eyes`` make of one percept."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every field of the percept."""
     decision_period_s: tuple[float, float] = (0.1, 0.5)
@@ -141,7 +145,7 @@ class Learned(Policy):
             )
         self._eyes = Eyes(scenario, card.barrier)
 
-    def act(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         acting = np.flatnonzero(self.active)
         flat = self.flat(percept)

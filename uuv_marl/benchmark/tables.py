@@ -11,7 +11,7 @@ from scipy.stats import bootstrap, trim_mean
 
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import Knowledge, Results, Row
-from uuv_marl.scenario_files import differences
+from uuv_marl.scenario import differences
 
 Float64 = NDArray[np.float64]
 _CONFIDENCE = 0.95

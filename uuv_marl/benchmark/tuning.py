@@ -104,7 +104,7 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
     import optuna  # noqa: PLC0415 - an extra
     from optuna.storages.journal import JournalFileBackend  # noqa: PLC0415
 
-    from uuv_marl.scenario_files import load_scenario  # noqa: PLC0415
+    from uuv_marl.scenario import load_scenario  # noqa: PLC0415
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     space, gains = SPACES[policy]

@@ -59,7 +59,7 @@ def benchmark(
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import rich_table
         from uuv_marl.replay.command import command
-        from uuv_marl.scenario_files import ScenarioError, load_scenario
+        from uuv_marl.scenario import ScenarioError, load_scenario
 
         changes, files = changes_of(overrides or []), scenario or ["single_obstacle"]
         scenarios = [load_scenario(name, overrides=changes) for name in files]

@@ -83,7 +83,7 @@ def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
 
 def changes_of(overrides: Sequence[str]) -> dict[str, object]:
     """The fields that ``--set`` changes in scenarios that policies run on. Raises ScenarioError, PolicyError."""
-    from uuv_marl.scenario_files import parse_override
+    from uuv_marl.scenario import parse_override
 
     changes = dict(parse_override(text) for text in overrides)
     for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):

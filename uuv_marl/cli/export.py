@@ -23,7 +23,7 @@ def export(
         with extra("onnx", "export to ONNX"):
             from uuv_marl.baselines.export import write_onnx
 
-        from uuv_marl.scenario_files import load_scenario
+        from uuv_marl.scenario import load_scenario
 
         write_onnx(policy, load_scenario(scenario), output)
         console.print(f"Model: {output}")

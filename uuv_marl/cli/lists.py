@@ -16,8 +16,8 @@ def scenarios(
 ) -> None:
     """List the scenarios, or show one."""
     with explained():
-        from uuv_marl.scenario_files import load_scenario, scenario_names
-        from uuv_marl.scenario_files import show as show_scenario
+        from uuv_marl.scenario import load_scenario, scenario_names
+        from uuv_marl.scenario import show as show_scenario
 
         if show is not None:
             text = show_scenario(show)

@@ -142,7 +142,7 @@ def _simulated(
     """An episode of each policy on the same seed; all are refused before the first is simulated."""
     from uuv_marl.baselines import granted, make
     from uuv_marl.replay.record import checked, record
-    from uuv_marl.scenario_files import load_scenario
+    from uuv_marl.scenario import load_scenario
 
     scenario = load_scenario(name, overrides=changes_of(overrides))
     checked(inspect, scenario)

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from uuv_marl.envs.observation import observe
 from uuv_marl.envs.reward import RewardFunction, pay, rates
 from uuv_marl.envs.state import global_state, state_layout
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import ScenarioError, load_scenario
+from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 
 _BEST = ("bio_inspired_plus", "mappo")
 _FEW = ("bio_inspired", *_BEST)

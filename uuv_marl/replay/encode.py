@@ -61,7 +61,7 @@ inspected vehicles is drawn by their own, finer heading."""
 
 
 def payload(recordings: Sequence[Recording]) -> dict[str, Any]:
-    """All that a page shows of these episodes, as plain values; docs/replay.md has the keys."""
+    """All that a page shows of these episodes, as plain values; ``decode.js`` gives their ``arrays`` as numbers."""
     return {"schema": SCHEMA, "uuv_marl": __version__, "episodes": [_episode(recording) for recording in recordings]}
 
 

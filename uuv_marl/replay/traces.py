@@ -15,8 +15,7 @@ from uuv_marl.replay.command import command
 from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Float32, Recording
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.trajectory import arrival_times, reference
 
 _ELSE = "give the folder of a benchmark or a file of its folder traces, or simulate with --scenario and --policy"
@@ -172,9 +171,9 @@ def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:
     """Raise ReplayError where the arrays are not those of a trace of so many vehicles."""
     sizes: dict[str | int, int] = {2: 2, 3: 3, "vehicle": num_vehicles}
     for name, axes in _SHAPES.items():
-        shape = trace[name].shape if name in trace else ()
+        shape = trace[name].shape if name in trace and trace[name].dtype == np.float32 else ()
         if len(shape) != len(axes) or any(sizes.setdefault(a, n) != n for a, n in zip(axes, shape, strict=True)):
-            got = f"has the shape {shape}" if name in trace else "is missing"
+            got = f"is {trace[name].dtype} of shape {trace[name].shape}" if name in trace else "is missing"
             raise ReplayError(f"{path} is no trace of this version of uuv_marl: {name} {got}; run the benchmark again")
     if not len(trace["route_time_s"]) or not np.isin(trace["route_time_s"], trace["time_s"]).all():
         raise ReplayError(f"{path}: route_time_s must be times of time_s; run the benchmark again")

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
 
 Float64 = NDArray[np.float64]

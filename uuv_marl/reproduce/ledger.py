@@ -26,7 +26,7 @@ from uuv_marl.reproduce.study import (
     Case,
     Study,
 )
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import load_scenario
 
 Float64 = NDArray[np.float64]
 CASES = (TRACKING, SINGLE, MULTI, ZETA_SMALL, ZETA_LARGE, DELTA_SMALL, DELTA_LARGE, *COMPARATORS.values())

@@ -13,7 +13,7 @@ from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, legend, panels
 from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
 from uuv_marl.reproduce.drawing import against_time
 from uuv_marl.reproduce.study import SINGLE, TRACKING, Columns, Part, Report, Study, Tables
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import load_scenario
 from uuv_marl.sim.vehicle import Plant, State6, advance, plant
 
 FORCE = (1500.0, 150.0)

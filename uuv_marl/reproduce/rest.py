@@ -20,8 +20,7 @@ from uuv_marl.baselines.policy import Policy
 from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, SKY, legend, panels
 from uuv_marl.reproduce.softening import PAPER, Softened, Softening
 from uuv_marl.reproduce.study import Columns, Part, Report, Study, Tables, stack
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
 
 Float64 = NDArray[np.float64]

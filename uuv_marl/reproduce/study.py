@@ -18,8 +18,7 @@ from uuv_marl.baselines import granted
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 
 Float64 = NDArray[np.float64]
 Trace = dict[str, NDArray[np.float32]]

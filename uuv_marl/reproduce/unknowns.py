@@ -14,7 +14,7 @@ import numpy as np
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.scenario_files import ScenarioError, load_scenario
+from uuv_marl.scenario import ScenarioError, load_scenario
 
 Value = float | int | str
 

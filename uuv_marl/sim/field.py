@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.scenario import RandomField, Scenario, growth
-from uuv_marl.scenario_checks import start_distance
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.sections import RandomField, growth
 from uuv_marl.sim.trajectory import arrival_times
 
 Float64 = NDArray[np.float64]
@@ -54,8 +54,8 @@ def _obstacles(scenario: Scenario, field: RandomField, waypoints: Float64, rng: 
     Grown by half of that they stay disjoint, so that the free water around them is connected, and some path keeps
     s_o + s_u from every surface.
     """
-    gap = 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
-    end_clear = max(field.end_clear_m * growth(scenario.swarm.num_vehicles), gap)
+    n, gap = scenario.swarm.num_vehicles, 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
+    end_clear = max(field.end_clear_m * growth(n), gap)
     wanted = int(rng.integers(field.obstacles[0], field.obstacles[1] + 1))
     first, second = (float(waypoints[0, 0]), float(waypoints[0, 1])), (float(waypoints[1, 0]), float(waypoints[1, 1]))
     placed: list[tuple[float, float, float]] = []
@@ -69,7 +69,7 @@ def _obstacles(scenario: Scenario, field: RandomField, waypoints: Float64, rng: 
         across = np.array([-step[1], step[0]]) / np.hypot(*step)
         x, y = (float(value) for value in waypoints[leg] + share * step + offset * across)
         if (
-            start_distance(scenario, first, second, (x, y)) >= radius + gap
+            scenario.start.distance(n, first, second, (x, y)) >= radius + gap
             and math.hypot(x - waypoints[-1, 0], y - waypoints[-1, 1]) >= radius + end_clear
             and all(math.hypot(x - a, y - b) >= radius + other + gap for a, b, other in placed)
         ):

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.learned import BARRIER, Eyes
 from uuv_marl.envs.task import refuse_losses
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.shaping import VIEW_SIZE, Weights, shaped, view
 

@@ -22,8 +22,7 @@ from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, rows_of, sav
 from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.fleet import Episodes
 from uuv_marl.train.folder import Say, opened, quiet, versions
 from uuv_marl.train.mappo import Hyperparameters, Mappo

@@ -7,8 +7,7 @@ from typing import NamedTuple
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.scenario import Scenario
-from uuv_marl.scenario_files import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.fleet import TRAINING_SEEDS
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]

@@ -1,7 +1,7 @@
-"""Scenario: everything that fixes a simulation but the seed; frozen, validated, in SI units and degrees.
+"""The sections of a scenario: their fields with ranges, and what the fields of one section demand of each other.
 
-The numbers and their sources are in ``scenarios/*.toml``; nothing here has a default value that matters.
-Symbols of the vehicle are Fossen's; resistances (X_u, Y_v, ...) are positive, as in the paper's Eq. 4.
+In SI units and degrees. Symbols of the vehicle are Fossen's; resistances (X_u, Y_v, ...) are positive, as in the
+paper's Eq. 4.
 """
 
 import math
@@ -11,12 +11,12 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from uuv_marl import scenario_checks
-
 MAX_RANGE_M = 4096.0
 """Positions in a percept saturate here, so that observation bounds are finite."""
 NOMINAL_VEHICLES = 54
 """The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
+MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0
+"""Widths of sub-sectors that the sonar's table of directions is made for."""
 
 
 def within(low: float, high: float) -> AfterValidator:
@@ -41,12 +41,27 @@ Clock = Annotated[float, within(0.0001, 3_600)]
 Legs = Annotated[int, within(1, 8)]
 Discs = Annotated[int, within(0, 64)]
 Channel = Literal["compass", "link"]
+Point = tuple[float, float]
+"""North and east [m]."""
+
+
+def growth(num_vehicles: int) -> float:
+    """Factor on lengths that keeps the density of the paper's 54 vehicles in larger swarms."""
+    return max(1.0, math.sqrt(num_vehicles / NOMINAL_VEHICLES))
 
 
 class Section(BaseModel):
     """A part of a scenario: immutable, no unknown fields, no silent conversion."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True)
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        self._check()
+        return self
+
+    def _check(self) -> None:
+        """Raise ValueError where one field contradicts another."""
 
 
 class Swarm(Section):
@@ -84,6 +99,30 @@ class Start(Section):
         columns = math.floor((width - self.spacing_m / 2) / self.spacing_m) + 1
         return max(columns, 1), math.floor(length / row_m) + 1, row_m
 
+    def distance(self, num_vehicles: int, first: Point, second: Point, point: Point) -> float:
+        """Distance [m] of a point from the rectangle around both start rectangles, 0 inside.
+
+        Args:
+            num_vehicles: size of the swarm, which the rectangles grow with.
+            first: start of the trajectory's first leg, north and east [m].
+            second: end of that leg, north and east [m].
+            point: the point, north and east [m].
+        """
+        length, width = self.sides(num_vehicles)
+        leg = math.dist(first, second)
+        ahead = ((second[0] - first[0]) / leg, (second[1] - first[1]) / leg)
+        offset = (point[0] - first[0], point[1] - first[1])
+        along = offset[0] * ahead[0] + offset[1] * ahead[1]
+        across = abs(-offset[0] * ahead[1] + offset[1] * ahead[0])
+        return math.hypot(max(along, -length - along, 0.0), max(across - width - self.gap_m / 2, 0.0))
+
+    def _check(self) -> None:
+        if self.speed_min_mps > self.speed_max_mps:
+            raise ValueError(
+                f"start.speed_min_mps must not exceed start.speed_max_mps = {self.speed_max_mps:g}, "
+                f"got {self.speed_min_mps:g}"
+            )
+
 
 class Trajectory(Section):
     """The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest."""
@@ -98,6 +137,11 @@ class Trajectory(Section):
         """Time to the end of the fixed polyline; the bound on any task time."""
         points = self.waypoints_m or ()
         return sum(math.dist(a, b) for a, b in pairwise(points)) / self.speed_mps
+
+    def _check(self) -> None:
+        for k, (a, b) in enumerate(pairwise(self.waypoints_m or ())):
+            if math.dist(a, b) < 1e-6:
+                raise ValueError(f"trajectory.waypoints_m must differ from one to the next, got {list(a)} twice at {k}")
 
 
 class Obstacle(Section):
@@ -127,13 +171,11 @@ class RandomField(Section):
     end_clear_m: Positive
     """Radius kept free around the end, for up to 54 vehicles."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check(self) -> None:
         for name in ("legs", "leg_length_m", "obstacles", "radius_m"):
             low, high = getattr(self, name)
             if low > high:
                 raise ValueError(f"random_field.{name} must be [low, high] with low <= high, got [{low}, {high}]")
-        return self
 
 
 class Vehicle(Section):
@@ -187,6 +229,19 @@ class SonarArray(Section):
     sub_sectors: Annotated[int, within(1, 64)]
     """k_a (Eq. 12)."""
 
+    def _check(self) -> None:
+        width = self.aperture_deg / self.sub_sectors
+        if width > MAX_SECTOR_DEG:
+            raise ValueError(
+                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of at most {MAX_SECTOR_DEG:g} deg, "
+                f"got {width:g} deg; use at least {math.ceil(self.aperture_deg / MAX_SECTOR_DEG)}"
+            )
+        if width < MIN_SECTOR_DEG:
+            raise ValueError(
+                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of at least {MIN_SECTOR_DEG:g} deg, "
+                f"got {width:g} deg; lower it or raise aperture_deg"
+            )
+
 
 class Sonar(Section):
     """What a vehicle hears."""
@@ -210,16 +265,12 @@ class Sonar(Section):
         """Sub-sectors of the active arrays."""
         return sum(array.sub_sectors for array in self.arrays if array.kind == "active")
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check(self) -> None:
         names = [array.name for array in self.arrays]
         if len(set(names)) < len(names):
             raise ValueError(f"sonar.arrays must have different names, got {names}")
         if len(set(self.channels)) < len(self.channels):
             raise ValueError(f"sonar.channels must name each channel once, got {list(self.channels)}")
-        for array in self.arrays:
-            scenario_checks.check_sub_sectors(array)
-        return self
 
 
 class Timing(Section):
@@ -242,8 +293,7 @@ class Timing(Section):
         """Integration steps in a control hold."""
         return round(self.control_hold_s / self.integration_step_s)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check(self) -> None:
         for long, short in (("control_hold_s", "integration_step_s"), ("decision_period_s", "control_hold_s")):
             ratio = getattr(self, long) / getattr(self, short)
             if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
@@ -251,7 +301,6 @@ class Timing(Section):
                     f"timing.{long} must be a whole multiple of timing.{short} = {getattr(self, short):g}, "
                     f"got {getattr(self, long):g}; change either"
                 )
-        return self
 
 
 class Constraints(Section):
@@ -300,6 +349,10 @@ class Disturbance(Section):
     loss_times_s: Annotated[tuple[NonNegative, ...], Field(max_length=16384)]
     """At each of these times a vehicle, drawn by the seed, is lost."""
 
+    def _check(self) -> None:
+        if list(self.loss_times_s) != sorted(self.loss_times_s):
+            raise ValueError(f"disturbance.loss_times_s must not fall, got {list(self.loss_times_s)}; sort them")
+
 
 class Reward(Section):
     """Weights of the terms in ``envs/reward.py``."""
@@ -310,50 +363,3 @@ class Reward(Section):
     effort: NonNegative
     collision: NonNegative
     arrival: NonNegative
-
-
-class Scenario(Section):
-    """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
-
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
-    """Set by the loader: the file's name; names results and pictures."""
-    title: str
-    """One line."""
-    source: str
-    """Where it comes from."""
-    version: Annotated[int, within(1, 1_000_000)]
-    """Raised by any change of its numbers."""
-    swarm: Swarm
-    start: Start
-    trajectory: Trajectory
-    obstacles: Annotated[tuple[Obstacle, ...], Field(max_length=1024)] = ()
-    random_field: RandomField | None = None
-    vehicle: Vehicle
-    actuators: Actuators
-    sonar: Sonar
-    timing: Timing
-    constraints: Constraints
-    contact: Contact
-    arrival: Arrival
-    time_limit: TimeLimit
-    disturbance: Disturbance
-    reward: Reward
-
-    @property
-    def max_obstacles(self) -> int:
-        """Most obstacles that a world of this scenario can hold."""
-        return self.random_field.obstacles[1] if self.random_field else len(self.obstacles)
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        scenario_checks.check_start(self)
-        scenario_checks.check_course(self)
-        scenario_checks.check_losses(self)
-        scenario_checks.check_times(self)
-        scenario_checks.check_vehicle(self)
-        return self
-
-
-def growth(num_vehicles: int) -> float:
-    """Factor on lengths that keeps the density of the paper's 54 vehicles in larger swarms."""
-    return max(1.0, math.sqrt(num_vehicles / NOMINAL_VEHICLES))

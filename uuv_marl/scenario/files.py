@@ -14,9 +14,9 @@ from tomlkit.container import Container
 from tomlkit.items import AbstractTable
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.scenario import Scenario
 
-_FOLDER = Path(__file__).resolve().parent / "scenarios"
+_FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
 _MAX_BYTES = 1_000_000
 _SHOWN = 80
@@ -61,7 +61,7 @@ def load_scenario(
     Raises:
         ScenarioError: names the field, the value and the remedy.
     """
-    if not isinstance(overrides, Mapping | None):
+    if not isinstance(cast(object, overrides), Mapping | None):
         raise ScenarioError(f"overrides must be a dictionary of fields and values, got {_shown(overrides)}")
     data: dict[str, Any] = {}
     try:
@@ -69,7 +69,7 @@ def load_scenario(
         for field, value in (overrides or {}).items():
             _assign(data, str(field), value)
         if num_vehicles is not None:
-            whole = isinstance(num_vehicles, Integral) and not isinstance(num_vehicles, bool)
+            whole = isinstance(cast(object, num_vehicles), Integral) and not isinstance(num_vehicles, bool)
             _assign(data, "swarm.num_vehicles", int(num_vehicles) if whole else num_vehicles)
         return Scenario.model_validate(_frozen(data))
     except ValidationError as error:
@@ -254,7 +254,8 @@ def _step(place: Any, part: str, field: str) -> Any:
 
 def _index(entries: Sequence[Any], part: str, field: str) -> int:
     places = {str(k): k for k in range(len(entries))}
-    names = {str(entry["name"]): k for k, entry in enumerate(entries) if isinstance(entry, dict) and "name" in entry}
+    tables = {k: cast(dict[str, Any], entry) for k, entry in enumerate(entries) if isinstance(entry, dict)}
+    names = {str(table["name"]): k for k, table in tables.items() if "name" in table}
     found = (places | names).get(part)
     if found is None:
         known = ", ".join(names or places) or "none"
@@ -279,7 +280,7 @@ def _explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
     names: list[str] = []
     for part in error["loc"]:
         try:
-            place = place[part]
+            place = cast(dict[Any, Any], place)[part]
         except (KeyError, IndexError, TypeError):
             place = None
         name = cast(dict[str, Any], place).get("name") if isinstance(part, int) and isinstance(place, dict) else None

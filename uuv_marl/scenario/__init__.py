@@ -1,0 +1,15 @@
+"""Scenarios: everything that fixes a simulation but the seed.
+
+``load_scenario`` makes a ``Scenario`` from a name, a TOML file or another scenario. ``*.toml`` hold the shipped ones,
+every number with its source.
+"""
+
+from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario.files import differences, load_scenario, parse_override, scenario_names, show, to_toml
+from uuv_marl.scenario.scenario import Scenario
+from uuv_marl.scenario.sections import MAX_RANGE_M, growth
+
+__all__ = [
+    "MAX_RANGE_M", "Scenario", "ScenarioError", "differences", "growth", "load_scenario", "parse_override",
+    "scenario_names", "show", "to_toml",
+]  # fmt: skip

@@ -1,0 +1,141 @@
+"""Scenario: everything that fixes a simulation but the seed; frozen, validated, in SI units and degrees.
+
+The numbers and their sources are in the TOML files beside; nothing here has a default value that matters.
+"""
+
+import logging
+import math
+from functools import cache
+from typing import Annotated
+
+from pydantic import Field
+
+from uuv_marl.scenario import sections
+from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
+
+MAX_STEPS = 10_000
+"""Most integration steps in a decision; compiled code can't be interrupted."""
+
+
+class Scenario(sections.Section):
+    """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+    """Set by the loader: the file's name; names results and pictures."""
+    title: str
+    """One line."""
+    source: str
+    """Where it comes from."""
+    version: Annotated[int, sections.within(1, 1_000_000)]
+    """Raised by any change of its numbers."""
+    swarm: sections.Swarm
+    start: sections.Start
+    trajectory: sections.Trajectory
+    obstacles: Annotated[tuple[sections.Obstacle, ...], Field(max_length=1024)] = ()
+    random_field: sections.RandomField | None = None
+    vehicle: sections.Vehicle
+    actuators: sections.Actuators
+    sonar: sections.Sonar
+    timing: sections.Timing
+    constraints: sections.Constraints
+    contact: sections.Contact
+    arrival: sections.Arrival
+    time_limit: sections.TimeLimit
+    disturbance: sections.Disturbance
+    reward: sections.Reward
+
+    @property
+    def max_obstacles(self) -> int:
+        """Most obstacles that a world of this scenario can hold."""
+        return self.random_field.obstacles[1] if self.random_field else len(self.obstacles)
+
+    def _check(self) -> None:
+        _check_start(self)
+        _check_course(self)
+        _check_losses(self)
+        _check_times(self)
+        check_vehicle(self.vehicle, self.actuators, self.timing, self.start.speed_max_mps)
+        if self.trajectory.speed_mps > top_speed(self.vehicle, self.actuators):
+            warn_of_speed(self.trajectory.speed_mps)
+
+
+def _check_start(scenario: Scenario) -> None:
+    """The vehicles fit into the start area at their spacing, which keeps their hulls apart."""
+    start, n, apart = scenario.start, scenario.swarm.num_vehicles, 2 * scenario.contact.hull_radius_m
+    if start.spacing_m < apart:
+        raise ValueError(
+            f"start.spacing_m must be at least two hull radii = {apart:g}, got {start.spacing_m:g}; "
+            "raise it or lower contact.hull_radius_m"
+        )
+    if start.gap_m < start.spacing_m and n > 1:
+        raise ValueError(
+            f"start.gap_m must be at least start.spacing_m = {start.spacing_m:g}, so that the two groups keep it from "
+            f"each other, got {start.gap_m:g}"
+        )
+    columns, rows, _ = start.lattice(n)
+    needed = math.ceil(n / 2)
+    if columns * rows < needed:
+        raise ValueError(
+            f"start.spacing_m = {start.spacing_m:g} leaves room for {columns * rows} vehicles in each start rectangle, "
+            f"but {needed} are needed; lower it, or raise start.length_m or start.width_m"
+        )
+
+
+def _check_course(scenario: Scenario) -> None:
+    """One trajectory, and no obstacle on its start or end."""
+    points, clear = scenario.trajectory.waypoints_m, scenario.constraints.s_o_m
+    if (points is None) == (scenario.random_field is None):
+        raise ValueError(
+            "trajectory.waypoints_m is needed, unless random_field draws the trajectory; "
+            f"got {'neither' if points is None else 'both'}"
+        )
+    if points is None:
+        if scenario.obstacles:
+            raise ValueError("obstacles must be empty where random_field draws them")
+        return
+    for k, obstacle in enumerate(scenario.obstacles):
+        centre, apart = obstacle.centre_m, obstacle.radius_m + clear
+        where = f"obstacles.{k} at {list(centre)} m, radius {obstacle.radius_m:g} m,"
+        if scenario.start.distance(scenario.swarm.num_vehicles, points[0], points[1], centre) < apart:
+            raise ValueError(f"{where} lies on the start; keep {clear:g} m from the two start rectangles")
+        if math.dist(centre, points[-1]) < apart:
+            raise ValueError(f"{where} lies on the trajectory's end; keep {clear:g} m from it")
+
+
+def _check_losses(scenario: Scenario) -> None:
+    """Somebody is left."""
+    losses, n = len(scenario.disturbance.loss_times_s), scenario.swarm.num_vehicles
+    if losses >= n:
+        raise ValueError(
+            f"disturbance.loss_times_s loses {losses} of {n} vehicles; "
+            "at least one must remain: shorten it or raise swarm.num_vehicles"
+        )
+
+
+def _check_times(scenario: Scenario) -> None:
+    """Decisions that an episode has room for, and that are soon computed."""
+    timing, limit, field = scenario.timing, scenario.time_limit, scenario.random_field
+    duration = scenario.trajectory.duration_s
+    if field is not None:
+        duration = field.legs[0] * field.leg_length_m[0] / scenario.trajectory.speed_mps
+    shortest = limit.factor * duration + limit.extra_s
+    period, steps = timing.decision_period_s, timing.holds_per_decision * timing.steps_per_hold
+    if period > shortest:
+        raise ValueError(
+            f"timing.decision_period_s must be at most the shortest time limit = {shortest:g}, got {period:g}; "
+            "lower it, or raise time_limit.factor or time_limit.extra_s"
+        )
+    if steps > MAX_STEPS:
+        raise ValueError(
+            f"timing.decision_period_s = {period:g} takes {steps:,} steps of timing.integration_step_s = "
+            f"{timing.integration_step_s:g}; at most {MAX_STEPS:,} are possible: lower it or raise the step"
+        )
+
+
+@cache
+def warn_of_speed(speed_mps: float) -> None:
+    """Say once that no vehicle can follow l(t)."""
+    text = (
+        "trajectory.speed_mps = %g is more than a vehicle holds at full force (actuators.max_force_n): none can follow"
+    )
+    logging.getLogger("uuv_marl").warning(text, speed_mps)

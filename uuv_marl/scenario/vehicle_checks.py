@@ -1,0 +1,169 @@
+"""What the physics demands of a vehicle: inertia positive, damping dissipative, no motion too fast for its time steps.
+
+Every message names the field, its value and the remedy.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.scenario.sections import Actuators, Timing, Vehicle
+
+Float64 = NDArray[np.float64]
+RK4_LIMIT = 2.78
+"""Classical Runge-Kutta is stable on the negative real axis up to this product of rate and step."""
+TRIAL_STEPS, RUNS = 600, 128
+"""A vehicle is tried for so many integration steps, a minute at the paper's step."""
+RUNAWAY = 1e8
+"""A speed [m/s, rad/s] beyond which a trial has diverged; none comes near it that does not."""
+SAMPLED_LIMIT = 2.0
+"""A sampled damping loop overshoots without end above this product of rate and hold."""
+
+
+def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_mps: float) -> None:
+    """Refuse a vehicle that is no passive body, or that the simulation can't follow.
+
+    Args:
+        vehicle: inertia and damping.
+        actuators: limits of thrust and torque, and the yaw damping within them.
+        timing: the control hold and the integration step.
+        speed_mps: the highest surge speed at the start [m/s].
+
+    Raises:
+        ValueError: names the field, the value and the remedy.
+    """
+    inertia = _inertia(vehicle)
+    if np.linalg.eigvalsh(inertia)[0] <= 0:
+        raise ValueError(
+            f"vehicle.x_G_m = {vehicle.x_G_m:g} and vehicle.Y_rdot_kgm = {vehicle.Y_rdot_kgm:g} couple sway and yaw so "
+            "strongly that the inertia matrix is not positive definite; lower them"
+        )
+    _check_damping(vehicle)
+    _check_step(vehicle, actuators, timing, speed_mps)
+    damping, hold = actuators.yaw_damping_nms, timing.control_hold_s
+    if not damping / inertia[2, 2] * hold < SAMPLED_LIMIT:
+        raise ValueError(
+            f"actuators.yaw_damping_nms = {damping:g} is unstable when held for timing.control_hold_s = {hold:g}; "
+            f"use less than {SAMPLED_LIMIT * inertia[2, 2] / hold:.4g}"
+        )
+
+
+def top_speed(vehicle: Vehicle, actuators: Actuators) -> float:
+    """Surge speed [m/s] that a vehicle holds at full force."""
+    return _terminal(vehicle.X_u, vehicle.X_uu, actuators.max_force_n)
+
+
+def _terminal(linear: float, quadratic: float, force: float) -> float:
+    """Speed at which linear plus quadratic resistance equals the force, with its sign."""
+    return 2 * force / (linear + math.sqrt(linear**2 + 4 * quadratic * abs(force))) if force else 0.0
+
+
+def _inertia(p: Vehicle) -> Float64:
+    """The inertia matrix M of Eq. 2, added mass included."""
+    m_23 = p.m_kg * p.x_G_m - p.Y_rdot_kgm
+    return np.array(
+        [[p.m_kg - p.X_udot_kg, 0, 0], [0, p.m_kg - p.Y_vdot_kg, m_23], [0, m_23, p.I_z_kgm2 - p.N_rdot_kgm2]]
+    )
+
+
+def _check_damping(p: Vehicle) -> None:
+    """Nu . D(nu) nu >= 0 for every nu, linear and non-linear part each; surge and yaw rate are bounded."""
+    if (p.Y_r + p.N_v) ** 2 > 4 * p.Y_v * p.N_r:
+        raise ValueError(
+            f"vehicle.Y_r + vehicle.N_v = {p.Y_r + p.N_v:g} lets linear damping add energy; "
+            f"keep its size within 2 sqrt(Y_v N_r) = {2 * math.sqrt(p.Y_v * p.N_r):g}"
+        )
+    coupling = abs(p.Y_rr + p.N_rv)
+    # Y_vv s^3 - c s + N_rr >= 0 for all s = |v / r| >= 0; the minimum lies at s = sqrt(c / (3 Y_vv)).
+    bound = 3 * (p.Y_vv * p.N_rr**2 / 4) ** (1 / 3)
+    if coupling > bound:
+        raise ValueError(
+            f"vehicle.Y_rr + vehicle.N_rv = {p.Y_rr + p.N_rv:g} lets quadratic damping add energy; "
+            f"keep its size within {bound:g}"
+        )
+    for linear, quadratic in (("X_u", "X_uu"), ("N_r", "N_rr")):
+        if max(getattr(p, linear), getattr(p, quadratic)) == 0:
+            raise ValueError(
+                f"vehicle.{linear} and vehicle.{quadratic} must not both be 0: nothing would bound the speed; raise one"
+            )
+
+
+def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float) -> None:
+    """Runge-Kutta follows the fastest motion, by its damping rate and in a trial."""
+    rate = _damping_rate(p, limits, speed_mps)
+
+    def fails(step_s: float) -> bool:
+        return not rate * step_s < RK4_LIMIT or _diverges(p, limits, speed_mps, step_s)  # pyright: ignore[reportArgumentType] - frozen models have a hash
+
+    h = timing.integration_step_s
+    if fails(h):
+        shorter = (timing.control_hold_s / 2**k for k in range(1, 16))
+        remedy = next((f"use at most {step:.3g}, or " for step in shorter if step < h and not fails(step)), "")
+        raise ValueError(
+            f"timing.integration_step_s = {h:g} is too long for this vehicle, so that Runge-Kutta diverges "
+            f"under actuators.max_force_n = {limits.max_force_n:g} and max_torque_nm = {limits.max_torque_nm:g}; "
+            f"{remedy}lower these limits, the vehicle's resistances or its added masses"
+        )
+
+
+def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
+    """How fast [1/s] damping acts at the largest speeds that full force and torque can hold, or at the start."""
+    u = max(top_speed(p, limits), speed_mps)
+    r = _terminal(p.N_r, p.N_rr, limits.max_torque_nm)
+    sway, yaw = [p.Y_v + 2 * p.Y_vv * u, -p.Y_r - 2 * p.Y_rr * r], [-p.N_v - p.N_rv * r, p.N_r + 2 * p.N_rr * r]
+    sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(_inertia(p)[1:, 1:], [sway, yaw]))).max())
+    return max(sway_yaw, (p.X_u + 2 * p.X_uu * u) / (p.m_kg - p.X_udot_kg))
+
+
+@lru_cache(maxsize=1024)
+def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -> bool:
+    """Whether Runge-Kutta at this step runs away somewhere: a trial of Eq. 2 at full action, held and switched."""
+    inverse = np.linalg.inv(_inertia(p))
+    motion = inverse @ _resistance(p)
+    push = inverse[:, ::2] @ _pushes(limits)
+    # Half of them start at the speeds that an action holds alone, so that short steps need no time to reach them.
+    nu = np.zeros((3, RUNS))
+    nu[0] = speed_mps
+    held = np.array([[math.cos(k), math.sin(k)] for k in range(RUNS // 2)]).T
+    nu[0, ::2] = [_terminal(p.X_u, p.X_uu, limits.max_force_n * share) for share in held[0]]
+    nu[2, ::2] = [_terminal(p.N_r, p.N_rr, limits.max_torque_nm * share) for share in held[1]]
+    factor = np.ones((7, RUNS))
+
+    def rate(nu: Float64, push: Float64) -> Float64:
+        factor[1:4], factor[4:] = nu, np.abs(nu)
+        return push + motion @ (nu[:, None] * factor).reshape(21, RUNS)
+
+    with np.errstate(all="ignore"):
+        for k in range(TRIAL_STEPS):
+            a = rate(nu, push[k])
+            b = rate(nu + step_s / 2 * a, push[k])
+            c = rate(nu + step_s / 2 * b, push[k])
+            d = rate(nu + step_s * c, push[k])
+            nu += step_s / 6 * (a + 2 * (b + c) + d)
+            if k % 50 == 49 and not (np.abs(nu) < RUNAWAY).all():
+                return True
+    return False
+
+
+def _resistance(p: Vehicle) -> Float64:
+    """-C(nu) nu - D(nu) nu of Eq. 2 as a matrix times the products of (u, v, r) with (1, u, v, r, |u|, |v|, |r|)."""
+    inertia = _inertia(p)
+    m_11, m_22, m_23 = inertia[0, 0], inertia[1, 1], inertia[1, 2]
+    force = np.zeros((3, 3, 7))
+    force[0, 0, [0, 4]], force[0, 1, 3], force[0, 2, 3] = (-p.X_u, -p.X_uu), m_22, m_23
+    force[1, 0, 3], force[1, 1, [0, 5]], force[1, 2, [0, 6]] = -m_11, (-p.Y_v, -p.Y_vv), (p.Y_r, p.Y_rr)
+    force[2, 0, [2, 3]] = m_11 - m_22, -m_23
+    force[2, 1, [0, 6]], force[2, 2, [0, 6]] = (p.N_v, p.N_rv), (-p.N_r, -p.N_rr)
+    return force.reshape(3, 21)
+
+
+def _pushes(limits: Actuators) -> Float64:
+    """Thrust and torque of every trial, shape (step, 2, run): 16 are held, others redrawn after 1 to 100 steps."""
+    runs, every = np.arange(RUNS), np.resize([1, 2, 5, 20, 100], RUNS)
+    every[:16] = TRIAL_STEPS
+    drawn = np.random.default_rng(0).integers(0, 16, (TRIAL_STEPS, RUNS))
+    drawn[0, :16] = runs[:16]
+    angle = drawn[np.arange(TRIAL_STEPS)[:, None] // every, runs] * math.pi / 8
+    return np.stack([limits.max_force_n * np.cos(angle), limits.max_torque_nm * np.sin(angle)], axis=1)
