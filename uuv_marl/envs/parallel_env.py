@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, make_task
-from uuv_marl.envs.view import OneWorld, RenderOptions
+from uuv_marl.envs.view import OneWorld
 from uuv_marl.sim.arguments import action_array
 
 Float32 = NDArray[np.float32]
@@ -175,7 +176,7 @@ def parallel_env(
         max_cycles: truncates after so many decisions; None for the scenario's time limit.
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: how to draw, any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or ``map``) and
-            ``sonar_of`` (index of the vehicle whose sonar is shown); see ``uuv_marl.envs.view.RenderOptions``.
+            ``sonar_of`` (index of the vehicle whose sonar is shown): ``uuv_marl.envs.drawing.options``.
         reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces

@@ -8,9 +8,10 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Float32, Outcome, ScenarioLike, TaskOptions, make_task, refuse_losses
-from uuv_marl.envs.view import RenderOptions, TaskBased
+from uuv_marl.envs.view import TaskBased
 from uuv_marl.extras import extra
 from uuv_marl.sim.arguments import action_array, whole_number
 

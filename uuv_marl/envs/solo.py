@@ -8,9 +8,10 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import granted, make
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Changes, Float32, Outcome, Reward, ScenarioLike, changed, make_task
-from uuv_marl.envs.view import OneWorld, RenderOptions
+from uuv_marl.envs.view import OneWorld
 from uuv_marl.sim.arguments import action_array
 
 

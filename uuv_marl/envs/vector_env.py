@@ -9,9 +9,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, ScenarioLike, Task, TaskOptions, make_task
-from uuv_marl.envs.view import RenderOptions, TaskBased
+from uuv_marl.envs.view import TaskBased
 from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
 
 Infos = dict[str, Any]

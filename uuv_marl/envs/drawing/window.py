@@ -8,8 +8,8 @@ from collections.abc import Callable
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
 from uuv_marl.envs.drawing.frame import Frame, Panel
+from uuv_marl.envs.drawing.options import Look
 from uuv_marl.envs.drawing.scene import Scene
-from uuv_marl.envs.view import Look
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 
