@@ -252,6 +252,7 @@ def test_the_learner_of_solo_shows_its_sonar():
         ({"size": (10, 800)}, r"\['size'\] must be \(width, height\), .* from 320 to 4096, got \(10, 800\)"),
         ({"size": 800}, r"\['size'\] must be"),
         ({"size": (800.0, 800)}, r"\['size'\] must be"),
+        ({"camera": np.zeros(2)}, r"\['camera'\] must be one of"),
         ({"camera": "fly"}, r"\['camera'\] must be one of \['follow', 'map'\], got 'fly'"),
         ({"sonar_of": 5}, r"\['sonar_of'\] must be the index of a vehicle, 0 to 4, or None, got 5"),
         ({"sonar_of": True}, r"\['sonar_of'\] must be"),

@@ -47,7 +47,7 @@ def look(options: RenderOptions | None, num_vehicles: int, sonar_of: int | None 
             f"render_options['size'] must be (width, height), whole numbers of pixels from {low} to {high}, "
             f"got {chosen.size!r}"
         )
-    if chosen.camera not in CAMERAS:
+    if not isinstance(chosen.camera, str) or chosen.camera not in CAMERAS:
         raise ValueError(f"render_options['camera'] must be one of {list(CAMERAS)}, got {chosen.camera!r}")
     i = chosen.sonar_of
     if i is not None and not (_whole(i) and 0 <= i < num_vehicles):
