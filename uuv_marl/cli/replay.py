@@ -107,7 +107,9 @@ def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
         return lambda recordings, path, _: write_page(recordings, path)
     if len(inspect) > 1:
         raise ReplayError(f"a film shows the sonar of one vehicle, got {len(inspect)}; give one --inspect, or .html")
-    from uuv_marl.replay.film import write_film
+    from uuv_marl.replay.film import check_format, write_film
+
+    check_format(Path(f"film{suffix}"))
 
     return lambda recordings, path, report: write_film(
         recordings, path, sonar_of=inspect[0] if inspect else None, progress=report
