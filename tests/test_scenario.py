@@ -27,7 +27,9 @@ def test_the_shipped_scenarios():
 def test_every_number_carries_its_source(name):
     for line in (FOLDER / f"{name}.toml").read_text().splitlines():
         value = line.split("#")[0]
-        if re.search(r"=.*(\d|true|false|\[\])", value) and not value.startswith(("version", "title", "source", "name")):
+        if re.search(r"=.*(\d|true|false|\[\])", value) and not value.startswith(
+            ("version", "title", "source", "name")
+        ):
             comment = line.partition("#")[2]
             assert re.search(
                 r"section|Table|Eq\.|assumed|Repoulias|none in the paper|nobody|as in the paper", comment
