@@ -213,13 +213,13 @@ def test_broken_files_are_named(tmp_path):
     ("n_r", "n_rr", "diverges"), [(500.0, 1000.0, True), (2500.0, 100.0, True), (50.0, 100.0, False)]
 )
 def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
-    from uuv_marl.sim.vehicle import advance, plant
+    from uuv_marl.sim.vehicle import STILL, advance, plant
 
     p = plant(load_scenario(BASE))._replace(N_r=n_r, N_rr=n_rr)
     rng, state = np.random.default_rng(0), (0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
     for _ in range(2000):
         angle = rng.uniform(0, 2 * np.pi)
-        state = advance(state, (3000 * np.cos(angle), 3000 * np.sin(angle)), 0.1, p)
+        state = advance(state, (3000 * np.cos(angle), 3000 * np.sin(angle)), STILL, 0.1, p)
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
 
 
@@ -312,7 +312,7 @@ VEHICLE = ("m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "N_rdot_kgm2", "X_u", "
 
 
 def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
-    from uuv_marl.sim.vehicle import advance, plant
+    from uuv_marl.sim.vehicle import STILL, advance, plant
 
     rng, base, accepted = np.random.default_rng(5), load_scenario(BASE), 0
     for _ in range(30):
@@ -328,7 +328,7 @@ def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
         for hold in (1, 10, 100, 600):
             state = (0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
             for angle in np.repeat(rng.uniform(0.0, 2 * np.pi, 600 // hold), hold):
-                state = advance(state, (force * np.cos(angle), torque * np.sin(angle)), 0.1, p)
+                state = advance(state, (force * np.cos(angle), torque * np.sin(angle)), STILL, 0.1, p)
             assert np.isfinite(state).all(), changes
     assert accepted > 5
 

@@ -16,7 +16,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.vehicle import advance, plant
+from uuv_marl.sim.vehicle import STILL, advance, plant
 
 
 def play(scenario, seeds, steps, policy="bio_inspired"):
@@ -177,7 +177,7 @@ def test_a_force_held_over_a_decision_keeps_its_direction_in_the_world():
     for _ in range(5):
         c, s = math.cos(state[2]), math.sin(state[2])
         tau = 3000 * (c * world[0] + s * world[1]), 3000 * (c * world[1] - s * world[0])
-        state = advance(state, tau, 0.1, p)
+        state = advance(state, tau, STILL, 0.1, p)
     np.testing.assert_allclose(swarm.state.eta[0, 0, :2], state[:2], atol=1e-9)
     np.testing.assert_allclose(swarm.state.nu[0, 0], state[3:], atol=1e-9)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from uuv_marl import load_scenario
 from uuv_marl.scenario import ScenarioError
 from uuv_marl.sim import vehicle
-from uuv_marl.sim.vehicle import plant
+from uuv_marl.sim.vehicle import STILL, plant
 
 speed = st.floats(-6.0, 6.0)
 COUPLED = {
@@ -102,7 +102,7 @@ def test_runge_kutta_converges_at_order_4():
     def end(steps):
         state = start
         for _ in range(steps):
-            state = vehicle.advance(state, tau, time / steps, FULL)
+            state = vehicle.advance(state, tau, STILL, time / steps, FULL)
         return np.array(state)
 
     exact = end(4096)
@@ -115,8 +115,8 @@ def test_runge_kutta_converges_at_order_4():
 @given(speed, speed, speed, st.floats(-3, 3), st.floats(-3, 3), st.floats(-500, 500), st.floats(-500, 500))
 def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
     tau = (700.0, -300.0)
-    a = np.array(vehicle.advance((0.0, 0.0, psi, u, v, r), tau, 0.1, FULL))
-    b = np.array(vehicle.advance((x, y, psi + turn, u, v, r), tau, 0.1, FULL))
+    a = np.array(vehicle.advance((0.0, 0.0, psi, u, v, r), tau, STILL, 0.1, FULL))
+    b = np.array(vehicle.advance((x, y, psi + turn, u, v, r), tau, STILL, 0.1, FULL))
     c, s = math.cos(turn), math.sin(turn)
     moved = np.array([x + c * a[0] - s * a[1], y + s * a[0] + c * a[1], a[2] + turn])
     np.testing.assert_allclose(b[:3], moved, atol=1e-9)
@@ -124,15 +124,15 @@ def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
 
 
 def test_mirrored_vehicle_moves_as_the_mirror_image():
-    a = vehicle.advance((0.0, 0.0, 0.4, 2.0, 0.6, 0.9), (500.0, 200.0), 0.1, PLAIN)
-    b = vehicle.advance((0.0, 0.0, -0.4, 2.0, -0.6, -0.9), (500.0, -200.0), 0.1, PLAIN)
+    a = vehicle.advance((0.0, 0.0, 0.4, 2.0, 0.6, 0.9), (500.0, 200.0), STILL, 0.1, PLAIN)
+    b = vehicle.advance((0.0, 0.0, -0.4, 2.0, -0.6, -0.9), (500.0, -200.0), STILL, 0.1, PLAIN)
     np.testing.assert_allclose(b, np.array(a) * [1, -1, -1, 1, -1, -1], atol=1e-12)
 
 
 def test_full_thrust_reaches_the_speed_whose_drag_equals_it():
     state = (0.0,) * 6
     for _ in range(2000):
-        state = vehicle.advance(state, (3000.0, 0.0), 0.1, PLAIN)
+        state = vehicle.advance(state, (3000.0, 0.0), STILL, 0.1, PLAIN)
     u = state[3]
     assert (PLAIN.X_u + PLAIN.X_uu * u) * u == pytest.approx(3000.0, rel=1e-9)
 
@@ -170,3 +170,14 @@ def test_wrap_gives_the_same_direction_in_one_turn(angle):
     assert -math.pi <= wrapped < math.pi
     assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-12)
     assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-12)
+
+
+@given(*[st.floats(-1.5, 1.5)] * 2, st.floats(-3, 3))
+def test_a_uniform_flow_carries_a_vehicle_along_and_changes_nothing_else(north, east, psi):
+    """Galilean invariance: the trajectory in a current is the one in still water plus the current times the time."""
+    still = moved = (0.0, 0.0, psi, 1.0, -0.3, 0.4)
+    for _ in range(40):
+        still = vehicle.advance(still, (900.0, -250.0), STILL, 0.1, FULL)
+        moved = vehicle.advance(moved, (900.0, -250.0), (north, east), 0.1, FULL)
+    assert moved[2:] == still[2:]
+    assert moved[:2] == pytest.approx((still[0] + 4.0 * north, still[1] + 4.0 * east), abs=1e-12)

@@ -14,7 +14,7 @@ from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
 from uuv_marl.reproduce.drawing import against_time
 from uuv_marl.reproduce.study import SINGLE, TRACKING, Columns, Part, Report, Study, Tables
 from uuv_marl.scenario import load_scenario
-from uuv_marl.sim.vehicle import Plant, State6, advance, plant
+from uuv_marl.sim.vehicle import STILL, Plant, State6, advance, plant
 
 FORCE = (1500.0, 150.0)
 """Held surge force [N] and yaw torque [N m] of the lone vehicle: a turning circle, from rest."""
@@ -28,7 +28,7 @@ def printed_step(state: State6, h: float, p: Plant) -> State6:
     V(t + t_r / 2) is defined nowhere; the mean of V(t) and V(t + t_r) stands for it.
     """
     x, y, psi, u, v, r = state
-    _, _, _, u_next, v_next, r_next = advance(state, FORCE, h, p)
+    _, _, _, u_next, v_next, r_next = advance(state, FORCE, STILL, h, p)
     middle = ((u + u_next) / 2, (v + v_next) / 2, (r + r_next) / 2)
 
     def rate(angle: float, nu: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -45,7 +45,7 @@ def printed_step(state: State6, h: float, p: Plant) -> State6:
 
 def classical_step(state: State6, h: float, p: Plant) -> State6:
     """What we use: Runge-Kutta on pose and velocity together."""
-    return advance(state, FORCE, h, p)
+    return advance(state, FORCE, STILL, h, p)
 
 
 def convergence() -> Columns:

@@ -23,7 +23,7 @@ from uuv_marl.benchmark.style import BLACK, BLUE, COLOURS, GREY, ORANGE, panels
 from uuv_marl.reproduce.formation import Formation, drag_n, formations, stiffness, straight_leg
 from uuv_marl.reproduce.study import Columns, Part, Report, Study, Tables
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.vehicle import derivative, plant
+from uuv_marl.sim.vehicle import STILL, derivative, plant
 
 Float64 = NDArray[np.float64]
 Complex128 = NDArray[np.complex128]
@@ -72,7 +72,7 @@ def vehicle_jacobians(scenario: Scenario) -> tuple[Float64, Float64]:
 
     def rate(at: Float64) -> Float64:
         psi, u, v, r, tau_u, tau_r = at.tolist()
-        return np.array(derivative((0.0, 0.0, psi, u, v, r), (tau_u, tau_r), parameters))
+        return np.array(derivative((0.0, 0.0, psi, u, v, r), (tau_u, tau_r), STILL, parameters))
 
     slopes = np.array([(rate(point + d) - rate(point - d)) / (2.0 * step) for d in np.eye(6) * step]).T
     return np.hstack([np.zeros((6, 2)), slopes[:, :4]]), slopes[:, 4:]

@@ -204,6 +204,16 @@ class Vehicle(Section):
     N_rv: Signed
     N_rr: NonNegative
 
+    @property
+    def inertia(self) -> tuple[float, float, float, float]:
+        """Entries m_11 [kg], m_22 [kg], m_23 [kg m] and m_33 [kg m2] of Eq. 2's matrix M, added mass included."""
+        return (
+            self.m_kg - self.X_udot_kg,
+            self.m_kg - self.Y_vdot_kg,
+            self.m_kg * self.x_G_m - self.Y_rdot_kgm,
+            self.I_z_kgm2 - self.N_rdot_kgm2,
+        )
+
 
 class Actuators(Section):
     """Limits of thrust and torque, the same for every policy."""

@@ -62,10 +62,8 @@ def _terminal(linear: float, quadratic: float, force: float) -> float:
 
 def _inertia(p: Vehicle) -> Float64:
     """The inertia matrix M of Eq. 2, added mass included."""
-    m_23 = p.m_kg * p.x_G_m - p.Y_rdot_kgm
-    return np.array(
-        [[p.m_kg - p.X_udot_kg, 0, 0], [0, p.m_kg - p.Y_vdot_kg, m_23], [0, m_23, p.I_z_kgm2 - p.N_rdot_kgm2]]
-    )
+    m_11, m_22, m_23, m_33 = p.inertia
+    return np.array([[m_11, 0, 0], [0, m_22, m_23], [0, m_23, m_33]])
 
 
 def _check_damping(p: Vehicle) -> None:

@@ -7,7 +7,7 @@ from uuv_marl.sim.arrays import State
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.desk import Columns
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.vehicle import Plant, actuators, advance, project, turned, wrap
+from uuv_marl.sim.vehicle import STILL, Plant, actuators, advance, project, turned, wrap
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -60,7 +60,7 @@ def move(steps: int, step_s: float, now: Columns, plant: Plant) -> None:
         for i in range(now.x.shape[0]):
             state = now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i]
             tau = now.tau_u[i], now.tau_r[i]
-            now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i] = advance(state, tau, step_s, plant)
+            now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i] = advance(state, tau, STILL, step_s, plant)
     for i in range(now.x.shape[0]):
         now.psi[i] = wrap(now.psi[i])
         now.cos[i], now.sin[i] = cos_sin(now.psi[i])

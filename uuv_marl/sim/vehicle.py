@@ -14,7 +14,10 @@ from uuv_marl.sim.trigonometry import cos_sin
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 State6 = tuple[float, float, float, float, float, float]
-"""A vehicle's joint state (x, y, psi, u, v, r)."""
+"""A vehicle's joint state (x, y, psi, u, v, r); u and v are relative to the water."""
+
+STILL: Vector2 = (0.0, 0.0)
+"""Still water, as a flow."""
 
 
 class Plant(NamedTuple):
@@ -48,9 +51,7 @@ class Plant(NamedTuple):
 def plant(scenario: Scenario) -> Plant:
     """The scenario's vehicle and actuators as numbers for the compiled functions."""
     vehicle, actuators = scenario.vehicle, scenario.actuators
-    m_22 = vehicle.m_kg - vehicle.Y_vdot_kg
-    m_23 = vehicle.m_kg * vehicle.x_G_m - vehicle.Y_rdot_kgm
-    m_33 = vehicle.I_z_kgm2 - vehicle.N_rdot_kgm2
+    m_11, m_22, m_23, m_33 = vehicle.inertia
     determinant = m_22 * m_33 - m_23 * m_23
     return Plant(
         m=vehicle.m_kg,
@@ -68,7 +69,7 @@ def plant(scenario: Scenario) -> Plant:
         Y_rr=vehicle.Y_rr,
         N_rv=vehicle.N_rv,
         N_rr=vehicle.N_rr,
-        inverse_11=1.0 / (vehicle.m_kg - vehicle.X_udot_kg),
+        inverse_11=1.0 / m_11,
         inverse_22=m_33 / determinant,
         inverse_23=-m_23 / determinant,
         inverse_33=m_22 / determinant,
@@ -113,12 +114,21 @@ def acceleration(nu: Vector3, tau: Vector2, p: Plant) -> Vector3:
 
 
 @compiled_inline
-def derivative(state: State6, tau: Vector2, p: Plant) -> State6:
-    """Rate of the joint state (eta, nu) under thrust [N] and torque [N m]. Eq. 1-2; R(psi) takes body to north-east."""
+def derivative(state: State6, tau: Vector2, flow: Vector2, p: Plant) -> State6:
+    """Rate of the joint state (eta, nu). Eq. 1-2; R(psi) takes body to north-east.
+
+    Args:
+        state: pose and velocity relative to the water.
+        tau: thrust [N] and torque [N m].
+        flow: velocity of the water, north and east [m/s]. It carries the vehicle along. The equations of motion hold
+            relative to the water: exactly where it is uniform and steady (Fossen, Handbook of Marine Craft
+            Hydrodynamics and Motion Control, 2021, chapter 10), else to first order.
+        p: the vehicle.
+    """
     _, _, psi, u, v, r = state
     c, s = cos_sin(psi)
     du, dv, dr = acceleration((u, v, r), tau, p)
-    return c * u - s * v, s * u + c * v, r, du, dv, dr
+    return c * u - s * v + flow[0], s * u + c * v + flow[1], r, du, dv, dr
 
 
 @compiled_inline
@@ -131,12 +141,12 @@ def ahead(state: State6, h: float, rate: State6) -> State6:
 
 
 @compiled_inline
-def advance(state: State6, tau: Vector2, h: float, p: Plant) -> State6:
-    """The joint state one step of h [s] later, tau held: the classical fourth-order Runge-Kutta method (Eq. 23-24)."""
-    a = derivative(state, tau, p)
-    b = derivative(ahead(state, 0.5 * h, a), tau, p)
-    c = derivative(ahead(state, 0.5 * h, b), tau, p)
-    d = derivative(ahead(state, h, c), tau, p)
+def advance(state: State6, tau: Vector2, flow: Vector2, h: float, p: Plant) -> State6:
+    """The joint state h [s] later, tau and flow held: the classical fourth-order Runge-Kutta method (Eq. 23-24)."""
+    a = derivative(state, tau, flow, p)
+    b = derivative(ahead(state, 0.5 * h, a), tau, flow, p)
+    c = derivative(ahead(state, 0.5 * h, b), tau, flow, p)
+    d = derivative(ahead(state, h, c), tau, flow, p)
     x, y, psi, u, v, r = state
     w = h / 6.0
     return (
