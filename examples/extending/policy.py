@@ -1,0 +1,50 @@
+"""A policy of your own, with a memory. In this folder: ``uuv-marl benchmark --policy policy:Smooth``."""
+
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl import baselines, load_scenario
+from uuv_marl.percept import Percept
+from uuv_marl.sim.swarm import Swarm
+
+Float32 = NDArray[np.float32]
+
+
+class Memory(NamedTuple):
+    """What each vehicle keeps from decision to decision."""
+
+    wish: Annotated[Float32, "world vehicle 2", "Smoothed direction to the reference point, in the body frame [1]."]
+
+
+class Smooth(baselines.Policy):
+    """Half thrust towards the reference point, whose direction is smoothed, and away from the nearest neighbour."""
+
+    Memory: ClassVar[type[Any] | None] = Memory
+
+    def remember(self, percept: Percept, worlds: NDArray[np.bool_]) -> None:
+        """Take the new direction into the mean, in the worlds that have gone on."""
+        to_reference = percept["reference"]
+        length = np.maximum(np.linalg.norm(to_reference, axis=-1, keepdims=True), 1e-3)
+        self.memory.wish[worlds] += 0.2 * ((to_reference / length) - self.memory.wish)[worlds]
+
+    def decide(self, percept: Percept) -> Float32:
+        """Shares of full force and torque, shape (world, vehicle, 2)."""
+        neighbour, heard = percept["neighbour"], percept["heard"][..., None]
+        squared = np.maximum((neighbour**2).sum(axis=-1, keepdims=True), 1.0)
+        away = -(heard * neighbour / squared).sum(axis=-2)
+        wish = self.memory.wish + 30.0 * away
+        turn = 0.3 * np.arctan2(wish[..., 1], wish[..., 0]) - 0.3 * percept["yaw_rate"][..., 0]
+        return np.stack([np.full_like(turn, 0.5), turn], axis=-1).astype(np.float32)
+
+
+if __name__ == "__main__":
+    scenario = load_scenario("starter")
+    swarm, policy = Swarm(scenario), Smooth(scenario)
+    percept, collisions = swarm.reset(seed=0), 0
+    while swarm.facts.time_s[0] < 30.0:
+        percept = swarm.step(policy.act(percept))
+        collisions += swarm.facts.collisions[0]
+    away = np.hypot(*(swarm.facts.centre - swarm.facts.reference[:, :2])[0])
+    print(f"after 30 s the swarm is {away:.0f} m from the reference point, with {collisions} collisions")

@@ -1,0 +1,33 @@
+"""A reward of your own: a function from the swarm after a step to a number for every vehicle of every world."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+import uuv_marl
+from uuv_marl import baselines
+from uuv_marl.sim.swarm import Swarm
+
+
+def close_and_careful(swarm: Swarm) -> NDArray[np.float64]:
+    """Near the reference point is good, near an obstacle or a neighbour is bad. Shape (world, vehicle).
+
+    ``swarm.state`` and ``swarm.facts`` hold the arrays; ``help(uuv_marl.sim.arrays.Facts)`` explains each.
+    """
+    offset = swarm.state.eta[:, :, :2] - swarm.facts.reference[:, None, :2]
+    distance = np.linalg.norm(offset, axis=-1)
+    near = np.minimum(swarm.facts.clearance, swarm.facts.spacing)
+    reward = -0.01 * distance - np.clip(1.0 - near / 5.0, 0.0, 1.0) - 10.0 * swarm.facts.contacts
+    return np.where(swarm.state.alive, reward, 0.0)
+
+
+if __name__ == "__main__":
+    scenario = baselines.granted("bio_inspired_plus", uuv_marl.load_scenario("starter"))
+    env = uuv_marl.parallel_env(scenario, reward=close_and_careful)
+    policy = baselines.make("bio_inspired_plus", env)
+    observations, _ = env.reset(seed=0)
+    policy.reset(seed=0)
+    total = 0.0
+    while env.agents:
+        observations, rewards, *_ = env.step(policy(observations))
+        total += sum(rewards.values())
+    print(f"all vehicles together were paid {total:.1f}")
