@@ -63,8 +63,8 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
         num_worlds: worlds stepped together.
         scenario: a name, a TOML file or a ``Scenario``.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as for
-            ``uuv_marl.parallel_env``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+            for ``uuv_marl.parallel_env``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - SB3's own form

@@ -1,13 +1,14 @@
 """The physics as the paper's formulas say it, in plain Python: a vehicle, a pair, a sub-sector at a time.
 
 Read from the top: ``PlainEngine.decide`` is one decision of a swarm; its parts follow in the order of a step, and below
-each the formulas. Nothing is sorted, tabulated or skipped, so it is slow. The compiled engine gives the same bits, which
-tests/test_engines.py checks. To change the physics, change both.
+each the formulas. Nothing is sorted, tabulated or skipped, so it is slow. The compiled engine gives the same bits:
+tests/test_engines.py. Who changes the physics changes both.
 
 Symbols are those of ``uuv_marl.sim.vehicle``: eta = (x north, y east, psi clockwise from north), nu = (u surge, v sway,
 r yaw rate) in the body frame, x forward, y starboard; SI units and radians. Equation numbers are the paper's.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -19,9 +20,9 @@ from uuv_marl.percept import MAX_SPEED, Percept, PerceptLayout
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.scenario.sections import SonarArray
 from uuv_marl.sim.arrays import World
-from uuv_marl.sim.model import rules
+from uuv_marl.sim.model import model
 from uuv_marl.sim.trigonometry import cos_sin as compiled_cos_sin
-from uuv_marl.sim.vehicle import Plant, plant
+from uuv_marl.sim.vehicle import Plant
 from uuv_marl.sim.world import RUNAWAY
 
 Row = Sequence[float]
@@ -35,7 +36,8 @@ class PlainEngine:
 
     def __init__(self, scenario: Scenario, world: World) -> None:
         self.state, self.course, self.facts, self.senses = world
-        self.plant, self.rules, self.sonar = plant(scenario), rules(scenario), scenario.sonar
+        numbers = model(scenario)
+        self.plant, self.rules, self.sonar = numbers.plant, numbers.rules, scenario.sonar
         self.sectors = sub_sectors(scenario.sonar.arrays)
         self.percept = Percept(world.senses.percept, PerceptLayout.of(scenario))
 
@@ -202,7 +204,7 @@ class PlainEngine:
 
 
 def know_neighbour(k: int, i: int, j: int, eta: Rows, nu: Rows, heading: Rows, see: dict[str, Any]) -> None:
-    """Write vehicle j, whom vehicle i hears in sub-sector k: where it is, and by the link who it is and its velocity."""
+    """Write where vehicle j is, whom vehicle i hears in sub-sector k; by the link also who it is and its velocity."""
     see["heard"][k] = 1.0
     see["neighbour"][k] = to_body(eta[j][0] - eta[i][0], eta[j][1] - eta[i][1], heading[i])
     if "link_identity" in see:
@@ -300,7 +302,7 @@ def advance(now: Row, tau: Row, h: float, p: Plant) -> Row:
 
 def reference(t: float, waypoints: Rows, times: Row) -> tuple[float, float, float, float]:
     """Position and velocity of l(t): constant speed from waypoint to waypoint, then at rest at the last. Eq. 5."""
-    for k, (start, end) in enumerate(zip(waypoints[:-1], waypoints[1:], strict=True)):
+    for k, (start, end) in enumerate(itertools.pairwise(waypoints)):
         if t < times[k + 1]:
             v_x, v_y = ((end[axis] - start[axis]) / (times[k + 1] - times[k]) for axis in range(2))
             return start[0] + v_x * (t - times[k]), start[1] + v_y * (t - times[k]), v_x, v_y
