@@ -44,6 +44,7 @@ OVERLAPPING = [
 COUPLED = {"vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0, "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0,
            "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0}  # fmt: skip
 HIDING = {"sonar.obstacles_hide_vehicles": True}
+CORNERS = {"trajectory.waypoints_m": [[0.0, 0.0], [4.0, 0.0], [4.0, 8.0]]}  # at 1 s and 3 s
 FATAL = {"contact.ends_vehicle": True}
 DAMPED = {"actuators.yaw_damping_nms": 600.0}
 MANY_LOSSES = {"disturbance.loss_times_s": [0.6, 1.0, 1.1, 1.2]}
@@ -61,6 +62,7 @@ EPISODES = {
     ),
     "link alone": ("multi_obstacle", {"num_vehicles": 9, "overrides": {"sonar.channels": ["link"]}}, ""),
     "obstacles hide": ("multi_obstacle", {"num_vehicles": 12, "overrides": HIDING}, ""),
+    "corners on a tick": ("tracking", {"overrides": CORNERS}, ""),
     "overlapping arrays": ("single_obstacle", {"num_vehicles": 7, "overrides": {"sonar.arrays": OVERLAPPING}}, ""),
     "five holds, coupled, damped": ("starter", {"overrides": {**FINE, **COUPLED, **DAMPED}}, "arrival"),
 }  # fmt: skip

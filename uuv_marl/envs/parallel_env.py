@@ -175,7 +175,7 @@ def parallel_env(
             ``timing.decision_period_s``. Meanwhile the force is held in the world frame and projected anew.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
         engine: ``numba``, or ``plain``: the same run, bit for bit, from the plain Python of ``uuv_marl/sim/plain.py``,
-            some hundred times slower.
+            tens to hundreds of times slower.
     """
     task = make_task(
         scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,

@@ -10,7 +10,7 @@ r yaw rate) in the body frame, x forward, y starboard; SI units and radians. Equ
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +29,8 @@ Row = Sequence[float]
 Rows = Sequence[Row]
 """One row for each vehicle, obstacle (centre north and east, radius [m]), waypoint or sub-sector."""
 Pair = tuple[float, float]
+
+_cos_sin: Callable[[float], Pair] = getattr(compiled_cos_sin, "py_func", compiled_cos_sin)
 
 
 class PlainEngine:
@@ -217,7 +219,7 @@ def know_neighbour(k: int, i: int, j: int, eta: Rows, nu: Rows, heading: Rows, s
 
 def cos_sin(angle: float) -> Pair:
     """Cosine and sine [rad]: the package's own (``uuv_marl.sim.trigonometry``), whose bits no C library decides."""
-    return getattr(compiled_cos_sin, "py_func", compiled_cos_sin)(angle) if math.isfinite(angle) else (math.nan,) * 2
+    return _cos_sin(angle) if math.isfinite(angle) else (math.nan, math.nan)
 
 
 def wrap(angle: float) -> float:

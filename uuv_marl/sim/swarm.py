@@ -1,4 +1,4 @@
-"""Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
+"""Swarm: any number of worlds, reset one by one and stepped in one call: seeds, draws and checks before an engine."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ class Swarm:
         scenario: what to simulate.
         num_worlds: how many worlds a call steps.
         engine: ``numba`` (compiled: one world runs serially, several run on threads), or ``plain``, the same numbers
-            from the plain Python of ``uuv_marl/sim/plain.py``, some hundred times slower.
+            from the plain Python of ``uuv_marl/sim/plain.py``, tens to hundreds of times slower.
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, engine: EngineName = "numba") -> None:
@@ -49,8 +49,9 @@ class Swarm:
         self.keys = np.zeros(num_worlds, np.uint64)
         """Of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
         self._sizes = _sizes(scenario, num_worlds, self.layout.size)
-        self._world = World(*(allocate(table, self._sizes) for table in _TABLES))
-        self.state, self.course, self.facts, self._senses = self._world
+        self.state, self.course = allocate(State, self._sizes), allocate(Course, self._sizes)
+        self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)
+        self._world = World(self.state, self.course, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
         self._engine = make_engine(engine, scenario, self._world)
 
