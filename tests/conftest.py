@@ -16,8 +16,10 @@ from uuv_marl.sim.swarm import Swarm
 NEEDS = {
     "test_env.py": "pygame",
     "test_export.py": "onnx",
+    "test_film.py": "av",
     "test_mappo.py": "torch",
     "test_ppo.py": "stable_baselines3",
+    "test_rendering.py": "pygame",
     "test_sb3.py": "stable_baselines3",
     "test_torchrl.py": "torchrl",
     "test_vector_env.py": "pygame",

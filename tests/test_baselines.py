@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import pickle
 from importlib import resources
 
 import numpy as np
@@ -110,7 +111,7 @@ def test_forces_turn_with_the_world(name):
         if name.startswith("sdc"):  # its lattice lies north-east, so only the move is a symmetry
             policy.act(percept)
             if moved:
-                policy._slots = policy._slots @ rotation.T
+                policy.memory.slots[...] = policy.memory.slots @ rotation.T
         actions.append(policy.act(percept))
     if not name.startswith("sdc"):
         np.testing.assert_allclose(actions[0], actions[1], atol=2e-4)
@@ -184,7 +185,7 @@ def test_slots_are_assigned_so_that_ways_are_short():
     slots = sdc.hexagonal_slots(7)[[3, 1, 4, 0, 6, 5, 2]]
     swarm.state.eta[0, :, :2] = slots * 1.1 + (500.0, 300.0)
     policy.act(swarm.observe())
-    np.testing.assert_allclose(policy._slots[0], slots, atol=1e-9)
+    np.testing.assert_allclose(policy.memory.slots[0], slots, atol=1e-9)
 
 
 def test_policies_that_remember_forget_on_reset():
@@ -223,7 +224,7 @@ def test_unknown_names_and_parameters_suggest():
         make("bio_inspired", "tracking")
     with pytest.raises(PolicyError, match="num_worlds must be at least 1"):
         make("bio_inspired", load_scenario("tracking"), 0)
-    with pytest.raises(PolicyError, match="no parameter 'gain'; it has gains, obstacle_term"):
+    with pytest.raises(PolicyError, match="no parameter .gain.; did you mean .gains.. It has gains, obstacle_term"):
         make("bio_inspired", load_scenario("tracking"), gain=3)
 
 
@@ -240,3 +241,86 @@ def test_tuned_gains_come_from_shipped_trials(name):
     scenario = granted(name, load_scenario("tracking"))
     gains = make(name, scenario).gains._asdict()
     assert {key: gains[key] for key in data["best"]} == data["best"]
+
+
+def flown(name, scenario, decisions=6, worlds=2):
+    scenario = granted(name, load_scenario(scenario))
+    swarm, policy = Swarm(scenario, worlds), make(name, scenario, worlds)
+    percept = swarm.reset(0)
+    policy.reset(0)
+    for _ in range(decisions):
+        percept = swarm.step(policy.act(percept))
+    return swarm, policy, percept
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
+    swarm, policy, percept = flown(name, "starter")
+    again, kept, water = pickle.loads(pickle.dumps(policy)), policy.snapshot(), swarm.snapshot()
+    first = policy.act(percept)
+    assert np.array_equal(again.act(percept), first)
+    swarm.step(first)
+    policy.act(swarm.percept)
+    swarm.restore(water)
+    policy.restore(kept)
+    assert np.array_equal(policy.act(swarm.percept), first)
+    with pytest.raises(PolicyError, match="clamps must be int64 of shape"):
+        policy.restore({**kept, "clamps": np.zeros(5)})
+
+
+@pytest.mark.parametrize("name", ["sff", "sdc"])
+def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
+    swarm, policy, percept = flown(name, "starter")
+    first = policy.act(percept)
+    assert np.array_equal(policy.act(percept), first), "asked twice at one time, it must say the same"
+    swarm.step(first)
+    swarm.step(first)
+    with pytest.raises(PolicyError, match=r"was asked at 0\.6 s and then at 0\.8 s in world 0, and its memory needs"):
+        policy.act(swarm.percept)
+    policy.reset(0)
+    policy.act(swarm.percept)
+
+
+@pytest.mark.parametrize("name", ["sff", "sdc"])
+def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
+    """So that memory does not outlive an autoreset, whichever API did it; the other world keeps its own."""
+    swarm, policy, percept = flown(name, "starter")
+    before = [array[1].copy() for array in policy.memory]
+    percept = swarm.reset([5], worlds=[0])
+    action = policy.act(percept)
+    alone = make(name, swarm.scenario, 1)
+    assert np.array_equal(action[0], alone.act(Swarm(swarm.scenario).reset(5))[0])
+    assert any(not np.array_equal(now[0], then) for now, then in zip(policy.memory, before, strict=True))
+    idle = policy.memory[0][0].copy()
+    policy.active[:] = [False, True]
+    swarm.step(action)
+    policy.act(swarm.percept)
+    assert np.array_equal(policy.memory[0][0], idle), "a world that does not count was remembered"
+
+
+def test_gains_and_parameters_can_be_written_behind_a_name():
+    scenario = load_scenario("starter")
+    policy = make("bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle", scenario)
+    assert policy.gains == bio_inspired.Gains(zeta_n=0.5)
+    assert make("bio_inspired", scenario, zeta_n=0.5).gains == policy.gains
+    percept = Swarm(scenario).reset(0)
+    assert not np.array_equal(policy.act(percept), make("bio_inspired", scenario).act(percept))
+    assert granted("sff,cluster=3", scenario).sonar.channels == ("link",)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
+        ("bio_inspired,zeta_n=x", "the gain zeta_n must be a finite number, got 'x'"),
+        ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
+        ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
+        ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
+        ("idle,gain=1", "has no parameter 'gain'; It has none"),
+        ("guarded:sff", "'guarded:' is reserved"),
+        ("bio_insp,zeta_n=1", "did you mean 'bio_inspired'"),
+    ],
+)
+def test_a_name_that_means_nothing_is_explained(name, message):
+    with pytest.raises(PolicyError, match=message):
+        make(name, load_scenario("starter"))

@@ -75,6 +75,8 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "reproduce.job.make",
         "reproduce.identify.identify",
         "heldout.job.run",
+        "replay.record.record",
+        "replay.traces.from_folder",
     ):
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.training.train", stop_at_once)

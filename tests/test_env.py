@@ -1,6 +1,5 @@
-"""The PettingZoo environments: conformance, contract, determinism, errors, pictures."""
+"""The PettingZoo environments: conformance, contract, determinism, errors."""
 
-import pickle
 import warnings
 
 import gymnasium
@@ -444,21 +443,6 @@ def test_actions_are_projected_onto_the_disc():
     assert a.swarm.facts.effort[0, 0] == pytest.approx(1.0)
 
 
-def test_a_picture_shows_what_is_there():
-    env = uuv_marl.parallel_env("multi_obstacle", render_mode="rgb_array")
-    env.reset(seed=0)
-    picture = env.render()
-    assert picture.shape == (800, 800, 3)
-    colours = {tuple(int(v) for v in c) for c in np.unique(picture.reshape(-1, 3), axis=0)}
-    assert (213, 94, 0) in colours  # obstacles
-    assert (240, 228, 66) in colours  # vehicles
-    env.step({agent: np.ones(2, np.float32) for agent in env.agents})
-    assert not np.array_equal(env.render(), picture)
-    twin = pickle.loads(pickle.dumps(env))
-    np.testing.assert_array_equal(twin.render(), env.render())
-    env.close()
-
-
 class OneWorld(gymnasium.Env):
     """A single-agent face of one world, for Gymnasium's forked workers."""
 
@@ -493,43 +477,6 @@ def test_gymnasium_workers_give_the_same_run(context):
         runs.append(record)
         envs.close()
     assert runs[0] == runs[1]
-
-
-def test_without_a_display_a_window_is_refused_with_the_remedy(monkeypatch):
-    pygame = pytest.importorskip("pygame")
-    pygame.display.quit()
-    env = uuv_marl.parallel_env(num_vehicles=2, render_mode="human")
-    for driver in ("offscreen", "dummy"):
-        with monkeypatch.context() as patch:
-            for name in ("SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
-                patch.delenv(name, raising=False)
-            patch.setattr(pygame.display, "get_driver", lambda driver=driver: driver)
-            with pytest.raises(RuntimeError, match="found no display for its window; use render_mode='rgb_array'"):
-                env.reset(seed=0)
-            assert not pygame.display.get_init()
-    with monkeypatch.context() as patch:
-        patch.setenv("SDL_VIDEODRIVER", "nonsense")
-        with pytest.raises(RuntimeError, match="found no display for its window; use render_mode"):
-            env.reset(seed=0)
-    env.reset(seed=0)  # SDL_VIDEODRIVER=dummy, chosen on purpose
-    assert env.render() is None
-    env.close()
-
-
-def test_closing_the_window_ends_no_run():
-    pygame = pytest.importorskip("pygame")
-    env = uuv_marl.parallel_env(num_vehicles=2, render_mode="human", max_cycles=3, decision_period=0.1)
-    env.reset(seed=0)
-    actions = dict.fromkeys(env.agents, np.zeros(2))
-    pygame.event.post(pygame.event.Event(pygame.QUIT))
-    with pytest.warns(UserWarning, match="the window was closed; the run goes on without it"):
-        env.step(actions)
-    assert not pygame.display.get_init()
-    env.step(actions)
-    assert env.render() is None
-    *_, infos = env.step(actions)
-    assert infos["uuv_0"]["ending"] == "time_limit"
-    env.close()
 
 
 def test_tab_completion_shows_the_public_names():

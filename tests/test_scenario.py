@@ -23,11 +23,13 @@ def test_the_shipped_scenarios():
     assert set(scenario_names()) == set(SCENARIOS)
 
 
-@pytest.mark.parametrize("name", ["base", *SCENARIOS])
+@pytest.mark.parametrize("name", ["base", "vehicles/literature_185", *SCENARIOS])
 def test_every_number_carries_its_source(name):
     for line in (FOLDER / f"{name}.toml").read_text().splitlines():
         value = line.split("#")[0]
-        if re.search(r"=.*(\d|true|false|\[\])", value) and not value.startswith(("version", "title", "source")):
+        if re.search(r"=.*(\d|true|false|\[\])", value) and not value.startswith(
+            ("version", "title", "source", "name")
+        ):
             comment = line.partition("#")[2]
             assert re.search(
                 r"section|Table|Eq\.|assumed|Repoulias|none in the paper|nobody|as in the paper", comment
@@ -338,3 +340,44 @@ def test_light_commands_import_nothing_heavy():
         "assert not {'matplotlib', 'scipy.stats'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_scenario_names_its_vehicle_whose_numbers_stand_in_a_file(tmp_path):
+    scenario = load_scenario("tracking")
+    assert scenario.vehicle.name == "literature_185"
+    assert load_scenario(scenario, overrides={"vehicle.m_kg": 200.0, "vehicle": "literature_185"}) == scenario
+    shown = show("tracking")
+    assert 'name = "literature_185"' in shown
+    assert "m_kg = 185.0  # Repoulias and Papadopoulos 2007" in shown
+    hull = (FOLDER / "vehicles" / "literature_185.toml").read_text()
+    heavy = hull.replace("m_kg = 185.0", "m_kg = 300.0").replace('"literature_185"', '"heavy"')
+    (tmp_path / "heavy.toml").write_text(heavy)
+    own = tmp_path / "mine.toml"
+    own.write_text('vehicle = "heavy.toml"\nextends = "tracking"\n')
+    mine = load_scenario(own)
+    assert (mine.vehicle.name, mine.vehicle.m_kg, mine.actuators) == ("heavy", 300.0, scenario.actuators)
+    assert load_scenario(mine) == mine
+    (tmp_path / "again.toml").write_text(to_toml(mine))
+    assert load_scenario(tmp_path / "again.toml").vehicle == mine.vehicle
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("m_kg = 185.0", "", "lacks vehicle.m_kg; a vehicle's file gives all numbers"),
+        ("lever_arm_m = 1.0", "", "lacks actuators.lever_arm_m"),
+        ("[vehicle]", "[swarm]\nnum_vehicles = 3\n[vehicle]", "holds 'swarm'; it may hold vehicle and actuators only"),
+        ("m_kg = 185.0", "m_kg = ", "is not valid TOML"),
+    ],
+)
+def test_a_vehicle_file_that_is_not_whole_is_refused(tmp_path, before, after, message):
+    hull = (FOLDER / "vehicles" / "literature_185.toml").read_text()
+    path = tmp_path / "mine.toml"
+    path.write_text(hull.replace(before, after, 1))
+    with pytest.raises(ScenarioError, match=re.escape(message)):
+        load_scenario("tracking", overrides={"vehicle": str(path)})
+
+
+def test_an_unknown_vehicle_names_the_nearest():
+    with pytest.raises(ScenarioError, match=r"vehicle 'literature_18' is unknown; did you mean 'literature_185'\?"):
+        load_scenario("tracking", overrides={"vehicle": "literature_18"})

@@ -17,9 +17,19 @@ class ResultsError(RuntimeError):
     """A file or folder that can't be written, or that can't take these results."""
 
 
+class ReplayError(ValueError):
+    """An episode that can't be shown; the message names the remedy."""
+
+
 class ClusterError(RuntimeError):
     """A cluster that can't do the work; the message says what to do."""
 
 
 class MissingExtraError(ModuleNotFoundError):
     """A library is missing that one of the package's extras would install; the message says how."""
+
+
+MENDABLE = (
+    ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, ClusterError, MissingExtraError,
+)  # fmt: skip
+"""All of them."""

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 
 Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Bool = NDArray[np.bool_]
 
 MAX_SPEED = 64.0
 """Velocities in a percept saturate here [m/s, rad/s], so that observation bounds are finite."""
@@ -146,6 +148,15 @@ class PerceptLayout:
         return np.repeat(np.array(values, np.float32), [field.size for field in self.table])
 
 
+class Clock(NamedTuple):
+    """When a percept was heard. The arrays are the swarm's own: they show the present."""
+
+    time_s: Float64
+    """Since the reset, shape (world,)."""
+    episode: NDArray[np.uint64]
+    """A number that every reset changes, except one with the same seed, shape (world,)."""
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class Percept:
     """What vehicles know: ``flat`` of shape (..., layout.size), float32, physical units; its fields as views.
@@ -158,6 +169,10 @@ class Percept:
 
     flat: Float32
     layout: PerceptLayout
+    clock: Clock | None = None
+    """When this was perceived, where the swarm itself gives the percept; None for one made of observations."""
+    alive: Bool | None = None
+    """False for lost vehicles, whose rows are zero, shape (world, vehicle); None where nobody says."""
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -197,6 +197,7 @@ def odd_arguments(rng, folder):
         lambda: uuv_marl.parallel_env("starter", reward=thing),
         lambda: uuv_marl.parallel_env("starter", decision_period=thing),
         lambda: uuv_marl.parallel_env("starter", render_mode=thing),
+        lambda: uuv_marl.parallel_env("starter", render_options=pick(rng, (thing, {"size": thing}, {"camera": thing}))),
         lambda: uuv_marl.vector_env(thing, "starter"),
         lambda: uuv_marl.parallel_env("starter").reset(seed=thing),
         lambda: uuv_marl.vector_env(2, "starter").reset(seed=thing),

@@ -1,12 +1,13 @@
 """The paper's controller (Eq. 18-22), from positions alone, and the strongest hand-made form of the same law."""
 
 import math
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -62,10 +63,12 @@ class BioInspired(Policy):
     ) -> None:
         super().__init__(scenario, num_worlds)
         self.gains = gains or Gains()
+        if obstacle_term not in get_args(ObstacleTerm):
+            raise PolicyError(f"obstacle_term must be 'per_echo' or 'per_obstacle', got {obstacle_term!r}")
         self._once = obstacle_term == "per_obstacle"
         self._centres = scenario.sonar.echo_reports == "centre"
 
-    def act(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         flat = self.flat(percept)
         action = np.empty((*flat.shape[:2], 2), np.float32)

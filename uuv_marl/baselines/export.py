@@ -135,7 +135,7 @@ def _model(policy: Learned) -> onnx.ModelProto:
     """The model with its documentation; its metadata hold the card, the vehicle's limits and the file's digest."""
     card, layout, graph = policy.checkpoint.card, policy.layout, _Graph()
     _act(graph, policy)
-    units = [f"{row.scale:g} {row.unit}".removesuffix(" 1") for row in layout.table]
+    units = [f"{row.kind.scale:g} {row.kind.unit}".removesuffix(" 1") for row in layout.table]
     fields = ", ".join(f"{row.name} {row.size} [{unit}]" for row, unit in zip(layout.table, units, strict=True))
     observation = helper.make_tensor_value_info(
         "observation",

@@ -1,14 +1,16 @@
 """Floors that every other policy must beat: random actions, and none."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.streams import packed, unpacked
 
 Float32 = NDArray[np.float32]
 
@@ -28,7 +30,20 @@ class Random(Policy):
         for w, seed in zip(worlds, seeds, strict=True):
             self._rngs[w] = np.random.default_rng((seed, 1))
 
-    def act(self, percept: Percept) -> Float32:
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All that later decisions depend on, the random streams too."""
+        return super().snapshot() | {"streams": packed(self._rngs)}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot. Raises PolicyError where it is another policy's."""
+        super().restore(snapshot)
+        try:
+            streams = unpacked(snapshot["streams"], self.num_worlds)
+        except (KeyError, ValueError) as error:
+            raise PolicyError(f"the snapshot is none of {self.name}: {error}") from None
+        self._rngs = [stream or np.random.default_rng() for stream in streams]
+
+    def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         n = self.flat(percept).shape[1]
         drawn = np.stack([rng.random((n, 2)) for rng in self._rngs])
@@ -39,6 +54,6 @@ class Random(Policy):
 class Idle(Policy):
     """No force at all."""
 
-    def act(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:
         """Zeros of shape (world, vehicle, 2)."""
         return np.zeros((*self.flat(percept).shape[:2], 2), np.float32)

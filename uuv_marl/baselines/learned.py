@@ -22,7 +22,7 @@ from uuv_marl.atomic import replacing
 from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits, Policy, PolicyError
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario import Scenario, load_vehicle
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
 from uuv_marl.sim.views import Starts, fields
@@ -40,21 +40,18 @@ MOST_BARRIER = 8.0
 _CARD = "uuv_marl"
 _MOST_WEIGHT = 1e6
 """Larger weights are no result of training, and overflow in single precision."""
-_FIRST_VEHICLE = {
-    "vehicle.m_kg": 185.0, "vehicle.I_z_kgm2": 50.0, "vehicle.x_G_m": 0.0, "vehicle.X_udot_kg": -30.0,
-    "vehicle.Y_vdot_kg": -80.0, "vehicle.Y_rdot_kgm": 0.0, "vehicle.N_rdot_kgm2": -30.0, "vehicle.X_u": 70.0,
-    "vehicle.Y_v": 100.0, "vehicle.Y_r": 0.0, "vehicle.N_v": 0.0, "vehicle.N_r": 50.0, "vehicle.X_uu": 100.0,
-    "vehicle.Y_vv": 200.0, "vehicle.Y_rr": 0.0, "vehicle.N_rv": 0.0, "vehicle.N_rr": 100.0,
-    "actuators.max_force_n": 3000.0, "actuators.max_torque_nm": 3000.0, "actuators.lever_arm_m": 1.0,
-}  # fmt: skip
+_FIRST_VEHICLE = "literature_185"
 """The vehicle of version 0.1.0, which wrote checkpoints without saying so."""
 
 
 def vehicle_of(scenario: Scenario) -> dict[str, float]:
     """Hull and actuators of a scenario, by field; without the inner loop, which policies declare themselves."""
-    sections = {"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()}
-    numbers = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
-    return {field: value for field, value in numbers.items() if field != "actuators.yaw_damping_nms"}
+    return _numbers({"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()})
+
+
+def _numbers(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
+    return {field: every[field] for field in every if field not in ("vehicle.name", "actuators.yaw_damping_nms")}
 
 
 def _all_gains(gains: Any) -> Any:
@@ -67,6 +64,10 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """What a checkpoint says of itself."""
 
     format: Literal[1] = 1
+    kind: Literal["mlp"] = "mlp"
+    """What the tensors are: ``mlp``, tanh layers."""
+    features: Literal["percept"] = "percept"
+    """What the first layer is given: ``percept``, what ``Eyes`` make of one percept."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every field of the percept."""
     decision_period_s: tuple[float, float] = (0.1, 0.5)
@@ -77,7 +78,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """Channels beyond the percept."""
     barrier: Annotated[Gains, pydantic.BeforeValidator(_all_gains)] = BARRIER
     """Of Eq. 20-21; what the actor says is added to their force."""
-    vehicle: dict[str, float] = _FIRST_VEHICLE
+    vehicle: dict[str, float] = pydantic.Field(default_factory=lambda: _numbers(load_vehicle(_FIRST_VEHICLE)))
     """Hull and actuators that it was trained on, by field of the scenario."""
     training: dict[str, Any] = {}
     """How it came about: settings, versions, agent-steps, validation."""
@@ -141,7 +142,7 @@ class Learned(Policy):
             )
         self._eyes = Eyes(scenario, card.barrier)
 
-    def act(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         acting = np.flatnonzero(self.active)
         flat = self.flat(percept)

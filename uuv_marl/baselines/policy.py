@@ -1,6 +1,5 @@
 """What a policy is: percepts in, actions out, memory behind ``reset``; and the channels that it needs beyond them."""
 
-import abc
 import json
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -10,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.errors import PolicyError
-from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.percept import Clock, Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.vehicle import project
 
 Float32 = NDArray[np.float32]
@@ -40,8 +40,11 @@ class Limits(NamedTuple):
         )  # fmt: skip
 
 
-class Policy(abc.ABC):
+class Policy:
     """Maps the percepts of any number of worlds to actions.
+
+    A subclass defines ``decide``. One that remembers also names its ``Memory`` and defines ``remember``; the base class
+    makes, clears, keeps and gives back these arrays.
 
     Args:
         scenario: gives the vehicle's limits, the decision period and the percept's layout.
@@ -51,6 +54,9 @@ class Policy(abc.ABC):
         PolicyError: the scenario does not grant the channels or the inner loop that the policy declares.
     """
 
+    Memory: ClassVar[type[Any] | None] = None
+    """Table of what is remembered (``uuv_marl.sim.tables``): a NamedTuple of arrays over world, vehicle, sector and
+    active sub-sector. Zero is nothing: so it starts, and so it is forgotten."""
     channels: ClassVar[tuple[str, ...]] = ()
     """Channels needed beyond the percept: ``compass``, ``link``."""
     yaw_damping_nms: ClassVar[float] = 0.0
@@ -80,21 +86,100 @@ class Policy(abc.ABC):
         """How often a numerical clamp bound since the reset, shape (world,)."""
         self.active: Bool = np.ones(num_worlds, np.bool_)
         """Worlds whose actions count, shape (world,), all unless a caller says otherwise; ``act`` may leave the others'
-        zero, to save time."""
+        zero, to save time, and remembers nothing of them."""
+        self._time_s: Float64 = np.full(num_worlds, np.nan)
+        self._episode = np.zeros(num_worlds, np.uint64)
+        sonar = scenario.sonar
+        sizes = {
+            "world": num_worlds,
+            "vehicle": scenario.swarm.num_vehicles,
+            "sector": sonar.num_sectors,
+            "active": sonar.num_active_sectors,
+        }
+        self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
+        """What is remembered, the arrays of ``Memory``."""
 
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Forget the past of these worlds (default all); world w draws from ``seed + w``, or one seed for each."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
         seeds = [own or 0 for own in world_seeds(seed, chosen)]
-        self.clamps[chosen] = 0
+        self.clamps[chosen], self._time_s[chosen] = 0, np.nan
+        for array in self.memory:
+            array[chosen] = 0
         self.forget(chosen, seeds)
 
     def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:
-        """Hook: clear the memory of these worlds."""
+        """Hook: start anew, in these worlds, what is not in ``memory``, such as random streams."""
 
-    @abc.abstractmethod
     def act(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2), float32, within the unit disc, from percepts (world, vehicle, ...)."""
+        """Remember what is perceived, then decide. To be called once for every decision.
+
+        Where the percept says its time, a world that has been reset is forgotten by itself, and a second call at the
+        same time gives the same actions and remembers nothing twice.
+
+        Args:
+            percept: of shape (world, vehicle, ...).
+
+        Returns:
+            Actions of shape (world, vehicle, 2), float32, within the unit disc.
+
+        Raises:
+            PolicyError: the percept is of another swarm; or the policy has a memory and was left out of a decision.
+        """
+        if self.Memory is not None:
+            self.flat(percept)
+            self.remember(percept, self._gone_on(percept.clock))
+        return self.decide(percept)
+
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Hook: take what these worlds perceive, shape (world,), into ``memory``."""
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions as ``act`` gives them, from the percept and ``memory``, which stay as they are."""
+        raise NotImplementedError(f"{self.name} must define decide(percept)")
+
+    def _gone_on(self, clock: Clock | None) -> Bool:
+        """Worlds that have gone on since the latest call, shape (world,); those that were reset are forgotten."""
+        if clock is None:
+            return self.active.copy()
+        now, then, period = clock.time_s, self._time_s, self.scenario.timing.decision_period_s
+        fresh = self.active & ((clock.episode != self._episode) | (now == 0.0) & (then > 0.0))
+        for array in self.memory:
+            array[fresh] = 0
+        then[fresh], self._episode[fresh] = np.nan, clock.episode[fresh]
+        passed = now - then
+        late = self.active & ((passed > 1.5 * period) | (passed < 0.0))
+        if late.any():
+            w = int(np.flatnonzero(late)[0])
+            raise PolicyError(
+                f"{self.name} was asked at {then[w]:g} s and then at {now[w]:g} s in world {w}, and its memory needs "
+                f"every decision, {period:g} s apart; call act once for every step, or reset or restore the policy too"
+            )
+        new = self.active & ~(passed == 0.0)
+        then[new] = now[new]
+        return new
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All that later decisions depend on, copied, for ``restore``."""
+        return {name: array.copy() for name, array in self._arrays().items()}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot of the same policy, for the same scenario and number of worlds.
+
+        Raises:
+            PolicyError: an array is missing, or has another shape or type.
+        """
+        for name, array in self._arrays().items():
+            given = snapshot.get(name)
+            if given is None or given.shape != array.shape or given.dtype != array.dtype:
+                got = "nothing" if given is None else f"{given.dtype} of shape {given.shape}"
+                raise PolicyError(f"the snapshot's {name} must be {array.dtype} of shape {array.shape}, got {got}")
+        for name, array in self._arrays().items():
+            array[...] = snapshot[name]
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        memory: dict[str, NDArray[Any]] = self.memory._asdict() if self.Memory else {}
+        return {**memory, "clamps": self.clamps, "time_s": self._time_s, "episode": self._episode}
 
     def flat(self, percept: Percept) -> Float32:
         """The percept's rows for compiled code, shape (world, vehicle, entry), float32.

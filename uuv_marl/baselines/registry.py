@@ -3,9 +3,10 @@
 import difflib
 import importlib
 import inspect
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, overload
+from typing import Any, NamedTuple, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,8 +74,40 @@ class EnvPolicy:
         return {agent: actions[i] for i, agent in enumerate(self._agents) if agent in observations}
 
 
+class Named(NamedTuple):
+    """What the name of a policy says."""
+
+    kind: Kind
+    parameters: dict[str, str]
+    """By key, as written."""
+
+
+def parse(name: str) -> Named:
+    """A policy from its name: ``NAME[,key=value ...]``.
+
+    Args:
+        name: NAME is one of ``POLICIES``, the path of a checkpoint, or ``module:Class``; each key is one of the
+            policy's parameters or gains.
+
+    Raises:
+        PolicyError: nobody has that name; the message names the nearest.
+    """
+    if name.startswith("guarded:"):
+        raise PolicyError(f"policy {name!r}: the prefix 'guarded:' is reserved for a filter that does not exist yet")
+    plain, *pairs = [name] if Path(name).exists() else name.split(",")
+    wrong = next((pair for pair in pairs if not all(pair.partition("="))), None)
+    if wrong is not None:
+        raise PolicyError(f"policy {name!r}: {wrong!r} must be key=value, such as bio_inspired,zeta_n=0.5")
+    parts = [pair.partition("=") for pair in pairs]
+    return Named(_kind(plain), {key.strip(): value.strip() for key, _, value in parts})
+
+
 def policy_class(name: str) -> Kind:
-    """A policy's kind by its name, checkpoint, or ``module:Class``. Raises PolicyError with the nearest name."""
+    """A policy's kind by its name, as ``parse`` reads it. Raises PolicyError with the nearest name."""
+    return parse(name).kind
+
+
+def _kind(name: str) -> Kind:
     if name not in POLICIES and is_checkpoint(name):
         trained = Trained(name, Path(name))
         trained.checkpoint  # noqa: B018 - refused now, not in the middle of a benchmark
@@ -118,22 +151,19 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
     """A policy by name.
 
     Args:
-        name: one of ``POLICIES``, the path of a checkpoint (``runs/mappo/best``), or ``module:Class``.
+        name: one of ``POLICIES``, the path of a checkpoint (``runs/mappo/best``), or ``module:Class``; parameters and
+            gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``.
         target: a scenario, for a policy that maps ``Percept`` to actions; or a parallel environment of ours, wrapped
             or not, for one that maps its observation dictionaries to action dictionaries.
         num_worlds: worlds stepped together; 1 for an environment.
-        parameters: keyword arguments of the policy, such as ``gains``.
+        parameters: keyword arguments of the policy, such as ``gains``, or single gains by name.
 
     Raises:
         PolicyError: unknown name or parameter, or the target lacks what the policy declares (see ``granted``).
     """
-    constructor: Any = policy_class(name)
-    known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
-    unknown = [key for key in parameters if key not in known]
-    if unknown:
-        raise PolicyError(f"policy {name!r} has no parameter {unknown[0]!r}; it has {', '.join(known) or 'none'}")
+    kind, written = parse(name)
     if isinstance(target, Scenario):
-        return constructor(target, num_worlds, **parameters)
+        return _made(name, kind, target, num_worlds, {**written, **parameters})
     env: Any = getattr(target, "unwrapped", None)
     if not isinstance(getattr(env, "scenario", None), Scenario):
         raise PolicyError(f"a policy is made for a Scenario (see load_scenario) or our parallel_env, got {target!r}")
@@ -142,4 +172,41 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
             f"{type(env).__name__} has no agents by name; make the policy with make(name, env.scenario, num_worlds) "
             "and call policy.act(env.swarm.percept)"
         )
-    return EnvPolicy(constructor(env.scenario, 1, **parameters), env.possible_agents)
+    return EnvPolicy(_made(name, kind, env.scenario, 1, {**written, **parameters}), env.possible_agents)
+
+
+def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
+    """The policy with these parameters: keyword arguments of its kind, and single gains."""
+    constructor: Any = kind
+    known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
+    if isinstance(parameters.get("gains"), str):
+        raise PolicyError(f"policy {name!r}: gains are written one by one, such as bio_inspired,zeta_n=0.5")
+    given = {key: _value(value) for key, value in parameters.items() if key in known}
+    policy: Policy = constructor(scenario, num_worlds, **given)
+    policy.name = name
+    gains: Any = getattr(policy, "gains", None)
+    fields: tuple[str, ...] = getattr(gains, "_fields", ())
+    changed = {key: _value(value) for key, value in parameters.items() if key not in known}
+    for key, value in changed.items():
+        if key not in fields:
+            there = [*known, *fields]
+            near = difflib.get_close_matches(key, there, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise PolicyError(f"policy {name!r} has no parameter {key!r}; {hint}It has {', '.join(there) or 'none'}")
+        if not (isinstance(value, float | int) and math.isfinite(value)):
+            raise PolicyError(f"policy {name!r}: the gain {key} must be a finite number, got {value!r}")
+    if changed:
+        policy.gains = gains._replace(**changed)  # pyright: ignore[reportAttributeAccessIssue] - it has gains
+    return policy
+
+
+def _value(written: object) -> object:
+    """What a text stands for: a number, true or false, or itself. Other values stay as they are."""
+    if not isinstance(written, str):
+        return written
+    if written in ("true", "false"):
+        return written == "true"
+    try:
+        return float(written)
+    except ValueError:
+        return written

@@ -7,8 +7,7 @@ short-range repulsion and an obstacle term are added.
 """
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +19,13 @@ from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import Fields, Starts, fields
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
 
 SLOT_PITCH_M = 12.0
 """Distance between neighbouring slots."""
@@ -66,6 +67,15 @@ class Gains(NamedTuple):
     """Damping of informed vehicles towards the reference's velocity [N s/m]."""
 
 
+@described
+class Memory(NamedTuple):
+    """The slots of the lattice, and how long they have been held."""
+
+    slots: Annotated[Float64, "world vehicle 2", "Each vehicle's slot, north and east of the lattice's centre [m]."]
+    depth: Annotated[Float64, "world vehicle", "Its distance from the informed vehicle's slot [m]."]
+    decisions: Annotated[Int64, "world", "Decisions since the slots were assigned, this one included."]
+
+
 class Sdc(Policy):
     """Distributed consensus with prescribed performance; one vehicle alone reads the reference.
 
@@ -73,6 +83,7 @@ class Sdc(Policy):
     acts on its own percept. The informed vehicle is the one whose slot is nearest to the lattice's centre.
     """
 
+    Memory: ClassVar[type[Any] | None] = Memory
     channels: ClassVar[tuple[str, ...]] = ("compass", "link")
     yaw_damping_nms: ClassVar[float] = 600.0
     """Without it, in the settings tried by hand, the informed vehicle left the others behind and none arrived."""
@@ -89,29 +100,25 @@ class Sdc(Policy):
                 f"scenario {scenario.name!r} has {n}; use fewer, or another policy"
             )
         self._lattice = hexagonal_slots(n)
-        self._slots = np.zeros((num_worlds, n, 2))
-        self._depth = np.zeros((num_worlds, n))
-        self._decisions = np.zeros(num_worlds, np.int64)
 
-    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:  # noqa: ARG002 - nothing is drawn
-        """Slots are assigned anew at the next decision, the funnel opens again."""
-        self._decisions[list(worlds)] = 0
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Assign slots at a world's first decision, and count on: the funnel shrinks."""
+        for w in np.flatnonzero(worlds & (self.memory.decisions == 0)):
+            self._assign(int(w), Percept(percept.flat[w], percept.layout))
+        self.memory.decisions[worlds] += 1
 
-    def act(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        for w in np.flatnonzero(self._decisions == 0):
-            self._assign(int(w), Percept(flat[w], percept.layout))
+        flat, memory = self.flat(percept), self.memory
         action = np.empty((*flat.shape[:2], 2), np.float32)
         g = self.gains
         rho = (g.rho_0 - g.rho_inf) * np.exp(
-            -g.kappa * self.scenario.timing.decision_period_s * self._decisions
+            -g.kappa * self.scenario.timing.decision_period_s * (memory.decisions - 1)
         ) + g.rho_inf
         _act(
-            flat, self.layout.offsets, g, self.limits, self._slots, self._depth, self.all_informed, rho,
+            flat, self.layout.offsets, g, self.limits, memory.slots, memory.depth, self.all_informed, rho,
             action, self.clamps,
         )  # fmt: skip
-        self._decisions += 1
         return action
 
     def _assign(self, w: int, percept: Percept) -> None:
@@ -124,10 +131,10 @@ class Sdc(Policy):
         places -= places.mean(axis=0)
         cost = ((places[:, None, :] - self._lattice[None, :, :]) ** 2).sum(axis=-1)
         _, slot = linear_sum_assignment(cost)
-        self._slots[w] = self._lattice[slot]
-        root = self._slots[w, np.argmin((self._slots[w] ** 2).sum(axis=-1))]
+        slots = self.memory.slots[w] = self._lattice[slot]
+        root = slots[np.argmin((slots**2).sum(axis=-1))]
         # Rounded, so that slots equally far from the informed one are peers, not predecessors of each other.
-        self._depth[w] = np.round(np.hypot(*(self._slots[w] - root).T), 6)
+        self.memory.depth[w] = np.round(np.hypot(*(slots - root).T), 6)
 
 
 class SdcInformed(Sdc):

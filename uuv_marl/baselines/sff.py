@@ -6,8 +6,7 @@ passes obstacles on either side; and the vehicle is pulled to l(t).
 """
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,12 @@ from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import Fields, Starts, fields
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
 
 HORIZON_S = 1.0
 """How far ahead neighbours are predicted."""
@@ -61,39 +61,39 @@ class Gains(NamedTuple):
     """Damping towards the reference's velocity [N s/m]; 0 where it is not used."""
 
 
+@described
 class Memory(NamedTuple):
-    """What each vehicle remembers of the decision before."""
+    """What each vehicle heard, and how that has changed since the decision before, in its body frame."""
 
-    identity: Float32
-    """Who was heard in each sub-sector, 0 for nobody, shape (world, vehicle, sector)."""
-    position: Float64
-    """Where, in the body frame of then [m], shape (world, vehicle, sector, 2)."""
-    velocity: Float64
-    """And how it moved [m/s], shape (world, vehicle, sector, 2)."""
+    identity: Annotated[Float32, "world vehicle sector", "Who is heard, 0 for nobody."]
+    position: Annotated[Float64, "world vehicle sector 2", "Where [m]."]
+    velocity: Annotated[Float64, "world vehicle sector 2", "How it moves [m/s]."]
+    known: Annotated[Bool, "world vehicle sector", "Whether it was heard at the decision before."]
+    rate: Annotated[Float64, "world vehicle sector 2", "Change of its position since then, per second [m/s]."]
+    turn: Annotated[Float64, "world vehicle sector 2", "Change of its velocity since then [m/s]."]
 
 
 class Sff(Policy):
     """Self-organised fission and fusion, neighbours' velocity over the link, the reference's velocity unused."""
 
+    Memory: ClassVar[type[Any] | None] = Memory
     channels: ClassVar[tuple[str, ...]] = ("link",)
     tuned_as: ClassVar[str] = "sff"
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
         super().__init__(scenario, num_worlds)
         self.gains = gains or Gains(**tuned(self.tuned_as))
-        shape = (num_worlds, scenario.swarm.num_vehicles, scenario.sonar.num_sectors)
-        self._memory = Memory(np.zeros(shape, np.float32), np.zeros((*shape, 2)), np.zeros((*shape, 2)))
 
-    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:  # noqa: ARG002 - nothing is drawn
-        """Nobody has been heard yet."""
-        self._memory.identity[list(worlds)] = 0.0
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Compare what is heard with what was heard."""
+        period = self.scenario.timing.decision_period_s
+        _remember(self.flat(percept), self.layout.offsets, period, worlds, self.memory)
 
-    def act(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         flat = self.flat(percept)
         action = np.empty((*flat.shape[:2], 2), np.float32)
-        period = self.scenario.timing.decision_period_s
-        _act(flat, self.layout.offsets, self.gains, self.limits, period, self._memory, action)
+        _decide(flat, self.layout.offsets, self.gains, self.limits, self.memory, action)
         return action
 
 
@@ -123,19 +123,48 @@ def _recall(identity: float, known: Float32) -> int:
 
 
 @compiled
-def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, period: float, memory: Memory, action: Float32) -> None:
+def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Memory) -> None:
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            f_x, f_y = _force(w, i, see, g, limits, period, memory)
+            if worlds[w]:
+                _compare(w, i, see, period, memory)
+
+
+@compiled
+def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None:
+    """What one vehicle hears, beside what it heard; the frame has turned by its yaw rate times the period since."""
+    who, where, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
+    r = float(see.yaw_rate[w, i, 0])
+    c, s = math.cos(r * period), math.sin(r * period)
+    for k in range(see.heard.shape[2]):
+        old = _recall(see.link_identity[w, i, k], who)
+        memory.known[w, i, k] = old >= 0
+        if old >= 0:
+            p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
+            v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
+            memory.rate[w, i, k, 0] = (p_x - c * where[old, 0] - s * where[old, 1]) / period
+            memory.rate[w, i, k, 1] = (p_y - c * where[old, 1] + s * where[old, 0]) / period
+            memory.turn[w, i, k, 0] = v_x - c * moved[old, 0] - s * moved[old, 1]
+            memory.turn[w, i, k, 1] = v_y - c * moved[old, 1] + s * moved[old, 0]
+    for k in range(see.heard.shape[2]):
+        who[k] = see.link_identity[w, i, k]
+        where[k, 0], where[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
+        moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
+
+
+@compiled
+def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory, action: Float32) -> None:
+    see = fields(flat, at)
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            f_x, f_y = _force(w, i, see, g, limits, memory)
             write_action(f_x, f_y, limits, action[w, i])
 
 
 @compiled
-def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, period: float, memory: Memory) -> tuple[float, float]:
-    who, where, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
-    u, v, r = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), float(see.yaw_rate[w, i, 0])
-    c, s = math.cos(r * period), math.sin(r * period)
+def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, memory: Memory) -> tuple[float, float]:
+    u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
     f_x, f_y = pull * l_x + g.drag * own_drag(u, limits), pull * l_y
@@ -147,17 +176,13 @@ def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, period: float,
         p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
         q_x, q_y = p_x, p_y
-        old = _recall(see.link_identity[w, i, k], who)
-        if old >= 0:
-            # The frame has turned by r * period since then.
-            rate_x = (p_x - c * where[old, 0] - s * where[old, 1]) / period
-            rate_y = (p_y - c * where[old, 1] + s * where[old, 0]) / period
+        if memory.known[w, i, k]:
+            rate_x, rate_y = memory.rate[w, i, k, 0], memory.rate[w, i, k, 1]
             slow = HORIZON_S * min(1.0, _MAX_RATE_MPS / max(math.hypot(rate_x, rate_y), 1e-9))
             q_x, q_y = p_x + slow * rate_x, p_y + slow * rate_y
-            turn_x = v_x - c * moved[old, 0] - s * moved[old, 1]
-            turn_y = v_y - c * moved[old, 1] + s * moved[old, 0]
-            if math.hypot(turn_x, turn_y) > change:
-                change, leader_x, leader_y = math.hypot(turn_x, turn_y), v_x, v_y
+            turned = math.hypot(memory.turn[w, i, k, 0], memory.turn[w, i, k, 1])
+            if turned > change:
+                change, leader_x, leader_y = turned, v_x, v_y
         distance = max(math.hypot(q_x, q_y), 0.1)
         attraction = clustering(distance, g)
         f_x, f_y = f_x + attraction * q_x / distance, f_y + attraction * q_y / distance
@@ -172,8 +197,4 @@ def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, period: float,
     f_x += g.reference_velocity * (see.reference_velocity[w, i, 0] - u)
     f_y += g.reference_velocity * (see.reference_velocity[w, i, 1] - v)
     o_x, o_y = pass_obstacle(w, i, see, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
-    for k in range(see.heard.shape[2]):
-        who[k] = see.link_identity[w, i, k]
-        where[k, 0], where[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
-        moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
     return f_x + o_x, f_y + o_y

@@ -1,15 +1,16 @@
 """Run a policy on a scenario over seeds."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines import make
+from uuv_marl.baselines import POLICIES, make
 from uuv_marl.benchmark.metrics import Meter, Metrics
-from uuv_marl.errors import DivergenceError
+from uuv_marl.errors import DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 
@@ -58,11 +59,18 @@ class Progress(NamedTuple):
     """Of the simulated time that all its seeds need at most."""
 
 
-def evaluate(scenario: Scenario, policy: str, seeds: Sequence[int], **parameters: object) -> Iterator[Run | Progress]:
+Watch = Callable[[Swarm, Float32 | None], None]
+"""Called with the swarm after its reset and after every step, and with the actions that led there, shape
+(world, vehicle, 2), None after the reset. It may only look, and must copy what it keeps."""
+
+
+def evaluate(
+    scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None = None, /, **parameters: object
+) -> Iterator[Run | Progress]:
     """Episodes of a policy on a scenario, each as soon as it ends, with progress in between.
 
     The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed
-    alone, not on the seeds beside it. ``parameters`` go to the policy.
+    alone, not on the seeds beside it. ``watch`` sees every step, and ``parameters`` go to the policy.
 
     Raises:
         DivergenceError: the integration step could not follow a vehicle. Such a run has no metrics; those of the seeds
@@ -70,15 +78,30 @@ def evaluate(scenario: Scenario, policy: str, seeds: Sequence[int], **parameters
     """
     for first in range(0, len(seeds), BATCH):
         batch = seeds[first : first + BATCH]
-        for event in _batch(scenario, policy, batch, parameters):
+        for event in _batch(scenario, policy, batch, watch or _look_away, parameters):
             if isinstance(event, Progress):
                 yield Progress((first + event.share * len(batch)) / len(seeds))
             else:
                 yield event
 
 
+@contextmanager
+def blaming(policy: str) -> Generator[None]:
+    """Turn what a user's own policy makes ``evaluate`` raise into a PolicyError that names it."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        if policy in POLICIES or isinstance(error, PolicyError):
+            raise
+        raise PolicyError(f"policy {policy!r}: {error}") from error
+
+
+def _look_away(swarm: Swarm, action: Float32 | None) -> None:
+    pass
+
+
 def _batch(
-    scenario: Scenario, policy: str, seeds: Sequence[int], parameters: dict[str, object]
+    scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch, parameters: dict[str, object]
 ) -> Iterator[Run | Progress]:
     swarm = Swarm(scenario, len(seeds))
     actor = make(policy, scenario, len(seeds), **parameters)
@@ -91,11 +114,14 @@ def _batch(
     steps, step = math.ceil(limits.max() / period) + 1, 0
     every = max(round(ROUTE_PERIOD_S / period), math.ceil(steps * swarm.num_vehicles / MOST_SAMPLES), 1)
     samples = [_sample(swarm)]
+    watch(swarm, None)
     diverged: list[str] = []
     report_every = max(1, round(2.0 / period))
     while active.any():
-        percept = swarm.step(actor.act(percept), active)
+        action = actor.act(percept)
+        percept = swarm.step(action, active)
         meter.update(active)
+        watch(swarm, action)
         step += 1
         ended = active & swarm.ended
         for w in (int(index) for index in np.flatnonzero(ended)):

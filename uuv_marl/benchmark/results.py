@@ -34,7 +34,7 @@ _SOURCES = (
 )  # fmt: skip
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
 _LONGEST_NAME = 200
-"""Bytes of a trace's name, which file systems limit to 255."""
+"""Bytes of a run's name, of which file systems allow 255."""
 
 
 class Row(NamedTuple):
@@ -71,8 +71,8 @@ class Content(TypedDict):
 _CONTENT = TypeAdapter(Content)
 
 
-def read_content(path: Path) -> Content:
-    """What a ``results.json`` holds. Raises ResultsError where it is none of this version's."""
+def read_content(path: Path, remedy: str = "move it away or give another --output") -> Content:
+    """What a ``results.json`` holds. Raises ResultsError with the remedy where it is none of this version's."""
     try:
         content = _CONTENT.validate_json(path.read_bytes())
     except OSError as error:
@@ -86,7 +86,7 @@ def read_content(path: Path) -> Content:
         if not unknown:
             return content
         reason = f"runs name {min(unknown)!r}, which is not described"
-    raise ResultsError(f"{path} can't be read ({reason}); move it away or give another --output")
+    raise ResultsError(f"{path} can't be read ({reason}); {remedy}")
 
 
 class Results:
@@ -193,11 +193,16 @@ class Results:
 
 
 def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
-    """Where the time series of a run are, in the folder of its ``results.json``; a long name ends in a hash."""
+    """Where the time series of a run are, in the folder of its ``results.json``."""
+    return folder / "traces" / f"{run_name(scenario, policy, seed)}.npz"
+
+
+def run_name(scenario: str, policy: str, seed: int) -> str:
+    """A name of a run for files, without a suffix; a long one ends in a hash."""
     name = f"{scenario}.{quote(policy, safe='')}.{seed}"
     if len(name.encode()) > _LONGEST_NAME:
         name = f"{name.encode()[: _LONGEST_NAME - 17].decode(errors='ignore')}-{_hash(name.encode())}"
-    return folder / "traces" / f"{name}.npz"
+    return name
 
 
 def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
@@ -213,7 +218,9 @@ def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-        raise ResultsError(f"{path} can't be read ({error}); delete it, and the same command makes it again") from error
+        raise ResultsError(
+            f"{path} can't be read ({error}); delete it, and the benchmark's command makes it again"
+        ) from error
 
 
 def knowledge(policy: str) -> Knowledge:

@@ -1,16 +1,16 @@
 """The benchmark as a job: which runs are missing, run them, and write table and pictures."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from uuv_marl.atomic import write_text, writing
-from uuv_marl.baselines import POLICIES, granted
-from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
-from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.results import Results, Row
 from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
-from uuv_marl.errors import PolicyError
 from uuv_marl.scenario import Scenario, differences, scenario_names
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed", "mappo")
@@ -38,18 +38,29 @@ def run_missing(
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
             done, fresh = len(seeds) - len(missing), 0
             report(scenario.name, policy, done / len(seeds))
-            try:
+            with blaming(policy):
                 for event in evaluator(granted(policy, scenario), policy, missing):
                     if isinstance(event, Run):
                         results.add(scenario.name, policy, event)
                         fresh += 1
                     share = event.share if isinstance(event, Progress) else fresh / len(missing)
                     report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
-            except (TypeError, ValueError) as error:
-                if policy in POLICIES or isinstance(error, PolicyError):
-                    raise
-                raise PolicyError(f"policy {policy!r}: {error}") from error
             report(scenario.name, policy, 1.0)
+
+
+def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]) -> Row:
+    """The run that went worst: by most collisions, then by not arriving, then by the smallest distance.
+
+    That distance is between two vehicles or to an obstacle's surface, whichever is smaller. Of equals the first counts,
+    by scenario, policy and seed as given.
+    """
+
+    def badness(row: Row) -> tuple[int, bool, float]:
+        metrics = row.metrics
+        away = [d for d in (metrics["min_spacing_m"], metrics["min_obstacle_distance_m"]) if d is not None]
+        return metrics["collisions"], metrics["task_time_s"] is None, -min(away, default=math.inf)
+
+    return max((row for s in scenarios for p in policies for row in results.select(s.name, p, seeds)), key=badness)
 
 
 def title(scenario: Scenario, seeds: Sequence[int]) -> str:

@@ -1,7 +1,6 @@
 """``uuv-marl benchmark``, and ``tune``, which found the gains of what it compares."""
 
 import itertools
-import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -10,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.progress import TaskID
 
-from uuv_marl.cli.console import console, explained, extra, working
+from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, working
 
 if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
 
+_WORST = "The worst episode, by collisions, arrival and distance, is seed {worst.seed} of {worst.policy}. Watch it:"
 _NEXT = """Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}");
 train a policy with uuv-marl train mappo --output runs/mappo, and compare it with --policy runs/mappo/best."""
 
@@ -54,22 +54,20 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import PolicyError, granted, make
+        from uuv_marl.baselines import granted, make
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import rich_table
-        from uuv_marl.scenario import ScenarioError, load_scenario, parse_override
+        from uuv_marl.replay.command import command
+        from uuv_marl.scenario import ScenarioError, load_scenario
 
-        changes = dict(parse_override(text) for text in overrides or [])
-        for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
-            raise PolicyError(f"{field} can't be set here: every policy brings its own, see 'uuv-marl policies'")
-        scenarios = [load_scenario(name, overrides=changes) for name in scenario or ["single_obstacle"]]
+        changes, files = changes_of(overrides or []), scenario or ["single_obstacle"]
+        scenarios = [load_scenario(name, overrides=changes) for name in files]
         names = [loaded.name for loaded in scenarios]
         if len(set(names)) < len(names):
             raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
         policies = list(dict.fromkeys(policy or runner.DEFAULT_POLICIES))
-        if any(":" in name for name in policies):
-            sys.path.append("")  # last, so that no file of this folder takes the place of an installed module
+        find_modules(policies)
         for name, loaded in itertools.product(policies, scenarios):
             make(name, granted(name, loaded))  # refused now, not after hours of others' runs
         evaluator, cluster = _where(ray, policies)
@@ -92,6 +90,10 @@ def benchmark(
         console.print(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
         for path in pictures:
             console.print(f"  {path}", highlight=False)
+        worst = runner.worst(results, scenarios, policies, wanted)
+        shown = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
+        console.print(_WORST.format(worst=worst), markup=False, highlight=False)
+        console.print(f"  {shown}", markup=False, highlight=False, soft_wrap=True)
         console.print(_NEXT.format(output=output), markup=False, highlight=False)
 
 

@@ -4,7 +4,7 @@ import errno
 import sys
 import sysconfig
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
@@ -14,14 +14,13 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from uuv_marl.atomic import locked
-from uuv_marl.errors import ClusterError, DivergenceError, MissingExtraError, PolicyError, ResultsError, ScenarioError
+from uuv_marl.errors import MENDABLE, PolicyError
 from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
 
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
 errors = Console(stderr=True)
 
-_MENDABLE = (ScenarioError, PolicyError, DivergenceError, ResultsError, ClusterError, MissingExtraError)
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 _NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")))
@@ -35,7 +34,7 @@ def explained() -> Iterator[None]:
         yield
     except Exception as error:
         frames = _own_frames(error) or _own_frames(error.__cause__)
-        if isinstance(error, _MENDABLE):
+        if isinstance(error, MENDABLE):
             message = str(error)
         elif frames:
             message = f"{type(error).__name__}: {error}"
@@ -80,3 +79,19 @@ def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
     except KeyboardInterrupt:
         console.print(f"Stopped. {kept}; the same command goes on.")
         raise typer.Exit(130) from None
+
+
+def changes_of(overrides: Sequence[str]) -> dict[str, object]:
+    """The fields that ``--set`` changes in scenarios that policies run on. Raises ScenarioError, PolicyError."""
+    from uuv_marl.scenario import parse_override
+
+    changes = dict(parse_override(text) for text in overrides)
+    for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
+        raise PolicyError(f"{field} can't be set here: every policy brings its own, see 'uuv-marl policies'")
+    return changes
+
+
+def find_modules(policies: Sequence[str]) -> None:
+    """Let ``module:Class`` be looked for in the current folder too."""
+    if any(":" in name for name in policies):
+        sys.path.append("")  # last, so that no file of this folder takes the place of an installed module

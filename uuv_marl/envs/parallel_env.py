@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, make_task
 from uuv_marl.envs.view import OneWorld
@@ -36,8 +37,14 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
         "is_parallelizable": True,
     }
 
-    def __init__(self, task: Task, render_mode: str | None = None, info_terms: bool = False) -> None:
-        self._show(task, render_mode)
+    def __init__(
+        self,
+        task: Task,
+        render_mode: str | None = None,
+        info_terms: bool = False,
+        render_options: RenderOptions | None = None,
+    ) -> None:
+        self._show(task, render_mode, render_options)
         self._info_terms = info_terms
         self.np_random = np.random.default_rng()
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
@@ -77,7 +84,7 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
             self.np_random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0,)))
         self.agents = list(self.possible_agents)
         self._rows = slice(None)
-        self._view.update(self.swarm)
+        self._view.update()
         return {agent: observation[i] for i, agent in enumerate(self.agents)}, {agent: {} for agent in self.agents}
 
     def step(
@@ -103,7 +110,7 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
                 infos[agent] |= {} if goes else ending(self._task, 0, self._index[agent])
             self.agents = [agent for agent, goes in zip(acted, going.tolist(), strict=True) if goes]
             self._rows = np.array([self._index[agent] for agent in self.agents], np.int64)
-        self._view.update(self.swarm)
+        self._view.update()
         observations = dict(zip(acted, outcome.observation[0, rows], strict=True))
         rewards = dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True))
         flags = (outcome.terminated, outcome.truncated)
@@ -156,6 +163,7 @@ def parallel_env(
     max_cycles: int | None = None,
     render_mode: str | None = None,
     *,
+    render_options: RenderOptions | None = None,
     reward: Reward = "individual",
     info_terms: bool = False,
     decision_period: float | None = None,
@@ -169,6 +177,8 @@ def parallel_env(
         num_vehicles: replaces the scenario's.
         max_cycles: truncates after so many decisions; None for the scenario's time limit.
         render_mode: ``human``, ``rgb_array`` or None.
+        render_options: how to draw, any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or ``map``) and
+            ``sonar_of`` (index of the vehicle whose sonar is shown): ``uuv_marl.envs.drawing.options``.
         reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
@@ -181,7 +191,7 @@ def parallel_env(
         scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
         overrides=overrides, engine=engine,
     )  # fmt: skip
-    return SwarmParallelEnv(task, render_mode, info_terms)
+    return SwarmParallelEnv(task, render_mode, info_terms, render_options)
 
 
 def env(*args: Any, **kwargs: Any) -> AECEnv[str, Float32, Float32 | None]:

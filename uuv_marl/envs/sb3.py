@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Float32, Outcome, ScenarioLike, TaskOptions, make_task, refuse_losses
 from uuv_marl.envs.view import TaskBased
@@ -63,6 +64,7 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
         num_worlds: worlds stepped together.
         scenario: a name, a TOML file or a ``Scenario``.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
+        render_options: as for ``uuv_marl.parallel_env``.
         options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
             for ``uuv_marl.parallel_env``.
     """
@@ -75,9 +77,10 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
         scenario: ScenarioLike = "single_obstacle",
         *,
         render_mode: str | None = None,
+        render_options: RenderOptions | None = None,
         **options: Unpack[TaskOptions],
     ) -> None:
-        self._show(make_task(scenario, num_worlds, **options), render_mode)
+        self._show(make_task(scenario, num_worlds, **options), render_mode, render_options)
         refuse_losses(self.scenario, "SwarmVecEnv")
         self._shape = (num_worlds, self.swarm.num_vehicles)
         layout = self.swarm.layout
@@ -102,6 +105,7 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
         observation = self._task.reset(self._seed)
         self._seed = None
         self._forget(np.ones(self._shape[0], np.bool_))
+        self._view.update()
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return observation.reshape(self.num_envs, -1)
 
@@ -125,6 +129,7 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
                 self._end(world, outcome, infos)
             observation = self._task.reset(worlds=worlds)
             self._forget(over)
+        self._view.update()
         return (
             observation.reshape(self.num_envs, -1),
             outcome.reward.astype(np.float32).reshape(-1),
@@ -149,7 +154,7 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of every world."""
         self._task.need_reset("render()")
-        return [self._view.draw(self.swarm, world) for world in range(self._shape[0])]
+        return [self._view.draw(world) for world in range(self._shape[0])]
 
     def close(self) -> None:
         """Free the canvas."""

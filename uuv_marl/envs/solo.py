@@ -8,6 +8,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import granted, make
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Changes, Float32, Outcome, Reward, ScenarioLike, changed, make_task
 from uuv_marl.envs.view import OneWorld
@@ -26,6 +27,8 @@ class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
         others: name of a policy, or ``module:Class``. The scenario gets the channels and the inner loop that it
             declares (``uuv_marl.baselines.granted``), for the learner too: with ``sdc`` the observation is longer.
         render_mode: ``human``, ``rgb_array`` or None.
+        render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
+            otherwise.
         info_terms: put the reward's terms into the info.
         scenario, max_cycles, reward: as for ``uuv_marl.parallel_env``.
         changes: ``num_vehicles``, ``decision_period`` and ``overrides``, likewise.
@@ -39,13 +42,14 @@ class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
         others: str = "bio_inspired",
         *,
         render_mode: str | None = None,
+        render_options: RenderOptions | None = None,
         info_terms: bool = False,
         max_cycles: int | None = None,
         reward: Reward = "individual",
         **changes: Unpack[Changes],
     ) -> None:
         suited = granted(others, changed(scenario, **changes))
-        self._show(make_task(suited, max_cycles=max_cycles, reward=reward), render_mode)
+        self._show(make_task(suited, max_cycles=max_cycles, reward=reward), render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
         self._info_terms = info_terms
         layout = self.swarm.layout
@@ -61,7 +65,7 @@ class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
         observation = self._task.reset(seed)
         # Policies that draw follow the world's seed, and go on from the environment's stream where there is none.
         self._others.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
-        self._view.update(self.swarm)
+        self._view.update()
         self._running = True
         return observation[0, 0], {}
 
@@ -76,7 +80,7 @@ class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
         actions[0, 0] = own
         outcome = self._task.step(actions)
         self._running = bool(outcome.acting[0, 0])
-        self._view.update(self.swarm)
+        self._view.update()
         return (
             outcome.observation[0, 0],
             float(outcome.reward[0, 0]),

@@ -9,6 +9,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, ScenarioLike, Task, TaskOptions, make_task
 from uuv_marl.envs.view import TaskBased
@@ -48,8 +49,9 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         render_mode: str | None = None,
         info_terms: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        render_options: RenderOptions | None = None,
     ) -> None:
-        self._show(task, render_mode)
+        self._show(task, render_mode, render_options)
         self._info_terms = info_terms
         self.autoreset_mode = self.metadata["autoreset_mode"] = AutoresetMode(autoreset_mode)
         self.num_envs = task.swarm.num_worlds
@@ -78,6 +80,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         if isinstance(seed, int | np.integer):
             super().reset(seed=int(seed))
         self._due = self._due & ~mask
+        self._view.update()
         return observation, _masked({"agent_mask": self.swarm.state.alive.copy()}, mask)
 
     def step(self, actions: ArrayLike) -> tuple[Float32, Float64, Bool, Bool, Infos]:
@@ -99,6 +102,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         if resets.any():
             observation = self._task.reset(worlds=np.flatnonzero(resets).tolist())
             infos["agent_mask"] = self.swarm.state.alive & (outcome.acting | resets[:, None])
+        self._view.update()
         return observation, outcome.world_reward, outcome.world_terminated, outcome.world_truncated, infos
 
     def _infos(self, outcome: Outcome) -> Infos:
@@ -139,7 +143,7 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
     def render(self) -> tuple[Any, ...]:
         """A picture (height, width, 3) of every world."""
         self._task.need_reset("render()")
-        return tuple(self._view.draw(self.swarm, world) for world in range(self.num_envs))
+        return tuple(self._view.draw(world) for world in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
         """Nothing shows a window here; frees the canvas."""
@@ -156,6 +160,7 @@ def vector_env(
     scenario: ScenarioLike = "single_obstacle",
     *,
     render_mode: str | None = None,
+    render_options: RenderOptions | None = None,
     info_terms: bool = False,
     autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     **options: Unpack[TaskOptions],
@@ -169,6 +174,7 @@ def vector_env(
         num_envs: worlds stepped together.
         scenario: a name, a TOML file or a ``Scenario``.
         render_mode: ``rgb_array`` or None.
+        render_options: as for ``uuv_marl.parallel_env``.
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
             ``SwarmVectorEnv``.
@@ -177,4 +183,4 @@ def vector_env(
             all vehicles.
     """
     task = make_task(scenario, whole_number("num_envs", num_envs, 1), **options)
-    return SwarmVectorEnv(task, render_mode, info_terms, autoreset_mode)
+    return SwarmVectorEnv(task, render_mode, info_terms, autoreset_mode, render_options)

@@ -13,14 +13,14 @@ Int32 = NDArray[np.int32]
 
 
 class Event(NamedTuple):
-    """Something that happened to one or two vehicles."""
+    """Something that happened at a sample; ``uuv_marl.replay.events`` says when."""
 
     time_s: float
     kind: str
     """``collision`` of two vehicles, ``obstacle`` for a vehicle that hit one, ``near`` and ``near_obstacle`` where
     spacing fell below s_u or clearance below s_o, ``lost``, or ``arrived`` for the whole swarm."""
     vehicles: tuple[int, ...]
-    """Whom it concerns, empty for the whole swarm."""
+    """Whom it concerns; empty for the whole swarm, and where a saved trace does not say."""
 
 
 class Inspection(NamedTuple):
@@ -32,19 +32,21 @@ class Inspection(NamedTuple):
     heard: Int32
     """Index of the vehicle heard in each sub-sector, -1 for none, shape (time, sector)."""
     neighbour: Float32
-    """Position of that vehicle, shape (time, sector, 2)."""
+    """Position of that vehicle, NaN for none, shape (time, sector, 2)."""
     echo_range: Float32
-    """Range to the nearest obstacle in each active sub-sector, 0 for none, shape (time, active)."""
+    """Range to the nearest obstacle in each active sub-sector, NaN for none, shape (time, active)."""
     echo_position: Float32
-    """Position that the echo reports, shape (time, active, 2)."""
+    """Position that the echo reports, NaN for none, shape (time, active, 2)."""
     action: Float32
-    """Shares of full surge force and yaw torque that the policy asked for until the next sample, shape (time, 2)."""
+    """Shares of full surge force and yaw torque that the policy asked for until the next sample, shape (time, 2); NaN
+    at the end and once the vehicle is lost."""
 
 
 class Recording(NamedTuple):
     """One episode: what was simulated, and where everybody was at each sample.
 
-    Frame north, east [m]; NaN once a vehicle is lost. Arrays that a saved trace does not hold are None.
+    There is a sample at the start and one for each decision; a saved trace has one every 0.5 s. Frame north, east [m];
+    NaN once a vehicle is lost. Arrays that a saved trace does not hold are None.
     """
 
     scenario: Scenario
@@ -66,11 +68,12 @@ class Recording(NamedTuple):
     speed: Float32
     """Over ground [m/s], shape (time, vehicle)."""
     series: dict[str, Float32]
-    """``min_spacing_m``, ``obstacle_clearance_m``, ``centre_error_m`` and ``collisions`` so far, shape (time,) each."""
+    """``min_spacing_m`` and ``obstacle_clearance_m``, the smallest since the sample before, ``centre_error_m``, and
+    ``collisions`` so far (not of a trace), shape (time,) each; NaN where there is nothing to measure."""
     events: list[Event]
     force: Float32 | None
-    """Length of the action since the sample before, as a share of full force, shape (time, vehicle)."""
+    """Length of the action since the sample before, as a share of full force, shape (time, vehicle); 0 at the start."""
     spacing: Float32 | None
-    """Smallest distance to another vehicle since the sample before [m], shape (time, vehicle)."""
+    """Smallest distance to another vehicle since the sample before [m], NaN for none, shape (time, vehicle)."""
     inspections: dict[int, Inspection]
     """By index of the vehicle."""

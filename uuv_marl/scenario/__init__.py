@@ -5,11 +5,20 @@ every number with its source.
 """
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario.files import differences, load_scenario, parse_override, scenario_names, show, to_toml
+from uuv_marl.scenario.files import (
+    differences,
+    load_scenario,
+    load_vehicle,
+    parse_override,
+    scenario_names,
+    show,
+    to_toml,
+    vehicle_names,
+)
 from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.sections import MAX_RANGE_M, growth
 
 __all__ = [
-    "MAX_RANGE_M", "Scenario", "ScenarioError", "differences", "growth", "load_scenario", "parse_override",
-    "scenario_names", "show", "to_toml",
+    "MAX_RANGE_M", "Scenario", "ScenarioError", "differences", "growth", "load_scenario", "load_vehicle",
+    "parse_override", "scenario_names", "show", "to_toml", "vehicle_names",
 ]  # fmt: skip

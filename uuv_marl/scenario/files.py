@@ -15,9 +15,11 @@ from tomlkit.items import AbstractTable
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario.scenario import Scenario
+from uuv_marl.scenario.sections import Actuators, Vehicle
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
+_VEHICLES = _FOLDER / "vehicles"
 _MAX_BYTES = 1_000_000
 _SHOWN = 80
 _EXPLANATIONS = {
@@ -43,6 +45,20 @@ def scenario_names() -> list[str]:
     return sorted(path.stem for path in _FOLDER.glob("*.toml") if path != _BASE)
 
 
+def vehicle_names() -> list[str]:
+    """Names of the vehicles that ship with the package."""
+    return sorted(path.stem for path in _VEHICLES.glob("*.toml"))
+
+
+def load_vehicle(name: str) -> dict[str, dict[str, Any]]:
+    """A vehicle's sections ``vehicle`` and ``actuators``, by name or TOML file.
+
+    Raises:
+        ScenarioError: there is no such vehicle, or its file is broken.
+    """
+    return _vehicle(name).data
+
+
 def load_scenario(
     scenario: str | os.PathLike[str] | Scenario,
     *,
@@ -56,7 +72,7 @@ def load_scenario(
             A file states only what differs from the scenario named by its ``extends``, else from ``base.toml``.
         num_vehicles: replaces ``swarm.num_vehicles``.
         overrides: ``{"sonar.echo_reports": "surface", "sonar.arrays.bow.range_m": 80.0}``; entries of lists are
-            addressed by their name or index.
+            addressed by their name or index. ``{"vehicle": "literature_185"}`` replaces the vehicle and its limits.
 
     Raises:
         ScenarioError: names the field, the value and the remedy.
@@ -67,7 +83,10 @@ def load_scenario(
     try:
         data = _data(scenario)
         for field, value in (overrides or {}).items():
-            _assign(data, str(field), value)
+            if field == "vehicle" and isinstance(value, str):
+                data = _merged(data, load_vehicle(value))
+            else:
+                _assign(data, str(field), value)
         if num_vehicles is not None:
             whole = isinstance(cast(object, num_vehicles), Integral) and not isinstance(num_vehicles, bool)
             _assign(data, "swarm.num_vehicles", int(num_vehicles) if whole else num_vehicles)
@@ -124,8 +143,8 @@ def show(name: str | os.PathLike[str]) -> str:
     """A scenario's complete TOML with the source of every number: its comment, or the user's file that sets it."""
     document = tomlkit.parse(to_toml(load_scenario(name)))
     sources: dict[str, str] = {}
-    for file in reversed(_chain(_find(name))):
-        own = "" if file.path.parent == _FOLDER else f"# {file.path.name}"
+    for file in _layers(_find(name)):
+        own = "" if file.path.is_relative_to(_FOLDER) else f"# {file.path.name}"
         sources |= {field: item.trivia.comment or own for field, item in _items(tomlkit.parse(file.text))}
     for field, item in _items(document):
         if "." in field and sources.get(field):
@@ -176,6 +195,32 @@ def _find(name: Any, beside: Path | None = None) -> Path:
     )
 
 
+def _vehicle(name: str, beside: Path | None = None) -> _File:
+    """A vehicle's file, which must be complete: numbers of two vehicles are never mixed without a word."""
+    file = _parse(_find_vehicle(name, beside))
+    needed = {"vehicle": set(Vehicle.model_fields), "actuators": set(Actuators.model_fields) - {"yaw_damping_nms"}}
+    for section, fields in needed.items():
+        given = file.data.get(section)
+        missing = sorted(fields - set(cast(dict[str, Any], given) if isinstance(given, dict) else ()))
+        if missing:
+            raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; a vehicle's file gives all numbers")
+    other = next((key for key in file.data if key not in needed), None)
+    if other is not None:
+        raise ScenarioError(f"vehicle {file.path} holds {_shown(other)}; it may hold vehicle and actuators only")
+    return file
+
+
+def _find_vehicle(name: str, beside: Path | None = None) -> Path:
+    path = (beside or Path()) / name if name.endswith(".toml") else _VEHICLES / f"{name}.toml"
+    if name in vehicle_names() or (name.endswith(".toml") and path.is_file()):
+        return path
+    near = difflib.get_close_matches(name, vehicle_names(), n=1, cutoff=0.4)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise ScenarioError(
+        f"vehicle {_shown(name)} is unknown; {hint}give one of {', '.join(vehicle_names())}, or a path ending in .toml"
+    )
+
+
 def _parse(path: Path) -> _File:
     try:
         if path.stat().st_size > _MAX_BYTES:
@@ -207,13 +252,23 @@ def _chain(path: Path) -> list[_File]:
     return chain
 
 
+def _layers(path: Path) -> Iterator[_File]:
+    """The base, what extends it, and the file itself; before each the vehicle that it names."""
+    for file in reversed(_chain(path)):
+        named = file.data.get("vehicle")
+        if isinstance(named, str):
+            yield _vehicle(named, file.path.parent)
+            file.data.pop("vehicle")
+        yield file
+
+
 def _data(scenario: Any) -> dict[str, Any]:
     """A scenario's fields and values, not yet checked."""
     if isinstance(scenario, Scenario):
         return scenario.model_dump(mode="json", exclude_none=True)
     path = _find(scenario)
     data: dict[str, Any] = {}
-    for file in reversed(_chain(path)):
+    for file in _layers(path):
         data = _merged(data, file.data)
     data.pop("extends", None)
     return {**data, "name": path.stem}

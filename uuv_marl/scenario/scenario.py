@@ -20,7 +20,7 @@ MAX_STEPS = 10_000
 class Scenario(sections.Section):
     """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+    name: sections.Name
     """Set by the loader: the file's name; names results and pictures."""
     title: str
     """One line."""

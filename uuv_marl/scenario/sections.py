@@ -50,6 +50,9 @@ def growth(num_vehicles: int) -> float:
     return max(1.0, math.sqrt(num_vehicles / NOMINAL_VEHICLES))
 
 
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+
+
 class Section(BaseModel):
     """A part of a scenario: immutable, no unknown fields, no silent conversion."""
 
@@ -181,6 +184,8 @@ class RandomField(Section):
 class Vehicle(Section):
     """Parameters of Eq. 3-4. Dimensions follow from the force or moment and the velocities they multiply."""
 
+    name: Name
+    """The file in ``vehicles/`` that the numbers come from, where nothing overrides them."""
     m_kg: Positive
     I_z_kgm2: Positive
     x_G_m: Annotated[float, within(-100, 100)]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.desk import Cells, Columns
 
 Float64 = NDArray[np.float64]
@@ -73,7 +73,7 @@ def place(value: float, low: float, side: float, num: int) -> int:
     return int(min(cell, num - 1.0)) if cell > 0.0 else 0
 
 
-@compiled
+@compiled_inner
 def sort(w: int, alive: Bool, side: float, now: Columns, cells: Cells) -> Grid:
     """Fill ``cells`` with the living of world w, ``alive`` of shape (world, vehicle), in cells of this side [m]."""
     grid, x, y, c, s = fit(w, alive, side, now), now.x, now.y, now.cos, now.sin

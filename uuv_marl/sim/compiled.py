@@ -151,6 +151,18 @@ def compiled_inline(function: F) -> F:
     return _jit(function, forceinline=True)
 
 
+def compiled_inner(function: F) -> F:
+    """As ``compiled``, for compiled callers alone: what takes all arrays of a world compiles faster without a door."""
+    dispatcher = cast(Any, _jit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True))
+
+    def refuse(*_args: object, **_names: object) -> None:
+        raise TypeError(f"{function.__name__} can be called by compiled code only")
+
+    # A call from Python would run into the missing door; so Numba is never told of one, and asked to open one, refuses.
+    dispatcher._insert, dispatcher._compile_for_args = lambda *_args: None, refuse
+    return cast(F, dispatcher)
+
+
 def compiled_parallel(function: F) -> F:
     """Compile with Numba, ``prange`` running over threads."""
     return _jit(function, parallel=True)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.tables import rows
 
 Float64 = NDArray[np.float64]
@@ -109,7 +109,7 @@ def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -
     )
 
 
-@compiled
+@compiled_inner
 def desk(room: Scratch, t: int) -> Desk:
     """Thread t's scratch by name. Every array has a column of its own: tests/test_tables.py."""
     a, b, c, d = room.reals[t], room.wholes[t], room.shorts[t], room.sector_reals[t]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import Course
 from uuv_marl.sim.cells import Grid, place
-from uuv_marl.sim.compiled import compiled, compiled_inline
+from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.desk import Cells, Desk, Ear
 from uuv_marl.sim.sonar import Suite, cross, diamond
 
@@ -25,7 +25,7 @@ _REACH_CELLS = 5.0
 """Cells searched around a listener before its empty sub-sectors are followed one by one; the fastest of 2.5, 3.5, 5."""
 
 
-@compiled
+@compiled_inner
 def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> bool:
     """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy)."""
     obstacles, length2 = course.obstacles, dx * dx + dy * dy
@@ -102,7 +102,7 @@ def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: 
         keep_nearest(num, vehicles, ear)
 
 
-@compiled
+@compiled_inner
 def gather(box: Box, cells: Cells, grid: Grid, ear: Ear) -> int:
     """Collect the entries of the cells that meet a rectangle of the world; how many."""
     north, south, east, west = box
@@ -141,7 +141,7 @@ def hear(p: int, w: int, course: Course, suite: Suite, desk: Desk, grid: Grid) -
         box = reached(min(k, sectors - 1), near, 1.5 * near, pose, suite)
 
 
-@compiled
+@compiled_inner
 def reached(k: int, near: float, far: float, pose: Pose, suite: Suite) -> Box:
     """Rectangle around what sub-sector k of a listener with this pose hears between two distances [m]."""
     x, y, c, s = pose

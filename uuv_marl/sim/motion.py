@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import State
-from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.desk import Columns
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant, actuators, advance, project, turned, wrap
@@ -13,7 +13,7 @@ Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 
 
-@compiled
+@compiled_inner
 def load(w: int, state: State, now: Columns) -> None:
     """The columns of world w from its state."""
     eta, nu = state.eta, state.nu
@@ -25,7 +25,7 @@ def load(w: int, state: State, now: Columns) -> None:
         now.cos[i], now.sin[i] = cos_sin(now.psi[i])
 
 
-@compiled
+@compiled_inner
 def load_one(w: int, i: int, state: State, now: Columns) -> None:
     """The columns of vehicle i alone, whose latest motion is thrown away."""
     eta, nu = state.eta, state.nu

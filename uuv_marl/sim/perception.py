@@ -5,7 +5,7 @@ import math
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import MAX_RANGE_M
 from uuv_marl.sim.arrays import Course, World
-from uuv_marl.sim.compiled import compiled, compiled_inline
+from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.desk import Desk
 from uuv_marl.sim.hearing import Pose
 from uuv_marl.sim.model import Model
@@ -81,7 +81,7 @@ def write_percept(p: int, w: int, world: World, model: Model, desk: Desk, see: F
             break
 
 
-@compiled
+@compiled_inner
 def write_echoes(i: int, w: int, pose: Pose, course: Course, suite: Suite, see: Fields) -> None:
     """What vehicle i hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17."""
     x, y, c, s = pose

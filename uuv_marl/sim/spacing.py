@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import Grid, place
-from uuv_marl.sim.compiled import compiled, compiled_inline
+from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.desk import Cells
 
 Float64 = NDArray[np.float64]
 
 
-@compiled
+@compiled_inner
 def find_nearest(cells: Cells, grid: Grid) -> None:
     """Fill ``cells.nearest``, infinite where there is nobody else."""
     cells.nearest[: grid.living] = math.inf
@@ -35,7 +35,7 @@ def lower_all(first: int, end: int, x: float, y: float, cells: Cells) -> None:
         cells.nearest[q] = squared if squared < cells.nearest[q] else cells.nearest[q]
 
 
-@compiled
+@compiled_inner
 def search(p: int, cells: Cells, grid: Grid) -> float:
     """Squared distance [m2] of entry p from the nearest other: in the cells around it, then in ever larger blocks."""
     x, y, least, reach = cells.x[p], cells.y[p], math.inf, grid.side
@@ -59,7 +59,7 @@ def search(p: int, cells: Cells, grid: Grid) -> float:
         reach *= 2.0
 
 
-@compiled
+@compiled_inner
 def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, grid: Grid) -> int:
     """Contact episodes of entry p that begin: vehicles nearer than ``touch`` [m] now that were not ``before``."""
     i, count = cells.vehicle[p], 0
@@ -83,7 +83,7 @@ def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, gr
     return count
 
 
-@compiled
+@compiled_inner
 def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
     """Lower the spacing of the living and raise their contacts; how many episodes between vehicles began.
 
@@ -102,7 +102,7 @@ def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid
     return began // 2
 
 
-@compiled
+@compiled_inner
 def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
     """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began."""
     obstacles, before, facts = world.course.obstacles, world.state.before, world.facts
@@ -122,7 +122,7 @@ def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Gri
     return began
 
 
-@compiled
+@compiled_inner
 def farthest(x: float, y: float, cells: Cells, grid: Grid) -> int:
     """The entry of ``cells`` farthest from (x, y), -1 for none."""
     best, most = -1, -1.0
@@ -134,7 +134,7 @@ def farthest(x: float, y: float, cells: Cells, grid: Grid) -> int:
     return best
 
 
-@compiled
+@compiled_inner
 def extent(cells: Cells, grid: Grid) -> float:
     """Largest distance between two of the living [m], infinite for fewer than two.
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.percept import Clock, Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
@@ -58,7 +58,7 @@ class Swarm:
     @property
     def percept(self) -> Percept:
         """What every vehicle knows now, shape (world, vehicle, ...)."""
-        return Percept(self._senses.percept, self.layout)
+        return Percept(self._senses.percept, self.layout, Clock(self.facts.time_s, self.keys), self.state.alive)
 
     @property
     def heard(self) -> NDArray[np.int32]:

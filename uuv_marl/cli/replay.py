@@ -1,0 +1,172 @@
+"""``uuv-marl replay`` shows an episode: as a page for the browser, or as a film."""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from uuv_marl.cli.console import changes_of, console, explained, find_modules, progress_bar
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from uuv_marl.replay.recording import Recording
+
+_MOST_POLICIES = 4
+_FILMS = (".mp4", ".gif", ".png")
+_SCENARIO, _POLICY = "single_obstacle", "bio_inspired"
+
+Write = Callable[["Sequence[Recording]", Path, Callable[[float], object]], object]
+
+
+def replay(
+    run: Annotated[
+        Path | None,
+        typer.Argument(help="Folder of a benchmark, or a trace of its seed 0. Without it the episode is simulated."),
+    ] = None,
+    scenario: Annotated[
+        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's only one.")
+    ] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Name, checkpoint (runs/mappo/best) or module:Class; repeat it for up to four side by side. "
+            f"Default: {_POLICY}, or the folder's only one."
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the episode, for all policies. Default: 0.")] = None,
+    inspect: Annotated[
+        list[int] | None,
+        typer.Option(min=0, metavar="VEHICLE", help="Show this vehicle's sonar too; repeat it for up to eight."),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `swarm.num_vehicles=200`."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            help="A page (.html), a film (.mp4, .gif) or a picture (.png). Default: a page in results/replay."
+        ),
+    ] = None,
+) -> None:
+    """Show an episode: as one HTML file that any browser opens without a network, or as a film.
+
+    The page has a time line on which collisions and near misses are marked, trails, zoom, and plots that follow the
+    time. A simulated episode is shown at every decision. What a benchmark saved of its seed 0 is shown every 0.5 s,
+    without forces and sonar.
+
+    Example: uuv-marl replay --policy bio_inspired --policy sff --seed 3 --inspect 7
+
+    Example: uuv-marl replay results/benchmark --policy sff --output sff.mp4
+    """
+    with explained():
+        from uuv_marl.errors import ReplayError
+
+        write = _writer(output, inspect or [])
+        policies = list(dict.fromkeys(policy or []))
+        if len(policies) > _MOST_POLICIES:
+            raise ReplayError(f"at most {_MOST_POLICIES} policies can be shown side by side, got {len(policies)}")
+        if run is not None and (inspect or overrides):
+            raise ReplayError(
+                f"{run} is saved, with neither sonar nor other numbers; leave it out for --inspect and --set, and give "
+                "--scenario, --policy and --seed"
+            )
+        try:
+            with progress_bar() as bar:
+                if run is None:
+                    recordings = _simulated(
+                        scenario or _SCENARIO, policies or [_POLICY], seed or 0, inspect or [], overrides or [], bar
+                    )
+                else:
+                    recordings = _saved(run, scenario, policies, seed)
+                path = output or _ready(_default(recordings))
+                task = bar.add_task("writing", total=1.0)
+                write(recordings, path, lambda share: bar.update(task, completed=share))
+                bar.update(task, completed=1.0)
+        except KeyboardInterrupt:
+            console.print("Stopped; nothing was written.")
+            raise typer.Exit(130) from None
+        console.print(f"Replay: {path} ({path.stat().st_size / 1000:,.0f} kB)", highlight=False, soft_wrap=True)
+
+
+def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
+    """What writes a file with this ending; what can't be written is refused before anything is simulated."""
+    from uuv_marl.errors import ReplayError
+
+    suffix = ".html" if output is None else output.suffix.lower()
+    if suffix not in (".html", *_FILMS):
+        raise ReplayError(f"--output {output} must end in {', '.join(('.html', *_FILMS[:-1]))} or {_FILMS[-1]}")
+    if output is not None:
+        _ready(output)
+    if suffix == ".html":
+        from uuv_marl.replay.page import write_page
+
+        return lambda recordings, path, _: write_page(recordings, path)
+    if len(inspect) > 1:
+        raise ReplayError(f"a film shows the sonar of one vehicle, got {len(inspect)}; give one --inspect, or .html")
+    from uuv_marl.replay.film import check_format, write_film
+
+    check_format(Path(f"film{suffix}"))
+
+    return lambda recordings, path, report: write_film(
+        recordings, path, sonar_of=inspect[0] if inspect else None, progress=report
+    )
+
+
+def _ready(output: Path) -> Path:
+    """The path, in a folder that can be written to, which is made where it is missing. Raises ResultsError."""
+    from uuv_marl.atomic import writing
+    from uuv_marl.errors import ReplayError
+
+    if output.is_dir():
+        raise ReplayError(f"--output {output} is a folder; give a file in it, such as {output / 'replay.html'}")
+    with writing(output):
+        output.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=output.parent):
+            return output
+
+
+def _default(recordings: "Sequence[Recording]") -> Path:
+    from uuv_marl.benchmark.results import run_name
+
+    first, policies = recordings[0], "-".join(recording.policy for recording in recordings)
+    return Path("results/replay") / f"{run_name(first.scenario.name, policies, first.seed)}.html"
+
+
+def _simulated(
+    name: str, policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str], bar: "Progress"
+) -> "list[Recording]":
+    """An episode of each policy on the same seed; all are refused before the first is simulated."""
+    from uuv_marl.baselines import granted, make
+    from uuv_marl.replay.record import checked, record
+    from uuv_marl.scenario import load_scenario
+
+    scenario = load_scenario(name, overrides=changes_of(overrides))
+    checked(inspect, scenario)
+    find_modules(policies)
+    for policy in policies:
+        make(policy, granted(policy, scenario))
+    recordings: list[Recording] = []
+    for policy in policies:
+        task = bar.add_task(f"{scenario.name}: {policy}", total=1.0)
+        report = lambda share, task=task: bar.update(task, completed=share)  # noqa: E731
+        recordings.append(record(scenario, policy, seed, inspect, report))
+        report(1.0)
+    return recordings
+
+
+def _saved(run: Path, scenario: str | None, policies: Sequence[str], seed: int | None) -> "list[Recording]":
+    """What a benchmark has saved of an episode."""
+    from uuv_marl.errors import ReplayError
+    from uuv_marl.replay.traces import from_folder, from_trace
+
+    if run.suffix != ".npz":
+        return [from_folder(run, scenario, policy, seed or 0) for policy in policies or [None]]
+    if scenario or policies or seed is not None:
+        raise ReplayError(
+            f"{run} is one episode already; leave out --scenario, --policy and --seed, or give the folder"
+        )
+    return [from_trace(run)]

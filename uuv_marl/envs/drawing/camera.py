@@ -1,0 +1,82 @@
+"""Where metres are on a picture: north up, east right."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from uuv_marl.envs.drawing.scene import Float, Scene
+
+CAMERAS = ("follow", "map")
+"""``follow`` keeps the swarm and l(t) in view, ``map`` the whole course."""
+_MARGIN = 0.12
+"""Of the picture, on each side."""
+_LEAST_M = 80.0
+"""What a camera that follows shows at least."""
+_STRAY = 3.0
+"""Vehicles this many s_l from l(t) may leave the view of a camera that follows."""
+
+
+class Camera(NamedTuple):
+    """A view."""
+
+    centre: Float
+    """What is in the middle of the picture: north, east [m], shape (2,)."""
+    scale: float
+    """Pixels per metre."""
+    size: tuple[int, int]
+    """Width and height [px]."""
+
+    def pixels(self, points: Float) -> Float:
+        """Where points (..., north and east [m]) are on the picture: (..., right and down [px])."""
+        offset = (points - self.centre) * self.scale
+        return np.stack([self.size[0] / 2 + offset[..., 1], self.size[1] / 2 - offset[..., 0]], axis=-1)
+
+    @property
+    def reach(self) -> Float:
+        """From the middle to the edges: north, east [m], shape (2,)."""
+        return np.array([self.size[1], self.size[0]]) / (2.0 * self.scale)
+
+    def magnified(self, factor: int) -> "Camera":
+        """The same view on a picture that is larger."""
+        return Camera(self.centre, self.scale * factor, (self.size[0] * factor, self.size[1] * factor))
+
+
+def aim(kind: str, scenes: Sequence[Scene], size: tuple[int, int]) -> Camera:
+    """One of ``CAMERAS`` for a picture of this size [px]; where several scenes are shown, the same for all."""
+    if kind == "map":
+        return _around(np.concatenate([_course(scene) for scene in scenes]), size)
+    return _around(np.concatenate([_swarm(scene) for scene in scenes]), size, _LEAST_M)
+
+
+def nice(length: float) -> float:
+    """The smallest of 1, 2, 5, 10, 20, ... that is no shorter."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length * (1.0 - 1e-9))
+
+
+def _around(points: Float, size: tuple[int, int], least_m: float = 1.0) -> Camera:
+    low, high = points.min(axis=0), points.max(axis=0)
+    north, east = np.maximum(high - low, least_m) / (1.0 - 2.0 * _MARGIN)
+    return Camera((low + high) / 2.0, float(min(size[0] / east, size[1] / north)), size)
+
+
+def _swarm(scene: Scene) -> Float:
+    away = np.hypot(*(scene.position - scene.reference).T)
+    shown = scene.position[scene.alive & (away < _STRAY * scene.scenario.constraints.s_l_m)]
+    return np.concatenate([shown, scene.reference[None]])
+
+
+def _course(scene: Scene) -> Float:
+    """Trajectory and obstacles, with room for the swarm that starts behind and swings around them."""
+    start, n = scene.scenario.start, scene.scenario.swarm.num_vehicles
+    length, width = start.sides(n)
+    ahead = scene.waypoints[1] - scene.waypoints[0]
+    ahead = ahead / np.hypot(*ahead)
+    behind, aside = -length * ahead, (start.gap_m / 2.0 + width) * np.array([-ahead[1], ahead[0]])
+    corners = scene.waypoints[0] + np.array([behind + aside, behind - aside, aside, -aside])
+    room = 0.3 * start.spacing_m * math.sqrt(n)
+    discs, radius = scene.obstacles[:, :2], scene.obstacles[:, 2:]
+    ways = np.concatenate([scene.waypoints - room, scene.waypoints + room])
+    return np.concatenate([corners, ways, discs - radius, discs + radius])

@@ -1,0 +1,64 @@
+"""What all drawn frames share: colours and text."""
+
+import functools
+import os
+from pathlib import Path
+
+import matplotlib as mpl
+
+from uuv_marl.extras import extra
+
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
+with extra("render", "rendering"):
+    import pygame
+
+Colour = tuple[int, int, int]
+
+BLUE, ORANGE, GREEN, PINK, AMBER = (0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0)
+"""Okabe and Ito's palette, as the figures have it (``uuv_marl.benchmark.style``)."""
+WHITE, WATER, GRID = (255, 255, 255), (246, 250, 252), (222, 231, 236)
+PASSIVE, ACTIVE, EDGE = (250, 243, 248), (246, 226, 238), (232, 210, 224)
+TEXT, QUIET, TRACK = (33, 41, 48), (96, 108, 118), (70, 80, 88)
+DISC, KEEP_OUT, LOST = (115, 115, 115), (165, 165, 165), (140, 140, 140)
+TRAILS: tuple[Colour, ...] = ((222, 234, 243), (200, 221, 236), (174, 207, 228), (145, 190, 219))
+"""From the oldest to the newest part."""
+
+
+def palette() -> list[Colour]:
+    """Colours that a picture can do with: all but trails, and how strong ones fade into the water."""
+    strong = (BLUE, ORANGE, GREEN, PINK, AMBER, TEXT, QUIET, DISC)
+
+    def mixed(colour: Colour, k: int) -> Colour:
+        red, green, blue = (round(c + (w - c) * k / 3) for c, w in zip(colour, WATER, strict=True))
+        return red, green, blue
+
+    faded = [mixed(colour, k) for colour in strong for k in range(3)]
+    return [WHITE, WATER, GRID, PASSIVE, ACTIVE, EDGE, KEEP_OUT, LOST, *faded]
+
+
+@functools.cache
+def _font(height: int, bold: bool) -> pygame.font.Font:
+    """DejaVu Sans, which Matplotlib brings and the figures use."""
+    pygame.font.init()
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return pygame.font.Font(Path(mpl.get_data_path()) / "fonts" / "ttf" / name, height)
+
+
+@functools.lru_cache(maxsize=1024)
+def text(words: str, height: int, colour: Colour = TEXT, bold: bool = False) -> pygame.Surface:
+    """Words as a picture, in letters of this height [px]."""
+    if not pygame.font.get_init():  # the user called pygame.quit()
+        _font.cache_clear()
+    return _font(height, bold).render(words, True, colour)
+
+
+def write(
+    surface: pygame.Surface, words: str, at: tuple[float, float], height: int, colour: Colour = TEXT,
+    *, bold: bool = False, halo: bool = False,
+) -> None:  # fmt: skip
+    """Put words on a surface, the upper left corner at ``at`` [px]; ``halo`` keeps them readable on lines."""
+    x, y = round(at[0]), round(at[1])
+    if halo:
+        edge = text(words, height, WHITE, bold)
+        surface.blits([(edge, (x + dx, y + dy)) for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1))], doreturn=False)
+    surface.blit(text(words, height, colour, bold), (x, y))

@@ -1,0 +1,120 @@
+"""The legend of a frame: a sign and a word for everything that is drawn."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from uuv_marl.envs.drawing import ink
+from uuv_marl.envs.drawing.painter import DART, FINE, cross
+from uuv_marl.envs.drawing.scene import TRAIL_S, Scene
+from uuv_marl.extras import extra
+
+with extra("render", "rendering"):
+    import pygame
+
+Sign = Callable[[pygame.Surface, float], object]
+"""Draws into a fine surface of 24 x 16 units of so many pixels."""
+WIDE, HIGH = 24, 16
+
+
+def _water(scene: Scene) -> list[tuple[str, Sign]]:
+    limits = scene.scenario.constraints
+    found = [("vehicle", _dart(ink.BLUE)), ("l(t), to follow", _target)]
+    if scene.trail.size:
+        found.append((f"last {TRAIL_S:g} s", _trail))
+    near = f"nearer than {limits.s_u_m:g} m"
+    if scene.obstacles.size:
+        found.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))
+        near += "" if limits.s_o_m == limits.s_u_m else f", obstacle {limits.s_o_m:g} m"
+    found += [(near, _dart(ink.AMBER)), ("collision", _hit)]
+    if scene.scenario.disturbance.loss_times_s or scene.scenario.contact.ends_vehicle:
+        found.append(("lost", _lost))
+    return found
+
+
+def _sonar(scene: Scene) -> list[tuple[str, Sign]]:
+    if scene.sonar is None:
+        return []
+    found = [("active sonar", _patch(ink.ACTIVE)), ("passive sonar", _patch(ink.PASSIVE)), ("hears", _heard)]
+    return [*found, ("echo", _echo)] if scene.obstacles.size else found
+
+
+def rows(width: int, scene: Scene, height: int) -> int:
+    """How many rows a scene's legend takes in this width, with letters of this height [px]."""
+    return 1 + max(row for row, *_ in _flow(width, scene, height))
+
+
+def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height: int) -> None:
+    """Draw a scene's legend into an area with room for its ``rows``."""
+    unit = height / 12.0
+    for row, x, words, sign in _flow(area.width, scene, height):
+        y = area.top + (3 + 20 * row) * unit
+        surface.blit(_drawn(sign, unit), (area.left + round(x), round(y)))
+        ink.write(surface, words, (area.left + x + (WIDE + 4) * unit, y), height)
+
+
+def _flow(width: int, scene: Scene, height: int) -> list[tuple[int, float, str, Sign]]:
+    """Row, left end, word and sign; where one row is not enough, the sonar has its own."""
+    unit, signs = height / 12.0, [*_water(scene), *_sonar(scene)]
+    wide = [(WIDE + 18) * unit + ink.text(words, height).get_width() for words, _ in signs]
+    breaks = {len(_water(scene))} if sum(wide) > width - 8 * unit else set[int]()
+    row, x, flown = 0, 8 * unit, list[tuple[int, float, str, Sign]]()
+    for k, (words, sign) in enumerate(signs):
+        if x > 8 * unit and (k in breaks or x + wide[k] > width):
+            row, x = row + 1, 8 * unit
+        flown.append((row, x, words, sign))
+        x += wide[k]
+    return flown
+
+
+def _drawn(sign: Sign, unit: float) -> pygame.Surface:
+    fine = pygame.Surface((round(WIDE * unit) * FINE, round(HIGH * unit) * FINE), depth=32)
+    fine.fill(ink.WHITE)
+    sign(fine, unit * FINE)
+    return pygame.transform.smoothscale(fine, (round(WIDE * unit), round(HIGH * unit)))
+
+
+def _dart(colour: ink.Colour) -> Sign:
+    return lambda fine, unit: pygame.draw.polygon(fine, colour, (([10.0, 8.0] + 15.0 * DART) * unit).tolist())
+
+
+def _trail(fine: pygame.Surface, unit: float) -> None:
+    for k, colour in enumerate(ink.TRAILS):
+        pygame.draw.line(fine, colour, (5.0 * k * unit, 8.0 * unit), (5.0 * (k + 1) * unit, 8.0 * unit), round(unit))
+
+
+def _disc(fine: pygame.Surface, unit: float) -> None:
+    pygame.draw.circle(fine, ink.KEEP_OUT, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(unit / 2))
+    pygame.draw.circle(fine, ink.DISC, (12.0 * unit, 8.0 * unit), 5.0 * unit)
+
+
+def _target(fine: pygame.Surface, unit: float) -> None:
+    pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(2.0 * unit))
+    pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 2.0 * unit)
+
+
+def _hit(fine: pygame.Surface, unit: float) -> None:
+    cross(fine, np.array([12.0, 8.0]) * unit, 3.0 * unit, ink.ORANGE, round(0.8 * unit) * 2)
+    pygame.draw.circle(fine, ink.ORANGE, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(1.5 * unit))
+
+
+def _lost(fine: pygame.Surface, unit: float) -> None:
+    cross(fine, np.array([12.0, 8.0]) * unit, 3.5 * unit, ink.LOST, round(0.8 * unit) * 2)
+
+
+def _heard(fine: pygame.Surface, unit: float) -> None:
+    pygame.draw.line(fine, ink.PINK, (2.0 * unit, 8.0 * unit), (22.0 * unit, 8.0 * unit), round(unit))
+
+
+def _echo(fine: pygame.Surface, unit: float) -> None:
+    angles = np.linspace(-0.9, 0.9, 12)
+    arc = np.stack([4.0 + 9.0 * np.cos(angles), 8.0 + 9.0 * np.sin(angles)], axis=1) * unit
+    pygame.draw.lines(fine, ink.PINK, False, arc.tolist(), round(3.0 * unit))
+
+
+def _patch(colour: ink.Colour) -> Sign:
+    def draw(fine: pygame.Surface, unit: float) -> None:
+        fine.fill(colour)
+        pygame.draw.rect(fine, ink.EDGE, fine.get_rect(), round(unit))
+
+    return draw

@@ -1,0 +1,188 @@
+"""Paints the water of a scene: course, vehicles, trails, collisions and the sonar of one vehicle, seen from above.
+
+Everything but words is drawn at twice the size and scaled down, so that edges are smooth.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from uuv_marl.envs.drawing import ink
+from uuv_marl.envs.drawing.camera import Camera, nice
+from uuv_marl.envs.drawing.scene import Float, Scene
+from uuv_marl.envs.drawing.sonar import paint_arrays, paint_heard
+from uuv_marl.extras import extra
+
+with extra("render", "rendering"):
+    import pygame
+
+FINE = 2
+"""Pixels drawn for one that is shown, each way."""
+FRESH_S = 3.0
+"""A collision younger than this [s] has a ring around it."""
+_GRID_PX, _CHEVRON_PX = 70, 110
+DART = np.array([[0.6, 0.0], [-0.4, 0.34], [-0.2, 0.0], [-0.4, -0.34]])
+"""A vehicle of length 1, the bow at the front."""
+
+
+class Painter:
+    """Paints water of this size [px], with a grid of lines that tell how the view moves unless it is left out."""
+
+    def __init__(self, size: tuple[int, int], *, grid: bool = True) -> None:
+        self.size, self._lines = size, grid
+        self._fine = pygame.Surface((size[0] * FINE, size[1] * FINE), depth=32)
+        self._shown = pygame.Surface(size, depth=32)
+        self._unit = FINE * max(1.0, min(size) / 800.0)
+        """Fine pixels in one of a picture of the usual size."""
+
+    def paint(self, scene: Scene, camera: Camera) -> pygame.Surface:
+        """The picture; the next call paints over it."""
+        view = camera.magnified(FINE)
+        self._fine.fill(ink.WATER)
+        if scene.sonar:
+            paint_arrays(self._fine, scene, scene.sonar, view)
+        cell = nice(_GRID_PX / camera.scale * self._unit / FINE)
+        if self._lines:
+            self._grid(view, cell)
+        self._course(scene, view)
+        self._trails(scene, view)
+        if scene.sonar:
+            paint_heard(self._fine, scene, scene.sonar, view, self._unit)
+        self._vehicles(scene, view)
+        self._hits(scene, view)
+        self._reference(scene, view)
+        self._bar(view, cell)
+        pygame.transform.smoothscale(self._fine, self.size, self._shown)
+        self._words(scene, camera, cell)
+        return self._shown
+
+    def glimpse(self, scene: Scene, camera: Camera, seen: Camera) -> pygame.Surface:
+        """The whole course in small, with the rectangle that another camera shows."""
+        view = camera.magnified(FINE)
+        self._fine.fill(ink.WATER)
+        self._discs(scene, view)
+        pygame.draw.lines(self._fine, ink.TRACK, False, view.pixels(scene.waypoints).tolist(), FINE)
+        for place in view.pixels(scene.position[scene.alive]).tolist():
+            pygame.draw.circle(self._fine, ink.BLUE, place, FINE)
+        self._goal(view.pixels(scene.waypoints[-1]), 5.0 * FINE)
+        pygame.draw.circle(self._fine, ink.GREEN, view.pixels(scene.reference).tolist(), 2.5 * FINE)
+        high, low = view.pixels(seen.centre + seen.reach), view.pixels(seen.centre - seen.reach)
+        rectangle = pygame.Rect(low[0], high[1], high[0] - low[0], low[1] - high[1])
+        pygame.draw.rect(self._fine, ink.TEXT, rectangle, FINE)
+        pygame.draw.rect(self._fine, ink.KEEP_OUT, self._fine.get_rect(), FINE)
+        return pygame.transform.smoothscale(self._fine, self.size, self._shown)
+
+    def _grid(self, view: Camera, cell: float) -> None:
+        """Lines of one shown pixel, which scaling down leaves crisp."""
+        low, high = view.centre - view.reach, view.centre + view.reach
+        width, height = view.size
+        for axis in (0, 1):
+            lines = np.arange(math.ceil(low[axis] / cell), high[axis] / cell) * cell
+            for at in view.pixels(np.repeat(lines[:, None], 2, axis=1))[:, 1 - axis] // FINE * FINE:
+                self._fine.fill(ink.GRID, (0, at, width, FINE) if axis == 0 else (at, 0, FINE, height))
+
+    def _course(self, scene: Scene, view: Camera) -> None:
+        """Obstacles, the trajectory with its direction, start and goal."""
+        self._discs(scene, view)
+        points, unit = view.pixels(scene.waypoints), self._unit
+        pygame.draw.lines(self._fine, ink.TRACK, False, points.tolist(), round(1.8 * unit))
+        spacing = nice(_CHEVRON_PX * unit / view.scale) * view.scale
+        passed = 0.0
+        for start, end in pairwise(points):
+            length = math.hypot(*(end - start))
+            along = (end - start) / length
+            across = np.array([-along[1], along[0]])
+            for at in np.arange(spacing / 2 - passed % spacing, length, spacing):
+                tip = start + max(at, 0.0) * along
+                wings = [tip - 8.0 * unit * (along - side * across) for side in (0.6, -0.6)]
+                if -20 < tip[0] < view.size[0] + 20 and -20 < tip[1] < view.size[1] + 20:
+                    pygame.draw.polygon(self._fine, ink.TRACK, [tip.tolist(), *(wing.tolist() for wing in wings)])
+            passed += length
+        pygame.draw.circle(self._fine, ink.WHITE, points[0].tolist(), 5.0 * unit)
+        pygame.draw.circle(self._fine, ink.TRACK, points[0].tolist(), 5.0 * unit, round(1.5 * unit))
+        self._goal(points[-1], 11.0 * unit)
+
+    def _discs(self, scene: Scene, view: Camera) -> None:
+        for middle, radius in zip(view.pixels(scene.obstacles[:, :2]).tolist(), scene.obstacles[:, 2], strict=True):
+            around = (float(radius) + scene.scenario.constraints.s_o_m) * view.scale
+            pygame.draw.circle(self._fine, ink.KEEP_OUT, middle, around, FINE)
+            pygame.draw.circle(self._fine, ink.DISC, middle, float(radius) * view.scale)
+
+    def _goal(self, at: Float, size: float) -> None:
+        angles = np.arange(10) * math.pi / 5.0
+        radii = np.where(np.arange(10) % 2, 0.42, 1.0)[:, None] * size
+        star = (at + radii * np.stack([np.sin(angles), -np.cos(angles)], axis=1)).tolist()
+        pygame.draw.polygon(self._fine, ink.AMBER, star)
+        pygame.draw.polygon(self._fine, ink.TEXT, star, max(1, round(size / 12)))
+
+    def _trails(self, scene: Scene, view: Camera) -> None:
+        places = view.pixels(np.concatenate([scene.trail, scene.position[None]])[:, scene.alive])
+        for part, colour in zip(np.array_split(np.arange(len(places) - 1), len(ink.TRAILS)), ink.TRAILS, strict=True):
+            for line in places[part[0] : part[-1] + 2].swapaxes(0, 1).tolist() if part.size else ():
+                pygame.draw.lines(self._fine, colour, False, line, FINE)
+
+    def _vehicles(self, scene: Scene, view: Camera) -> None:
+        """Darts as long as s_u, so that two that overlap are too near; longer where they would be specks."""
+        unit, apart = self._unit, scene.scenario.start.spacing_m * view.scale
+        least = max(min(6.0 * unit, 0.75 * apart), 3.0 * unit)
+        length = min(max(scene.scenario.constraints.s_u_m * view.scale, least), 22.0 * unit)
+        turned = np.stack([np.sin(scene.heading), -np.cos(scene.heading)], axis=-1)
+        ahead, aside = turned, np.stack([-turned[:, 1], turned[:, 0]], axis=-1)
+        places = view.pixels(scene.position)
+        darts = places[:, None] + length * (DART[:, :1] * ahead[:, None] + DART[:, 1:] * aside[:, None])
+        colours = np.where(scene.near[:, None], ink.AMBER, ink.BLUE).tolist()
+        for i in np.flatnonzero(~scene.alive):
+            cross(self._fine, places[i], 3.5 * unit, ink.LOST, round(1.6 * unit))
+        for i in np.flatnonzero(scene.alive):
+            pygame.draw.polygon(self._fine, colours[i], darts[i].tolist())
+        if scene.sonar:
+            i = scene.sonar.vehicle
+            pygame.draw.polygon(self._fine, ink.PINK, darts[i].tolist())
+            pygame.draw.circle(self._fine, ink.PINK, places[i].tolist(), 0.8 * length + 3 * unit, round(1.5 * unit))
+
+    def _hits(self, scene: Scene, view: Camera) -> None:
+        """A cross wherever vehicles collided, and a ring around it while it is fresh."""
+        unit = self._unit
+        for place, when in zip(view.pixels(scene.hits[:, :2]), scene.hits[:, 2], strict=True):
+            cross(self._fine, place, 4.0 * unit, ink.ORANGE, round(2.0 * unit))
+            if scene.time_s - when < FRESH_S:
+                pygame.draw.circle(self._fine, ink.ORANGE, place.tolist(), 13.0 * unit, round(2.5 * unit))
+
+    def _reference(self, scene: Scene, view: Camera) -> None:
+        at, unit = view.pixels(scene.reference).tolist(), self._unit
+        for colour, wider in ((ink.WHITE, 1.2), (ink.GREEN, 0.0)):
+            pygame.draw.circle(self._fine, colour, at, (12.0 + wider) * unit, round((2.6 + 2.0 * wider) * unit))
+            pygame.draw.circle(self._fine, colour, at, (2.4 + wider) * unit)
+
+    def _bar(self, view: Camera, cell: float) -> None:
+        """The scale bar, as long as a cell of the grid, and beside it the arrow to the north."""
+        unit = self._unit
+        right, low, long = view.size[0] - 34.0 * unit, view.size[1] - 10.0 * unit, cell * view.scale
+        ticks = [(right - long, low - 5 * unit), (right - long, low), (right, low), (right, low - 5 * unit)]
+        pygame.draw.lines(self._fine, ink.TEXT, False, ticks, round(1.5 * unit))
+        x, y = view.size[0] - 15.0 * unit, low - 13 * unit
+        arrow = [(x, y - 14 * unit), (x - 5 * unit, y), (x, y - 3 * unit), (x + 5 * unit, y)]
+        pygame.draw.polygon(self._fine, ink.TEXT, arrow)
+
+    def _words(self, scene: Scene, camera: Camera, cell: float) -> None:
+        unit = self._unit / FINE
+        height = round(12 * unit)
+        for words, point in (("start", scene.waypoints[0]), ("goal", scene.waypoints[-1])):
+            x, y = camera.pixels(point).tolist()
+            left = x - ink.text(words, height, bold=True).get_width() / 2
+            ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)
+        x, y = camera.pixels(scene.reference).tolist()
+        ink.write(self._shown, "l(t)", (x + 15 * unit, y - 7 * unit), height, ink.GREEN, bold=True, halo=True)
+        right, low = self.size[0], self.size[1] - 9 * unit - height
+        words = f"{cell:g} m"
+        left = right - 34 * unit - (cell * camera.scale + ink.text(words, height).get_width()) / 2
+        ink.write(self._shown, words, (left, low - 5 * unit), height, halo=True)
+        ink.write(self._shown, "N", (right - 19 * unit, low), height, bold=True, halo=True)
+
+
+def cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:
+    """A diagonal cross that reaches so far from its middle, everything in pixels."""
+    for slope in (1.0, -1.0):
+        start, end = (at + size * np.array([[-1.0, -slope], [1.0, slope]])).tolist()
+        pygame.draw.line(surface, colour, start, end, width)

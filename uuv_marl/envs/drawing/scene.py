@@ -1,0 +1,123 @@
+"""A scene: what there is to draw of one world at one moment, whether it happens now or was recorded."""
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.envs.task import Task
+from uuv_marl.scenario import Scenario
+
+Float = NDArray[np.floating]
+Bool = NDArray[np.bool_]
+
+TRAIL_S = 20.0
+"""How long a trail is [s]."""
+
+
+class Sonar(NamedTuple):
+    """What one vehicle's sonar tells it."""
+
+    vehicle: int
+    neighbour: Float
+    """Positions of the vehicles that it hears, in its body frame [m], shape (heard, 2)."""
+    echo_range: Float
+    """Range to the nearest obstacle in each active sub-sector [m], 0 for none, shape (active,)."""
+
+
+class Scene(NamedTuple):
+    """One world at one moment. Frame north, east [m]; the vehicle is the last axis but the coordinates."""
+
+    scenario: Scenario
+    waypoints: Float
+    """Corners of the trajectory, shape (point, 2)."""
+    obstacles: Float
+    """Centre north, east and radius, shape (obstacle, 3)."""
+    time_s: float
+    reference: Float
+    """Position of l(t), shape (2,)."""
+    position: Float
+    """Of everybody, of the lost where they were lost, shape (vehicle, 2)."""
+    heading: Float
+    """Clockwise from north [rad], shape (vehicle,)."""
+    alive: Bool
+    """False for lost vehicles, shape (vehicle,)."""
+    near: Bool
+    """Nearer than s_u to another vehicle, or than s_o to an obstacle, shape (vehicle,)."""
+    trail: Float
+    """Where everybody was, the oldest first, shape (sample, vehicle, 2)."""
+    hits: Float
+    """Collisions so far: north, east and time [s], shape (hit, 3)."""
+    arrival_s: float | None
+    """When the swarm arrived, None before."""
+    collisions: int
+    """So far."""
+    min_spacing_m: float
+    """Smallest distance between two vehicles; infinite for one alone."""
+    clearance_m: float
+    """Smallest distance of a vehicle to an obstacle's surface; infinite without obstacles."""
+    centre_error_m: float
+    """Distance of the swarm's centre to l(t)."""
+    sonar: Sonar | None
+
+
+class Memory:
+    """What a scene shows of the past: trails and collisions of every world, as far as the steps were noted."""
+
+    def __init__(self, task: Task) -> None:
+        swarm = task.swarm
+        self._every = max(1, round(1.0 / swarm.scenario.timing.decision_period_s))
+        self._trail: deque[Float] = deque(maxlen=round(TRAIL_S))
+        self._hits: list[list[tuple[float, float, float]]] = [[] for _ in range(swarm.num_worlds)]
+        self._keys, self._time_s, self._steps = swarm.keys.copy(), np.full(swarm.num_worlds, -1.0), 0
+
+    def note(self, task: Task) -> None:
+        """Look at the worlds after a reset or a step; looking twice at the same moment changes nothing."""
+        swarm, facts = task.swarm, task.swarm.facts
+        if np.array_equal(facts.time_s, self._time_s) and np.array_equal(swarm.keys, self._keys):
+            return
+        for w in np.flatnonzero((swarm.keys != self._keys) | (facts.time_s < self._time_s)):
+            self._hits[w].clear()
+            for sample in self._trail:
+                sample[w] = np.nan
+        for w, i in np.argwhere((facts.contacts > 0) & (facts.time_s > self._time_s)[:, None]):
+            self._hits[w].append((*swarm.state.eta[w, i, :2], facts.time_s[w]))
+        if self._steps % self._every == 0:
+            self._trail.append(swarm.state.eta[:, :, :2].astype(np.float32))
+        self._steps += 1
+        self._keys, self._time_s = swarm.keys.copy(), facts.time_s.copy()
+
+    def scene(self, task: Task, world: int, sonar_of: int | None) -> Scene:
+        """A world as it stands, with the sonar of one vehicle where it lives."""
+        swarm, w = task.swarm, world
+        course, state, facts, constraints = swarm.course, swarm.state, swarm.facts, swarm.scenario.constraints
+        alive, position = state.alive[w].copy(), state.eta[w, :, :2].copy()
+        arrival_s = float(facts.arrival_s[w, 0])
+        return Scene(
+            scenario=swarm.scenario,
+            waypoints=course.waypoints[w, : course.last[w] + 1].copy(),
+            obstacles=course.obstacles[w, : course.num_obstacles[w]].copy(),
+            time_s=float(facts.time_s[w]),
+            reference=facts.reference[w, :2].copy(),
+            position=position,
+            heading=state.eta[w, :, 2].copy(),
+            alive=alive,
+            near=alive & ((facts.spacing[w] < constraints.s_u_m) | (facts.clearance[w] < constraints.s_o_m)),
+            trail=np.array([sample[w] for sample in self._trail if np.isfinite(sample[w, 0, 0])]).reshape(
+                -1, *position.shape
+            ),
+            hits=np.array(self._hits[w]).reshape(-1, 3),
+            arrival_s=arrival_s if np.isfinite(arrival_s) else None,
+            collisions=int(task.collisions[w]),
+            min_spacing_m=float(facts.min_spacing[w]),
+            clearance_m=float(facts.obstacle_clearance[w].min()),
+            centre_error_m=float(np.hypot(*(facts.centre[w] - facts.reference[w, :2]))),
+            sonar=None if sonar_of is None or not alive[sonar_of] else _sonar(task, world, sonar_of),
+        )
+
+
+def _sonar(task: Task, world: int, vehicle: int) -> Sonar:
+    percept, at = task.swarm.percept, (world, vehicle)
+    neighbour = percept["neighbour"][at][percept["heard"][at] > 0]
+    return Sonar(vehicle, neighbour, percept["echo_range"][at].copy())

@@ -1,0 +1,224 @@
+"""A recording as JSON that a browser unpacks by itself: small, with stated resolutions. ``decode.js`` reads it.
+
+Arrays become whole numbers, these become differences from what their neighbours in time predict, and deflate packs the
+differences, of which most are zero. Motion is smooth, so an array is coded from coarse to fine: every ``stride``-th
+sample by its second differences, then the samples halfway between by how far they are from a cubic through the four
+around them, until all are there. What decides is exact: series and the course keep all bits of their float32.
+"""
+
+import base64
+import math
+import zlib
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl import __version__
+from uuv_marl.replay.recording import Float32, Recording
+from uuv_marl.scenario import Scenario, growth
+
+Int32 = NDArray[np.int32]
+
+SCHEMA = 1
+
+
+class Coding(NamedTuple):
+    """How an array becomes whole numbers."""
+
+    unit: float
+    """What 1 stands for."""
+    slack: float = 0.5
+    """Largest error, in units, of what lies between every ``stride``-th sample; there it is half a unit."""
+    stride: int = 16
+    """Coarsest step of an array that is smooth in time, a power of two; 1 for one that is not."""
+    order: int = 2
+    """How often every ``stride``-th sample is differenced."""
+
+    @property
+    def resolution(self) -> float:
+        """Largest error of a decoded number, but for the last bit of a float32."""
+        return self.unit * max(self.slack, 0.5)
+
+
+_TURN = 2 * math.pi
+CODINGS = {
+    "reference": Coding(0.03),
+    "position": Coding(0.03, 2),
+    "heading": Coding(_TURN / 64, 2),
+    "speed": Coding(0.1, 4),
+    "force": Coding(0.05, 4),
+    "spacing": Coding(0.25, 2),
+    "inspected_heading": Coding(_TURN / 1024),
+    "neighbour": Coding(0.25, stride=1, order=1),
+    "echo_range": Coding(0.25, stride=1, order=1),
+    "echo_position": Coding(0.25, stride=1, order=1),
+    "action": Coding(0.02, stride=1, order=1),
+}
+"""In m, rad, m/s and shares of full force. A hull is 2 m wide, and a pixel of a whole map about 1 m; the sonar of
+inspected vehicles is drawn by their own, finer heading."""
+
+
+def payload(recordings: Sequence[Recording]) -> dict[str, Any]:
+    """All that a page shows of these episodes, as plain values; ``decode.js`` gives their ``arrays`` as numbers."""
+    return {"schema": SCHEMA, "uuv_marl": __version__, "episodes": [_episode(recording) for recording in recordings]}
+
+
+def _episode(recording: Recording) -> dict[str, Any]:
+    scenario = recording.scenario
+    arrival, limits = scenario.arrival, scenario.constraints
+    return {
+        "scenario": scenario.name,
+        "version": scenario.version,
+        "policy": recording.policy,
+        "seed": recording.seed,
+        "vehicles": scenario.swarm.num_vehicles,
+        "period_s": scenario.timing.decision_period_s,
+        "metrics": recording.metrics,
+        "constraints": {"s_l_m": limits.s_l_m, "s_o_m": limits.s_o_m, "s_u_m": limits.s_u_m},
+        "contact_m": scenario.contact.hull_radius_m,
+        "arrival": {
+            "radius_m": arrival.radius_m,
+            "spread_m": arrival.spread_m * growth(scenario.swarm.num_vehicles),
+            "dwell_s": arrival.dwell_s,
+        },
+        "sonar": _sonar(scenario),
+        "events": [event._asdict() for event in recording.events],
+        "inspected": list(recording.inspections),
+        "arrays": _arrays(recording),
+    }
+
+
+def _sonar(scenario: Scenario) -> list[dict[str, Any]]:
+    """The arrays in the order of their sub-sectors, whose bounds are angles clockwise from the bow [rad]."""
+    return [
+        {
+            "name": array.name,
+            "axis_rad": math.radians(array.mounting_deg),
+            "aperture_rad": math.radians(array.aperture_deg),
+            "range_m": array.range_m,
+            "active": array.kind == "active",
+            "bounds_rad": [
+                math.radians(array.mounting_deg + array.aperture_deg * (k / array.sub_sectors - 0.5))
+                for k in range(array.sub_sectors + 1)
+            ],
+        }
+        for array in scenario.sonar.arrays
+    ]
+
+
+def _arrays(recording: Recording) -> dict[str, Any]:
+    tick_s = recording.scenario.timing.control_hold_s
+    smooth = {
+        "reference": recording.reference,
+        "position": recording.position,
+        "heading": unwrapped(recording.heading),
+        "speed": recording.speed,
+        "force": recording.force,
+        "spacing": recording.spacing,
+    }
+    exact = {**recording.series, "waypoints": recording.waypoints, "obstacles": recording.obstacles}
+    arrays = {"time_s": _coded(recording.time_s, Coding(tick_s, stride=1))}
+    arrays |= {name: _bits(np.asarray(values, np.float32)) for name, values in exact.items()}
+    if recording.inspections:
+        inspected = list(recording.inspections)
+        arrays["heard"] = _whole(np.stack([sonar.heard for sonar in recording.inspections.values()], axis=1), 1)
+        smooth["inspected_heading"] = unwrapped(recording.heading[:, inspected])
+        for name in ("neighbour", "echo_range", "echo_position", "action"):
+            smooth[name] = np.stack([getattr(sonar, name) for sonar in recording.inspections.values()], axis=1)
+    return arrays | {name: _coded(values, CODINGS[name]) for name, values in smooth.items() if values is not None}
+
+
+def unwrapped(heading: Float32) -> Float32:
+    """Headings that don't jump by a turn from sample to sample, so that one can interpolate, shape (time, vehicle)."""
+    step = np.diff(heading, axis=0, prepend=heading[:1])
+    turns = np.cumsum(np.nan_to_num(np.rint(step / _TURN)), axis=0)
+    return (heading - _TURN * turns).astype(np.float32)
+
+
+def _coded(values: Float32, coding: Coding) -> dict[str, Any]:
+    """An array of numbers in units, NaN where one is missing."""
+    missing = np.isnan(values)
+    scaled = _filled(values.astype(np.float64), missing) / coding.unit
+    data = (
+        _smooth(scaled, coding)
+        if coding.stride > 1
+        else pack(_differences(np.rint(scaled).astype(np.int32), coding.order))
+    )
+    mask = pack(_differences(missing.astype(np.int32), 1)) if missing.any() else None
+    return _entry(values.shape, "float32", coding.unit, coding.stride, coding.order, mask, data)
+
+
+def _bits(values: Float32) -> dict[str, Any]:
+    """An array of which every bit is kept."""
+    return _entry(values.shape, "float32", None, 1, 2, None, pack(_differences(values.view(np.int32), 2)))
+
+
+def _whole(values: Int32, order: int) -> dict[str, Any]:
+    """An array of whole numbers."""
+    return _entry(values.shape, "int32", None, 1, order, None, pack(_differences(values, order)))
+
+
+def _entry(
+    shape: tuple[int, ...], dtype: str, scale: float | None, stride: int, order: int, missing: str | None, data: str
+) -> dict[str, Any]:
+    return {
+        "shape": list(shape), "dtype": dtype, "scale": scale, "stride": stride, "order": order, "missing": missing,
+        "data": data,
+    }  # fmt: skip
+
+
+def _filled(values: NDArray[np.float64], missing: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """The value before in place of each one that is missing, zero where there is none."""
+    if not missing.any():
+        return values
+    time = np.arange(len(values)).reshape(-1, *[1] * (values.ndim - 1))
+    last = np.maximum.accumulate(np.where(missing, -1, time), axis=0)
+    return np.where(last >= 0, np.take_along_axis(values, np.maximum(last, 0), axis=0), 0.0)
+
+
+def _differences(values: Int32, order: int) -> Int32:
+    """Differences in time of this order, modulo 2^32, in the order of the vehicles, then of time. Shape (value,)."""
+    for _ in range(order):
+        values = np.diff(values, axis=0, prepend=np.zeros_like(values[:1]))
+    return np.moveaxis(values, 0, -1).ravel()
+
+
+def _smooth(scaled: NDArray[np.float64], coding: Coding) -> str:
+    """Samples from coarse to fine; each level's differences stand in the order of the vehicles, then of time."""
+    whole = np.zeros(scaled.shape, np.int32)
+    whole[:: coding.stride] = np.rint(scaled[:: coding.stride])
+    levels = [_differences(whole[:: coding.stride], coding.order)]
+    half = coding.stride // 2
+    while half:
+        now = np.arange(half, len(whole), 2 * half)
+        guess = _between(whole, now, half)
+        whole[now] = np.where(np.abs(guess - scaled[now]) <= coding.slack, guess, np.rint(scaled[now]))
+        levels.append(_differences(whole[now] - guess, 0))
+        half //= 2
+    return pack(np.concatenate(levels))
+
+
+def _between(whole: Int32, now: NDArray[np.int64], half: int) -> Int32:
+    """What samples ``half`` before and after ``now``, and three times as far, say of it; shape as ``whole[now]``."""
+    after = np.where(now + half < len(whole), now + half, now - half)
+    guess = (whole[now - half] + whole[after]) >> 1
+    inner = (now >= 3 * half) & (now + 3 * half < len(whole))
+    t = now[inner]
+    near, far = whole[t - half] + whole[t + half], whole[t - 3 * half] + whole[t + 3 * half]
+    guess[inner] = (9 * near - far + 8) >> 4
+    return guess
+
+
+def pack(values: Int32) -> str:
+    """Whole numbers as text: deflated, in base64.
+
+    Small numbers of either sign become small unsigned ones. Their lowest bytes come first, then the next ones, as many
+    as any number needs.
+    """
+    unsigned = ((values << 1) ^ (values >> 31)).view(np.uint32)
+    planes = max(1, math.ceil(int(unsigned.max(initial=0)).bit_length() / 8))
+    rows = unsigned.astype("<u4").view(np.uint8).reshape(-1, 4).T[:planes]
+    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 6, zlib.Z_FILTERED)
+    return base64.b64encode(deflate.compress(np.ascontiguousarray(rows).tobytes()) + deflate.flush()).decode("ascii")

@@ -1,0 +1,81 @@
+"""What is marked on a replay's time line: contacts, near misses, losses and the arrival."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.replay.recording import Event, Float32
+
+Bool = NDArray[np.bool_]
+Int32 = NDArray[np.int32]
+
+REARM_S = 2.0
+"""A vehicle's next near miss counts once it has kept its distance for so long, so that one which stays at the limit
+makes one mark, not a hundred."""
+
+
+def near_misses(kind: str, time_s: Float32, below: Bool) -> list[Event]:
+    """An event for each sample at which near misses begin, with all vehicles whose miss begins there.
+
+    Args:
+        kind: of the events.
+        time_s: shape (time,).
+        below: whether a vehicle is below its limit, shape (time, vehicle).
+    """
+    events: list[Event] = []
+    last = np.full(below.shape[1], -np.inf)
+    for now, low in zip(time_s.tolist(), below, strict=True):
+        began = np.flatnonzero(low & (now - last > REARM_S))
+        if began.size:
+            events.append(Event(now, kind, tuple(began.tolist())))
+        last[low] = now
+    return events
+
+
+def contacts(time_s: Float32, began: Int32, clearance: Float32, position: Float32, hull_radius_m: float) -> list[Event]:
+    """An event for each contact that the engine counted.
+
+    The engine counts contacts for each vehicle, not with whom: a vehicle whose hull begins to overlap an obstacle has
+    hit that, and the others have hit each other.
+
+    Args:
+        time_s: shape (time,).
+        began: contacts that began since the sample before, shape (time, vehicle).
+        clearance: smallest distance to an obstacle's surface since the sample before [m], shape (time, vehicle).
+        position: also of those who are lost by the contact [m], shape (time, vehicle, 2).
+        hull_radius_m: an obstacle's surface nearer than this is a contact, and a vehicle nearer than twice this.
+    """
+    events: list[Event] = []
+    inside = clearance < hull_radius_m
+    for t in np.flatnonzero(began.any(axis=1)).tolist():
+        now, left = float(time_s[t]), began[t].copy()
+        hit = np.flatnonzero((left > 0) & inside[t] & ~inside[t - 1]).tolist()
+        left[hit] -= 1
+        while left.any():
+            i = int(left.argmax())
+            j = _partner(i, left, position[t - 1 : t + 1], 2 * hull_radius_m)
+            if j is None:
+                hit += [i] * int(left[i])
+                left[i] = 0
+            else:
+                events.append(Event(now, "collision", (min(i, j), max(i, j))))
+                left[[i, j]] -= 1
+        events += [Event(now, "obstacle", (i,)) for i in hit]
+    return events
+
+
+def _partner(i: int, left: Int32, position: Float32, touch_m: float) -> int | None:
+    """Whom vehicle i hit between two samples: of those with contacts ``left`` who were apart from it, the nearest."""
+    before, now = np.hypot(*np.moveaxis(position - position[:, i : i + 1], -1, 0))
+    others = np.flatnonzero((left > 0) & (np.arange(len(left)) != i)).tolist()
+    return min(others, key=lambda j: (before[j] < touch_m, now[j]), default=None)
+
+
+def losses(time_s: Float32, alive: Bool) -> list[Event]:
+    """An event for each vehicle at the first sample without it; ``alive`` has shape (time, vehicle)."""
+    gone, who = np.nonzero(alive[:-1] & ~alive[1:])
+    return [Event(float(time_s[t + 1]), "lost", (i,)) for t, i in zip(gone.tolist(), who.tolist(), strict=True)]
+
+
+def arrival(task_time_s: float | None) -> list[Event]:
+    """The swarm's arrival, if it did arrive."""
+    return [] if task_time_s is None else [Event(task_time_s, "arrived", ())]

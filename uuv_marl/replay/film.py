@@ -1,0 +1,175 @@
+"""Films and stills of recorded episodes, drawn as the environments draw: MP4, GIF and PNG, without a display."""
+
+import importlib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from uuv_marl.atomic import replacing, writing
+from uuv_marl.envs.drawing import ink
+from uuv_marl.envs.drawing.camera import CAMERAS
+from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
+from uuv_marl.errors import ReplayError
+from uuv_marl.extras import extra
+from uuv_marl.replay.recording import Recording
+from uuv_marl.replay.scenes import Scenes
+
+Picture = NDArray[np.uint8]
+SUFFIXES = (".mp4", ".gif", ".png")
+MOST = 4
+"""Recordings side by side."""
+_LENGTH_S, _HOLD_S = {".mp4": 20.0, ".gif": 10.0}, 2.0
+"""How long a film lasts where no speed is given, and how long it stays at its last picture [s]."""
+_FPS = {".mp4": 20, ".gif": 8}
+_MOMENTS = 4
+"""Of a still, side by side."""
+
+
+class Format(NamedTuple):
+    """How a film is cut."""
+
+    size: tuple[int, int]
+    """Width and height [px]."""
+    fps: int
+    plain: bool
+    """Without trails and grid."""
+    speed: float
+    """Seconds of the episode in a second of the film."""
+
+
+def write_film(
+    recordings: Sequence[Recording], path: Path, *,
+    camera: str = "follow", sonar_of: int | None = None, speed: float | None = None,
+    size: tuple[int, int] | None = None, progress: Callable[[float], object] | None = None,
+) -> None:  # fmt: skip
+    """Write a film of episodes side by side, on one clock; or as PNG a still with moments of them.
+
+    A GIF has neither trails nor a grid, which would double its size.
+
+    Args:
+        recordings: one to four.
+        path: ends in ``.mp4``, ``.gif`` or ``.png``. It is written whole or not at all.
+        camera: ``follow`` or ``map``.
+        sonar_of: index of a vehicle whose sonar is shown; the recordings must hold its inspection.
+        speed: seconds of the episode in a second of the film; None for a film of 20 s, or a GIF of 10 s.
+        size: width and height [px]; None for what suits the format.
+        progress: is called with the share that is done, 0 to 1.
+
+    Raises:
+        ReplayError: an argument can't be used.
+        ResultsError: the file can't be written.
+        MissingExtraError: the extra ``render`` is not installed.
+    """
+    suffix = check_format(path)
+    if not 1 <= len(recordings) <= MOST:
+        raise ReplayError(f"a film shows 1 to {MOST} recordings side by side, got {len(recordings)}")
+    if camera not in CAMERAS:
+        raise ReplayError(f"camera must be one of {list(CAMERAS)}, got {camera!r}")
+    if speed is not None and not speed > 0.0:
+        raise ReplayError(f"speed must be positive, got {speed}")
+    if size is not None and not all(320 <= side <= 4096 and side % 2 == 0 for side in size):
+        raise ReplayError(f"size must be width and height, even numbers of pixels from 320 to 4096, got {size}")
+    scenes = [Scenes(recording, sonar_of, trails=suffix != ".gif") for recording in recordings]
+    longest = max(float(recording.time_s[-1]) for recording in recordings)
+    form = Format(
+        size or _size(suffix, len(recordings)),
+        _FPS.get(suffix, 1),
+        suffix == ".gif",
+        speed or max(1.0, round(longest / _LENGTH_S.get(suffix, longest))),
+    )
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as partial:
+        if suffix == ".png":
+            Image.fromarray(_still(scenes, form, camera, longest)).save(partial, optimize=True)
+        else:
+            write = _write_mp4 if suffix == ".mp4" else _write_gif
+            write(partial, _pictures(scenes, form, camera, longest, progress or (lambda share: share)), form)
+
+
+def check_format(path: Path) -> str:
+    """The format that a path's suffix names. Raises ReplayError or MissingExtraError where it can't be written."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ReplayError(f"{path} must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+    if suffix == ".mp4":
+        _av()
+    return suffix
+
+
+def _size(suffix: str, num: int) -> tuple[int, int]:
+    """Of the whole picture; a GIF fits a page of GitHub."""
+    if suffix == ".png":
+        return 1320, 450 * num
+    across = ((560, 414, 276, 206) if suffix == ".gif" else (800, 640, 480, 400))[num - 1]
+    return across * num, across + 140
+
+
+def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
+    """What all recordings have in common, and what tells them apart."""
+    rows = [
+        (str(one.policy), f"{one.scenario.name}, {one.scenario.swarm.num_vehicles} vehicles", f"seed {one.seed}")
+        for one in (scene.recording for scene in scenes)
+    ]
+    shared = [len(set(column)) == 1 for column in zip(*rows, strict=True)]
+    shared[0] = False
+    common = ", ".join(word for word, same in zip(rows[0], shared, strict=True) if same)
+    return common, [", ".join(word for word, same in zip(row, shared, strict=True) if not same) for row in rows]
+
+
+def _pictures(
+    scenes: Sequence[Scenes], form: Format, camera: str, longest: float, progress: Callable[[float], object]
+) -> Iterator[Picture]:
+    frame, (common, names) = Frame(form.size, len(scenes), grid=not form.plain), _names(scenes)
+    heading = f"{common}, {form.speed:.3g} times as fast" if form.speed != 1.0 else common
+    num = int(np.ceil(longest / form.speed * form.fps)) + 1
+    for k in range(num):
+        now = k * form.speed / form.fps
+        panels = [Panel(name, one.at(now)) for name, one in zip(names, scenes, strict=True)]
+        yield pixels(frame.draw(panels, camera, heading))
+        progress((k + 1) / num)
+
+
+def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) -> Picture:
+    """A row for each recording, from its start to the last one's end."""
+    common, names = _names(scenes)
+    moments = np.linspace(0.0, longest, _MOMENTS).tolist()
+    panels = [
+        Panel(f"{name} at {one.at(now).time_s:.0f} s", one.at(now), now)
+        for name, one in zip(names, scenes, strict=True)
+        for now in moments
+    ]
+    return pixels(Frame(form.size, _MOMENTS).draw(panels, camera, common))
+
+
+def _write_gif(path: Path, pictures: Iterator[Picture], form: Format) -> None:
+    """In few colours, the same for all frames, so that what stands still takes no room."""
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for colour in ink.palette() for part in colour])
+    frames = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    durations = [round(1000 / form.fps)] * (len(frames) - 1) + [round(1000 * _HOLD_S)]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=True)
+
+
+def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
+    """H.264, as every browser and slide program plays it."""
+    av = _av()
+    with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
+        stream = container.add_stream("libx264", rate=form.fps, options={"crf": "23", "preset": "veryfast"})
+        stream.width, stream.height, stream.pix_fmt = *form.size, "yuv420p"
+        picture = np.zeros((*form.size[::-1], 3), np.uint8)
+        for picture in pictures:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        for _ in range(round(_HOLD_S * form.fps)):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+
+
+def _av() -> Any:
+    """PyAV, the encoder."""
+    with extra("render", "an .mp4"):
+        return importlib.import_module("av")

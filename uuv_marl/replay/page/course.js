@@ -1,0 +1,137 @@
+/** What does not move: grid, course, obstacles, scale bar, and the small map of it all. */
+import { View } from "./camera.js";
+import { circle, label, star } from "./shapes.js";
+
+/** Lines at round distances. */
+export function drawGrid(context, view, palette) {
+  const step = roundStep(120 / view.scale);
+  const north = view.height / 2 / view.scale;
+  const east = view.width / 2 / view.scale;
+  context.beginPath();
+  for (let at = Math.ceil((view.east - east) / step) * step; at < view.east + east; at += step) {
+    context.moveTo(Math.round(view.x(at)) + 0.5, 0);
+    context.lineTo(Math.round(view.x(at)) + 0.5, view.height);
+  }
+  for (let at = Math.ceil((view.north - north) / step) * step; at < view.north + north; at += step) {
+    context.moveTo(0, Math.round(view.y(at)) + 0.5);
+    context.lineTo(view.width, Math.round(view.y(at)) + 0.5);
+  }
+  context.lineWidth = 1;
+  context.strokeStyle = palette.grid;
+  context.stroke();
+}
+
+/** The next of 1, 2, 5, 10, 20, ... from a number. */
+function roundStep(number) {
+  const power = 10 ** Math.floor(Math.log10(number));
+  return power * [1, 2, 5, 10].find((step) => step * power >= number * 0.999);
+}
+
+/** Trajectory with start and goal, arrival radius, obstacles with their keep-out ring. */
+export function drawCourse(context, episode, view, palette, weight) {
+  const corners = episode.values("waypoints");
+  const discs = episode.values("obstacles");
+  const [goal_x, goal_y] = [view.x(corners.at(-1)), view.y(corners.at(-2))];
+  context.lineWidth = 1.5 * weight;
+  context.strokeStyle = palette.track;
+  context.setLineDash([7 * weight, 6 * weight]);
+  context.beginPath();
+  for (let k = 0; k < corners.length; k += 2) context.lineTo(view.x(corners[k + 1]), view.y(corners[k]));
+  context.stroke();
+  context.setLineDash([2, 4]);
+  context.beginPath();
+  circle(context, goal_x, goal_y, episode.arrival.spread_m * view.scale);
+  context.stroke();
+  context.setLineDash([]);
+
+  context.beginPath();
+  for (let k = 0; k < discs.length; k += 3) {
+    circle(context, view.x(discs[k + 1]), view.y(discs[k]), discs[k + 2] * view.scale);
+  }
+  context.fillStyle = palette.obstacle;
+  context.fill();
+  context.beginPath();
+  for (let k = 0; k < discs.length; k += 3) {
+    const radius = discs[k + 2] + episode.constraints.s_o_m;
+    circle(context, view.x(discs[k + 1]), view.y(discs[k]), radius * view.scale);
+  }
+  context.setLineDash([4, 4]);
+  context.strokeStyle = palette.keepout;
+  context.stroke();
+  context.setLineDash([]);
+
+  context.beginPath();
+  circle(context, view.x(corners[1]), view.y(corners[0]), 5 * weight);
+  context.fillStyle = palette.water;
+  context.fill();
+  context.strokeStyle = palette.track;
+  context.stroke();
+  context.fillStyle = context.strokeStyle = palette.goal;
+  if (weight === 1) {
+    context.beginPath();
+    circle(context, goal_x, goal_y, episode.arrival.radius_m * view.scale);
+    context.stroke();
+  }
+  star(context, goal_x, goal_y, 9 * weight);
+}
+
+/** A length that one reads off, and where north is. */
+export function drawScaleBar(context, view, palette) {
+  const metres = roundStep(70 / view.scale);
+  const [left, right, y] = [16, 16 + metres * view.scale, view.height - 16];
+  context.lineWidth = 2;
+  context.strokeStyle = palette.ink;
+  context.beginPath();
+  context.moveTo(left, y - 5);
+  context.lineTo(left, y);
+  context.lineTo(right, y);
+  context.lineTo(right, y - 5);
+  context.stroke();
+  label(context, `${metres} m`, left + 6, y - 6, palette);
+  const x = view.width - 22;
+  context.fillStyle = palette.ink;
+  context.beginPath();
+  context.moveTo(x, 12);
+  context.lineTo(x + 5, 26);
+  context.lineTo(x, 23);
+  context.lineTo(x - 5, 26);
+  context.fill();
+  label(context, "N", x - 4, 40, palette);
+}
+
+/** The whole course in a corner, and the part of it that the picture shows. */
+export function drawMap(context, episode, time, poses, view, look) {
+  const map = look.map;
+  context.save();
+  context.translate(10, 10);
+  context.beginPath();
+  context.roundRect(0, 0, map.width, map.height, 6);
+  context.fillStyle = look.palette.panel;
+  context.globalAlpha = 0.8;
+  context.fill();
+  context.globalAlpha = 1;
+  context.clip();
+  drawCourse(context, episode, map, look.palette, 0.5);
+  context.fillStyle = look.palette.scale[8];
+  const dot = episode.vehicles > 200 ? 1 : 1.8;
+  for (let i = 0; i < episode.vehicles; i++) {
+    context.fillRect(map.x(poses[3 * i + 1]) - dot / 2, map.y(poses[3 * i]) - dot / 2, dot, dot);
+  }
+  const [north, east] = [view.height / 2 / view.scale, view.width / 2 / view.scale];
+  context.lineWidth = 1;
+  context.strokeStyle = look.palette.ink;
+  context.strokeRect(
+    map.x(view.east - east), map.y(view.north + north), 2 * east * map.scale, 2 * north * map.scale,
+  );
+  context.restore();
+}
+
+/** The frame of the small map in a picture's corner, or null where the picture has no room or shows it all. */
+export function mapView(course, view) {
+  const [tall, wide] = [course.high[0] - course.low[0], course.high[1] - course.low[1]];
+  const most = Math.min(140, 0.22 * view.width, 0.3 * view.height);
+  const scale = most / Math.max(tall, wide);
+  if (most < 60 || scale > 0.75 * view.scale) return null;
+  const [north, east] = [(course.low[0] + course.high[0]) / 2, (course.low[1] + course.high[1]) / 2];
+  return new View(north, east, scale, wide * scale, tall * scale);
+}

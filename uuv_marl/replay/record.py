@@ -1,0 +1,163 @@
+"""Recording an episode while it is simulated, by the loop and with the numbers of the benchmark."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
+from uuv_marl.errors import ReplayError
+from uuv_marl.replay.events import arrival, contacts, losses, near_misses
+from uuv_marl.replay.recording import Event, Float32, Inspection, Recording
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.swarm import Swarm
+
+MOST_INSPECTED = 8
+"""Vehicles whose sonar one recording holds."""
+
+
+def record(
+    scenario: Scenario,
+    policy: str,
+    seed: int,
+    inspect: Iterable[int] = (),
+    report: Callable[[float], None] | None = None,
+) -> Recording:
+    """Run an episode as the benchmark does, and keep where everybody was at every decision.
+
+    Args:
+        scenario: what to simulate; the policy is granted what it declares.
+        policy: its name, checkpoint, or ``module:Class``.
+        seed: of the episode.
+        inspect: indices of up to ``MOST_INSPECTED`` vehicles whose sonar and actions are kept.
+        report: called with the share of the longest possible episode that is done.
+
+    Raises:
+        ReplayError: a vehicle to inspect is not there, or there are too many.
+        PolicyError: the policy is unknown, or can't drive this scenario.
+        DivergenceError: the integration step could not follow a vehicle.
+    """
+    watched = checked(inspect, scenario)
+    scenario = granted(policy, scenario)
+    tape = _Tape(watched)
+    with blaming(policy):
+        for event in evaluate(scenario, policy, [seed], tape):
+            if isinstance(event, Run):
+                return tape.recording(scenario, policy, event)
+            if report:
+                report(event.share)
+    raise AssertionError("an episode ends with a run or an error")
+
+
+def checked(inspect: Iterable[int], scenario: Scenario) -> list[int]:
+    """The vehicles to inspect, each once. Raises ReplayError where they are too many, or not in the scenario."""
+    chosen, n = list(dict.fromkeys(inspect)), scenario.swarm.num_vehicles
+    for i in chosen:
+        if not 0 <= i < n:
+            raise ReplayError(f"vehicle {i} can't be inspected: {scenario.name} has vehicles 0 to {n - 1}; give those")
+    if len(chosen) > MOST_INSPECTED:
+        raise ReplayError(
+            f"at most {MOST_INSPECTED} vehicles can be inspected, got {len(chosen)}; give fewer, or make two replays"
+        )
+    return chosen
+
+
+class _Tape:
+    """Copies of what a swarm of one world shows after its reset and after every step."""
+
+    def __init__(self, inspect: Sequence[int]) -> None:
+        self._inspect = inspect
+        self._samples: dict[str, list[NDArray[Any]]] = {}
+        self._actions: list[Float32] = []
+
+    def __call__(self, swarm: Swarm, action: Float32 | None) -> None:
+        """Keep the state of world 0, as ``evaluate``'s watch."""
+        eta, nu, facts = swarm.state.eta[0], swarm.state.nu[0], swarm.facts
+        seen = list(self._inspect)
+        percept = swarm.percept
+        self._add("time_s", facts.time_s[0])
+        self._add("reference", facts.reference[0, :2])
+        self._add("position", eta[:, :2])
+        self._add("heading", eta[:, 2])
+        self._add("speed", np.hypot(nu[:, 0], nu[:, 1]))
+        self._add("force", np.sqrt(facts.effort[0]))
+        self._add("spacing", facts.spacing[0])
+        self._add("clearance", facts.clearance[0])
+        self._add("alive", swarm.state.alive[0], np.bool_)
+        self._add("contacts", facts.contacts[0], np.int32)
+        self._add("collisions", facts.collisions[0], np.int32)
+        self._add("heard", swarm.heard[0, seen], np.int32)
+        for name in ("neighbour", "echo", "echo_range", "echo_position"):
+            self._add(name, percept[name][0, seen])
+        if action is not None:
+            self._actions.append(np.array(action[0, seen], np.float32))
+
+    def _add(self, name: str, values: ArrayLike, kind: DTypeLike = np.float32) -> None:
+        copy: NDArray[Any] = np.array(values, kind)
+        self._samples.setdefault(name, []).append(copy)
+
+    def recording(self, scenario: Scenario, policy: str, run: Run) -> Recording:
+        """The recording of the run that was watched."""
+        tape = {name: np.array(values) for name, values in self._samples.items()}
+        alive = tape["alive"]
+        return Recording(
+            scenario=scenario,
+            policy=policy,
+            seed=run.seed,
+            metrics=run.metrics,
+            waypoints=run.waypoints,
+            obstacles=run.obstacles,
+            time_s=tape["time_s"],
+            reference=tape["reference"],
+            position=_where(alive, tape["position"]),
+            heading=_where(alive, tape["heading"]),
+            speed=_where(alive, tape["speed"]),
+            series={
+                "min_spacing_m": finite(run.series["min_spacing_m"]),
+                "obstacle_clearance_m": finite(run.series["obstacle_distance_m"].min(axis=1, initial=np.inf)),
+                "centre_error_m": run.series["centre_error_m"],
+                "collisions": np.cumsum(tape["collisions"]).astype(np.float32),
+            },
+            events=_events(scenario, tape, run),
+            force=_where(alive, tape["force"]),
+            spacing=finite(tape["spacing"]),
+            inspections=self._inspections(tape),
+        )
+
+    def _inspections(self, tape: dict[str, NDArray[Any]]) -> dict[int, Inspection]:
+        steps = len(self._actions)
+        asked = np.full((steps + 1, len(self._inspect), 2), np.nan, np.float32)
+        asked[:steps] = self._actions
+        asked = _where(tape["alive"][:, list(self._inspect)], asked)
+        echo = tape["echo"] > 0
+        neighbour = _where(tape["heard"] >= 0, tape["neighbour"])
+        reach, place = _where(echo, tape["echo_range"]), _where(echo, tape["echo_position"])
+        return {
+            i: Inspection(tape["heard"][:, k], neighbour[:, k], reach[:, k], place[:, k], asked[:, k])
+            for k, i in enumerate(self._inspect)
+        }
+
+
+def _events(scenario: Scenario, tape: dict[str, NDArray[Any]], run: Run) -> list[Event]:
+    """All events in the order of time."""
+    time, limits = tape["time_s"], scenario.constraints
+    events = [
+        *contacts(time, tape["contacts"], tape["clearance"], tape["position"], scenario.contact.hull_radius_m),
+        *near_misses("near", time, tape["spacing"] < limits.s_u_m),
+        *near_misses("near_obstacle", time, tape["clearance"] < limits.s_o_m),
+        *losses(time, tape["alive"]),
+        *arrival(run.metrics["task_time_s"]),
+    ]
+    return sorted(events, key=lambda event: event.time_s)
+
+
+def _where(there: NDArray[Any], values: NDArray[Any]) -> Float32:
+    """The values, NaN where they are not ``there``, whose axes are the first ones of the values."""
+    return np.where(there.reshape(there.shape + (1,) * (values.ndim - there.ndim)), values, np.float32(np.nan))
+
+
+def finite(values: Float32) -> Float32:
+    """The values, NaN where they are infinite because there is nothing to measure."""
+    return np.where(np.isfinite(values), values, np.float32(np.nan))

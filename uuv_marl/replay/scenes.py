@@ -1,0 +1,86 @@
+"""Scenes of a recording, for the painter that draws live worlds too."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, Sonar
+from uuv_marl.errors import ReplayError
+from uuv_marl.replay.recording import Event, Inspection, Recording
+
+
+class Scenes:
+    """Gives the scene of a recording at any time, with trails and the sonar of one inspected vehicle if asked.
+
+    Raises:
+        ReplayError: nothing was recorded of that vehicle's sonar.
+    """
+
+    def __init__(self, recording: Recording, sonar_of: int | None = None, *, trails: bool = True) -> None:
+        self.recording = recording
+        if sonar_of is not None and sonar_of not in recording.inspections:
+            held = ", ".join(map(str, sorted(recording.inspections))) or "none"
+            raise ReplayError(
+                f"the recording holds no sonar of vehicle {sonar_of}, only of: {held}; "
+                "name the vehicle when you record the episode"
+            )
+        self._sonar_of, self._back_s = sonar_of, np.linspace(TRAIL_S, 1.0, round(TRAIL_S)) if trails else np.zeros(0)
+        self._alive = np.isfinite(recording.position[:, :, 0])
+        last = np.maximum.accumulate(np.where(self._alive, np.arange(len(recording.time_s))[:, None], 0), axis=0)
+        vehicles = np.arange(recording.scenario.swarm.num_vehicles)
+        self._position = recording.position[last, vehicles]
+        self._heading = recording.heading[last, vehicles]
+        self._collisions = [event for event in recording.events if event.kind in ("collision", "obstacle")]
+        self._hits = np.array([self._place(event) for event in self._collisions if event.vehicles]).reshape(-1, 3)
+
+    def at(self, time_s: float) -> Scene:
+        """The latest sample that is no later; the last one after the end."""
+        recording = self.recording
+        k = max(int(np.searchsorted(recording.time_s, time_s + 1e-6, side="right")) - 1, 0)
+        now, alive = float(recording.time_s[k]), self._alive[k]
+        past = np.unique(np.searchsorted(recording.time_s, now - self._back_s))
+        series = {name: float(values[k]) for name, values in recording.series.items()}
+        arrival_s = recording.metrics["task_time_s"]
+        return Scene(
+            scenario=recording.scenario,
+            waypoints=recording.waypoints,
+            obstacles=recording.obstacles,
+            time_s=now,
+            reference=recording.reference[k],
+            position=self._position[k],
+            heading=self._heading[k],
+            alive=alive,
+            near=alive & self._near(k),
+            trail=self._position[past],
+            hits=self._hits[self._hits[:, 2] <= now],
+            arrival_s=arrival_s if arrival_s is not None and arrival_s <= now else None,
+            collisions=round(series.get("collisions", sum(event.time_s <= now for event in self._collisions))),
+            min_spacing_m=_distance(series["min_spacing_m"]),
+            clearance_m=_distance(series["obstacle_clearance_m"]),
+            centre_error_m=series["centre_error_m"],
+            sonar=self._sonar(k),
+        )
+
+    def _near(self, k: int) -> NDArray[np.bool_]:
+        recording, limits = self.recording, self.recording.scenario.constraints
+        discs, position = recording.obstacles, self._position[k]
+        offset = position[:, None] - discs[None, :, :2]
+        near = (np.hypot(offset[..., 0], offset[..., 1]) - discs[:, 2] < limits.s_o_m).any(axis=1)
+        return near if recording.spacing is None else near | (recording.spacing[k] < limits.s_u_m)
+
+    def _place(self, event: Event) -> list[float]:
+        """North, east and time of a collision."""
+        k = int(np.searchsorted(self.recording.time_s, event.time_s))
+        north, east = self._position[min(k, len(self._position) - 1), list(event.vehicles)].mean(axis=0).tolist()
+        return [north, east, event.time_s]
+
+    def _sonar(self, k: int) -> Sonar | None:
+        i = self._sonar_of
+        if i is None or not self._alive[k, i]:
+            return None
+        inspection: Inspection = self.recording.inspections[i]
+        return Sonar(i, inspection.neighbour[k][inspection.heard[k] >= 0], inspection.echo_range[k])
+
+
+def _distance(metres: float) -> float:
+    """Infinite where there was nothing to measure."""
+    return metres if np.isfinite(metres) else np.inf

@@ -1,0 +1,205 @@
+"""Recordings of what a benchmark has saved: less than a simulation shows, but at once and without the policy."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import ValidationError
+
+from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.benchmark.results import FILE, Content, load_trace, read_content, trace_path
+from uuv_marl.errors import ReplayError
+from uuv_marl.replay.command import command
+from uuv_marl.replay.events import arrival, losses, near_misses
+from uuv_marl.replay.record import finite
+from uuv_marl.replay.recording import Event, Float32, Recording
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.sim.trajectory import arrival_times, reference
+
+_ELSE = "give the folder of a benchmark or a file of its folder traces, or simulate with --scenario and --policy"
+_MOST_LISTED = 10
+_SHAPES: dict[str, tuple[str | int, ...]] = {
+    "time_s": ("time",),
+    "min_spacing_m": ("time",),
+    "centre_error_m": ("time",),
+    "obstacle_distance_m": ("time", "obstacle"),
+    "obstacles": ("obstacle", 3),
+    "waypoints": ("point", 2),
+    "route_time_s": ("sample",),
+    "route_position": ("sample", "vehicle", 2),
+    "route_heading": ("sample", "vehicle"),
+    "route_velocity": ("sample", "vehicle", 2),
+}
+"""Of the arrays that a recording needs; equal names are equal sizes."""
+
+
+class Saved(NamedTuple):
+    """A benchmark's folder, and what its results.json says."""
+
+    folder: Path
+    content: Content
+
+    @staticmethod
+    def at(folder: Path) -> "Saved":
+        """Raises ReplayError where there is no results.json of this version."""
+        if not (folder / FILE).is_file():
+            raise ReplayError(f"{folder} holds no {FILE}, which says what was run; {_ELSE}")
+        return Saved(folder, read_content(folder / FILE, "run the benchmark again, into another --output"))
+
+
+def from_trace(path: str | Path) -> Recording:
+    """The recording of a file in the folder ``traces`` of a benchmark, as far as it goes.
+
+    It has no force, spacing of single vehicles, collisions over time or inspections.
+
+    Raises:
+        ReplayError: it is no trace of a benchmark, or holds no routes.
+        ResultsError: it, or the results.json beside it, can't be read.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise ReplayError(f"{path} does not exist; {_ELSE}")
+    saved = Saved.at(path.absolute().parent.parent)
+    for row in saved.content["runs"]:
+        if trace_path(saved.folder, *row[:3]) == path.absolute():
+            return _recording(saved, row.scenario, row.policy, row.seed, row.metrics)
+    raise ReplayError(f"{path} is no trace of a run in {saved.folder / FILE}; {_ELSE}")
+
+
+def from_folder(folder: str | Path, scenario: str | None, policy: str | None, seed: int) -> Recording:
+    """The recording of a run in a benchmark's folder, as ``from_trace`` gives it.
+
+    Args:
+        folder: that holds the results.json.
+        scenario: its name; None for the only one there.
+        policy: its name; None for the only one of that scenario.
+        seed: of the run.
+
+    Raises:
+        ReplayError: the run is not there, or its trace holds no routes.
+        ResultsError: results.json or the trace can't be read.
+    """
+    saved = Saved.at(Path(folder))
+    rows = saved.content["runs"]
+    scenario = _chosen(folder, "--scenario", scenario, {row.scenario for row in rows})
+    rows = [row for row in rows if row.scenario == scenario]
+    policy = _chosen(folder, "--policy", policy, {row.policy for row in rows})
+    metrics = {row.seed: row.metrics for row in rows if row.policy == policy}
+    if seed not in metrics:
+        raise ReplayError(
+            f"{folder} holds no run of {policy} on {scenario} with seed {seed}, only {_listed(metrics)}; give one of "
+            f"these, or simulate it: {command(scenario, policy, seed)}"
+        )
+    return _recording(saved, scenario, policy, seed, metrics[seed])
+
+
+def _chosen(folder: str | Path, option: str, wanted: str | None, held: set[str]) -> str:
+    """What is wanted, or the only one that is held."""
+    if wanted in held:
+        return wanted
+    if wanted is None and len(held) == 1:
+        return next(iter(held))
+    missing = "" if wanted is None else f" no {wanted!r} but"
+    raise ReplayError(f"{folder} holds{missing} {_listed(held) or 'no runs'}; choose with {option}")
+
+
+def _listed(held: Iterable[Any]) -> str:
+    """The first of them, for a message."""
+    names = [str(name) for name in sorted(held)]
+    return ", ".join(names[:_MOST_LISTED]) + (" and others" if len(names) > _MOST_LISTED else "")
+
+
+def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics) -> Recording:
+    path, scenario = trace_path(saved.folder, name, policy, seed), _scenario(saved, name, policy)
+    trace = load_trace(path)
+    if not any(array.startswith("route_") for array in trace):
+        raise ReplayError(
+            f"{path} holds no routes: a benchmark keeps those of seed 0 alone. Simulate the run again, with the "
+            f"benchmark's own --set or file: {command(name, policy, seed)}"
+        )
+    _check(path, trace, scenario.swarm.num_vehicles)
+    at = np.searchsorted(trace["time_s"], trace["route_time_s"])
+    since = np.concatenate([[0], at[:-1] + 1])
+    spacing = np.minimum.reduceat(trace["min_spacing_m"], since)
+    clearance = np.minimum.reduceat(trace["obstacle_distance_m"].min(axis=1, initial=np.inf), since)
+    velocity = trace["route_velocity"]
+    return Recording(
+        scenario=scenario,
+        policy=policy,
+        seed=seed,
+        metrics=metrics,
+        waypoints=trace["waypoints"],
+        obstacles=trace["obstacles"],
+        time_s=trace["route_time_s"],
+        reference=_reference(trace["waypoints"], scenario.trajectory.speed_mps, trace["route_time_s"]),
+        position=trace["route_position"],
+        heading=trace["route_heading"],
+        speed=np.hypot(velocity[:, :, 0], velocity[:, :, 1]),
+        series={
+            "min_spacing_m": finite(spacing),
+            "obstacle_clearance_m": finite(clearance),
+            "centre_error_m": trace["centre_error_m"][at],
+        },
+        events=_events(scenario, trace, metrics),
+        force=None,
+        spacing=None,
+        inspections={},
+    )
+
+
+def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
+    """The scenario that was run, with what the policy was granted."""
+    try:
+        scenario = Scenario.model_validate_json(json.dumps(saved.content["scenarios"][name]))
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(map(str, first["loc"]))
+        raise ReplayError(
+            f"{saved.folder / FILE} describes {name!r} in the words of another version of uuv_marl ({field}: "
+            f"{first['msg']}); run the benchmark again"
+        ) from None
+    known = saved.content["policies"][policy]
+    return load_scenario(
+        scenario,
+        overrides={"sonar.channels": known["channels"], "actuators.yaw_damping_nms": known["yaw_damping_nms"]},
+    )
+
+
+def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:
+    """Raise ReplayError where the arrays are not those of a trace of so many vehicles."""
+    sizes: dict[str | int, int] = {2: 2, 3: 3, "vehicle": num_vehicles}
+    for name, axes in _SHAPES.items():
+        shape = trace[name].shape if name in trace and trace[name].dtype == np.float32 else ()
+        if len(shape) != len(axes) or any(sizes.setdefault(a, n) != n for a, n in zip(axes, shape, strict=True)):
+            got = f"is {trace[name].dtype} of shape {trace[name].shape}" if name in trace else "is missing"
+            raise ReplayError(f"{path} is no trace of this version of uuv_marl: {name} {got}; run the benchmark again")
+    if not len(trace["route_time_s"]) or not np.isin(trace["route_time_s"], trace["time_s"]).all():
+        raise ReplayError(f"{path}: route_time_s must be times of time_s; run the benchmark again")
+
+
+def _reference(waypoints: Float32, speed_mps: float, time_s: Float32) -> Float32:
+    """Where l(t) was, shape (time, 2)."""
+    corners = waypoints.astype(np.float64)
+    times = arrival_times(corners, speed_mps)
+    return np.array([reference(t, corners, times, len(corners) - 1)[:2] for t in time_s.tolist()], np.float32)
+
+
+def _events(scenario: Scenario, trace: dict[str, Float32], metrics: Metrics) -> list[Event]:
+    """What the series say, so that nobody is named but the lost; in the order of time."""
+    time, hull, limits = trace["time_s"], scenario.contact.hull_radius_m, scenario.constraints
+    spacing, clearance = trace["min_spacing_m"], trace["obstacle_distance_m"].min(axis=1, initial=np.inf)
+    marks = [
+        event
+        for kind, low in (
+            ("collision", spacing < 2 * hull),
+            ("obstacle", clearance < hull),
+            ("near", spacing < limits.s_u_m),
+            ("near_obstacle", clearance < limits.s_o_m),
+        )
+        for event in near_misses(kind, time, low[:, None])
+    ]
+    alive = np.isfinite(trace["route_heading"])
+    events = [*(event._replace(vehicles=()) for event in marks), *losses(trace["route_time_s"], alive)]
+    return sorted([*events, *arrival(metrics["task_time_s"])], key=lambda event: event.time_s)
