@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba.np.arrayobj import reshape_unchecked  # pyright: ignore[reportMissingTypeStubs]
+from numba.np.arrayobj import reshape_unchecked  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled_inline
