@@ -11,7 +11,7 @@ import numpy as np
 from worker import Case, Maker, repeated, serve
 
 from uuv_marl import load_scenario
-from uuv_marl.sim import hearing, motion, swarm, world
+from uuv_marl.sim import engine, hearing, motion, swarm, world
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.desk import desk
 from uuv_marl.sim.model import Model
@@ -67,7 +67,7 @@ def part(name: str) -> Maker:
     def made(agents: int, worlds: int) -> Case:
         water = swarm.Swarm(load_scenario("single_obstacle", num_vehicles=agents), worlds)
         water.reset(0)
-        with patch.object(swarm, "step_worlds") as step_worlds:  # what a step gives to compiled code
+        with patch.object(engine, "step_worlds") as step_worlds:  # what a step gives to compiled code
             water.step(np.zeros((worlds, agents, 2), np.float32))
         _, _, action, *parts, scratch = step_worlds.call_args.args
         given = action, World(*parts[:4]), Model(*parts[4:])

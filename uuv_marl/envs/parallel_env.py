@@ -14,6 +14,7 @@ from uuv_marl.envs.ending import ending
 from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, make_task
 from uuv_marl.envs.view import OneWorld
 from uuv_marl.sim.arguments import action_array
+from uuv_marl.sim.engine import EngineName
 
 Float32 = NDArray[np.float32]
 Infos = dict[str, dict[str, Any]]
@@ -167,6 +168,7 @@ def parallel_env(
     info_terms: bool = False,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
+    engine: EngineName = "numba",
 ) -> SwarmParallelEnv:
     """A PettingZoo parallel environment.
 
@@ -182,10 +184,12 @@ def parallel_env(
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
             ``timing.decision_period_s``. Meanwhile the force is held in the world frame and projected anew.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
+        engine: ``numba``, or ``plain``: the same run, bit for bit, from the plain Python of ``uuv_marl/sim/plain.py``,
+            tens to hundreds of times slower.
     """
     task = make_task(
         scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
-        overrides=overrides,
+        overrides=overrides, engine=engine,
     )  # fmt: skip
     return SwarmParallelEnv(task, render_mode, info_terms, render_options)
 

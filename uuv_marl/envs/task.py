@@ -13,6 +13,7 @@ from uuv_marl.envs.reward import RewardFunction, pay, rates
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
+from uuv_marl.sim.engine import EngineName
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 
@@ -59,14 +60,20 @@ class Task:
         reward: ``individual`` (the sum of a vehicle's terms), ``team`` (their mean over all vehicles, for each; a lost
             vehicle is also charged its own loss whole), or a function from the swarm to an array (world, vehicle).
         max_cycles: truncates after so many decisions, if the scenario's time limit does not come first.
+        engine: what steps the worlds: ``numba`` or ``plain``, see ``Swarm``.
     """
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, reward: Reward = "individual", max_cycles: int | None = None
+        self,
+        scenario: Scenario,
+        num_worlds: int = 1,
+        reward: Reward = "individual",
+        max_cycles: int | None = None,
+        engine: EngineName = "numba",
     ) -> None:
         if not callable(reward) and reward not in ("individual", "team"):
             raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
-        self.swarm = Swarm(scenario, num_worlds)
+        self.swarm = Swarm(scenario, num_worlds, engine)
         self.state_layout = state_layout(scenario)
         self._rates = rates(scenario)
         self._ready = np.zeros(num_worlds, np.bool_)
@@ -183,6 +190,7 @@ class TaskOptions(Changes, total=False):
 
     max_cycles: int | None
     reward: Reward
+    engine: EngineName
 
 
 def changed(
@@ -202,10 +210,11 @@ def make_task(
     *,
     max_cycles: int | None = None,
     reward: Reward = "individual",
+    engine: EngineName = "numba",
     **changes: Unpack[Changes],
 ) -> Task:
     """A task from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
-    return Task(changed(scenario, **changes), num_worlds, reward, max_cycles)
+    return Task(changed(scenario, **changes), num_worlds, reward, max_cycles, engine)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

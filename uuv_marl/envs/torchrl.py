@@ -35,8 +35,8 @@ class SwarmEnv(TaskBased, EnvBase):
         scenario: a name, a TOML file or a ``Scenario``.
         seed: of the first reset, world w from ``seed + w``; as ``set_seed``.
         device: where the tensors go; the water stays on the CPU.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as for
-            ``uuv_marl.parallel_env``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+            for ``uuv_marl.parallel_env``.
     """
 
     def __init__(

@@ -178,9 +178,9 @@ def vector_env(
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
             ``SwarmVectorEnv``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as for
-            ``uuv_marl.parallel_env``. ``reward`` shapes ``infos["agent_reward"]``; the row's own is the mean over all
-            vehicles.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+            for ``uuv_marl.parallel_env``. ``reward`` shapes ``infos["agent_reward"]``; the row's own is the mean over
+            all vehicles.
     """
     task = make_task(scenario, whole_number("num_envs", num_envs, 1), **options)
     return SwarmVectorEnv(task, render_mode, info_terms, autoreset_mode, render_options)

@@ -159,7 +159,10 @@ def compiled_inner(function: F) -> F:
         raise TypeError(f"{function.__name__} can be called by compiled code only")
 
     # A call from Python would run into the missing door; so Numba is never told of one, and asked to open one, refuses.
-    dispatcher._insert, dispatcher._compile_for_args = lambda *_args: None, refuse
+    def ignore(*_args: object) -> None:
+        return
+
+    dispatcher._insert, dispatcher._compile_for_args = ignore, refuse
     return cast(F, dispatcher)
 
 

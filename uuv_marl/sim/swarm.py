@@ -1,50 +1,27 @@
-"""Swarm: any number of worlds, reset one by one and stepped in one call. The only stepping loop there is."""
+"""Swarm: any number of worlds, reset one by one and stepped in one call: seeds, draws and checks before an engine."""
 
 import logging
-import os
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-from numba import config, get_num_threads
-from numba.np.ufunc.parallel import threading_layer
 from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.percept import Clock, Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
-from uuv_marl.sim.cells import max_cells
-from uuv_marl.sim.desk import scratch
 from uuv_marl.sim.disturbance import draw_losses
+from uuv_marl.sim.engine import EngineName, make_engine
 from uuv_marl.sim.field import draw_field
-from uuv_marl.sim.model import model
+from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
 from uuv_marl.sim.trajectory import arrival_times
-from uuv_marl.sim.world import observe_world, step_alone, step_worlds
-
-Float32 = NDArray[np.float32]
 
 _log = logging.getLogger("uuv_marl")
-_threads_of_parent = False
-
-
-def _note_fork() -> None:
-    global _threads_of_parent  # noqa: PLW0603 - set once, in a forked child
-    try:
-        threading_layer()
-    except ValueError:
-        return
-    _threads_of_parent = True
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_note_fork)
-
-
 _TABLES = (State, Course, Facts, Senses)
 
 
@@ -56,30 +33,27 @@ class Swarm:
 
     Args:
         scenario: what to simulate.
-        num_worlds: how many worlds a call steps. One world runs serially, several run on Numba's threads.
+        num_worlds: how many worlds a call steps.
+        engine: ``numba`` (compiled: one world runs serially, several run on threads), or ``plain``, the same numbers
+            from the plain Python of ``uuv_marl/sim/plain.py``, tens to hundreds of times slower.
     """
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, engine: EngineName = "numba") -> None:
         self.num_worlds = num_worlds = whole_number("num_worlds", num_worlds, 1)
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
-        self._model = model(scenario)
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
         self._duration_s = np.zeros(num_worlds)
         self.keys = np.zeros(num_worlds, np.uint64)
         """Of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
-        self._sizes = _sizes(scenario, num_worlds, len(self._model.rules.arrival_radii), self.layout.size)
-        self._world = World(*(allocate(table, self._sizes) for table in _TABLES))
-        self.state, self.course, self.facts, self._senses = self._world
+        self._sizes = _sizes(scenario, num_worlds, self.layout.size)
+        self.state, self.course = allocate(State, self._sizes), allocate(Course, self._sizes)
+        self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)
+        self._world = World(self.state, self.course, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
-        self._scratch = scratch(
-            min(num_worlds, cast(Any, config).NUMBA_NUM_THREADS),
-            self.num_vehicles,
-            scenario.sonar.num_sectors,
-            max_cells(self.num_vehicles),
-        )
+        self._engine = make_engine(engine, scenario, self._world)
 
     @property
     def percept(self) -> Percept:
@@ -169,17 +143,14 @@ class Swarm:
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
-        self._observe(w)
+        self._engine.observe(w)
 
     def observe(self) -> Percept:
         """Facts and percepts anew, as after a reset, where ``state`` or ``course`` was changed by hand."""
         self._check_indices(self._arrays())
         for w in range(self.num_worlds):
-            self._observe(w)
+            self._engine.observe(w)
         return self.percept
-
-    def _observe(self, w: int) -> None:
-        observe_world(w, self._world, self._model, self._scratch)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that a later run depends on, copied, for ``restore``: random streams too."""
@@ -234,29 +205,14 @@ class Swarm:
             )
         if not (self._ready if active is None else self._ready | ~active).all():
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
-        action = np.ascontiguousarray(action)
-        if self.num_worlds == 1:
-            diverged = (active is None or active[0]) and step_alone(action, self._world, self._model, self._scratch)
-        else:
-            diverged = self._step_worlds(action, active)
-        if diverged:
+        if self._engine.step(np.ascontiguousarray(action), active):
             for w in np.flatnonzero((self.facts.diverged >= 0) & ~self._warned):
                 _log.warning(self.divergence(int(w)))
                 self._warned[w] = True
         return self.percept
 
-    def _step_worlds(self, action: Float32, active: NDArray[np.bool_] | None) -> bool:
-        if _threads_of_parent:
-            raise RuntimeError(
-                "several worlds can't be stepped in a process forked after Numba's threads had started; "
-                "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
-            )
-        running = np.ones(self.num_worlds, np.bool_) if active is None else active
-        threads = min(get_num_threads(), len(self._scratch.reals))
-        return step_worlds(threads, running, action, *self._world, *self._model, self._scratch)
 
-
-def _sizes(scenario: Scenario, worlds: int, radii: int, entries: int) -> dict[str, int]:
+def _sizes(scenario: Scenario, worlds: int, entries: int) -> dict[str, int]:
     """Lengths of the axes of all tables."""
     field = scenario.random_field
     return {
@@ -266,6 +222,6 @@ def _sizes(scenario: Scenario, worlds: int, radii: int, entries: int) -> dict[st
         "obstacle": max(scenario.max_obstacles, 1),
         "loss": len(scenario.disturbance.loss_times_s),
         "sector": scenario.sonar.num_sectors,
-        "radius": radii,
+        "radius": 1 + len(ARRIVAL_RADII_M),
         "entry": entries,
     }

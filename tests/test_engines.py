@@ -1,16 +1,25 @@
-"""Speed never changes physics: same neighbours, and states within 4 ulp per control hold of the plain kernel."""
+"""Both engines compute the same, bit for bit: speed never changes physics, and the plain Python says what it is."""
 
 import functools
 import math
+import os
+import subprocess
+import sys
+import types
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tests import plain
-from uuv_marl import load_scenario
+import uuv_marl
+from uuv_marl import load_scenario, scenario_names
+from uuv_marl.baselines import make
+from uuv_marl.sim import model as model_module
+from uuv_marl.sim import plain
 from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
+from uuv_marl.sim.desk import Columns
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import plant
@@ -20,98 +29,237 @@ SIZES = (1, 2, 3, 54, 300, 600)
 GRIDS = [n for n in SIZES if n > ONE_CELL_UP_TO]
 
 
-def agree(ours, theirs, summed=0.0, ulps=4):
-    """Equal within ``ulps`` of the larger of the value and what it sums, since cancellation is no error."""
-    ours, theirs = np.asarray(ours), np.asarray(theirs)
-    with np.errstate(invalid="ignore"):
-        room = ulps * np.spacing(np.maximum(np.maximum(np.abs(ours), np.abs(theirs)), summed))
-        wrong = ~((ours == theirs) | (np.abs(ours - theirs) <= room))
-    assert not wrong.any(), (np.argwhere(wrong)[:5], ours[wrong][:5], theirs[wrong][:5])
+def array(name, mounting, aperture, sub_sectors, range_m, kind="passive"):
+    return {"name": name, "kind": kind, "mounting_deg": mounting, "aperture_deg": aperture, "range_m": range_m,
+            "sub_sectors": sub_sectors}  # fmt: skip
+
+
+OVERLAPPING = [
+    array("a", 0, 120, 7, 100, "active"), array("b", 20, 180, 5, 300.5), array("c", 7, 360, 9, 150),
+    array("d", -55, 33, 4, 4000), array("e", -30, 90, 3, 60, "active"),
+]  # fmt: skip
+
+# --- Whole episodes ---
+
+COUPLED = {"vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0, "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0,
+           "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0}  # fmt: skip
+HIDING = {"sonar.obstacles_hide_vehicles": True}
+CORNERS = {"trajectory.waypoints_m": [[0.0, 0.0], [4.0, 0.0], [4.0, 8.0]]}  # at 1 s and 3 s
+FATAL = {"contact.ends_vehicle": True}
+DAMPED = {"actuators.yaw_damping_nms": 600.0}
+MANY_LOSSES = {"disturbance.loss_times_s": [0.6, 1.0, 1.1, 1.2]}
+FINE = {"timing.decision_period_s": 0.5, "timing.integration_step_s": 0.02}
+LOSSES = {"disturbance.loss_times_s": [0.3, 1.25, 1.25]}
+EPISODES = {
+    **{name: (name, {"num_vehicles": n}, "") for n, name in enumerate(scenario_names(), 7)},
+    "starter": ("starter", {}, "arrival"),
+    "losses": ("lossy", {"overrides": LOSSES}, "lost"),
+    "losses within a decision": ("lossy", {"overrides": {**LOSSES, **FINE}}, "lost arrival"),
+    "all are lost": ("starter", {"overrides": {**FINE, **FATAL, **MANY_LOSSES}}, "lost end"),
+    "a contact ends a vehicle": ("starter", {"overrides": {**FINE, **FATAL}}, "lost arrival"),
+    "channels, echoes of surfaces": (
+        "starter", {"overrides": {"sonar.channels": ["compass", "link"], "sonar.echo_reports": "surface"}}, "arrival"
+    ),
+    "link alone": ("multi_obstacle", {"num_vehicles": 9, "overrides": {"sonar.channels": ["link"]}}, ""),
+    "obstacles hide": ("multi_obstacle", {"num_vehicles": 12, "overrides": HIDING}, ""),
+    "corners on a tick": ("tracking", {"overrides": CORNERS}, ""),
+    "overlapping arrays": ("single_obstacle", {"num_vehicles": 7, "overrides": {"sonar.arrays": OVERLAPPING}}, ""),
+    "five holds, coupled, damped": ("starter", {"overrides": {**FINE, **COUPLED, **DAMPED}}, "arrival"),
+}  # fmt: skip
+"""Scenario, changes, and what must happen beside echoes and contacts."""
+
+
+def both(scenario, worlds=2, seed=0):
+    """A swarm of each engine, at the same start."""
+    swarms = [Swarm(scenario, worlds, engine=engine) for engine in ("numba", "plain")]
+    for swarm in swarms:
+        swarm.reset(seed)
+    assert_same(*swarms)
+    return swarms
+
+
+def assert_same(ours, theirs):
+    """Every array has the same bits."""
+    theirs = theirs.snapshot()
+    for name, array in ours.snapshot().items():
+        np.testing.assert_array_equal(array, theirs[name], name)
+        assert array.tobytes() == theirs[name].tobytes(), f"the sign of a zero in {name}"
+
+
+def crowd(swarm, rng):
+    """Vehicles about to touch an obstacle or each other, on one spot, inside an obstacle; headings beyond pi."""
+    state, course, n = swarm.state, swarm.course, swarm.num_vehicles
+    for w in range(swarm.num_worlds):
+        x, y, radius = course.obstacles[w, 0] if course.num_obstacles[w] else (50.0, 20.0, 10.0)
+        angle = rng.uniform(-math.pi, math.pi, n)
+        away = radius + rng.uniform(1.05, 1.6, n)
+        state.eta[w] = np.stack([x + away * np.cos(angle), y + away * np.sin(angle), angle + math.pi], 1)
+        state.before[w] = state.eta[w, :, :2] + rng.normal(0.0, 3.0, (n, 2))
+        state.nu[w] = [6.0, 0.5, 0.1] * rng.uniform(0.9, 1.1, (n, 1))
+        state.eta[w, 1] = state.eta[w, 0] + [2.1 * math.cos(angle[0]), 2.1 * math.sin(angle[0]), 0.0]
+        state.eta[w, 3, :2] = state.eta[w, 2, :2]
+        state.eta[w, 4, :2] = x, y
+
+
+def assemble(swarm, rng):
+    """At rest around the trajectory's end, when l(t) is there."""
+    for w in range(swarm.num_worlds):
+        end = swarm.course.waypoints[w, swarm.course.last[w]]
+        places = end + np.linspace(-9.0, 9.0, swarm.num_vehicles)[:, None] * [0.6, 0.8]
+        swarm.state.eta[w, :, :2] = swarm.state.before[w] = places
+        swarm.state.nu[w] = 0.0
+        swarm.state.tick[w] = math.ceil(swarm.duration_s[w] / swarm.scenario.timing.control_hold_s)
+
+
+def at_random(swarm, rng):
+    action = rng.uniform(-1.2, 1.2, (swarm.num_worlds, swarm.num_vehicles, 2)).astype(np.float32)
+    action[~swarm.state.alive] = np.nan
+    return action
+
+
+def episode(scenario, seed, worlds):
+    """Decisions of both engines: random ones and a policy's, states written by hand, now and then a world that waits.
+
+    Yields the compiled swarm after each step, once the other is known to be the same.
+    """
+    swarms = ours, _ = both(scenario, worlds, seed)
+    policy = "bio_inspired_plus" if scenario.actuators.yaw_damping_nms else "bio_inspired"
+    actor, rng = make(policy, scenario, worlds), np.random.default_rng(seed)
+    actor.reset(seed)
+    writes = {15: crowd, 25: assemble}
+    for k in range(50):
+        if k in writes:
+            for swarm in swarms:
+                writes[k](swarm, np.random.default_rng(k))
+                swarm.observe()
+            assert_same(*swarms)
+        action = actor.act(ours.percept) if k % 10 < 5 else at_random(ours, rng)
+        active = None if k % 7 else np.arange(worlds) != k % 2
+        for swarm in swarms:
+            swarm.step(0.0 * action if k >= 25 else action, active)
+        assert_same(*swarms)
+        yield ours
+
+
+@pytest.mark.parametrize("name", EPISODES)
+def test_engines_give_the_same_bits(name):
+    scenario, change, happens = EPISODES[name]
+    scenario, seen = load_scenario(scenario, **{"num_vehicles": 5, **change}), set()
+    for worlds in (1, 2):
+        for swarm in episode(scenario, worlds, worlds):
+            facts, percept = swarm.facts, swarm.percept
+            flags = {
+                "heard": percept["heard"],
+                "echo": percept["echo"],
+                "contact": facts.contacts,
+                "lost": facts.lost,
+                "end": ~swarm.state.alive.any(1),
+                "arrival": swarm.arrived,
+                "diverged": facts.diverged >= 0,
+            }
+            seen |= {what for what, array in flags.items() if array.any()}
+    assert seen == {"heard", "contact", *happens.split(), *(["echo"] if scenario.max_obstacles else [])}
+
+
+@pytest.mark.parametrize("fine", [{}, FINE])
+def test_engines_lose_the_same_vehicle_to_its_speed(fine, monkeypatch):
+    monkeypatch.setattr(model_module, "plant", lambda scenario: plant(scenario)._replace(X_u=-2000.0, X_uu=0.0))
+    swarms = both(load_scenario("starter", overrides=fine), 3)
+    action = np.zeros((3, 5, 2), np.float32)
+    action[0, 2], action[1, 4] = (1.0, 0.0), (-0.5, 0.0)
+    for swarm in swarms:
+        swarm.state.nu[...] = 0.0
+    for _ in range(50):
+        for swarm in swarms:
+            swarm.step(action)
+        assert_same(*swarms)
+    assert swarms[0].facts.diverged.tolist() == [2, 4, -1]
+
+
+# --- What a user takes an engine by ---
+
+
+def test_environments_take_an_engine_and_give_the_same_episode():
+    ours, theirs = (uuv_marl.parallel_env("starter", engine=engine) for engine in ("numba", "plain"))
+    vector = uuv_marl.vector_env(2, "starter", engine="plain")
+    for env in (ours, theirs, vector):
+        env.reset(seed=3)
+    for _ in range(10):
+        (_, reward, *_), (_, same, *_) = (env.step({key: [0.9, 0.2] for key in env.agents}) for env in (ours, theirs))
+        vector.step(np.full((2, 5, 2), [0.9, 0.2], np.float32))
+        assert_same(ours.swarm, theirs.swarm)
+        assert reward == same
+    np.testing.assert_array_equal(vector.swarm.state.eta[0], ours.swarm.state.eta[0])
+
+
+def test_an_engine_that_there_is_not_is_refused():
+    with pytest.raises(ValueError, match="engine must be 'numba' or 'plain', got 'jax'"):
+        Swarm(BASE, engine="jax")
+
+
+def test_the_plain_engine_needs_no_compiler():
+    run = """
+import numpy as np
+from uuv_marl import load_scenario
+from uuv_marl.sim.swarm import Swarm
+swarm = Swarm(load_scenario("starter"), engine="plain")
+swarm.reset(0)
+print(swarm.step(np.full((1, 5, 2), 0.5)).flat.sum())
+"""
+    sums = {
+        subprocess.run(
+            [sys.executable, "-c", run], env={**os.environ, "NUMBA_DISABLE_JIT": disable}, check=True,
+            capture_output=True, text=True,
+        ).stdout
+        for disable in "01"
+    }  # fmt: skip
+    assert len(sums) == 1
 
 
 # --- Motion ---
-
-
-def summed_in_a_hold(speed, push, p, hold_s):
-    """Sizes of what a control hold adds to (x, y, psi, u, v, r) at these speeds and this share of full force.
-
-    The heading also sums pi, which ``wrap`` adds and takes away.
-    """
-    u, v, r = speed
-    thrust, torque = push * p.max_force, push * p.max_torque + p.yaw_damping * r
-    surge = p.inverse_11 * (thrust + (p.m - p.Y_vdot) * v * r + (p.X_u + p.X_uu * u) * u)
-    sway = p.inverse_22 * ((p.m - p.X_udot) * u * r + (p.Y_v + p.Y_vv * v) * v)
-    yaw = p.inverse_33 * (torque + (p.X_udot - p.Y_vdot) * u * v + (p.N_r + p.N_rr * r) * r)
-    far = hold_s * (u + v)
-    return np.array([far, far, np.full_like(u, math.pi), hold_s * surge, hold_s * sway, hold_s * yaw])
-
 
 CLOCKS = {
     "one hold": {},
     "five holds": {"timing.decision_period_s": 0.5},
     "fine steps": {"timing.integration_step_s": 0.02},
-    "five holds of fine steps": {"timing.decision_period_s": 0.5, "timing.integration_step_s": 0.02},
-    "yaw damping": {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0},
-    "coupled": {"timing.decision_period_s": 0.5, "vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0,
-                "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0, "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0},
-}  # fmt: skip
+    "five holds of fine steps": FINE,
+    "yaw damping": {"timing.decision_period_s": 0.5, **DAMPED},
+    "coupled": {"timing.decision_period_s": 0.5, **COUPLED},
+}
 
 
 @functools.cache
-def fleet(clock):
-    swarm = Swarm(load_scenario(BASE, num_vehicles=54, overrides=CLOCKS[clock]))
-    swarm.reset(0)
-    return swarm
+def fleets(clock):
+    return both(load_scenario(BASE, num_vehicles=16, overrides=CLOCKS[clock]), 1)
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
 @settings(max_examples=12)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, 1e-6]), st.booleans())
-def test_states_are_those_of_the_plain_kernel(clock, seed, small, astern):
-    rng, swarm = np.random.default_rng(seed), fleet(clock)
-    n, p, timing = swarm.num_vehicles, plant(swarm.scenario), swarm.scenario.timing
-    eta, nu = swarm.state.eta[0], swarm.state.nu[0]
-    eta[:, :2] = rng.uniform(-1000, 1000, (n, 2)) * small
-    eta[:, 2] = rng.uniform(-math.pi, math.pi, n)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, 1e-6, 300.0]), st.booleans())
+def test_engines_move_vehicles_alike_from_any_state(clock, seed, size, astern):
+    rng, swarms = np.random.default_rng(seed), fleets(clock)
+    n = swarms[0].num_vehicles
+    places = rng.uniform(-1000, 1000, (n, 2)) * size
+    headings = rng.uniform(-math.pi, math.pi, n)
     if astern:  # where the heading wraps
-        eta[:, 2] = math.pi * (1.0 - 10.0 ** rng.uniform(-16, -1, n)) * rng.choice([-1, 1], n)
-    nu[:] = rng.uniform(-1, 1, (n, 3)) * [6, 3, 3] * small
-    action = (rng.uniform(-1.5, 1.5, (1, n, 2)) * small).astype(np.float32)
-    clocks = timing.holds_per_decision, timing.steps_per_hold, timing.integration_step_s
-    was = np.abs(np.hstack([eta, nu]))
-    slow = [
-        plain.decide(*vehicle, p, *clocks)
-        for vehicle in zip(eta.tolist(), nu.tolist(), action[0].tolist(), strict=True)
-    ]
-    swarm.step(action)
-    then = np.array([[*place, *velocity] for place, velocity, _ in slow])
-    now = np.hstack([eta, nu])
-    # -pi and the heading just below pi are the same.
-    now[:, 2] = then[:, 2] + [math.remainder(turn, 2.0 * math.pi) for turn in now[:, 2] - then[:, 2]]
-    push = np.minimum(np.hypot(*action[0].T.astype(float)), 1.0)
-    summed = summed_in_a_hold(np.maximum(was, np.abs(then))[:, 3:].T, push, p, timing.control_hold_s)
-    agree(now, then, np.maximum(was, summed.T), ulps=4 * timing.holds_per_decision)
-    np.testing.assert_allclose(swarm.facts.effort[0], [effort for _, _, effort in slow], rtol=1e-14)
+        headings = math.pi * (1.0 - 10.0 ** rng.uniform(-16, -1, n)) * rng.choice([-1, 1], n)
+    velocities = rng.uniform(-1, 1, (n, 3)) * [6, 3, 3] * size
+    action = (rng.uniform(-1.5, 1.5, (1, n, 2)) * size).astype(np.float32)
+    for swarm in swarms:
+        swarm.state.eta[0, :, :2], swarm.state.eta[0, :, 2], swarm.state.nu[0] = places, headings, velocities
+        swarm.observe()
+    assert_same(*swarms)
+    for swarm in swarms:
+        swarm.step(action)
+    assert_same(*swarms)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e10, 1e25, 3e38])
 def test_an_action_of_any_size_is_projected_onto_the_unit_disc(size):
-    swarm = fleet("one hold")
-    swarm.reset(0)
-    swarm.step(np.full((1, 54, 2), size, np.float32))
-    np.testing.assert_allclose(swarm.facts.effort, 1.0, rtol=1e-15)
-
-
-def test_headings_are_those_of_the_poses_also_for_the_lost():
-    swarm = fleet("five holds")
-    swarm.reset(0)
-    swarm.state.alive[0, ::3] = False
-    action = np.full((1, 54, 2), 0.7, np.float32)
-    action[0, ::6] = np.nan
-    for _ in range(3):
-        swarm.step(action)
-        psi = swarm.state.eta[0, :, 2]
-        np.testing.assert_allclose(swarm.heading[0], np.stack([np.cos(psi), np.sin(psi)], 1), rtol=0, atol=1e-15)
+    for swarm in fleets("one hold"):
+        swarm.reset(0)
+        swarm.step(np.full((1, swarm.num_vehicles, 2), size, np.float32))
+        np.testing.assert_allclose(swarm.facts.effort, 1.0, rtol=1e-15)
 
 
 # --- Sine and cosine ---
@@ -151,18 +299,22 @@ def test_cosine_is_even_and_sine_odd_and_both_exact_at_zero():
 # --- Neighbours, distances, contacts ---
 
 
-def array(name, mounting, aperture, sub_sectors, range_m, kind="passive"):
-    return {"name": name, "kind": kind, "mounting_deg": mounting, "aperture_deg": aperture, "range_m": range_m,
-            "sub_sectors": sub_sectors}  # fmt: skip
+def compiled_copy(module):
+    """The functions of a module compiled as they stand, so that swarms of hundreds can be compared with them."""
+    space = dict(vars(module))
+    for name, function in vars(module).items():
+        if isinstance(function, types.FunctionType) and function.__module__ == module.__name__:
+            space[name] = numba.njit(types.FunctionType(function.__code__, space, name))
+    return types.SimpleNamespace(**space)
+
+
+PLAIN = compiled_copy(plain)
 
 
 SUITES = {
     "as set": None,
     "hiding": None,
-    "overlapping": [
-        array("a", 0, 120, 7, 100, "active"), array("b", 20, 180, 5, 300.5), array("c", 7, 360, 9, 150),
-        array("d", -55, 33, 4, 4000),
-    ],
+    "overlapping": OVERLAPPING,
     "twice": [array("a", 0, 120, 4, 100), array("b", 0, 120, 4, 500), array("c", 0, 120, 4, 100)],
     "blind gaps": [array("a", 0, 60, 3, 100, "active"), array("b", 180, 30, 1, 500), array("c", 32, 4, 1, 250)],
     "one wide": [array("a", 0, 120, 1, 500)],
@@ -295,37 +447,41 @@ def fill(swarm, layout, seed):
     swarm.observe()
 
 
-def check(swarm):
-    """The world as the plain kernel sees it."""
-    sonar, facts = swarm.scenario.sonar, swarm.facts
-    eta, before, alive = swarm.state.eta[0], swarm.state.before[0], swarm.state.alive[0]
-    discs = swarm.course.obstacles[0]
-    heading, hull = swarm.heading[0], swarm.scenario.contact.hull_radius_m
-    np.testing.assert_allclose(heading, np.stack([np.cos(eta[:, 2]), np.sin(eta[:, 2])], 1), rtol=0, atol=1e-15)
+def sectors(swarm):
+    return plain.Sectors(*(np.array(part) for part in plain.sub_sectors(swarm.scenario.sonar.arrays)))
 
-    hiding = discs if sonar.obstacles_hide_vehicles else discs[:0]
-    heard = plain.hear(eta, heading, alive, *plain.sub_sectors(sonar.arrays), hiding)
+
+def check(swarm):
+    """The world as the plain functions see it."""
+    facts, alive, hull = swarm.facts, swarm.state.alive[0], swarm.scenario.contact.hull_radius_m
+    eta, before = swarm.state.eta[0], swarm.state.before[0]
+    discs = swarm.course.obstacles[0, : swarm.course.num_obstacles[0]]
+    heading = np.array([plain.cos_sin(psi) for psi in eta[:, 2].tolist()])
+    np.testing.assert_array_equal(swarm.heading[0], heading)
+
+    suite, hiding = sectors(swarm), discs if swarm.scenario.sonar.obstacles_hide_vehicles else discs[:0]
+    heard = np.full(swarm.heard[0].shape, -1)
+    for i in np.flatnonzero(alive):
+        heard[i] = PLAIN.hear(i, eta, heading, alive, suite, hiding)
     np.testing.assert_array_equal(swarm.heard[0], heard)
     dx, dy = (eta[heard, axis] - eta[:, None, axis] for axis in (0, 1))
     c, s = heading[:, None, 0], heading[:, None, 1]
     there = np.stack([c * dx + s * dy, c * dy - s * dx], 2).astype(np.float32)
     np.testing.assert_array_equal(swarm.percept["neighbour"][0], np.where(heard[:, :, None] >= 0, there, 0))
 
-    spacing, largest, met = plain.measure_vehicles(eta, before, alive, hull)
-    agree(facts.spacing[0], spacing)
-    agree(facts.min_spacing[0], spacing.min())
-    agree(facts.max_spacing[0], largest)
-    clearance, reached, touched = plain.measure_obstacles(eta, before, alive, hull, discs)
-    span = np.abs(np.subtract.outer(eta[:, :2], discs[:, :2])).max() + discs[:, 2].max()
-    agree(facts.clearance[0], clearance, span)
-    agree(facts.obstacle_clearance[0], reached, span)
-    np.testing.assert_array_equal(facts.contacts[0], met + touched)
-    assert facts.collisions[0] == met.sum() // 2 + touched.sum()
+    spacing, largest, met = PLAIN.between_vehicles(eta, before, alive, hull)
+    clearance, reached, touched = PLAIN.to_obstacles(eta, before, alive, hull, discs)
+    np.testing.assert_array_equal(facts.spacing[0], spacing)
+    assert (facts.min_spacing[0], facts.max_spacing[0]) == (min(spacing), largest)
+    np.testing.assert_array_equal(facts.clearance[0], clearance)
+    np.testing.assert_array_equal(facts.obstacle_clearance[0, : len(discs)], reached)
+    np.testing.assert_array_equal(facts.contacts[0], np.add(met, touched))
+    assert facts.collisions[0] == sum(met) // 2 + sum(touched)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
 @pytest.mark.parametrize("suite", SUITES)
-def test_neighbours_distances_and_contacts_are_those_of_the_plain_kernel(suite, layout):
+def test_neighbours_distances_and_contacts_are_those_of_the_plain_functions(suite, layout):
     for n in SIZES if suite in ("as set", "hiding") else (3, 54, 300):
         for seed in range(2 if n > 54 else 4):
             swarm = world(suite, n)
@@ -348,7 +504,7 @@ def test_a_bearing_on_an_edge_along_the_border_of_a_cell_is_heard():
         sonar = {"sonar.arrays": [array("a", mounting, 60, 1, 500)]}
         swarm = Swarm(load_scenario(BASE, num_vehicles=n, overrides=sonar))
         swarm.reset(0)
-        (lower,), (upper,), _ = sectors = plain.sub_sectors(swarm.scenario.sonar.arrays)
+        (lower,), (upper,), *_ = sectors(swarm)
         for k, distance in ((k, distance) for k in range(8) for distance in (6 * cell, 8 * cell)):
             edge, quarter = (lower, upper)[k // 4], k % 4
             ahead = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)][quarter])
@@ -359,8 +515,7 @@ def test_a_bearing_on_an_edge_along_the_border_of_a_cell_is_heard():
             eta[0, :2], eta[1, :2], eta[2, :2] = 0.0, distance * ahead, 12 * cell
             swarm.state.eta[0], swarm.state.before[0] = eta, eta[:, :2]
             swarm.observe()
-            heard = plain.hear(eta, swarm.heading[0], swarm.state.alive[0], *sectors, np.zeros((0, 3)))
-            np.testing.assert_array_equal(swarm.heard[0], heard)
+            check(swarm)
 
 
 def test_bearings_within_rounding_of_an_edge_where_two_bins_of_direction_meet():
@@ -371,18 +526,18 @@ def test_bearings_within_rounding_of_an_edge_where_two_bins_of_direction_meet():
         sonar = {"sonar.arrays": [array("a", lower - 10, 20, 2, 500), array("b", lower + 10, 20, 2, 500)]}
         swarm = Swarm(load_scenario(BASE, num_vehicles=2, overrides=sonar))
         swarm.reset(0)
-        sectors = plain.sub_sectors(swarm.scenario.sonar.arrays)
-        edge = sectors[1][1] * 64.0
+        edge = sectors(swarm).upper[1] * 64.0
         for nudge in np.ndindex(5, 5):
             swarm.state.eta[0] = 0.0
             swarm.state.eta[0, 1, :2] = edge + (np.array(nudge) - 2) * np.spacing(edge)
             swarm.observe()
-            heard = plain.hear(swarm.state.eta[0], swarm.heading[0], np.ones(2, bool), *sectors, np.zeros((0, 3)))
-            np.testing.assert_array_equal(swarm.heard[0], heard)
+            check(swarm)
 
 
 def grid_of(eta, side=16.25):
-    return fit(eta[:, 0].copy(), eta[:, 1].copy(), np.ones((1, len(eta)), bool), 0, side)
+    now = Columns(*np.zeros((len(Columns._fields), len(eta))))
+    now.x[:], now.y[:] = eta[:, 0], eta[:, 1]
+    return fit(0, np.ones((1, len(eta)), bool), side, now)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
@@ -414,12 +569,13 @@ def test_one_lost_vehicle_more_calls_for_a_grid_and_changes_nothing(layout):
     assert more.facts.max_spacing[0] == few.facts.max_spacing[0]
 
 
-def test_a_vehicle_at_rest_on_a_hull_s_distance_from_an_obstacle_never_touches_it():
+@pytest.mark.parametrize("engine", ["numba", "plain"])
+def test_a_vehicle_at_rest_on_a_hull_s_distance_from_an_obstacle_never_touches_it(engine):
     """Where two ways of computing a distance differ by an ulp, an old gap must not count as a new contact."""
     offset = np.random.default_rng(0).uniform(20, 40, (10000, 2))
     x, y = next((x, y) for x, y in offset if math.sqrt(x * x + y * y) < math.hypot(x, y))
     disc = {"centre_m": [9e3, 9e3], "radius_m": 1.0}
-    one = Swarm(load_scenario(BASE, num_vehicles=1, overrides={"obstacles": [disc]}))
+    one = Swarm(load_scenario(BASE, num_vehicles=1, overrides={"obstacles": [disc]}), engine=engine)
     one.reset(0)
     one.state.eta[0], one.state.nu[0], one.course.obstacles[0, 0] = 0.0, 0.0, (x, y, math.hypot(x, y) - 1.0)
     for _ in range(3):
@@ -449,7 +605,4 @@ def test_the_largest_distance_is_found_whatever_the_shape(shape, n):
         swarm.state.eta[0, : len(points), :2] = swarm.state.before[0, : len(points)] = points
         swarm.state.alive[0] = np.arange(n) < len(points)
         swarm.observe()
-        _, largest, _ = plain.measure_vehicles(
-            swarm.state.eta[0], swarm.state.before[0], swarm.state.alive[0], swarm.scenario.contact.hull_radius_m
-        )
-        agree(swarm.facts.max_spacing[0], largest)
+        check(swarm)
