@@ -13,8 +13,8 @@ from worker import Case, Maker, repeated, serve
 from uuv_marl import load_scenario
 from uuv_marl.sim import engine, hearing, motion, swarm, world
 from uuv_marl.sim.arrays import World
-from uuv_marl.sim.desk import desk
 from uuv_marl.sim.model import Model
+from uuv_marl.sim.workspace import workspace
 
 PARTS = {
     "part_moved": (True, False, False, False, False),
@@ -35,30 +35,30 @@ def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> A
     """These parts of ``world.step_world``, compiled, over many worlds."""
 
     @compiled
-    def run(num, action, water, model, desk):
+    def run(num, action, water, model, workspace):
         for w in range(num):
-            motion.load(w, water.state, desk.now)
+            motion.load(w, water.state, workspace.now)
             if move:
-                motion.aim(w, action, desk.now)
-                world.hold(w, True, water, model, desk.now)
+                motion.load_action(w, action, workspace.now)
+                world.control_hold(w, True, water, model, workspace.now)
             if sort:
-                grid = world.arrange(w, water, model, desk)
+                grid = world.sort_into_cells(w, water, model, workspace)
                 if measure:
-                    world.measure(w, water, model, desk, grid)
+                    world.measure(w, water, model, workspace, grid)
                 if hear:
                     for p in range(grid.living):
-                        hearing.hear(p, w, water.course, model.suite, desk, grid)
+                        hearing.hear(p, w, water.course, model.suite, workspace, grid)
                 if perceive:
-                    world.perceive(w, water, model, desk, grid)
+                    world.perceive(w, water, model, workspace, grid)
 
     return run
 
 
 @compiled
-def stepped(num, action, water, model, desk):
+def stepped(num, action, water, model, workspace):
     """The whole step."""
     for w in range(num):
-        world.step_world(w, action, water, model, desk)
+        world.step_world(w, action, water, model, workspace)
 
 
 def part(name: str) -> Maker:
@@ -71,7 +71,7 @@ def part(name: str) -> Maker:
             water.step(np.zeros((worlds, agents, 2), np.float32))
         _, _, action, *parts, scratch = step_worlds.call_args.args
         given = action, World(*parts[:4]), Model(*parts[4:])
-        own = cast(Any, desk).py_func(scratch, 0)
+        own = cast(Any, workspace).py_func(scratch, 0)
         kernel = loop(*PARTS[name]) if name in PARTS else stepped
         case = repeated(lambda _: kernel(worlds, *given, own), agents * worlds)
         case.run(1)

@@ -27,12 +27,12 @@ import numpy as np
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl import load_scenario
-from uuv_marl.sim.desk import Columns
-from uuv_marl.sim.motion import move
+from uuv_marl.sim.workspace import Columns
+from uuv_marl.sim.motion import integrate
 from uuv_marl.sim.vehicle import plant
 assert uuv_marl.__file__.startswith(sys.argv[1]), uuv_marl.__file__
 now = Columns(*np.ones((len(Columns._fields), 2)))
-move(1, 0.1, now, plant(load_scenario("tracking")))
+integrate(1, 0.1, now, plant(load_scenario("tracking")))
 print(now.u[0].hex())
 """
 
@@ -72,7 +72,7 @@ def test_an_edit_compiles_what_uses_it_and_nothing_else(copy, tmp_path):
     edit(package / "sim" / "vehicle.py", '"""Nu\' = M^-1', '"""Another wording of: Nu\' = M^-1')
     with (package / "envs" / "vector_env.py").open("a") as file:
         file.write("# a comment\n")
-    edit(package / "sim" / "desk.py", "Squared length of the action as pushed.", "Another wording.")
+    edit(package / "sim" / "workspace.py", "Squared length of the action as pushed.", "Another wording.")
     with (package / "sim" / "motion.py").open("a") as file:
         file.write("\n\n_SOMETHING_ELSE = 1\n")
     assert "Compiling" not in run(copy, cache).stderr, "a docstring, a comment or a neighbour was compiled"
@@ -82,7 +82,7 @@ def test_an_edit_compiles_what_uses_it_and_nothing_else(copy, tmp_path):
     assert edited.stdout != cold.stdout, "old physics"
     functions = {path.name.split("-")[0] for path in set(cache.rglob("*.nbi")) - kept}
     assert functions == {
-        "motion.move",
+        "motion.integrate",
         "vehicle.advance",
         "vehicle.derivative",
         "vehicle.acceleration",
@@ -97,7 +97,7 @@ def test_an_edit_compiles_what_uses_it_and_nothing_else(copy, tmp_path):
 def test_broken_files_of_the_cache_are_compiled_anew(copy, tmp_path):
     cache = tmp_path / "cache"
     good = run(copy, cache).stdout
-    for pattern in ("motion.move*.nbi", "motion.move*.nbc"):
+    for pattern in ("motion.integrate*.nbi", "motion.integrate*.nbc"):
         for path in cache.rglob(pattern):
             path.write_bytes(path.read_bytes()[:40])
         done = run(copy, cache)
@@ -256,5 +256,5 @@ def test_inner_functions_refuse_python_and_do_not_crash():
     swarm = Swarm(load_scenario("starter"))
     swarm.reset(0)
     swarm.step(np.zeros((1, 5, 2)))
-    with pytest.raises(TypeError, match="clear can be called by compiled code only"):
-        world.clear(0, swarm.facts)
+    with pytest.raises(TypeError, match="clear_facts can be called by compiled code only"):
+        world.clear_facts(0, swarm.facts)

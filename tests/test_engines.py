@@ -19,10 +19,10 @@ from uuv_marl.baselines import make
 from uuv_marl.sim import model as model_module
 from uuv_marl.sim import plain
 from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
-from uuv_marl.sim.desk import Columns
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import plant
+from uuv_marl.sim.workspace import Columns
 
 BASE = load_scenario("tracking")
 SIZES = (1, 2, 3, 54, 300, 600)

@@ -21,7 +21,7 @@ from uuv_marl.baselines.learned import (
     BARRIER,
     WEIGHTS_FILE,
     Card,
-    Eyes,
+    Features,
     Layer,
     forward,
     load_checkpoint,
@@ -109,15 +109,15 @@ def test_actions_turn_with_the_world(best):
 
 def test_features_are_bounded_and_feel_what_is_near(place):
     scenario = load_scenario("single_obstacle", num_vehicles=3)
-    eyes = Eyes(scenario, BARRIER)
+    extract = Features(scenario, BARRIER)
     swarm = place("single_obstacle", [[0, 0, 0], [6.0, 0, 0], [-300.0, 5.0, 0]], obstacles=[(60.0, 0, 25.0)])
-    features, barrier = np.empty((1, 3, eyes.size), np.float32), np.empty((1, 3, 2), np.float32)
-    eyes.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
+    features, barrier = np.empty((1, 3, extract.size), np.float32), np.empty((1, 3, 2), np.float32)
+    extract.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
     assert np.abs(features).max() <= 4.0
     assert barrier[0, 0, 0] < -0.3, "pushed back by the vehicle ahead"
     before = features.copy()
     swarm.state.eta[0, 1, 0] = 7.0
-    eyes.look(swarm.observe().flat, features, barrier, np.zeros(1, np.int64))
+    extract.look(swarm.observe().flat, features, barrier, np.zeros(1, np.int64))
     assert np.abs(features - before)[0, 0].max() > 0.02
 
 

@@ -17,7 +17,7 @@ import torch
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Eyes, forward, load_checkpoint
+from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Features, forward, load_checkpoint
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
 from uuv_marl.sim.swarm import Swarm
@@ -165,12 +165,12 @@ def test_a_swarm_of_one_finds_the_force_that_follows():
     scenario = load_scenario(
         "tracking", num_vehicles=1, overrides={**OPEN_WATER, "trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
     )
-    swarm, eyes = Swarm(scenario), Eyes(scenario, BARRIER)
+    swarm, extract = Swarm(scenario), Features(scenario, BARRIER)
     swarm.reset(3)
-    features, barrier = np.empty((1, 1, eyes.size), np.float32), np.empty((1, 1, 2), np.float32)
+    features, barrier = np.empty((1, 1, extract.size), np.float32), np.empty((1, 1, 2), np.float32)
     actions = []
     for _ in range(400):
-        eyes.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
+        extract.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
         wish = forward(learner.layers, features[0]) + barrier[0]
         actions.append(wish / max(1.0, np.hypot(*wish[0])))  # no more than the vehicle has
         swarm.step(wish[None])

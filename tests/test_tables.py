@@ -8,9 +8,9 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.sim import world
 from uuv_marl.sim.arrays import Course, Facts, Senses, State
-from uuv_marl.sim.desk import Cells, Columns, Desk, Ear, desk, scratch
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, check, rows
+from uuv_marl.sim.workspace import Cells, Columns, Listener, Workspace, scratch, workspace
 
 SIZES = {"world": 2, "vehicle": 5, "point": 3, "obstacle": 4, "loss": 1, "sector": 21, "radius": 4, "entry": 98}
 LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5}
@@ -19,24 +19,24 @@ LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5}
 @pytest.fixture
 def desks():
     room = scratch(threads=2, num_vehicles=7, num_sectors=21, num_cells=4)
-    return room, [desk.py_func(room, t) for t in range(2)]
+    return room, [workspace.py_func(room, t) for t in range(2)]
 
 
 def test_every_array_of_a_desk_has_room_of_its_own(desks):
     arrays = [array for own in desks[1] for table in own for array in table]
-    assert len(arrays) == 2 * sum(len(table._fields) for table in (Columns, Cells, Ear))
+    assert len(arrays) == 2 * sum(len(table._fields) for table in (Columns, Cells, Listener))
     for a, b in itertools.combinations(arrays, 2):
         assert not np.shares_memory(a, b)
 
 
 def test_a_desk_leaves_no_column_unused_and_has_the_declared_types(desks):
     room, own = desks
-    for table, arrays in zip((Columns, Cells, Ear), Desk(*own[0]), strict=True):
+    for table, arrays in zip((Columns, Cells, Listener), Workspace(*own[0]), strict=True):
         for (name, row), array in zip(rows(table).items(), arrays, strict=True):
             assert array.dtype == row.dtype, name
             assert len(array) >= LENGTHS[row.axes[0]], name
     columns = sum(block.shape[1] for block in room)
-    assert columns == sum(len(table._fields) for table in (Columns, Cells, Ear))
+    assert columns == sum(len(table._fields) for table in (Columns, Cells, Listener))
 
 
 def test_a_table_tells_shapes_types_and_meaning():

@@ -1,7 +1,7 @@
 """Learned policies as ONNX models: the whole way from observation to action, barrier and bounds included.
 
-The graph repeats ``learned.Eyes`` and Eq. 20-21 for a batch of vehicles, without loops. As there, features and forces
-are computed in double precision and the network in single.
+The graph repeats ``learned.Features`` and Eq. 20-21 for a batch of vehicles, without loops. As there, features and
+forces are computed in double precision and the network in single.
 """
 
 import json
@@ -184,7 +184,7 @@ def _act(g: _Graph, policy: Learned) -> _Value:
 
 
 def _look(g: _Graph, flat: _Value, layout: PerceptLayout, gains: Gains, limits: Limits) -> tuple[_Value, _Value]:
-    """``learned.Eyes.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts."""
+    """``learned.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts."""
     sizes = {row.name: row.size for row in layout.table}
     percept = dict(zip(sizes, g.split(flat, list(sizes.values())), strict=True))
     sectors, active = sizes["heard"], sizes["echo"]

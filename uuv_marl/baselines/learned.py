@@ -67,7 +67,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     kind: Literal["mlp"] = "mlp"
     """What the tensors are: ``mlp``, tanh layers."""
     features: Literal["percept"] = "percept"
-    """What the first layer is given: ``percept``, what ``Eyes`` make of one percept."""
+    """What the first layer is given: ``percept``, what ``Features`` make of one percept."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every field of the percept."""
     decision_period_s: tuple[float, float] = (0.1, 0.5)
@@ -140,16 +140,16 @@ class Learned(Policy):
                 f"{self.name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
                 f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
             )
-        self._eyes = Eyes(scenario, card.barrier)
+        self._features = Features(scenario, card.barrier)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         acting = np.flatnonzero(self.active)
         flat = self.flat(percept)
         worlds, n = len(acting), flat.shape[1]
-        features, barrier = np.empty((worlds, n, self._eyes.size), np.float32), np.empty((worlds, n, 2), np.float32)
+        features, barrier = np.empty((worlds, n, self._features.size), np.float32), np.empty((worlds, n, 2), np.float32)
         clamps = np.zeros(worlds, np.int64)
-        self._eyes.look(flat[acting], features, barrier, clamps)
+        self._features.look(flat[acting], features, barrier, clamps)
         self.clamps[acting] += clamps
         wish = forward(self.checkpoint.layers, features.reshape(worlds * n, -1))
         action = np.empty((worlds * n, 2), np.float32)
@@ -159,7 +159,7 @@ class Learned(Policy):
         return whole
 
 
-class Eyes:
+class Features:
     """What actors see of a percept: bounded features, the same in training and in use, and the barrier's force.
 
     Args:
@@ -336,7 +336,7 @@ def _put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
 def _look(
     flat: Float32, at: Starts, gains: Gains, limits: Limits, features: Float32, barrier: Float32, clamps: Int64
 ) -> None:
-    """``Eyes.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do."""
+    """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

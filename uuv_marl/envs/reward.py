@@ -40,7 +40,7 @@ TERMS: Mapping[str, str] = {
 """The formula of each term; w is its weight in the scenario's ``reward``, dt the time between two decisions [s]."""
 
 
-class Rates(NamedTuple):
+class RewardWeights(NamedTuple):
     """The scenario's weights and lengths, as numbers for the compiled functions."""
 
     period_s: float
@@ -55,7 +55,7 @@ class Rates(NamedTuple):
     s_u_m: float
 
 
-class Payment(NamedTuple):
+class RewardTerms(NamedTuple):
     """What the latest step pays, shape (world, vehicle) each; zero for vehicles lost before."""
 
     reward: Float64
@@ -64,10 +64,10 @@ class Payment(NamedTuple):
     """The weighted ``TERMS``."""
 
 
-def rates(scenario: Scenario) -> Rates:
+def reward_weights(scenario: Scenario) -> RewardWeights:
     """The scenario's weights and lengths."""
     weight, limit = scenario.reward, scenario.constraints
-    return Rates(
+    return RewardWeights(
         scenario.timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
         weight.collision, weight.arrival, limit.s_l_m, limit.s_o_m, limit.s_u_m,
     )  # fmt: skip
@@ -75,16 +75,16 @@ def rates(scenario: Scenario) -> Rates:
 
 def reward_terms(swarm: Swarm) -> Mapping[str, Float64]:
     """The weighted ``TERMS`` of the latest step, shape (world, vehicle) each; zero for vehicles lost before."""
-    return pay(swarm, rates(swarm.scenario), np.ones(swarm.num_worlds, np.bool_)).terms
+    return compute_reward(swarm, reward_weights(swarm.scenario), np.ones(swarm.num_worlds, np.bool_)).terms
 
 
-def pay(swarm: Swarm, by: Rates, running: Bool) -> Payment:
+def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> RewardTerms:
     """The reward of the latest step for the worlds that are ``running``, shape (world,); others are paid nothing."""
     terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
     reward = np.zeros(terms.shape[1:])
     fill = _fill_one if swarm.num_worlds == 1 else _fill_all
-    fill(running, swarm.time_limit_s, swarm.state, swarm.facts, by, terms, reward)
-    return Payment(reward, dict(zip(TERMS, terms, strict=True)))
+    fill(running, swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward)
+    return RewardTerms(reward, dict(zip(TERMS, terms, strict=True)))
 
 
 @compiled
@@ -95,10 +95,10 @@ def shortfall(share: float) -> float:
 
 @compiled
 def _fill(
-    w: int, time_limit_s: Float64, state: State, facts: Facts, by: Rates, terms: Float64, reward: Float64
+    w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
 ) -> None:
     left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
-    worst_rate = by.tracking + by.obstacle + by.spacing + by.effort
+    worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
     arrived = not math.isnan(facts.arrival_s[w, 0])
     for i in range(state.alive.shape[1]):
         alive, lost = state.alive[w, i], facts.lost[w, i]
@@ -106,31 +106,43 @@ def _fill(
             continue
         dx, dy = state.eta[w, i, 0] - facts.reference[w, 0], state.eta[w, i, 1] - facts.reference[w, 1]
         away = math.sqrt(dx * dx + dy * dy)
-        terms[0, w, i] = -by.tracking * by.period_s * shortfall(away / by.s_l_m - 1.0)
-        terms[1, w, i] = -by.obstacle * by.period_s * shortfall(1.0 - facts.clearance[w, i] / by.s_o_m)
-        terms[2, w, i] = -by.spacing * by.period_s * shortfall(1.0 - facts.spacing[w, i] / by.s_u_m)
-        terms[3, w, i] = -by.effort * by.period_s * facts.effort[w, i]
-        terms[4, w, i] = -by.collision * facts.contacts[w, i]
+        terms[0, w, i] = -weights.tracking * weights.period_s * shortfall(away / weights.s_l_m - 1.0)
+        terms[1, w, i] = -weights.obstacle * weights.period_s * shortfall(1.0 - facts.clearance[w, i] / weights.s_o_m)
+        terms[2, w, i] = -weights.spacing * weights.period_s * shortfall(1.0 - facts.spacing[w, i] / weights.s_u_m)
+        terms[3, w, i] = -weights.effort * weights.period_s * facts.effort[w, i]
+        terms[4, w, i] = -weights.collision * facts.contacts[w, i]
         if lost:
-            terms[5, w, i] = -(by.collision + by.arrival + worst_rate * left_s)
+            terms[5, w, i] = -(weights.collision + weights.arrival + worst_rate * left_s)
         if alive and arrived:
-            terms[6, w, i] = by.arrival
+            terms[6, w, i] = weights.arrival
         for k in range(terms.shape[0]):
             reward[w, i] += terms[k, w, i]
 
 
 @compiled
 def _fill_one(
-    running: Bool, time_limit_s: Float64, state: State, facts: Facts, by: Rates, terms: Float64, reward: Float64
+    running: Bool,
+    time_limit_s: Float64,
+    state: State,
+    facts: Facts,
+    weights: RewardWeights,
+    terms: Float64,
+    reward: Float64,
 ) -> None:
     if running[0]:
-        _fill(0, time_limit_s, state, facts, by, terms, reward)
+        _fill(0, time_limit_s, state, facts, weights, terms, reward)
 
 
 @compiled_parallel
 def _fill_all(
-    running: Bool, time_limit_s: Float64, state: State, facts: Facts, by: Rates, terms: Float64, reward: Float64
+    running: Bool,
+    time_limit_s: Float64,
+    state: State,
+    facts: Facts,
+    weights: RewardWeights,
+    terms: Float64,
+    reward: Float64,
 ) -> None:
     for w in numba.prange(running.shape[0]):
         if running[w]:
-            _fill(w, time_limit_s, state, facts, by, terms, reward)
+            _fill(w, time_limit_s, state, facts, weights, terms, reward)

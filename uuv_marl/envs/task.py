@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.envs.observation import observe
-from uuv_marl.envs.reward import RewardFunction, pay, rates
+from uuv_marl.envs.reward import RewardFunction, compute_reward, reward_weights
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
@@ -75,7 +75,7 @@ class Task:
             raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
         self.swarm = Swarm(scenario, num_worlds, engine)
         self.state_layout = state_layout(scenario)
-        self._rates = rates(scenario)
+        self._weights = reward_weights(scenario)
         self._ready = np.zeros(num_worlds, np.bool_)
         self._over = np.zeros(num_worlds, np.bool_)
         self.collisions = np.zeros(num_worlds, np.int64)
@@ -158,7 +158,7 @@ class Task:
         if callable(self._reward):
             own = np.where(before, self._own_reward(self._reward, before), 0.0)
             return own, own.mean(axis=1), {}
-        reward, terms = pay(self.swarm, self._rates, ~self._over)
+        reward, terms = compute_reward(self.swarm, self._weights, ~self._over)
         mean = reward.mean(axis=1)
         if self._reward == "team":
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.

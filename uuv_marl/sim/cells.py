@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.desk import Cells, Columns
+from uuv_marl.sim.workspace import Cells, Columns
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]

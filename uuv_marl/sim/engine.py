@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import max_cells
-from uuv_marl.sim.desk import scratch
 from uuv_marl.sim.model import model
 from uuv_marl.sim.plain import PlainEngine
+from uuv_marl.sim.workspace import scratch
 from uuv_marl.sim.world import observe_world, step_alone, step_worlds
 
 Float32 = NDArray[np.float32]

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from uuv_marl.sim.arrays import Course
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
-from uuv_marl.sim.desk import Cells, Desk, Ear
 from uuv_marl.sim.sonar import Suite, cross, diamond
+from uuv_marl.sim.workspace import Cells, Listener, Workspace
 
 Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
@@ -38,7 +38,7 @@ def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> 
 
 
 @compiled_inline
-def locate(num: int, points: Points, pose: Pose, bins: int, ear: Ear) -> None:
+def locate(num: int, points: Points, pose: Pose, bins: int, ear: Listener) -> None:
     """Where the first ``num`` of the points are for a listener with this pose; itself nowhere."""
     (xs, ys, _), (x, y, c, s) = points, pose
     per_unit, last = 0.25 * bins, np.int32(bins - 1)
@@ -52,7 +52,7 @@ def locate(num: int, points: Points, pose: Pose, bins: int, ear: Ear) -> None:
 
 
 @compiled_inline
-def choose_sectors(num: int, layer: int, suite: Suite, ear: Ear) -> None:
+def choose_sectors(num: int, layer: int, suite: Suite, ear: Listener) -> None:
     """The sub-sector of a layer for each of those located. Eq. 12-13.
 
     No branch depends on the positions: a wrongly guessed branch costs more than all the arithmetic here.
@@ -71,7 +71,7 @@ def choose_sectors(num: int, layer: int, suite: Suite, ear: Ear) -> None:
 
 
 @compiled_inline
-def keep_nearest(num: int, vehicles: Int64, ear: Ear) -> None:
+def keep_nearest(num: int, vehicles: Int64, ear: Listener) -> None:
     """Of those located keep the nearest in each sub-sector, the lower index of equals. Eq. 14-15."""
     for q in range(num):
         k = np.uintp(ear.sector[q])
@@ -89,7 +89,7 @@ def keep_nearest(num: int, vehicles: Int64, ear: Ear) -> None:
 
 
 @compiled_inline
-def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: Suite, ear: Ear) -> None:
+def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: Suite, ear: Listener) -> None:
     """A listener with this pose hears the first ``num`` of the points, unless an obstacle is between."""
     locate(num, points, pose, suite.codes.shape[1], ear)
     xs, ys, vehicles = points
@@ -103,7 +103,7 @@ def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: 
 
 
 @compiled_inner
-def gather(box: Box, cells: Cells, grid: Grid, ear: Ear) -> int:
+def gather(box: Box, cells: Cells, grid: Grid, ear: Listener) -> int:
     """Collect the entries of the cells that meet a rectangle of the world; how many."""
     north, south, east, west = box
     left, right = place(west, grid.y_min, grid.side, grid.columns), place(east, grid.y_min, grid.side, grid.columns)
@@ -117,9 +117,9 @@ def gather(box: Box, cells: Cells, grid: Grid, ear: Ear) -> int:
 
 
 @compiled_inline
-def hear(p: int, w: int, course: Course, suite: Suite, desk: Desk, grid: Grid) -> None:
-    """Fill the ear for entry p of the cells: from those around it, then farther out where a sub-sector is empty."""
-    cells, ear, sectors = desk.cells, desk.ear, suite.lower.shape[0]
+def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
+    """Fill the listener for entry p of the cells: those around it, then farther out where a sub-sector is empty."""
+    cells, ear, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]
     pose = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(sectors + 1):
         ear.nearest[k] = ear.kept[k] = suite.squared_range[k]

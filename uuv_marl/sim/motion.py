@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import State
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.desk import Columns
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, actuators, advance, project, turned, wrap
+from uuv_marl.sim.workspace import Columns
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -35,14 +35,14 @@ def load_one(w: int, i: int, state: State, now: Columns) -> None:
 
 
 @compiled
-def aim(w: int, action: Float32, now: Columns) -> None:
+def load_action(w: int, action: Float32, now: Columns) -> None:
     """Project the actions of world w, shape (world, vehicle, 2), onto the unit disc."""
     for i in range(action.shape[1]):
         now.a_x[i], now.a_y[i] = project(np.float64(action[w, i, 0]), np.float64(action[w, i, 1]))
 
 
 @compiled
-def push(first: bool, now: Columns, plant: Plant) -> None:
+def apply_actuators(first: bool, now: Columns, plant: Plant) -> None:
     """Thrust and torque of one control hold. After the first, the force keeps its direction in the world. Eq. 22."""
     for i in range(now.x.shape[0]):
         a_x, a_y = now.a_x[i], now.a_y[i]
@@ -54,7 +54,7 @@ def push(first: bool, now: Columns, plant: Plant) -> None:
 
 
 @compiled
-def move(steps: int, step_s: float, now: Columns, plant: Plant) -> None:
+def integrate(steps: int, step_s: float, now: Columns, plant: Plant) -> None:
     """One control hold. Eq. 1-4, 23-24."""
     for _ in range(steps):
         for i in range(now.x.shape[0]):

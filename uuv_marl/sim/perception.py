@@ -6,11 +6,11 @@ from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import MAX_RANGE_M
 from uuv_marl.sim.arrays import Course, World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
-from uuv_marl.sim.desk import Desk
 from uuv_marl.sim.hearing import Pose
 from uuv_marl.sim.model import Model
 from uuv_marl.sim.sonar import Suite, cross
 from uuv_marl.sim.views import Fields
+from uuv_marl.sim.workspace import Workspace
 
 
 @compiled
@@ -45,9 +45,9 @@ def saturate(value: float, limit: float) -> float:
 
 
 @compiled_inline
-def write_percept(p: int, w: int, world: World, model: Model, desk: Desk, see: Fields) -> None:
+def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspace, see: Fields) -> None:
     """What entry p of the cells knows in world w, into the fields of its percept. Eq. 11, 14-17."""
-    cells, ear, course = desk.cells, desk.ear, world.course
+    cells, listener, course = workspace.cells, workspace.listener, world.course
     nu, reference, i = world.state.nu, world.facts.reference, cells.vehicle[p]
     x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(world.senses.percept.shape[2]):
@@ -63,9 +63,9 @@ def write_percept(p: int, w: int, world: World, model: Model, desk: Desk, see: F
     see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
     see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     for k in range(see.heard.shape[2]):
-        j = ear.heard[k]
+        j = listener.heard[k]
         see.heard[w, i, k] = 1.0 if j >= 0 else 0.0
-        see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = ear.kept_ahead[k], ear.kept_abeam[k]
+        see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = listener.kept_ahead[k], listener.kept_abeam[k]
         if see.link_identity.shape[2] > 0 and j >= 0:
             c_j, s_j = cells.cos[cells.entry[j]], cells.sin[cells.entry[j]]
             v_x, v_y = c_j * nu[w, j, 0] - s_j * nu[w, j, 1], s_j * nu[w, j, 0] + c_j * nu[w, j, 1]

@@ -52,28 +52,28 @@ class PlainEngine:
 
     def decide(self, w: int, action: Rows) -> None:
         """One decision period of world w: control holds, and what is perceived after the last."""
-        self.forget(w)
+        self.clear_facts(w)
         acting, decided_at = self.living(w), self.state.eta[w, :, 2].tolist()
         action = [project(*a) for a in action]
         for hold in range(self.rules.holds):
             self.move(w, action, None if hold == 0 else decided_at)
             self.state.tick[w] += 1
-            self.lose(w)
+            self.apply_losses(w)
             self.measure(w)
             self.sink(w)
-            self.judge(w)
+            self.check_arrival(w)
         self.facts.saturated[w] /= max(len(acting) * self.rules.holds, 1)
         self.perceive(w)
 
     def observe(self, w: int) -> None:
         """See ``Engine``."""
-        self.forget(w)
+        self.clear_facts(w)
         self.state.dwell[w], self.facts.arrival_s[w], self.facts.diverged[w] = 0, math.nan, -1
         self.measure(w)
-        self.judge(w)
+        self.check_arrival(w)
         self.perceive(w)
 
-    def forget(self, w: int) -> None:
+    def clear_facts(self, w: int) -> None:
         """Clear what is true of one decision."""
         facts = self.facts
         facts.spacing[w] = facts.min_spacing[w] = facts.clearance[w] = facts.obstacle_clearance[w] = math.inf
@@ -111,13 +111,13 @@ class PlainEngine:
 
     # --- What becomes true by it ---
 
-    def lose(self, w: int) -> None:
+    def apply_losses(self, w: int) -> None:
         """Vehicles whose scheduled time has come fall silent and stop."""
         for tick, i in zip(self.rules.loss_ticks, self.course.losses[w], strict=True):
             if tick == self.state.tick[w]:
-                self.drop(w, i)
+                self.lose_vehicle(w, i)
 
-    def drop(self, w: int, i: int) -> None:
+    def lose_vehicle(self, w: int, i: int) -> None:
         """Lose vehicle i."""
         if self.state.alive[w, i]:
             self.state.alive[w, i], self.state.nu[w, i], self.facts.lost[w, i] = False, 0.0, True
@@ -139,9 +139,9 @@ class PlainEngine:
         """Lose whom a contact ends."""
         for i in self.living(w):
             if self.rules.contact_ends and self.facts.contacts[w, i] > 0:
-                self.drop(w, i)
+                self.lose_vehicle(w, i)
 
-    def judge(self, w: int) -> None:
+    def check_arrival(self, w: int) -> None:
         """Where l(t) is and where the swarm's centre; the swarm arrives once it has rested at the end long enough."""
         state, facts, rules, last = self.state, self.facts, self.rules, int(self.course.last[w])
         t = int(state.tick[w]) * rules.hold_s

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
-from uuv_marl.sim.desk import Cells
+from uuv_marl.sim.workspace import Cells
 
 Float64 = NDArray[np.float64]
 

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled, compiled_inner, compiled_parallel
-from uuv_marl.sim.desk import Columns, Desk, Scratch, desk
 from uuv_marl.sim.hearing import hear
 from uuv_marl.sim.model import Model, Rules
-from uuv_marl.sim.motion import aim, load, load_one, move, push
+from uuv_marl.sim.motion import apply_actuators, integrate, load, load_action, load_one
 from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sonar import Suite
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
@@ -24,6 +23,7 @@ from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
 from uuv_marl.sim.views import Starts, fields
+from uuv_marl.sim.workspace import Columns, Scratch, Workspace, workspace
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -34,11 +34,11 @@ under water is a hundredth as fast."""
 
 
 @compiled_inner
-def hold(w: int, first: bool, world: World, model: Model, now: Columns) -> None:
+def control_hold(w: int, first: bool, world: World, model: Model, now: Columns) -> None:
     """Actions become forces, forces become motion. Eq. 1-4, 22-24."""
     state, facts, rules = world.state, world.facts, model.rules
-    push(first, now, model.plant)
-    move(rules.steps, rules.step_s, now, model.plant)
+    apply_actuators(first, now, model.plant)
+    integrate(rules.steps, rules.step_s, now, model.plant)
     for i in range(state.eta.shape[1]):
         state.before[w, i, 0], state.before[w, i, 1] = state.eta[w, i, 0], state.eta[w, i, 1]
         if not state.alive[w, i]:
@@ -56,15 +56,15 @@ def hold(w: int, first: bool, world: World, model: Model, now: Columns) -> None:
 
 
 @compiled_inner
-def lose(w: int, world: World, rules: Rules) -> None:
+def apply_losses(w: int, world: World, rules: Rules) -> None:
     """Vehicles whose scheduled time has come fall silent and stop."""
     for k in range(rules.loss_ticks.shape[0]):
         if rules.loss_ticks[k] == world.state.tick[w]:
-            drop(w, world.course.losses[w, k], world)
+            lose_vehicle(w, world.course.losses[w, k], world)
 
 
 @compiled_inner
-def drop(w: int, i: int, world: World) -> None:
+def lose_vehicle(w: int, i: int, world: World) -> None:
     """Lose one vehicle."""
     if world.state.alive[w, i]:
         world.state.alive[w, i] = False
@@ -73,25 +73,26 @@ def drop(w: int, i: int, world: World) -> None:
 
 
 @compiled_inner
-def arrange(w: int, world: World, model: Model, desk: Desk) -> Grid:
+def sort_into_cells(w: int, world: World, model: Model, workspace: Workspace) -> Grid:
     """Sort the living into cells."""
-    return sort(w, world.state.alive, model.rules.cell_side, desk.now, desk.cells)
+    return sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
 
 
 @compiled_inner
-def measure(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> int:
+def measure(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> int:
     """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
     facts, hull = world.facts, model.rules.hull
-    began = measure_vehicles(w, hull, world, desk.cells, grid) + measure_obstacles(w, hull, world, desk.cells, grid)
+    began = measure_vehicles(w, hull, world, workspace.cells, grid)
+    began += measure_obstacles(w, hull, world, workspace.cells, grid)
     for i in range(facts.spacing.shape[1]):
         facts.min_spacing[w] = min(facts.min_spacing[w], facts.spacing[w, i])
-    facts.max_spacing[w] = extent(desk.cells, grid)
+    facts.max_spacing[w] = extent(workspace.cells, grid)
     facts.collisions[w] += began
     return began
 
 
 @compiled_inner
-def judge(w: int, world: World, rules: Rules) -> None:
+def check_arrival(w: int, world: World, rules: Rules) -> None:
     """Where the reference and the swarm's centre are, and whether the swarm has arrived."""
     state, course, facts = world.state, world.course, world.facts
     last = course.last[w]
@@ -120,9 +121,9 @@ def judge(w: int, world: World, rules: Rules) -> None:
 
 
 @compiled_inner
-def perceive(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> None:
+def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> None:
     """What the living hear, and everybody's percept."""
-    state, senses, now = world.state, world.senses, desk.now
+    state, senses, now = world.state, world.senses, workspace.now
     see = fields(senses.percept, model.at)
     for i in range(state.alive.shape[1]):
         senses.heading[w, i, 0], senses.heading[w, i, 1] = now.cos[i], now.sin[i]
@@ -131,15 +132,15 @@ def perceive(w: int, world: World, model: Model, desk: Desk, grid: Grid) -> None
             senses.heard[w, i] = -1
             senses.percept[w, i] = 0.0
     for p in range(grid.living):
-        hear(p, w, world.course, model.suite, desk, grid)
-        i = desk.cells.vehicle[p]
+        hear(p, w, world.course, model.suite, workspace, grid)
+        i = workspace.cells.vehicle[p]
         for k in range(model.suite.lower.shape[0]):
-            senses.heard[w, i, k] = desk.ear.heard[k]
-        write_percept(p, w, world, model, desk, see)
+            senses.heard[w, i, k] = workspace.listener.heard[k]
+        write_percept(p, w, world, model, workspace, see)
 
 
 @compiled_inner
-def clear(w: int, facts: Facts) -> None:
+def clear_facts(w: int, facts: Facts) -> None:
     """Forget the step before."""
     facts.spacing[w] = math.inf
     facts.clearance[w] = math.inf
@@ -155,37 +156,37 @@ def clear(w: int, facts: Facts) -> None:
 @compiled
 def observe_world(w: int, world: World, model: Model, room: Scratch) -> None:
     """Facts and percepts of a world that has just been reset."""
-    own = desk(room, 0)
-    clear(w, world.facts)
+    own = workspace(room, 0)
+    clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
     load(w, world.state, own.now)
-    grid = arrange(w, world, model, own)
+    grid = sort_into_cells(w, world, model, own)
     measure(w, world, model, own, grid)
-    judge(w, world, model.rules)
+    check_arrival(w, world, model.rules)
     perceive(w, world, model, own, grid)
 
 
 @compiled_inner
-def pass_hold(w: int, first: bool, world: World, model: Model, desk: Desk) -> Grid:
+def step_hold(w: int, first: bool, world: World, model: Model, workspace: Workspace) -> Grid:
     """One control hold of world w and what becomes true by it; the cells of the living afterwards."""
-    hold(w, first, world, model, desk.now)
+    control_hold(w, first, world, model, workspace.now)
     world.state.tick[w] += 1
-    lose(w, world, model.rules)
-    grid = arrange(w, world, model, desk)
-    began = measure(w, world, model, desk, grid)
+    apply_losses(w, world, model.rules)
+    grid = sort_into_cells(w, world, model, workspace)
+    began = measure(w, world, model, workspace, grid)
     if model.rules.contact_ends and began > 0:
         for i in range(world.state.alive.shape[1]):
             if world.facts.contacts[w, i] > 0:
-                drop(w, i, world)
-        grid = arrange(w, world, model, desk)
-    judge(w, world, model.rules)
+                lose_vehicle(w, i, world)
+        grid = sort_into_cells(w, world, model, workspace)
+    check_arrival(w, world, model.rules)
     return grid
 
 
 @compiled_inner
-def step_world(w: int, action: Float32, world: World, model: Model, desk: Desk) -> None:
+def step_world(w: int, action: Float32, world: World, model: Model, workspace: Workspace) -> None:
     """One decision period of a world. ``action`` (world, vehicle, 2) holds shares of full force, body frame.
 
     A world that has diverged stays as it is.
@@ -193,23 +194,23 @@ def step_world(w: int, action: Float32, world: World, model: Model, desk: Desk) 
     facts = world.facts
     if facts.diverged[w] >= 0:
         return
-    clear(w, facts)
+    clear_facts(w, facts)
     num_alive = 0
     for i in range(action.shape[1]):
         num_alive += int(world.state.alive[w, i])
-    load(w, world.state, desk.now)
-    aim(w, action, desk.now)
-    grid = pass_hold(w, True, world, model, desk)
+    load(w, world.state, workspace.now)
+    load_action(w, action, workspace.now)
+    grid = step_hold(w, True, world, model, workspace)
     for _ in range(1, model.rules.holds):
-        grid = pass_hold(w, False, world, model, desk)
+        grid = step_hold(w, False, world, model, workspace)
     facts.saturated[w] /= max(num_alive * model.rules.holds, 1)
-    perceive(w, world, model, desk, grid)
+    perceive(w, world, model, workspace, grid)
 
 
 @compiled
 def step_alone(action: Float32, world: World, model: Model, room: Scratch) -> bool:
     """One decision period of the only world; whether it has diverged."""
-    step_world(0, action, world, model, desk(room, 0))
+    step_world(0, action, world, model, workspace(room, 0))
     return world.facts.diverged[0] >= 0
 
 
@@ -224,7 +225,7 @@ def step_worlds(
     """
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
-        own, world, model = desk(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
+        own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
         for w in range(t * share, min((t + 1) * share, action.shape[0])):
             if active[w]:
                 step_world(w, action, world, model, own)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import BARRIER, Eyes
+from uuv_marl.baselines.learned import BARRIER, Features
 from uuv_marl.envs.task import refuse_losses
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
@@ -75,8 +75,8 @@ class Fleet:
         patience = min(scenario.time_limit.extra_s, PATIENCE_S)
         scenario = load_scenario(scenario, overrides={"time_limit.factor": 1.0, "time_limit.extra_s": patience})
         self._swarms = [Swarm(load_scenario(scenario, num_vehicles=n), worlds) for n, worlds in sizes]
-        self._eyes = Eyes(scenario, BARRIER)
-        self.features = self._eyes.size
+        self._features = Features(scenario, BARRIER)
+        self.features = self._features.size
         self.size = self.features + VIEW_SIZE
         self._ends = np.cumsum([n * worlds for n, worlds in sizes])
         self.rows = int(self._ends[-1])
@@ -148,7 +148,9 @@ class Fleet:
         swarm, rows = self._swarms[k], self._rows(k)
         seen = self.seen[rows].reshape(swarm.num_worlds, swarm.num_vehicles, self.size)
         barrier = self._barrier[rows].reshape(swarm.num_worlds, swarm.num_vehicles, 2)
-        self._eyes.look(swarm.percept.flat, seen[:, :, : self.features], barrier, np.zeros(swarm.num_worlds, np.int64))
+        self._features.look(
+            swarm.percept.flat, seen[:, :, : self.features], barrier, np.zeros(swarm.num_worlds, np.int64)
+        )
         view(swarm, seen[:, :, self.features :])
 
     def _restart(self, k: int, worlds: Sequence[int]) -> None:

@@ -47,7 +47,7 @@ class Cells(NamedTuple):
     first: Annotated[Int64, "cell", "First entry of each cell, and of the end."]
 
 
-class Ear(NamedTuple):
+class Listener(NamedTuple):
     """One listener: what it hears in each sub-sector and beyond all, and whom it listens to."""
 
     heard: Annotated[Int64, "sector", "Index of the vehicle heard, -1 for none."]
@@ -66,12 +66,12 @@ class Ear(NamedTuple):
     some: Annotated[Int32, "vehicle", "Room for a choice of them."]
 
 
-class Desk(NamedTuple):
+class Workspace(NamedTuple):
     """What one thread works with."""
 
     now: Columns
     cells: Cells
-    ear: Ear
+    listener: Listener
 
 
 class Scratch(NamedTuple):
@@ -92,9 +92,9 @@ class Scratch(NamedTuple):
 
 
 def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -> Scratch:
-    """A column for each array of a desk, and a cache line between one thread's and the next's."""
+    """A column for each array of a workspace, and a cache line between one thread's and the next's."""
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
-    kinds = [(row.axes, row.dtype) for table in (Columns, Cells, Ear) for row in rows(table).values()]
+    kinds = [(row.axes, row.dtype) for table in (Columns, Cells, Listener) for row in rows(table).values()]
 
     def room(axis: str, dtype: type[Any]) -> NDArray[Any]:
         return np.zeros((threads, kinds.count(((axis,), dtype)), lengths[axis]), dtype)
@@ -110,12 +110,12 @@ def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -
 
 
 @compiled_inner
-def desk(room: Scratch, t: int) -> Desk:
+def workspace(room: Scratch, t: int) -> Workspace:
     """Thread t's scratch by name. Every array has a column of its own: tests/test_tables.py."""
     a, b, c, d = room.reals[t], room.wholes[t], room.shorts[t], room.sector_reals[t]
     heard, first = room.sector_wholes[t, 0], room.cell_wholes[t, 0]
-    return Desk(
+    return Workspace(
         Columns(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13]),
         Cells(a[14], a[15], a[16], a[17], b[0], b[1], a[18], b[2], first),
-        Ear(heard, d[0], d[1], d[2], d[3], a[19], a[20], b[3], a[21], a[22], a[23], c[0], b[4], c[1]),
+        Listener(heard, d[0], d[1], d[2], d[3], a[19], a[20], b[3], a[21], a[22], a[23], c[0], b[4], c[1]),
     )
