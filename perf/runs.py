@@ -22,9 +22,9 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, granted, make
 from uuv_marl.baselines.export import write_onnx
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.heldout.sets import SETS
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.studies.heldout.sets import SETS
 from uuv_marl.train.shaping import Weights
 
 SEED, MOST_AGENT_STEPS = 10_000, 30_000

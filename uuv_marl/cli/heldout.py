@@ -31,9 +31,9 @@ def heldout(
     """
     with explained():
         from uuv_marl.atomic import locked
-        from uuv_marl.heldout.episodes import episodes_of
-        from uuv_marl.heldout.job import run
-        from uuv_marl.heldout.page import write_page
+        from uuv_marl.studies.heldout.episodes import episodes_of
+        from uuv_marl.studies.heldout.job import run
+        from uuv_marl.studies.heldout.page import write_page
 
         with working(f"The finished episodes are in {output}") as bar:
             task = bar.add_task("held out", total=1.0)

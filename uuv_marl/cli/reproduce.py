@@ -28,7 +28,7 @@ def reproduce(
     Example: uuv-marl reproduce --only figure-11 --only table-2 --seeds 5
     """
     with explained():
-        from uuv_marl.reproduce.job import reproduce as run
+        from uuv_marl.studies.reproduce import reproduce as run
 
         with working(f"The finished runs are in {output}", alone=output) as bar:
             task = bar.add_task("reproduce", total=1.0)
@@ -48,12 +48,13 @@ def identify(
     """Search the parameters that the paper leaves open, so that sections 5.1 and 5.2.1 are met.
 
     Section 5.2.2 is not looked at and stays a prediction. This needs the extra "tune" and takes about an hour. Ctrl-C
-    keeps the finished trials, and the same command continues. The shipped result is in uuv_marl/reproduce/identified.
-    The trials' journal may hold pickled data, so continue none that you do not trust.
+    keeps the finished trials, and the same command continues. The shipped result is in
+    uuv_marl/studies/dynamics/identified. The trials' journal may hold pickled data, so continue none that you do not
+    trust.
     """
     with explained():
         with extra("tune", "identification"), working(f"The finished trials are in {output}", alone=output) as bar:
-            from uuv_marl.reproduce.identify import identify as search
+            from uuv_marl.studies.dynamics.identify import identify as search
 
             task = bar.add_task("identify", total=trials)
             path = search(
