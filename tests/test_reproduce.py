@@ -12,9 +12,10 @@ from typer.testing import CliRunner
 
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.cli import app
+from uuv_marl.errors import ResultsError
 from uuv_marl.studies import reproduce as job
-from uuv_marl.studies.columns import read_columns, write_columns
-from uuv_marl.studies.dynamics import literal, sensitivity
+from uuv_marl.studies.columns import columns, groups, read_columns, where, write_columns
+from uuv_marl.studies.dynamics import literal, rest, sensitivity
 from uuv_marl.studies.paper import cases, measures
 from uuv_marl.studies.paper.assumptions import ASSUMPTIONS, READINGS
 from uuv_marl.studies.paper.cases import (
@@ -170,6 +171,24 @@ def test_a_stopped_job_goes_on(tmp_path):
     assert (tmp_path / "figures" / "figure-12.png").exists()
 
 
+def test_a_part_without_runs_is_computed_once(tmp_path, monkeypatch):
+    """In a folder of its own; again once its table is gone."""
+    calls = []
+
+    def tables(suite, report):
+        calls.append(report(1.0))
+        return {"rest": {"value": np.arange(3.0)}}
+
+    part = rest.PART._replace(tables=tables, draw=lambda made: Figure())
+    monkeypatch.setattr(job, "PARTS", (part,))
+    for expected in (1, 1):
+        assert job.reproduce(tmp_path, 1, ["rest"], lambda what, share: None) == [tmp_path / "figures" / "rest.png"]
+        assert len(calls) == expected
+    (tmp_path / "data" / "rest.csv").unlink()
+    job.reproduce(tmp_path, 1, ["rest"], lambda what, share: None)
+    assert len(calls) == 2
+
+
 # What each sentence is tested against: swarms for which it is false.
 def swapped(words, cases, policy="bio_inspired", **parameters):
     """Other runs under the names of these cases."""
@@ -305,6 +324,26 @@ def test_a_case_that_changes_finds_no_old_runs(tmp_path):
     suite.run([before], lambda what, share: None)
     assert len(suite.metric(before, "effort")) == 1
     assert len(Suite(tmp_path, 1).metric(after, "effort")) == 0
+
+
+def test_policies_on_one_scenario_share_a_folder(tmp_path):
+    quick = {"time_limit.factor": 0.01, "time_limit.extra_s": 1.0}
+    both = [Case("x", "single_obstacle", name, quick, seeds=range(1), shared=True) for name in ("idle", "random")]
+    suite, shares = Suite(tmp_path), []
+    suite.run(both, lambda what, share: shares.append((what, share)))
+    assert [path.name for path in tmp_path.iterdir()] == ["x"]
+    assert suite.metric(both[0], "effort") == 0.0
+    assert suite.metric(both[1], "effort") > 0.0
+    assert shares[-1] == ("x: random", 1.0)
+    with pytest.raises(ResultsError, match="another 'single_obstacle'.*move it away or give another --output"):
+        Suite(tmp_path).results(both[0]._replace(overrides={}))
+
+
+def test_rows_are_selected_and_grouped():
+    table = columns({"a": a, "b": b, "value": a + b} for a, b in (("x", "1"), ("y", "1"), ("x", "2"), ("x", "1")))
+    assert where(table, a="x", b="1")["value"].tolist() == ["x1", "x1"]
+    found = {key: own["value"].tolist() for key, own in groups(table, "a").items()}
+    assert found == {("x",): ["x1", "x2", "x1"], ("y",): ["y1"]}
 
 
 def test_tables_survive_the_disk(tmp_path):

@@ -14,7 +14,7 @@ class PaperFigure(NamedTuple):
 
     def values(self, metric: str) -> tuple[float, ...]:
         """What the paper states of a metric, which may be two values or none."""
-        stated = getattr(self, metric, None)
+        stated: float | tuple[float, ...] | None = getattr(self, metric, None)
         return stated if isinstance(stated, tuple) else () if stated is None else (stated,)
 
 

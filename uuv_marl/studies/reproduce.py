@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.results import ResultsError, source_fingerprint
@@ -67,7 +68,7 @@ def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> 
 def make(part: Part, suite: Suite, folder: Path, report: Share) -> Path:
     """A part's data and picture; the picture is drawn from the data as they are on disk."""
     stamp, code = folder / "runs" / f"{part.name}.json", _code()
-    kept = json.loads(stamp.read_text(encoding="utf-8")) if stamp.exists() else {}
+    kept: dict[str, Any] = json.loads(stamp.read_text(encoding="utf-8")) if stamp.exists() else {}
     paths = [folder / "data" / f"{name}.csv" for name in kept.get("tables", ())]
     if kept.get("code") != code or not all(path.exists() for path in paths):
         suite.run(part.cases, lambda _, share: report(share))

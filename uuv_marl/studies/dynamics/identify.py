@@ -139,8 +139,7 @@ def draw(made: Tables) -> Figure:
             ax.plot(table[x][rows], table[y][rows], mark, color=colour, ms=size, mec=BLACK, mew=0.5, label=label)
         ax.add_patch(_box(spacing.values(x), obstacle.values(y)))
         ax.set(xlabel=x_words, ylabel=y_words)
-    legend(figure)
-    return figure
+    return legend(figure)
 
 
 def _box(across: Sequence[float], up: Sequence[float]) -> Rectangle:

@@ -113,8 +113,7 @@ def draw(made: Tables) -> Figure:
     ax.set_xticks([], minor=True)
     ax.set(xlabel="integration step [s]", ylabel=f"position error after {DURATION_S:g} s [m]")
     ax.set_title("(c) Eq. 24: a lone vehicle's turn")
-    legend(figure)
-    return figure
+    return legend(figure)
 
 
 CASES = tuple(case._replace(seeds=range(1)) for case in (TRACKING, SINGLE, AHEAD, INSIDE))

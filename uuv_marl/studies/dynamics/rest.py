@@ -248,8 +248,7 @@ def draw(made: Tables) -> Figure:
     axes[0].set_xlabel("yaw rate, rms [rad/s]")
     axes[1].set_xlabel("speed relative to the reference, rms [m/s]")
     axes[2].set_xlabel("largest Lyapunov exponent [1/s]")
-    legend(figure)
-    return figure
+    return legend(figure)
 
 
 PART = Part("rest", (), tables, draw)

@@ -7,7 +7,7 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -117,7 +117,7 @@ def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Number
             break
 
     def mean(name: str, scenario: str) -> float:
-        found = [value for m in metrics.get(scenario, ()) if (value := dict[str, float | None](m)[name]) is not None]
+        found = [value for m in metrics.get(scenario, ()) if (value := dict[str, Any](m)[name]) is not None]
         return sum(found) / len(found) if found else math.nan
 
     total, safe = len(SCENARIOS) * len(seeds), sum(not _fails(m) for found in metrics.values() for m in found)

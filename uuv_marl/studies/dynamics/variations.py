@@ -71,8 +71,7 @@ def variation(
         for ax, quantity in zip(axes, quantities, strict=True):
             _panel(ax, made[name], quantity, list(variants))
             ax.set_xlabel(axis)
-        legend(figure)
-        return figure
+        return legend(figure)
 
     return Part(name, tuple(cases.values()), tables, draw)
 

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 from uuv_marl.benchmark.results import Results
 from uuv_marl.studies.heldout.trainings import Trained
 
-_COUNTS = ("training_seed", "seed", "collisions", "clamps")
-
 
 class Episode(NamedTuple):
     """One episode; lengths in m, times in s, None where there is nothing to measure."""
@@ -36,9 +34,14 @@ class Episode(NamedTuple):
     """How often a numerical bound of a policy bound."""
 
     @property
+    def arrived(self) -> bool:
+        """Whether the swarm did."""
+        return self.task_time_s is not None
+
+    @property
     def succeeded(self) -> bool:
         """Arrived, and nobody touched anything."""
-        return self.task_time_s is not None and not self.collisions
+        return self.arrived and not self.collisions
 
     @property
     def efficiency(self) -> float:
@@ -46,17 +49,27 @@ class Episode(NamedTuple):
         return 0.0 if self.task_time_s is None else self.duration_s / self.task_time_s
 
 
+def select(episodes: Sequence[Episode], name: str, policy: str, training_seed: int | None = None) -> list[Episode]:
+    """A policy's episodes of a set, by seed; of one that ships, or of a training."""
+    mine = [e for e in episodes if (e.set, e.policy, e.training_seed) == (name, policy, training_seed)]
+    return sorted(mine, key=lambda e: e.seed)
+
+
+def measured(episodes: Sequence[Episode], name: str) -> list[float]:
+    """What was measured of a field, one value for each episode that has one."""
+    return [value for e in episodes if (value := getattr(e, name)) is not None]
+
+
 def episodes_of(results: Mapping[str, Results], trained: Sequence[Trained]) -> list[Episode]:
     """All that the results hold, in their order."""
-    labels = {str(one.policy): one for one in trained}
+    trainings = {str(one.policy): (one.algorithm, one.seed) for one in trained}
     rows: list[Episode] = []
     for name, kept in results.items():
         for row in sorted(kept.rows, key=lambda row: (row.policy, row.seed)):
-            one, metrics = labels.get(row.policy), dict[str, Any](row.metrics)
-            measured = {field: metrics[field] for field in Episode._fields if field in metrics}
-            measured["within_eq7"] = metrics["constraint_share"]["all"]
-            policy, seed = (one.algorithm, one.seed) if one else (row.policy, None)
-            rows.append(Episode(set=name, policy=policy, training_seed=seed, seed=row.seed, **measured))
+            policy, training_seed = trainings.get(row.policy, (row.policy, None))
+            values: dict[str, Any] = {**row.metrics, "within_eq7": row.metrics["constraint_share"]["all"]}
+            fields = {field: values[field] for field in Episode._fields if field in values}
+            rows.append(Episode(set=name, policy=policy, training_seed=training_seed, seed=row.seed, **fields))
     return rows
 
 
@@ -71,7 +84,8 @@ def write_episodes(episodes: Iterable[Episode], path: Path) -> None:
 
 def read_episodes(path: Path) -> list[Episode]:
     """What ``write_episodes`` wrote."""
-    types: dict[str, Any] = {"set": str, "policy": str} | dict.fromkeys(_COUNTS, int)
+    types: dict[str, Any] = dict.fromkeys(("set", "policy"), str)
+    types |= dict.fromkeys(("training_seed", "seed", "collisions", "clamps"), int)
 
     def parsed(name: str, text: str) -> Any:
         return types.get(name, float)(text) if text else None

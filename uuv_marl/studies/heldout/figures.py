@@ -13,8 +13,7 @@ from scipy.stats import binomtest
 
 from uuv_marl.benchmark.style import AMBER, BLACK, BLUE, GREEN, GREY, ORANGE, PINK, SKY, legend, panels, save
 from uuv_marl.studies.heldout.across import runs, success, tasks
-from uuv_marl.studies.heldout.episodes import Episode
-from uuv_marl.studies.heldout.targets import of
+from uuv_marl.studies.heldout.episodes import Episode, select
 from uuv_marl.studies.heldout.trainings import Trained
 
 ENDS = {
@@ -29,12 +28,12 @@ ENDS = {
 def draw_fields(episodes: Sequence[Episode], name: str, path: Path) -> Path:
     """Of each policy on a set, the best first: how many episodes end in each of four ways."""
     shipped = dict.fromkeys(e.policy for e in episodes if e.set == name and e.training_seed is None)
-    found = sorted((of(episodes, name, policy) for policy in shipped), key=success, reverse=True)
+    found = sorted((select(episodes, name, policy) for policy in shipped), key=success, reverse=True)
     figure, (ax,) = panels(1, 1, (8.0, 0.42 * len(found) + 1.5))
     for k, mine in enumerate(found):
         left = 0.0
         for label, (arrives, collides, colour, hatch) in ENDS.items():
-            share = np.mean([(e.task_time_s is not None, e.collisions > 0) == (arrives, collides) for e in mine])
+            share = np.mean([(e.arrived, e.collisions > 0) == (arrives, collides) for e in mine])
             ax.barh(k, share, left=left, height=0.7, color=colour, hatch=hatch, ec="white", lw=0.0, label=label)
             left += float(share)
         interval = binomtest(sum(e.succeeded for e in mine), len(mine)).proportion_ci(method="wilson")
@@ -42,13 +41,11 @@ def draw_fields(episodes: Sequence[Episode], name: str, path: Path) -> Path:
         ax.errorbar([sum(interval) / 2], [k], xerr=np.ptp(interval) / 2, color=BLACK, capsize=3, label=words)
     ax.set_yticks(range(len(found)), [f"{mine[0].policy} (n = {len(mine)})" for mine in found])
     ax.invert_yaxis()
-    ax.set_xlim(0.0, 1.0)
+    ax.set(xlim=(0.0, 1.0), xlabel="share of the episodes")
     ax.xaxis.set_major_formatter(PercentFormatter(1.0))
-    ax.set_xlabel("share of the episodes")
     ax.grid(visible=False, axis="y")
     figure.suptitle(f"How episodes end on the held-out set {name}")
-    legend(figure, columns=3)
-    return save(figure, path)
+    return save(legend(figure, columns=3), path)
 
 
 def draw_trainings(episodes: Sequence[Episode], trained: Sequence[Trained], path: Path) -> Path:
@@ -67,17 +64,15 @@ def draw_trainings(episodes: Sequence[Episode], trained: Sequence[Trained], path
         mean = np.mean([[v.arrived for v in run[:least]] for run in found], axis=0)
         steps = [v.agent_steps / 1e6 for v in found[0][:least]]
         left.plot(steps, mean, color=colour, linewidth=2.5, label=f"{algorithm}: mean of {len(found)}")
+    left.set(xlabel="agent-steps [million]", ylabel="validation episodes that arrive [share]")
     left.set_title("(a) while training")
-    left.set_xlabel("agent-steps [million]")
-    left.set_ylabel("validation episodes that arrive [share]")
     _held_out(right, episodes, colours)
     right.set_title("(b) afterwards, on held-out tasks")
     right.set_ylabel("episodes that arrive untouched [share]")
     for ax in (left, right):
         ax.set_ylim(-0.04, 1.04)
     figure.suptitle("Trainings from nothing, beside the policies that ship")
-    legend(figure, columns=4)
-    return save(figure, path)
+    return save(legend(figure, columns=4), path)
 
 
 def _held_out(ax: Axes, episodes: Sequence[Episode], colours: dict[str, str]) -> None:

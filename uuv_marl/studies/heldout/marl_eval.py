@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from uuv_marl.studies.heldout.across import tasks
-from uuv_marl.studies.heldout.episodes import Episode
+from uuv_marl.studies.heldout.episodes import Episode, select
 from uuv_marl.studies.heldout.trainings import Trained, Validation
 
 ENVIRONMENT = "uuv_marl"
@@ -49,7 +49,7 @@ def _validated(one: Validation) -> dict[str, list[float]]:
 
 
 def _evaluation(one: Trained, task: str, episodes: Sequence[Episode]) -> dict[str, Any]:
-    mine = [e for e in episodes if (e.set, e.policy, e.training_seed) == (task, one.algorithm, one.seed)]
+    mine = select(episodes, task, one.algorithm, one.seed)
     metrics = {
         "success": [float(e.succeeded) for e in mine],
         "efficiency": [round(e.efficiency, 4) for e in mine],

@@ -1,6 +1,6 @@
 """``report.md``: targets, a table for every set, algorithms over training seeds. Written from the episodes alone."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -10,11 +10,11 @@ from uuv_marl.baselines import POLICIES
 from uuv_marl.benchmark.style import house_style
 from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.studies.heldout.across import SCORES, runs, tasks
-from uuv_marl.studies.heldout.episodes import Episode, read_episodes, write_episodes
+from uuv_marl.studies.heldout.episodes import Episode, measured, read_episodes, select, write_episodes
 from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
 from uuv_marl.studies.heldout.sets import SETS, HeldOut
-from uuv_marl.studies.heldout.targets import RIVAL, of, paired, targets
+from uuv_marl.studies.heldout.targets import RIVAL, paired, targets
 from uuv_marl.studies.heldout.trainings import Trained
 
 _NOTHING = "–"
@@ -47,15 +47,12 @@ def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trai
 def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     """The page's text."""
     story = resources.files("uuv_marl.studies.heldout").joinpath("story.md").read_text(encoding="utf-8")
-    marks: dict[str, Callable[[], str]] = {
-        "targets": lambda: _targets(episodes),
-        "sets": lambda: "\n".join(_set(held, episodes) for held in SETS if any(e.set == held.name for e in episodes)),
-        "across": lambda: _across(episodes),
-        "trainings": lambda: _trainings(trained),
-    }
-    for name, text in marks.items():
-        story = story.replace("{" + name + "}", text())
-    return story
+    return story.format(
+        targets=_targets(episodes),
+        sets="\n".join(_set(held, episodes) for held in SETS if any(e.set == held.name for e in episodes)),
+        across=_across(episodes),
+        trainings=_trainings(trained),
+    )
 
 
 def _targets(episodes: Sequence[Episode]) -> str:
@@ -66,43 +63,34 @@ def _targets(episodes: Sequence[Episode]) -> str:
 
 
 def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:
-    rival = of(episodes, held.name, RIVAL)
-    here = {e.policy for e in episodes if e.set == held.name and e.training_seed is None}
-    order = [name for name in POLICIES if name in here]
-    rows = [(name, *_cells(of(episodes, held.name, name), None if name == RIVAL else rival)) for name in order]
-    note = f", {held.note}" if held.note else ""
-    count = max(len(of(episodes, held.name, name)) for name in order)
-    return f"### {held.name}\n\n`{held.scenario}`{note}, seeds from 0, at most {count}.\n\n" + markdown_table(
-        _HEADERS, rows
-    )
+    found = {name: mine for name in POLICIES if (mine := select(episodes, held.name, name))}
+    rows = [(name, *_cells(mine, [] if name == RIVAL else found.get(RIVAL, []))) for name, mine in found.items()]
+    note, count = f", {held.note}" if held.note else "", max(map(len, found.values()))
+    head = f"### {held.name}\n\n`{held.scenario}`{note}, seeds from 0, at most {count}.\n\n"
+    return head + markdown_table(_HEADERS, rows)
 
 
-def _cells(mine: Sequence[Episode], rival: Sequence[Episode] | None) -> tuple[str, ...]:
-    times = [e.task_time_s for e in mine if e.task_time_s is not None]
-    extra = paired(mine, rival) if rival else []
-    obstacle = [e.min_obstacle_distance_m for e in mine if e.min_obstacle_distance_m is not None]
-    spacing = [e.min_spacing_m for e in mine if e.min_spacing_m is not None]
+def _cells(mine: Sequence[Episode], rival: Sequence[Episode]) -> tuple[str, ...]:
+    times, extra = measured(mine, "task_time_s"), paired(mine, rival)
+    obstacle, spacing = measured(mine, "min_obstacle_distance_m"), measured(mine, "min_spacing_m")
     return (
         f"{len(times)}/{len(mine)}",
         f"{sum(e.collisions > 0 for e in mine)}",
-        _interval(1, times),
+        _interval(".1f", times),
         f"{max(times):.1f}" if times else _NOTHING,
         f"{np.mean(extra):+.1f} ({len(extra)})" if extra else _NOTHING,
-        _interval(2, obstacle),
+        _interval(".2f", obstacle),
         f"{min(obstacle):.2f}" if obstacle else _NOTHING,
-        _interval(2, spacing),
+        _interval(".2f", spacing),
         f"{min(spacing):.2f}" if spacing else _NOTHING,
         f"{np.mean([e.within_eq7 for e in mine]):.0%}",
-        f"{np.mean([e.centre_error_m for e in mine if e.centre_error_m is not None]):.1f}",
+        f"{np.mean(measured(mine, 'centre_error_m')):.1f}",
         f"{np.mean([e.effort for e in mine]):.2f}",
     )
 
 
-def _interval(digits: int, *samples: Sequence[float]) -> str:
-    if not all(samples):
-        return _NOTHING
-    e = estimate(*samples)
-    return f"{e.iqm:.{digits}f} [{e.low:.{digits}f}, {e.high:.{digits}f}]"
+def _interval(spec: str, *samples: Sequence[float]) -> str:
+    return f"{estimate(*samples):{spec}}" if all(samples) else _NOTHING
 
 
 def _across(episodes: Sequence[Episode]) -> str:
@@ -116,8 +104,8 @@ def _across(episodes: Sequence[Episode]) -> str:
     for policy in [*algorithms, *hand_made]:
         by_task = [runs(episodes, held, policy, trained=policy in algorithms) for held in compared]
         scores = [[[score(run) for run in found] for found in by_task] for score in SCORES.values()]
-        each = [_interval(2, task) for tasks_of_score in scores for task in tasks_of_score]
-        rows.append([policy, *each, *(_interval(2, *tasks_of_score) for tasks_of_score in scores)])
+        each = [_interval(".2f", task) for tasks_of_score in scores for task in tasks_of_score]
+        rows.append([policy, *each, *(_interval(".2f", *tasks_of_score) for tasks_of_score in scores)])
     return markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows)
 
 

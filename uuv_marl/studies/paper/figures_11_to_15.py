@@ -55,8 +55,7 @@ def draw_11(made: Tables) -> Figure:
     figure, axes = panels(3, size=(4.6, 4.6))
     draw_routes(axes[0], made["figure-11a"], SINGLE, "routes")
     draw_distances(axes[1:], made["figure-11b"], SINGLE)
-    legend(figure, columns=6)
-    return figure
+    return legend(figure, columns=6)
 
 
 def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
@@ -73,8 +72,7 @@ def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
         for ax, key, case, words in zip(axes, "ab", (small, large), ("too small", "too large"), strict=True):
             title = f"({key}) {symbol} {words}: {gain(case):g} (Table 1: {gain(SINGLE):g})"
             draw_routes(ax, made[f"{name}{key}"], case, title)
-        legend(figure, columns=4)
-        return figure
+        return legend(figure, columns=4)
 
     return Part(name, (small, large, SINGLE), tables, draw)
 
@@ -88,8 +86,7 @@ def draw_14(made: Tables) -> Figure:
     """Routes among four obstacles."""
     figure, (ax,) = panels(1, size=(7.0, 6.8))
     draw_routes(ax, made["figure-14"], MULTI)
-    legend(figure, columns=4)
-    return figure
+    return legend(figure, columns=4)
 
 
 def figure_15(suite: Suite, _report: Share) -> Tables:
@@ -101,8 +98,7 @@ def draw_15(made: Tables) -> Figure:
     """The whole range, and the part below 40 m."""
     figure, axes = panels(2)
     draw_distances(axes, made["figure-15"], MULTI)
-    legend(figure, columns=4)
-    return figure
+    return legend(figure, columns=4)
 
 
 PARTS = (

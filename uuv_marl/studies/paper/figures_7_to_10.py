@@ -60,8 +60,7 @@ def draw_7(made: Tables) -> Figure:
                 ax.quiverkey(arrows, 0.8, 1.04, fastest, f"{fastest:g} m/s", labelpos="E", color=BLACK)
         x, y = (float(table[column].min() + table[column].max()) / 2 for column in ("x_m", "y_m"))
         ax.set(xlim=(x - 125.0, x + 125.0), ylim=(y - 125.0, y + 125.0))
-    legend(figure)
-    return figure
+    return legend(figure)
 
 
 def figure_8(suite: Suite, _report: Share) -> Tables:
@@ -81,8 +80,7 @@ def draw_8(made: Tables) -> Figure:
     plan(right, TRACKING, "(b) centre of the swarm")
     centre = made["figure-8b"]
     right.plot(centre["centre_x_m"], centre["centre_y_m"], color=GREEN, label="route of the swarm's centre")
-    legend(figure, columns=4)
-    return figure
+    return legend(figure, columns=4)
 
 
 def figure_9(suite: Suite, _report: Share) -> Tables:
@@ -132,8 +130,7 @@ def draw_9(made: Tables) -> Figure:
     against_time(right, "order parameter, 1 where all are aligned [1]", "(c) how far headings agree")
     for ax in (left, middle, right):
         mark_corners(ax, TRACKING)
-    legend(figure, columns=7)
-    return figure
+    return legend(figure, columns=7)
 
 
 def figure_10(suite: Suite, _report: Share) -> Tables:
@@ -159,8 +156,7 @@ def draw_10(made: Tables) -> Figure:
     ):
         if value is not None:
             axes[1].axhline(value, color=colour, linestyle=style, linewidth=1.0, label=f"{label}: {value:g} m")
-    legend(figure, columns=3)
-    return figure
+    return legend(figure, columns=3)
 
 
 PARTS = (

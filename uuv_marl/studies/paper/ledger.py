@@ -180,11 +180,12 @@ def given_entries() -> list[Entry]:
          [obstacle.centre_m for obstacle in multi.obstacles]),
         ("5.2.2", "obstacles' diameter", "m", [50] * 4, [2 * obstacle.radius_m for obstacle in multi.obstacles]),
     ]  # fmt: skip
-    return [
-        Entry(section, "given", name, unit, *texts, verdict="as given" if len(set(texts)) == 1 else "differs")
-        for section, name, unit, *values in pairs
-        for texts in [[json.dumps(value).replace(".0", "") for value in values]]
-    ]
+    entries: list[Entry] = []
+    for section, name, unit, *values in pairs:
+        paper, ours = (json.dumps(value).replace(".0", "") for value in values)
+        judged = "as given" if paper == ours else "differs"
+        entries.append(Entry(section, "given", name, unit, paper, ours, verdict=judged))
+    return entries
 
 
 def assumption_entries() -> list[Entry]:

@@ -26,7 +26,7 @@ LINK_M = 20.0
 """Vehicles nearer than the start's gap belong to one group."""
 
 
-def between(trace: Trace, name: str, start: float, end: float) -> NDArray[np.float32]:
+def between(trace: Trace, name: str, start: float, end: float) -> Float32:
     """A series, or routes, in a window of time [s]."""
     time = trace["route_time_s" if name.startswith("route_") else "time_s"]
     return trace[name][(time >= start) & (time <= end)]
@@ -35,6 +35,13 @@ def between(trace: Trace, name: str, start: float, end: float) -> NDArray[np.flo
 def corners(trace: Trace) -> Float64:
     """When l(t) passes the corners, and the end [s]."""
     return corner_times(trace["waypoints"], SPEED_MPS)
+
+
+def near_corners(trace: Trace, name: str) -> list[tuple[float, Float32, Float32]]:
+    """When l(t) passes a corner [s], and a series in the windows before and after it."""
+    return [
+        (t, between(trace, name, t - WINDOW_S, t), between(trace, name, t, t + WINDOW_S)) for t in corners(trace)[:-1]
+    ]
 
 
 def order_on_last_leg(trace: Trace) -> float:
@@ -74,22 +81,17 @@ def rise_after_corners(trace: Trace) -> float:
 
 def left_at_next_corner(trace: Trace) -> float:
     """What is left of that rise at the next corner, the larger share."""
-    times = corners(trace)
-    shares = [
+    return max(
         off_path(trace, after - 10.0, after).mean() / off_path(trace, t, t + WINDOW_S).max()
-        for t, after in pairwise(times)
-    ]
-    return max(shares)
+        for t, after in pairwise(corners(trace))
+    )
 
 
 def rise_from_l(trace: Trace) -> float:
     """Rise of the distance from l(t) after a corner, the smaller one [m]."""
     return min(
-        float(
-            between(trace, "centre_error_m", t, t + WINDOW_S).max()
-            - between(trace, "centre_error_m", t - 10.0, t).mean()
-        )
-        for t in corners(trace)[:-1]
+        float(after.max() - between(trace, "centre_error_m", t - 10.0, t).mean())
+        for t, _, after in near_corners(trace, "centre_error_m")
     )
 
 
@@ -106,9 +108,8 @@ def turn_near_corner(trace: Trace) -> float:
 
 def extent_at_first_corner(trace: Trace) -> float:
     """Largest spacing after the first corner over its mean before."""
-    t = corners(trace)[0]
-    before = between(trace, "max_spacing_m", t - WINDOW_S, t).mean()
-    return float(between(trace, "max_spacing_m", t, t + WINDOW_S).max() / before)
+    _, before, after = near_corners(trace, "max_spacing_m")[0]
+    return float(after.max() / before.mean())
 
 
 def spread_of(name: str) -> Callable[[Trace], float]:
@@ -124,14 +125,7 @@ def spread_of(name: str) -> Callable[[Trace], float]:
 def spacing_change_at_corners(trace: Trace) -> float:
     """Change of the mean smallest spacing from before to after a corner, the larger share."""
     return max(
-        abs(
-            float(
-                between(trace, "min_spacing_m", t, t + WINDOW_S).mean()
-                / between(trace, "min_spacing_m", t - WINDOW_S, t).mean()
-            )
-            - 1.0
-        )
-        for t in corners(trace)[:-1]
+        abs(float(after.mean() / before.mean()) - 1.0) for _, before, after in near_corners(trace, "min_spacing_m")
     )
 
 
@@ -161,7 +155,8 @@ def sides(trace: Trace) -> float:
 
 def distance_travelled(trace: Trace) -> float:
     """By a vehicle, on average [m]."""
-    return path_length(trace["route_position"])
+    steps: Float64 = np.diff(trace["route_position"].astype(np.float64), axis=0)
+    return float(np.linalg.norm(steps, axis=-1).sum(axis=0).mean())
 
 
 def energy(trace: Trace) -> float:
@@ -208,11 +203,6 @@ def smaller_side(position: Float32, obstacle: Float32) -> float:
     past = offset[nearest, vehicles]
     starboard = float(np.mean(motion[:, 0] * past[:, 1] - motion[:, 1] * past[:, 0] > 0.0))
     return min(starboard, 1.0 - starboard)
-
-
-def path_length(position: Float32) -> float:
-    """Mean distance travelled by a vehicle [m], from routes of shape (time, vehicle, 2)."""
-    return float(np.linalg.norm(np.diff(position.astype(np.float64), axis=0), axis=-1).sum(axis=0).mean())
 
 
 def pair_unrest(position: Float32) -> float:

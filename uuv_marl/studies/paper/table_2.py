@@ -48,8 +48,7 @@ def draw(made: Tables) -> Figure:
     stated = PAPER["single_obstacle", "bio_inspired"].min_obstacle_distance_m or (np.nan,)
     axes[1].plot(len(by_policy) - 1, stated[-1], "s", color=GREEN, ms=7, ls="", label="paper, section 5.2.1")
     axes[1].set_ylim(bottom=0.0)
-    legend(figure)
-    return figure
+    return legend(figure)
 
 
 PART = Part("table-2", CASES, table_2, draw)
