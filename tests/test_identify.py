@@ -28,9 +28,9 @@ def synthetic(values, seeds=None):
 
 @pytest.mark.parametrize("name", ["tracking", "single_obstacle", "multi_obstacle"])
 def test_the_defaults_change_nothing(name):
-    choice = unknowns.setting(DEFAULTS)
-    assert load_scenario(name, overrides=choice.overrides) == load_scenario(name)
-    assert choice.policy == {"obstacle_term": "per_echo"}
+    choice = unknowns.case(DEFAULTS, name)
+    assert choice.load() == load_scenario(name)
+    assert choice.parameters == {"obstacle_term": "per_echo"}
 
 
 @pytest.mark.parametrize("name", UNKNOWNS)
@@ -38,17 +38,16 @@ def test_every_unknown_has_an_effect_and_holds_its_default(name):
     unknown = UNKNOWNS[name]
     ends = unknown.choices or (unknown.low, unknown.high)
     assert unknown.default in unknown.choices if unknown.choices else unknown.low <= unknown.default <= unknown.high
-    made = [unknowns.setting({**DEFAULTS, name: end}) for end in ends]
+    made = [unknowns.case({**DEFAULTS, name: end}, "tracking") for end in ends]
     assert made[0] != made[1]
     for choice in made:
-        load_scenario("tracking", overrides=choice.overrides)
+        choice.load()
 
 
 def test_the_start_stays_200_m_wide_and_always_fits():
     for spacing in (10.0, 16.0):
         for gap in (16.0, 60.0):
-            choice = unknowns.setting({**DEFAULTS, "start_spacing": spacing, "start_gap": gap})
-            start = load_scenario("tracking", overrides=choice.overrides).start
+            start = unknowns.case({**DEFAULTS, "start_spacing": spacing, "start_gap": gap}, "tracking").load().start
             assert 2 * start.width_m + start.gap_m == pytest.approx(200.0)
 
 
@@ -80,9 +79,9 @@ def test_a_setting_that_the_scenario_refuses_is_a_failure_and_no_exception():
 def test_a_swarm_that_fails_with_the_obstacle_skips_the_longer_scenario(monkeypatch):
     seen = []
 
-    def runs(choice, scenario, seeds):
-        seen.append(scenario)
-        return real(choice, scenario, seeds)
+    def runs(case):
+        seen.append(case.scenario)
+        return real(case)
 
     real = unknowns.runs
     monkeypatch.setattr(unknowns, "runs", runs)

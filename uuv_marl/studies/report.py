@@ -7,11 +7,10 @@ from pathlib import Path
 from string import Template
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.tables import estimate, markdown_table
-from uuv_marl.studies.columns import Columns, groups, read_columns, where
+from uuv_marl.studies.columns import Columns, Float64, groups, read_columns, where
 from uuv_marl.studies.dynamics.identify import METRICS, pareto, trials
 from uuv_marl.studies.dynamics.unknowns import OBJECTIVES
 from uuv_marl.studies.paper.ledger import Entry, markdown, read_ledger
@@ -81,7 +80,7 @@ def prediction(table: Columns) -> str:
     return markdown_table(("scenario", "parameters", *METRICS), rows).rstrip("\n")
 
 
-def _estimate(values: NDArray[np.float64]) -> str:
+def _estimate(values: Float64) -> str:
     found = values[np.isfinite(values)].tolist()
     if not found:
         return "–"

@@ -8,15 +8,14 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.runner import run_missing
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.studies.columns import Float32, Float64
 
-Float64 = NDArray[np.float64]
-Trace = dict[str, NDArray[np.float32]]
+Trace = dict[str, Float32]
 Report = Callable[[str, float], None]
 """Called with what is being done, and the share of the work that is done."""
 NOTHING: Mapping[str, object] = MappingProxyType({})

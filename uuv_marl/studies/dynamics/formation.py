@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.studies.columns import Float64
 
-Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
 
 ROUNDS = 1500
@@ -38,10 +38,13 @@ class Formation(NamedTuple):
     """Whether forces balance with the neighbour sets that the vehicles hear there."""
 
 
-def straight_leg(num_vehicles: int = 54, yaw_damping_nms: float = 0.0) -> Scenario:
-    """Open water and one leg to the north that starts at the origin."""
-    overrides = {
-        "trajectory.waypoints_m": [[0.0, 0.0], [4000.0, 0.0]],
+def straight_leg(
+    num_vehicles: int = 54, yaw_damping_nms: float = 0.0, hold_s: float = 0.1, leg_m: float = 4000.0
+) -> Scenario:
+    """Open water and one leg to the north that starts at the origin; all clocks tick with the control hold."""
+    clocks = ("control_hold_s", "integration_step_s", "decision_period_s")
+    overrides = {f"timing.{clock}": hold_s for clock in clocks} | {
+        "trajectory.waypoints_m": [[0.0, 0.0], [leg_m, 0.0]],
         "actuators.yaw_damping_nms": yaw_damping_nms,
     }
     return load_scenario("tracking", num_vehicles=num_vehicles, overrides=overrides)

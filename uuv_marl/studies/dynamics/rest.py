@@ -13,19 +13,17 @@ from collections.abc import Callable
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import BioInspired, Gains
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, SKY, legend, panels
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.studies.columns import Columns, groups
+from uuv_marl.studies.columns import Columns, Float64, groups
+from uuv_marl.studies.dynamics.formation import straight_leg
 from uuv_marl.studies.dynamics.softening import PAPER, Softened, Softening
 from uuv_marl.studies.part import Part, Share, Tables
 from uuv_marl.studies.suite import Suite
-
-Float64 = NDArray[np.float64]
 
 SEEDS = (0, 1, 2, 3)
 """Starts of every variant."""
@@ -63,13 +61,8 @@ class Variant:
 
     def scenario(self) -> Scenario:
         """Open water; the reference point rests after a second, or never in the time measured."""
-        clocks = ("control_hold_s", "integration_step_s", "decision_period_s")
         leg_m = 4.0 * (self.settle_s + 2.5 * MEASURE_S) if self.tracking else 4.0
-        overrides = {f"timing.{clock}": self.hold_s for clock in clocks} | {
-            "trajectory.waypoints_m": [[0.0, 0.0], [leg_m, 0.0]],
-            "actuators.yaw_damping_nms": self.yaw_damping_nms,
-        }
-        return load_scenario("tracking", num_vehicles=self.num_vehicles, overrides=overrides)
+        return straight_leg(self.num_vehicles, self.yaw_damping_nms, self.hold_s, leg_m)
 
     def policy(self, scenario: Scenario, num_worlds: int) -> Policy:
         """The law for this scenario: the paper's own code where nothing is softened."""

@@ -7,10 +7,9 @@ import textwrap
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from uuv_marl.benchmark.style import panels
-from uuv_marl.studies.columns import columns, groups
+from uuv_marl.studies.columns import Float64, columns, groups
 from uuv_marl.studies.paper.assumptions import READINGS
 from uuv_marl.studies.paper.cases import SCENARIOS
 from uuv_marl.studies.paper.ledger import CLOSE, NUMBERS, Number, difference
@@ -62,7 +61,7 @@ def draw(made: Tables) -> Figure:
     rows = groups(made["sensitivity"], "assumption", "alternative")
     heads = list(groups(made["sensitivity"], "section", "quantity", "paper", "unit"))
     figure, (ax,) = panels(1, size=(11.5, 0.27 * len(rows) + 2.4))
-    change: NDArray[np.float64] = np.full((len(rows), len(heads)), np.nan)
+    change: Float64 = np.full((len(rows), len(heads)), np.nan)
     for i, own in enumerate(rows.values()):
         for k, head in enumerate(groups(own, "section", "quantity", "paper", "unit")):
             j, value = heads.index(head), float(own["value"][k])

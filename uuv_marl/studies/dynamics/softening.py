@@ -4,14 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspired, Gains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.studies.columns import Float32, Float64
 
 
 class Softening(NamedTuple):

@@ -16,10 +16,11 @@ from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.scenario import ScenarioError, load_scenario
 from uuv_marl.studies.paper.ledger import difference
+from uuv_marl.studies.suite import Case
 
 Value = float | int | str
 
-SCENARIOS = ("single_obstacle", "tracking")
+SEARCHED = ("single_obstacle", "tracking")
 """The search looks at these alone; the quick one first."""
 SEEDS = (10_000, 10_001, 10_002, 10_003)
 """Of the tuning range 10,000-99,999; the benchmark never uses them."""
@@ -52,15 +53,6 @@ UNKNOWNS = {name: Unknown(**table) for name, table in _TABLES.items()}
 DEFAULTS: dict[str, Value] = {name: unknown.default for name, unknown in UNKNOWNS.items()}
 
 
-class Setting(NamedTuple):
-    """A choice of every unknown, as the package takes it."""
-
-    overrides: dict[str, object]
-    """For ``load_scenario``."""
-    policy: dict[str, object]
-    """For the policy ``bio_inspired``."""
-
-
 class Numbers(NamedTuple):
     """The paper's numbers under a setting, means over seeds; NaN where nothing was measured."""
 
@@ -85,8 +77,8 @@ _MEASURED_ON = {
 """The scenario of each of the paper's ``Numbers``, in their order."""
 
 
-def setting(values: Mapping[str, Value]) -> Setting:
-    """What a choice of the unknowns means for the scenarios and the policy; ``DEFAULTS`` change nothing."""
+def case(values: Mapping[str, Value], scenario: str, seeds: Sequence[int] | None = None) -> Case:
+    """A scenario under a choice of the unknowns; ``DEFAULTS`` change nothing."""
     vehicle = load_scenario("tracking").vehicle
     overrides: dict[str, object] = {}
     for name, unknown in UNKNOWNS.items():
@@ -95,22 +87,21 @@ def setting(values: Mapping[str, Value]) -> Setting:
             overrides[field] = getattr(vehicle, own) * float(values[name]) if section == "vehicle" else values[name]
     overrides["sonar.arrays.port.mounting_deg"] = -float(values["flank_mounting"])
     overrides["start.width_m"] = (_START_WIDTH_M - float(values["start_gap"])) / 2
-    return Setting(overrides, {"obstacle_term": values["obstacle_term"]})
+    parameters = {"obstacle_term": values["obstacle_term"]}
+    return Case(f"identified {scenario}", scenario, _POLICY, overrides, parameters, seeds)
 
 
-def runs(choice: Setting, scenario: str, seeds: Sequence[int]) -> Iterator[Run]:
-    """Episodes of the paper's controller under a setting."""
-    loaded = load_scenario(scenario, overrides=choice.overrides)
-    return (run for run in evaluate(loaded, _POLICY, seeds, **choice.policy) if isinstance(run, Run))
+def runs(of: Case) -> Iterator[Run]:
+    """Episodes of a case."""
+    return (run for run in evaluate(of.load(), of.policy, of.seeds or (), **of.parameters) if isinstance(run, Run))
 
 
 def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Numbers:
     """The paper's numbers of 5.1 and 5.2.1; the longer scenario is skipped where a swarm fails the other already."""
-    choice = setting(values)
     metrics: dict[str, list[Metrics]] = {}
-    for scenario in SCENARIOS:
+    for scenario in SEARCHED:
         try:
-            metrics[scenario] = [run.metrics for run in runs(choice, scenario, seeds)]
+            metrics[scenario] = [run.metrics for run in runs(case(values, scenario, seeds))]
         except ScenarioError:
             return Numbers()
         if any(map(_fails, metrics[scenario])):
@@ -120,7 +111,7 @@ def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Number
         found = [value for m in metrics.get(scenario, ()) if (value := dict[str, Any](m)[name]) is not None]
         return sum(found) / len(found) if found else math.nan
 
-    total, safe = len(SCENARIOS) * len(seeds), sum(not _fails(m) for found in metrics.values() for m in found)
+    total, safe = len(SEARCHED) * len(seeds), sum(not _fails(m) for found in metrics.values() for m in found)
     return Numbers(*(mean(name, scenario) for name, scenario in _MEASURED_ON.items()), failed=(total - safe) / total)
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.studies.columns import Float64
 from uuv_marl.studies.paper import measures
 from uuv_marl.studies.paper.cases import (
     COMPARATORS,
@@ -19,7 +20,6 @@ from uuv_marl.studies.paper.cases import (
 )  # fmt: skip
 from uuv_marl.studies.suite import Case, Suite, Trace
 
-Float64 = NDArray[np.float64]
 Values = Callable[[Suite], Float64]
 INF = float("inf")
 FASTER = (
@@ -73,7 +73,7 @@ def ratio(case: Case, to: Case, value: Callable[[Trace], float]) -> Values:
     return values
 
 
-def difference(case: Case, to: Case, name: str) -> Values:
+def minus(case: Case, to: Case, name: str) -> Values:
     """A metric of two cases, seed by seed, as the first minus the second."""
     return lambda suite: suite.metric(case, name) - suite.metric(to, name)
 
@@ -81,7 +81,7 @@ def difference(case: Case, to: Case, name: str) -> Values:
 def clearance_order(small: Case, large: Case) -> Values:
     """The smaller of the two gains in clearance: from ``small`` to Table 1, and on to ``large`` [m]."""
     name = "min_obstacle_distance_m"
-    return lambda suite: np.minimum(difference(SINGLE, small, name)(suite), difference(large, SINGLE, name)(suite))
+    return lambda suite: np.minimum(minus(SINGLE, small, name)(suite), minus(large, SINGLE, name)(suite))
 
 
 CLAIMS: tuple[Claim, ...] = (
@@ -165,10 +165,10 @@ CLAIMS: tuple[Claim, ...] = (
         for claim in (
             Claim("5.3", f"the proposed method is faster than {name}",
                   f"task time of {case.policy} less that of bio_inspired, seed by seed",
-                  "s", difference(case, SINGLE, "task_time_s"), 0.0, INF, FASTER),
+                  "s", minus(case, SINGLE, "task_time_s"), 0.0, INF, FASTER),
             Claim("5.3", f"the proposed method is safer than {name}",
                   f"smallest obstacle distance of bio_inspired less that of {case.policy}, seed by seed",
-                  "m", difference(SINGLE, case, "min_obstacle_distance_m"), 0.0, INF, SAFER),
+                  "m", minus(SINGLE, case, "min_obstacle_distance_m"), 0.0, INF, SAFER),
         )
     ),
 )  # fmt: skip

@@ -5,10 +5,9 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, draw_course
-from uuv_marl.studies.columns import Columns
+from uuv_marl.studies.columns import Columns, Int64
 from uuv_marl.studies.paper.measures import corner_times
 from uuv_marl.studies.suite import Case, Suite, Trace
 
@@ -63,7 +62,7 @@ def route_table(suite: Suite, case: Case) -> Columns:
     """Routes of seed 0: a row for each vehicle and second."""
     trace = suite.trace(case, 0)
     position, time = trace["route_position"], trace["route_time_s"]
-    kept: NDArray[np.int64] = np.unique(np.append(np.arange(0, len(time), 2), len(time) - 1))
+    kept: Int64 = np.unique(np.append(np.arange(0, len(time), 2), len(time) - 1))
     vehicles = int(position.shape[1])
     return {
         "vehicle": np.repeat(np.arange(vehicles), len(kept)),
@@ -74,7 +73,7 @@ def route_table(suite: Suite, case: Case) -> Columns:
     }
 
 
-def start_groups(trace: Trace) -> NDArray[np.int64]:
+def start_groups(trace: Trace) -> Int64:
     """0 for vehicles that start to port of the first leg, 1 to starboard, shape (vehicle,)."""
     leg = trace["waypoints"][1] - trace["waypoints"][0]
     offset = trace["route_position"][0] - trace["waypoints"][0]

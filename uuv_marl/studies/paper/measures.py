@@ -7,14 +7,11 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from uuv_marl.studies.columns import Float32, Float64, Int64
 from uuv_marl.studies.suite import Trace
-
-Float64 = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 
 SPEED_MPS = 4.0
 """Of l(t). Section 5.1."""
@@ -198,7 +195,7 @@ def smaller_side(position: Float32, obstacle: Float32) -> float:
     """
     offset = (position - obstacle[:2]).astype(np.float64)
     nearest = np.argmin(np.hypot(offset[..., 0], offset[..., 1])[1:-1], axis=0) + 1
-    vehicles: NDArray[np.int64] = np.arange(int(position.shape[1]))
+    vehicles: Int64 = np.arange(int(position.shape[1]))
     motion = (position[nearest + 1, vehicles] - position[nearest - 1, vehicles]).astype(np.float64)
     past = offset[nearest, vehicles]
     starboard = float(np.mean(motion[:, 0] * past[:, 1] - motion[:, 1] * past[:, 0] > 0.0))
