@@ -5,6 +5,7 @@ Uses only what both versions have. Seeds are tuning seeds, so that no reported o
 
 import hashlib
 import importlib
+import importlib.util
 import itertools
 import json
 import sys
@@ -22,11 +23,12 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, granted, make
 from uuv_marl.baselines.export import write_onnx
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.heldout.sets import SETS
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.shaping import Weights
 
+_SETS = "uuv_marl.studies.heldout.sets" if importlib.util.find_spec("uuv_marl.studies") else "uuv_marl.heldout.sets"
+SETS = importlib.import_module(_SETS).SETS
 SEED, MOST_AGENT_STEPS = 10_000, 30_000
 """The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
@@ -116,7 +118,8 @@ def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any
     """Kind, name, maker and its arguments of every hash."""
     for held, policy in itertools.product(SETS, POLICIES):
         name = f"{held.name} {policy}"
-        yield "episodes", name, episodes, (held.load(), policy, SEED + zlib.crc32(name.encode()) % 80_000)
+        scenario = load_scenario(held.scenario, overrides=held.overrides)
+        yield "episodes", name, episodes, (scenario, policy, SEED + zlib.crc32(name.encode()) % 80_000)
     for name in SCENARIOS:
         yield "parallel_env", f"{name} bio_inspired", parallel, (name, "bio_inspired", "individual")
         yield "parallel_env", f"{name} random", parallel, (name, "random", "team")

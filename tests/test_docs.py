@@ -72,9 +72,9 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     for work in (
         "benchmark.runner.run_missing",
         "benchmark.tuning.tune",
-        "reproduce.job.make",
-        "reproduce.identify.identify",
-        "heldout.job.run",
+        "studies.reproduce.make",
+        "studies.dynamics.identify.identify",
+        "studies.heldout.job.run",
         "replay.record.record",
         "replay.traces.from_folder",
     ):

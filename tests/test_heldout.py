@@ -13,13 +13,13 @@ from typer.testing import CliRunner
 from uuv_marl.baselines.learned import WEIGHTS_FILE
 from uuv_marl.benchmark.tables import estimate
 from uuv_marl.cli import app
-from uuv_marl.heldout import across, figures, job, page
-from uuv_marl.heldout.across import efficiency, success
-from uuv_marl.heldout.episodes import Episode, read_episodes, write_episodes
-from uuv_marl.heldout.marl_eval import write_marl_eval
-from uuv_marl.heldout.sets import ACROSS, SETS, HeldOut
-from uuv_marl.heldout.targets import paired, targets
-from uuv_marl.heldout.trainings import find_trainings
+from uuv_marl.studies.heldout import across, figures, job, page
+from uuv_marl.studies.heldout.across import efficiency, success
+from uuv_marl.studies.heldout.episodes import Episode, read_episodes, write_episodes
+from uuv_marl.studies.heldout.marl_eval import write_marl_eval
+from uuv_marl.studies.heldout.sets import SETS, HeldOut
+from uuv_marl.studies.heldout.targets import paired, targets
+from uuv_marl.studies.heldout.trainings import find_trainings
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "heldout"
 QUICK = {"swarm.num_vehicles": 3, "time_limit.factor": 0.02, "time_limit.extra_s": 1.0}
@@ -34,11 +34,10 @@ def test_seeds_are_the_benchmarks_and_sets_are_told_apart():
     assert len({held.name for held in SETS}) == len(SETS)
     assert max(held.seeds for held in SETS) == 500
     for held in SETS:
-        assert held.load().name == held.scenario
-    sets = {held.name: held for held in SETS}
-    for held in ACROSS:
-        assert held.load() == sets[held.name].load()
-        assert held.seeds <= sets[held.name].seeds
+        assert {case.load().name for case in held.cases(["a", "b"], None)} == {held.scenario}
+        assert max(len(case.seeds) for case in held.cases([], 30)) <= 30
+        assert held.across <= held.seeds
+    assert sum(held.across > 0 for held in SETS) == 3
 
 
 def test_scores_by_hand():
@@ -87,10 +86,10 @@ def test_episodes_come_back_from_their_file(tmp_path):
 
 @pytest.fixture
 def quick(monkeypatch):
-    held = HeldOut("quick", "random_field", 2, ("bio_inspired_plus", "mappo"), ("bio_inspired",), 1, QUICK, "tiny")
-    for module, names in ((job, ("SETS", "ACROSS")), (page, ("SETS",)), (across, ("ACROSS",))):
-        for name in names:
-            monkeypatch.setattr(module, name, (held,))
+    held = HeldOut("quick", "random_field", 2, ("bio_inspired_plus", "mappo"), ("bio_inspired",), 1, QUICK, "tiny", 2)
+    for module in (job, page, across):
+        monkeypatch.setattr(module, "SETS", (held,))
+    return held
 
 
 def trainings(folder, weights):
@@ -171,8 +170,8 @@ def test_without_trainings_the_command_ends_with_its_report(tmp_path, quick):
 def test_trainings_without_a_set_of_the_comparison_make_no_table(tmp_path, quick, monkeypatch):
     import uuv_marl.baselines
 
-    monkeypatch.setattr(across, "ACROSS", ())
-    monkeypatch.setattr(job, "ACROSS", ())
+    for module in (job, page, across):
+        monkeypatch.setattr(module, "SETS", (quick._replace(across=0),))
     weights = Path(uuv_marl.baselines.__file__).parent / "trained" / "mappo.safetensors"
     where = trainings(tmp_path / "trainings", weights)
     done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", "--seeds=1", f"--trainings={where}"])

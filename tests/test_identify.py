@@ -1,6 +1,5 @@
 """Identification: its space, its errors, its search, and the result that ships."""
 
-import json
 import math
 
 import numpy as np
@@ -8,9 +7,9 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.reproduce import identify, unknowns
-from uuv_marl.reproduce.study import read_columns
-from uuv_marl.reproduce.unknowns import DEFAULTS, OBJECTIVES, UNKNOWNS, Numbers
+from uuv_marl.studies.columns import read_columns
+from uuv_marl.studies.dynamics import identify, unknowns
+from uuv_marl.studies.dynamics.unknowns import DEFAULTS, OBJECTIVES, UNKNOWNS, Numbers
 
 HIT = Numbers(10.03, 12.29, 11.0, 205.0, 0.0)
 
@@ -29,9 +28,9 @@ def synthetic(values, seeds=None):
 
 @pytest.mark.parametrize("name", ["tracking", "single_obstacle", "multi_obstacle"])
 def test_the_defaults_change_nothing(name):
-    choice = unknowns.setting(DEFAULTS)
-    assert load_scenario(name, overrides=choice.overrides) == load_scenario(name)
-    assert choice.policy == {"obstacle_term": "per_echo"}
+    choice = unknowns.case(DEFAULTS, name)
+    assert choice.load() == load_scenario(name)
+    assert choice.parameters == {"obstacle_term": "per_echo"}
 
 
 @pytest.mark.parametrize("name", UNKNOWNS)
@@ -39,17 +38,16 @@ def test_every_unknown_has_an_effect_and_holds_its_default(name):
     unknown = UNKNOWNS[name]
     ends = unknown.choices or (unknown.low, unknown.high)
     assert unknown.default in unknown.choices if unknown.choices else unknown.low <= unknown.default <= unknown.high
-    made = [unknowns.setting({**DEFAULTS, name: end}) for end in ends]
+    made = [unknowns.case({**DEFAULTS, name: end}, "tracking") for end in ends]
     assert made[0] != made[1]
     for choice in made:
-        load_scenario("tracking", overrides=choice.overrides)
+        choice.load()
 
 
 def test_the_start_stays_200_m_wide_and_always_fits():
     for spacing in (10.0, 16.0):
         for gap in (16.0, 60.0):
-            choice = unknowns.setting({**DEFAULTS, "start_spacing": spacing, "start_gap": gap})
-            start = load_scenario("tracking", overrides=choice.overrides).start
+            start = unknowns.case({**DEFAULTS, "start_spacing": spacing, "start_gap": gap}, "tracking").load().start
             assert 2 * start.width_m + start.gap_m == pytest.approx(200.0)
 
 
@@ -81,9 +79,9 @@ def test_a_setting_that_the_scenario_refuses_is_a_failure_and_no_exception():
 def test_a_swarm_that_fails_with_the_obstacle_skips_the_longer_scenario(monkeypatch):
     seen = []
 
-    def runs(choice, scenario, seeds):
-        seen.append(scenario)
-        return real(choice, scenario, seeds)
+    def runs(case):
+        seen.append(case.scenario)
+        return real(case)
 
     real = unknowns.runs
     monkeypatch.setattr(unknowns, "runs", runs)
@@ -133,7 +131,7 @@ def test_a_resumed_search_is_an_uninterrupted_one(tmp_path, monkeypatch, end):
 
 @pytest.fixture(scope="module")
 def shipped():
-    return json.loads((identify.resources.files("uuv_marl.reproduce") / "identified" / "identified.json").read_text())
+    return identify.identified()
 
 
 @pytest.mark.docs
@@ -165,10 +163,8 @@ def test_the_shipped_front_follows_from_the_shipped_trials(shipped):
 
 @pytest.mark.docs
 def test_the_shipped_point_is_loaded_and_runs_as_recorded(shipped):
-    found = identify.identified()
-    assert found.values == shipped["chosen"]["values"]
-    assert found.reached == (max(found.errors.values()) <= identify.GOAL)
-    numbers = unknowns.measure(found.values)
+    assert shipped["all_within_5_percent"] == (max(shipped["chosen"]["errors"].values()) <= identify.GOAL)
+    numbers = unknowns.measure(shipped["chosen"]["values"])
     for name, value in shipped["chosen"]["numbers"].items():
         assert getattr(numbers, name) == pytest.approx(value, rel=0.02)
 

@@ -12,12 +12,13 @@ from typer.testing import CliRunner
 
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.cli import app
-from uuv_marl.reproduce import job, literal, measures, sensitivity
-from uuv_marl.reproduce.assumptions import ASSUMPTIONS, case_of
-from uuv_marl.reproduce.claims import CLAIMS
-from uuv_marl.reproduce.ledger import CASES, assumption_entries, difference, given_entries, ledger, read_ledger, verdict
-from uuv_marl.reproduce.page import page
-from uuv_marl.reproduce.study import (
+from uuv_marl.errors import ResultsError
+from uuv_marl.studies import reproduce as job
+from uuv_marl.studies.columns import columns, groups, read_columns, where, write_columns
+from uuv_marl.studies.dynamics import literal, rest, sensitivity
+from uuv_marl.studies.paper import cases, measures
+from uuv_marl.studies.paper.assumptions import ASSUMPTIONS, READINGS
+from uuv_marl.studies.paper.cases import (
     COMPARATORS,
     DELTA_LARGE,
     DELTA_SMALL,
@@ -26,15 +27,15 @@ from uuv_marl.reproduce.study import (
     TRACKING,
     ZETA_LARGE,
     ZETA_SMALL,
-    Case,
-    Study,
-    read_columns,
-    write_columns,
-)
+)  # fmt: skip
+from uuv_marl.studies.paper.claims import CLAIMS
+from uuv_marl.studies.paper.ledger import assumption_entries, difference, given_entries, ledger, read_ledger, verdict
+from uuv_marl.studies.report import page
+from uuv_marl.studies.suite import Case, Suite
 
 ROOT = Path(__file__).resolve().parent.parent
 SHIPPED = ROOT / "docs" / "paper"
-KEPT = {case.name for case in CASES}
+KEPT = {case.name for case in cases.ALL}
 FROM_RUNS = [part.name for part in job.PARTS if part.cases and {case.name for case in part.cases} <= KEPT]
 
 
@@ -79,8 +80,8 @@ def test_the_ledger_has_every_number_of_the_papers_results():
 def ledger_of_nothing():
     """The ledger of runs that measured nothing."""
 
-    class Empty(Study):
-        def metric(self, case, name, seeds=None):
+    class Empty(Suite):
+        def metric(self, case, name):
             return np.array([np.nan])
 
         def traces(self, case):
@@ -105,7 +106,7 @@ def test_our_numbers_are_those_of_the_runs(made):
     before = file.read_text()
     try:
         file.write_text(json.dumps(data))
-        changed = {(e.section, e.quantity): e for e in ledger(Study(made / "runs", 1))}["5.2.2", "task time"]
+        changed = {(e.section, e.quantity): e for e in ledger(Suite(made / "runs", 1))}["5.2.2", "task time"]
     finally:
         file.write_text(before)
     assert (changed.ours, changed.relative_difference, changed.verdict) == (527.0, 0.0, "matches within 5 %")
@@ -170,6 +171,24 @@ def test_a_stopped_job_goes_on(tmp_path):
     assert (tmp_path / "figures" / "figure-12.png").exists()
 
 
+def test_a_part_without_runs_is_computed_once(tmp_path, monkeypatch):
+    """In a folder of its own; again once its table is gone."""
+    calls = []
+
+    def tables(suite, report):
+        calls.append(report(1.0))
+        return {"rest": {"value": np.arange(3.0)}}
+
+    part = rest.PART._replace(tables=tables, draw=lambda made: Figure())
+    monkeypatch.setattr(job, "PARTS", (part,))
+    for expected in (1, 1):
+        assert job.reproduce(tmp_path, 1, ["rest"], lambda what, share: None) == [tmp_path / "figures" / "rest.png"]
+        assert len(calls) == expected
+    (tmp_path / "data" / "rest.csv").unlink()
+    job.reproduce(tmp_path, 1, ["rest"], lambda what, share: None)
+    assert len(calls) == 2
+
+
 # What each sentence is tested against: swarms for which it is false.
 def swapped(words, cases, policy="bio_inspired", **parameters):
     """Other runs under the names of these cases."""
@@ -184,20 +203,20 @@ FALSE = {
     "no tau_o": swapped("blind", (SINGLE, MULTI), gains=Gains(zeta_o=0.0)),
     "the same gains": {case.name: SINGLE for case in OBSTACLES},
     "huge delta_o": swapped("huge", (DELTA_LARGE,), gains=Gains(delta_o=400.0)),
-    "safer comparators": {case.name: DELTA_LARGE for case in COMPARATORS.values()},
-    "faster comparators": {case.name: ZETA_SMALL for case in COMPARATORS.values()},
+    "safer comparators": {case.name: DELTA_LARGE for case in COMPARATORS},
+    "faster comparators": {case.name: ZETA_SMALL for case in COMPARATORS},
 }
 
 
-class Swapped(Study):
+class Swapped(Suite):
     """A study in which some cases are others'."""
 
     def __init__(self, folder, swaps):
         super().__init__(folder, 1)
         self._swaps = swaps
 
-    def metric(self, case, name, seeds=None):
-        return super().metric(self._swaps.get(case.name, case), name, seeds)
+    def metric(self, case, name):
+        return super().metric(self._swaps.get(case.name, case), name)
 
     def trace(self, case, seed):
         return super().trace(self._swaps.get(case.name, case), seed)
@@ -208,10 +227,10 @@ def falsified(made):
     """By sentence, the swarms for which it does not hold."""
     found = {claim.says: [] for claim in CLAIMS}
     for name, swaps in FALSE.items():
-        Study(made / "runs", 1).run(swaps.values(), lambda share: None)
-        study = Swapped(made / "runs", swaps)
+        Suite(made / "runs", 1).run(list(swaps.values()), lambda what, share: None)
+        suite = Swapped(made / "runs", swaps)
         for claim in CLAIMS:
-            if not claim.holds(claim.values(study)).all():
+            if not claim.holds(claim.values(suite)).all():
                 found[claim.says].append(name)
     return found
 
@@ -283,12 +302,12 @@ def test_eq_24_as_printed_is_of_first_order_and_ours_of_fourth():
 
 
 def test_every_alternative_changes_something():
-    for assumption, other in ((a, b) for a in ASSUMPTIONS for b in a.alternatives):
-        for scenario in other.scenarios:
-            case = case_of(assumption.name, other, scenario)
-            default = Case("default", scenario)
-            assert case.load() != default.load() or case.parameters, other.label
-    names = [case.name for case in sensitivity.cases()]
+    taken, *others = READINGS
+    assert len(others) == sum(len(one.alternatives) for one in ASSUMPTIONS)
+    for other in others:
+        for scenario, case in READINGS[other].items():
+            assert case.load() != READINGS[taken][scenario].load() or case.parameters, other
+    names = [case.name for case in sensitivity.PART.cases]
     assert len(set(names)) == len(names)
 
 
@@ -299,12 +318,32 @@ def test_every_assumption_says_what_was_in_view():
 
 
 def test_a_case_that_changes_finds_no_old_runs(tmp_path):
-    study = Study(tmp_path, 1)
+    suite = Suite(tmp_path, 1)
     before = Case("x", "single_obstacle", overrides={"time_limit.factor": 0.01, "time_limit.extra_s": 1.0})
     after = before._replace(parameters={"gains": Gains(zeta_o=1.0)})
-    study.run([before], lambda share: None)
-    assert len(study.metric(before, "effort")) == 1
-    assert len(Study(tmp_path, 1).metric(after, "effort")) == 0
+    suite.run([before], lambda what, share: None)
+    assert len(suite.metric(before, "effort")) == 1
+    assert len(Suite(tmp_path, 1).metric(after, "effort")) == 0
+
+
+def test_policies_on_one_scenario_share_a_folder(tmp_path):
+    quick = {"time_limit.factor": 0.01, "time_limit.extra_s": 1.0}
+    both = [Case("x", "single_obstacle", name, quick, seeds=range(1), shared=True) for name in ("idle", "random")]
+    suite, shares = Suite(tmp_path), []
+    suite.run(both, lambda what, share: shares.append((what, share)))
+    assert [path.name for path in tmp_path.iterdir()] == ["x"]
+    assert suite.metric(both[0], "effort") == 0.0
+    assert suite.metric(both[1], "effort") > 0.0
+    assert shares[-1] == ("x: random", 1.0)
+    with pytest.raises(ResultsError, match="another 'single_obstacle'.*move it away or give another --output"):
+        Suite(tmp_path).results(both[0]._replace(overrides={}))
+
+
+def test_rows_are_selected_and_grouped():
+    table = columns({"a": a, "b": b, "value": a + b} for a, b in (("x", "1"), ("y", "1"), ("x", "2"), ("x", "1")))
+    assert where(table, a="x", b="1")["value"].tolist() == ["x1", "x1"]
+    found = {key: own["value"].tolist() for key, own in groups(table, "a").items()}
+    assert found == {("x",): ["x1", "x2", "x1"], ("y",): ["y1"]}
 
 
 def test_tables_survive_the_disk(tmp_path):
@@ -332,4 +371,4 @@ def test_the_page_in_the_docs_is_made_of_the_files_beside_it():
 
 
 def test_part_names_are_unique():
-    assert not [name for name, group in itertools.groupby(sorted(job.names())) if len(list(group)) > 1]
+    assert not [name for name, group in itertools.groupby(sorted(job.NAMES)) if len(list(group)) > 1]

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 from uuv_marl.baselines.learned import WEIGHTS_FILE
-from uuv_marl.heldout.episodes import read_episodes
-from uuv_marl.heldout.page import write_page
-from uuv_marl.heldout.trainings import find_trainings
+from uuv_marl.studies.heldout.episodes import read_episodes
+from uuv_marl.studies.heldout.page import write_page
+from uuv_marl.studies.heldout.trainings import find_trainings
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "heldout"
 

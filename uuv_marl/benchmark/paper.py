@@ -12,6 +12,11 @@ class PaperFigure(NamedTuple):
     mean_min_spacing_m: float | None = None
     source: str = ""
 
+    def values(self, metric: str) -> tuple[float, ...]:
+        """What the paper states of a metric, which may be two values or none."""
+        stated: float | tuple[float, ...] | None = getattr(self, metric, None)
+        return stated if isinstance(stated, tuple) else () if stated is None else (stated,)
+
 
 PAPER: dict[tuple[str, str], PaperFigure] = {
     ("tracking", "bio_inspired"): PaperFigure(min_spacing_m=10.03, mean_min_spacing_m=12.29, source="section 5.1"),

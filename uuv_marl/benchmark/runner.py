@@ -36,14 +36,14 @@ def run_missing(
         for policy in policies:
             results.use(policy)
             missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
-            done, fresh = len(seeds) - len(missing), 0
+            done, fresh, share = len(seeds) - len(missing), 0, 0.0
             report(scenario.name, policy, done / len(seeds))
             with blaming(policy):
                 for event in evaluator(granted(policy, scenario), policy, missing):
                     if isinstance(event, Run):
                         results.add(scenario.name, policy, event)
                         fresh += 1
-                    share = event.share if isinstance(event, Progress) else fresh / len(missing)
+                    share = max(share, event.share if isinstance(event, Progress) else fresh / len(missing))
                     report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
             report(scenario.name, policy, 1.0)
 

@@ -44,8 +44,8 @@ def panels(
     return figure, axes
 
 
-def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> None:
-    """One legend for all panels, each label once: below them, or in an empty panel."""
+def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> Figure:
+    """The figure with one legend for all panels, each label once: below them, or in an empty panel."""
     found: dict[str, Artist] = {}
     for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
@@ -54,6 +54,7 @@ def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> None:
         figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns)
     else:
         into.legend(found.values(), found.keys(), loc="center", fontsize=9)
+    return figure
 
 
 def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Sequence[Sequence[float]] | NDArray[Any]) -> None:

@@ -63,6 +63,10 @@ class Estimate(NamedTuple):
     low: float
     high: float
 
+    def __format__(self, spec: str) -> str:
+        """``mean [low, high]``, each number as ``spec`` says."""
+        return f"{self.iqm:{spec}} [{self.low:{spec}}, {self.high:{spec}}]"
+
 
 def estimate(*samples: Sequence[float]) -> Estimate:
     """Interquartile mean and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable.
@@ -113,9 +117,7 @@ def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigur
         if not values:
             return _NOTHING
         e = estimate(values)
-        return f"{e.iqm:.{digits}f}" + (
-            f" [{e.low:.{digits}f}, {e.high:.{digits}f}]" if len(runs) >= _FEWEST_SEEDS else ""
-        )
+        return f"{e if len(runs) >= _FEWEST_SEEDS else e.iqm:.{digits}f}"
 
     return Cells(
         policy=policy,

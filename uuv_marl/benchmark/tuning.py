@@ -2,7 +2,8 @@
 
 import csv
 import json
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import bio_inspired, granted, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario import Scenario, load_scenario
 
 TRIALS = 300
 SEEDS = (10_000, 10_001, 10_002, 10_003)
@@ -94,6 +95,52 @@ def cost(run: Run, scenario: Scenario) -> float:
     return time + _COLLISION_COST_S * metrics["collisions"] + _CLEARANCE_COST_S_PER_M * short
 
 
+def search(
+    output: Path,
+    name: str,
+    trials: int,
+    objective: Callable[[Any], float | Sequence[float]],
+    sampler: Callable[[int], Any],
+    report: Callable[[int, float], None],
+    objectives: int = 1,
+    first: dict[str, Any] | None = None,
+) -> Sequence[Any]:
+    """Minimise with Optuna; interrupted, the same call goes on, and draws what an uninterrupted one draws.
+
+    Args:
+        output: folder of the journal ``NAME.journal``, from which Optuna unpickles: go on with none you do not trust.
+        name: of the search.
+        trials: how many must be complete.
+        objective: from a trial to what is minimised.
+        sampler: made anew for every trial, from the number of trials before.
+        report: called with the number of complete trials and the smallest largest objective.
+        objectives: how many ``objective`` gives.
+        first: parameters of the first trial.
+
+    Returns:
+        All complete trials.
+    """
+    import optuna  # noqa: PLC0415 - an extra
+    from optuna.storages.journal import JournalFileBackend  # noqa: PLC0415
+    from optuna.trial import TrialState  # noqa: PLC0415
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    output.mkdir(parents=True, exist_ok=True)
+    storage = optuna.storages.JournalStorage(JournalFileBackend(str(output / f"{name}.journal")))
+    directions = [optuna.study.StudyDirection.MINIMIZE] * objectives
+    study = optuna.create_study(storage=storage, study_name=name, directions=directions, load_if_exists=True)
+
+    while (done := len(study.get_trials(states=(TrialState.COMPLETE,)))) < trials:
+        if first and not done and not study.get_trials(states=(TrialState.WAITING,)):
+            study.enqueue_trial(first)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+            study.sampler = sampler(done)
+        study.optimize(objective, n_trials=1)
+        report(done + 1, min(max(trial.values) for trial in study.get_trials(states=(TrialState.COMPLETE,))))
+    return study.get_trials(states=(TrialState.COMPLETE,))
+
+
 def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], None]) -> Path:
     """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
 
@@ -102,29 +149,20 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
     the number of trials done and the best cost [s].
     """
     import optuna  # noqa: PLC0415 - an extra
-    from optuna.storages.journal import JournalFileBackend  # noqa: PLC0415
 
-    from uuv_marl.scenario import load_scenario  # noqa: PLC0415
-
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
     space, gains = SPACES[policy]
     scenario = granted(policy, load_scenario(SCENARIO))
-    output.mkdir(parents=True, exist_ok=True)
-    storage = optuna.storages.JournalStorage(JournalFileBackend(str(output / f"{policy}.journal")))
 
     def objective(trial: optuna.Trial) -> float:
         drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.items()}
         runs = [run for run in evaluate(scenario, policy, SEEDS, gains=gains(**drawn)) if isinstance(run, Run)]
         return sum(cost(run, scenario) for run in runs) / len(runs)
 
-    study = optuna.create_study(storage=storage, study_name=policy, load_if_exists=True)
-    complete = (optuna.trial.TrialState.COMPLETE,)
-    while (done := len(study.get_trials(states=complete))) < trials:
-        # One sampler seed per trial: a resumed search draws what an uninterrupted one draws.
-        sampler = optuna.samplers.CmaEsSampler(seed=done, n_startup_trials=0, warn_independent_sampling=False)
-        study = optuna.load_study(study_name=policy, storage=storage, sampler=sampler)
-        study.optimize(objective, n_trials=1)
-        report(done + 1, study.best_value)
+    def sampler(seed: int) -> optuna.samplers.BaseSampler:
+        return optuna.samplers.CmaEsSampler(seed=seed, n_startup_trials=0, warn_independent_sampling=False)
+
+    finished = search(output, policy, trials, objective, sampler, report)
+    best = min(finished, key=lambda trial: trial.values)
     result = {
         "policy": policy,
         "objective": "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
@@ -132,14 +170,14 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         "seeds": list(SEEDS),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
         "space": {name: r._asdict() for name, r in space.items()},
-        "best": {name: float(f"{value:.4g}") for name, value in study.best_params.items()},
-        "best_cost_s": round(study.best_value, 3),
+        "best": {name: float(f"{value:.4g}") for name, value in best.params.items()},
+        "best_cost_s": round(best.values[0], 3),
     }
     trials_path, path = output / f"{policy}.csv", output / f"{policy}.json"
     with replacing(trials_path) as partial_path, partial_path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["cost_s", *space])
-        for trial in study.get_trials(states=complete):
-            writer.writerow([f"{trial.value:.3f}", *(f"{trial.params[name]:.4g}" for name in space)])
+        for trial in finished:
+            writer.writerow([f"{trial.values[0]:.3f}", *(f"{trial.params[name]:.4g}" for name in space)])
     write_text(path, json.dumps(result, indent=1) + "\n")
     return path

@@ -1,0 +1,94 @@
+"""Episodes as rows: what the page and the files are made of."""
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from uuv_marl.benchmark.results import Results
+from uuv_marl.studies.heldout.trainings import Trained
+
+
+class Episode(NamedTuple):
+    """One episode; lengths in m, times in s, None where there is nothing to measure."""
+
+    set: str
+    policy: str
+    training_seed: int | None
+    """Of a training; None for a policy that ships."""
+    seed: int
+    duration_s: float
+    """What l(t) takes."""
+    task_time_s: float | None
+    """None where the swarm did not arrive."""
+    collisions: int
+    min_obstacle_distance_m: float | None
+    min_spacing_m: float | None
+    mean_min_spacing_m: float | None
+    within_eq7: float
+    """Share of the time in which all three bounds of Eq. 7 hold."""
+    centre_error_m: float | None
+    effort: float
+    """Mean squared action, share of full force."""
+    clamps: int
+    """How often a numerical bound of a policy bound."""
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the swarm did."""
+        return self.task_time_s is not None
+
+    @property
+    def succeeded(self) -> bool:
+        """Arrived, and nobody touched anything."""
+        return self.arrived and not self.collisions
+
+    @property
+    def efficiency(self) -> float:
+        """l(t)'s time over the task's, 0 where the swarm does not arrive."""
+        return 0.0 if self.task_time_s is None else self.duration_s / self.task_time_s
+
+
+def select(episodes: Sequence[Episode], name: str, policy: str, training_seed: int | None = None) -> list[Episode]:
+    """A policy's episodes of a set, by seed; of one that ships, or of a training."""
+    mine = [e for e in episodes if (e.set, e.policy, e.training_seed) == (name, policy, training_seed)]
+    return sorted(mine, key=lambda e: e.seed)
+
+
+def measured(episodes: Sequence[Episode], name: str) -> list[float]:
+    """What was measured of a field, one value for each episode that has one."""
+    return [value for e in episodes if (value := getattr(e, name)) is not None]
+
+
+def episodes_of(results: Mapping[str, Results], trained: Sequence[Trained]) -> list[Episode]:
+    """All that the results hold, in their order."""
+    trainings = {str(one.policy): (one.algorithm, one.seed) for one in trained}
+    rows: list[Episode] = []
+    for name, kept in results.items():
+        for row in sorted(kept.rows, key=lambda row: (row.policy, row.seed)):
+            policy, training_seed = trainings.get(row.policy, (row.policy, None))
+            values: dict[str, Any] = {**row.metrics, "within_eq7": row.metrics["constraint_share"]["all"]}
+            fields = {field: values[field] for field in Episode._fields if field in values}
+            rows.append(Episode(set=name, policy=policy, training_seed=training_seed, seed=row.seed, **fields))
+    return rows
+
+
+def write_episodes(episodes: Iterable[Episode], path: Path) -> None:
+    """As CSV, lengths and times to a millimetre and a millisecond."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(Episode._fields)
+        for episode in episodes:
+            table.writerow(["" if v is None else f"{v:.3f}" if isinstance(v, float) else v for v in episode])
+
+
+def read_episodes(path: Path) -> list[Episode]:
+    """What ``write_episodes`` wrote."""
+    types: dict[str, Any] = dict.fromkeys(("set", "policy"), str)
+    types |= dict.fromkeys(("training_seed", "seed", "collisions", "clamps"), int)
+
+    def parsed(name: str, text: str) -> Any:
+        return types.get(name, float)(text) if text else None
+
+    with path.open(newline="", encoding="utf-8") as file:
+        return [Episode(**{name: parsed(name, text) for name, text in row.items()}) for row in csv.DictReader(file)]

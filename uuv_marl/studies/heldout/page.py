@@ -1,0 +1,126 @@
+"""``report.md``: targets, a table for every set, algorithms over training seeds. Written from the episodes alone."""
+
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from uuv_marl.baselines import POLICIES
+from uuv_marl.benchmark.style import house_style
+from uuv_marl.benchmark.tables import estimate, markdown_table
+from uuv_marl.studies.heldout.across import SCORES, runs, tasks
+from uuv_marl.studies.heldout.episodes import Episode, measured, read_episodes, select, write_episodes
+from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
+from uuv_marl.studies.heldout.marl_eval import write_marl_eval
+from uuv_marl.studies.heldout.sets import SETS, HeldOut
+from uuv_marl.studies.heldout.targets import RIVAL, paired, targets
+from uuv_marl.studies.heldout.trainings import Trained
+
+_NOTHING = "–"
+_NO_TRAININGS = "No trainings were given.\n"
+_HEADERS = (
+    "policy", "arrived", "collided", "task time [s]", "worst", f"beyond {RIVAL} [s]", "obstacle distance [m]", "worst",
+    "spacing [m]", "worst", "within Eq. 7", "centre error [m]", "effort",
+)  # fmt: skip
+
+
+def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trained]) -> list[Path]:
+    """``report.md`` with its pictures, ``episodes.csv`` and ``marl_eval.json``; the paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    page, table, raw = folder / "report.md", folder / "episodes.csv", folder / "marl_eval.json"
+    write_episodes(episodes, table)
+    episodes = read_episodes(table)  # rounded: the same page from the file
+    written = [page, table]
+    with house_style():
+        if any(e.set == "random_field" for e in episodes):
+            written.append(draw_fields(episodes, "random_field", folder / "figures" / "random_field.png"))
+        if trained:
+            written.append(draw_trainings(episodes, trained, folder / "figures" / "training.png"))
+    if tasks(episodes):
+        write_marl_eval(episodes, trained, raw)
+        written.append(raw)
+    page.write_text(report(episodes, trained), encoding="utf-8")
+    return written
+
+
+def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
+    """The page's text."""
+    story = resources.files("uuv_marl.studies.heldout").joinpath("story.md").read_text(encoding="utf-8")
+    return story.format(
+        targets=_targets(episodes),
+        sets="\n".join(_set(held, episodes) for held in SETS if any(e.set == held.name for e in episodes)),
+        across=_across(episodes),
+        trainings=_trainings(trained),
+    )
+
+
+def _targets(episodes: Sequence[Episode]) -> str:
+    found = targets(episodes, "mappo")
+    rows = [(t.set, t.demand, t.measured, "met" if t.met else "**missed**") for t in found]
+    met = sum(t.met for t in found)
+    return f"{met} of {len(found)} are met by `mappo`.\n\n" + markdown_table(("set", "demand", "measured", ""), rows)
+
+
+def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:
+    found = {name: mine for name in POLICIES if (mine := select(episodes, held.name, name))}
+    rows = [(name, *_cells(mine, [] if name == RIVAL else found.get(RIVAL, []))) for name, mine in found.items()]
+    note, count = f", {held.note}" if held.note else "", max(map(len, found.values()))
+    head = f"### {held.name}\n\n`{held.scenario}`{note}, seeds from 0, at most {count}.\n\n"
+    return head + markdown_table(_HEADERS, rows)
+
+
+def _cells(mine: Sequence[Episode], rival: Sequence[Episode]) -> tuple[str, ...]:
+    times, extra = measured(mine, "task_time_s"), paired(mine, rival)
+    obstacle, spacing = measured(mine, "min_obstacle_distance_m"), measured(mine, "min_spacing_m")
+    return (
+        f"{len(times)}/{len(mine)}",
+        f"{sum(e.collisions > 0 for e in mine)}",
+        _interval(".1f", times),
+        f"{max(times):.1f}" if times else _NOTHING,
+        f"{np.mean(extra):+.1f} ({len(extra)})" if extra else _NOTHING,
+        _interval(".2f", obstacle),
+        f"{min(obstacle):.2f}" if obstacle else _NOTHING,
+        _interval(".2f", spacing),
+        f"{min(spacing):.2f}" if spacing else _NOTHING,
+        f"{np.mean([e.within_eq7 for e in mine]):.0%}",
+        f"{np.mean(measured(mine, 'centre_error_m')):.1f}",
+        f"{np.mean([e.effort for e in mine]):.2f}",
+    )
+
+
+def _interval(spec: str, *samples: Sequence[float]) -> str:
+    return f"{estimate(*samples):{spec}}" if all(samples) else _NOTHING
+
+
+def _across(episodes: Sequence[Episode]) -> str:
+    compared = tasks(episodes)
+    if not compared:
+        return _NO_TRAININGS
+    algorithms = sorted({e.policy for e in episodes if e.training_seed is not None})
+    hand_made = [p for p in ("bio_inspired", RIVAL) if any(e.policy == p for e in episodes)]
+    headers = ["policy", *(f"{name}, {held.name}" for name in SCORES for held in compared)]
+    rows: list[list[str]] = []
+    for policy in [*algorithms, *hand_made]:
+        by_task = [runs(episodes, held, policy, trained=policy in algorithms) for held in compared]
+        scores = [[[score(run) for run in found] for found in by_task] for score in SCORES.values()]
+        each = [_interval(".2f", task) for tasks_of_score in scores for task in tasks_of_score]
+        rows.append([policy, *each, *(_interval(".2f", *tasks_of_score) for tasks_of_score in scores)])
+    return markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows)
+
+
+def _trainings(trained: Sequence[Trained]) -> str:
+    rows = [
+        (
+            one.algorithm, f"{one.seed}", f"{last.agent_steps / 1e6:.1f}", f"{last.seconds / 60:.0f}",
+            f"{one.best.agent_steps / 1e6:.1f}", f"{one.best.score:.2f}", f"{one.best.arrived:.0%}",
+            f"{last.score:.2f}",
+        )
+        for one in trained
+        for last in one.validations[-1:]
+    ]  # fmt: skip
+    headers = (
+        "algorithm", "seed", "million agent-steps", "minutes", "best at [million]", "its score", "arrived",
+        "last score",
+    )  # fmt: skip
+    return markdown_table(headers, rows) if rows else _NO_TRAININGS

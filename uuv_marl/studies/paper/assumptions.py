@@ -1,0 +1,40 @@
+"""What the paper leaves open, as ``assumptions.toml`` lists it."""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from typing import Any, NamedTuple
+
+from uuv_marl.studies.paper.cases import SCENARIOS
+from uuv_marl.studies.suite import NOTHING, Case
+
+_ALL = tuple(case.scenario for case in SCENARIOS)
+
+
+class Assumption(NamedTuple):
+    """One thing the paper does not say."""
+
+    name: str
+    taken: str
+    in_view: str
+    """Numbers of the paper that were known and looked at when it was chosen."""
+    alternatives: list[dict[str, Any]]
+    """Other readings, as ``_cases`` takes them."""
+
+
+def _cases(
+    name: str,
+    label: str,
+    overrides: Mapping[str, object] = NOTHING,
+    parameters: Mapping[str, object] = NOTHING,
+    scenarios: Iterable[str] = _ALL,
+) -> dict[str, Case]:
+    return {s: Case(f"{name} {label} {s}", s, overrides=overrides, parameters=parameters) for s in scenarios}
+
+
+_TABLES = tomllib.loads(resources.files("uuv_marl.studies.paper").joinpath("assumptions.toml").read_text("utf-8"))
+ASSUMPTIONS = tuple(Assumption(**table) for table in _TABLES["assumption"])
+READINGS = {("as taken", ""): {case.scenario: case for case in SCENARIOS}} | {
+    (one.name, other["label"]): _cases(one.name, **other) for one in ASSUMPTIONS for other in one.alternatives
+}
+"""By assumption and alternative: a case for each scenario where that applies; first how we take it."""

@@ -1,0 +1,102 @@
+"""Suites: cases whose missing runs are made and kept in a folder, so that a stopped job goes on."""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from uuv_marl.benchmark.evaluate import evaluate
+from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.runner import run_missing
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.studies.columns import Float32, Float64
+
+Trace = dict[str, Float32]
+Report = Callable[[str, float], None]
+"""Called with what is being done, and the share of the work that is done."""
+NOTHING: Mapping[str, object] = MappingProxyType({})
+
+
+class Case(NamedTuple):
+    """A policy on a scenario over seeds."""
+
+    name: str
+    """Names its folder."""
+    scenario: str
+    policy: str = "bio_inspired"
+    overrides: Mapping[str, object] = NOTHING
+    """Fields of the scenario that are changed."""
+    parameters: Mapping[str, object] = NOTHING
+    """Of the policy."""
+    seeds: Sequence[int] | None = None
+    """None for all of the suite's."""
+    routes: bool = False
+    """Whether routes of the suite's seeds are kept."""
+    shared: bool = False
+    """Whether cases of one name are policies on the same scenario, whose runs lie together."""
+
+    def load(self) -> Scenario:
+        """The scenario, before it grants what the policy declares."""
+        return load_scenario(self.scenario, overrides=self.overrides)
+
+    @property
+    def folder(self) -> str:
+        """Its name; where it is not shared also what is changed, so that a changed case never finds old runs."""
+        if self.shared:
+            return self.name
+        changed = hashlib.sha256(repr((self.load(), self.policy, sorted(self.parameters.items()))).encode())
+        words = "".join(c if c.isalnum() or c in ".-" else "_" for c in self.name)
+        return f"{words}.{changed.hexdigest()[:8]}"
+
+
+class Suite:
+    """Runs of cases in a folder.
+
+    Args:
+        folder: one sub-folder for each case, with a benchmark's results.
+        seeds: benchmark seeds 0 to ``seeds - 1``, for cases that name none.
+    """
+
+    def __init__(self, folder: Path, seeds: int = 1) -> None:
+        self.folder = folder
+        self.seeds = range(seeds)
+        self._open: dict[str, Results] = {}
+
+    def run(self, cases: Sequence[Case], report: Report) -> None:
+        """Run what is missing of these cases."""
+        work = [case.load().swarm.num_vehicles * len(self.seeds_of(case)) for case in cases]
+        for k, case in enumerate(cases):
+
+            def note(_scenario: str, policy: str, share: float, k: int = k, name: str = case.name) -> None:
+                report(f"{name}: {policy}", (sum(work[:k]) + share * work[k]) / sum(work))
+
+            evaluator = partial(evaluate, **case.parameters)
+            run_missing(self.results(case), [case.load()], [case.policy], self.seeds_of(case), note, evaluator)
+
+    def seeds_of(self, case: Case) -> Sequence[int]:
+        """What a case is run on."""
+        return self.seeds if case.seeds is None else case.seeds
+
+    def metric(self, case: Case, name: str) -> Float64:
+        """A metric by seed; NaN where there is none."""
+        rows = self.results(case).select(case.scenario, case.policy, self.seeds_of(case))
+        return np.array([dict[str, Any](row.metrics)[name] for row in rows], np.float64)
+
+    def trace(self, case: Case, seed: int) -> Trace:
+        """A run's time series and routes, see ``Results.trace``."""
+        return self.results(case).trace(case.scenario, case.policy, seed)
+
+    def traces(self, case: Case) -> list[Trace]:
+        """Those of all seeds."""
+        return [self.trace(case, seed) for seed in self.seeds_of(case)]
+
+    def results(self, case: Case) -> Results:
+        """What its folder holds."""
+        if case.name not in self._open:
+            routes = self.seeds if case.routes else ()
+            self._open[case.name] = Results(self.folder / case.folder, [case.load()], routes)
+        return self._open[case.name]
