@@ -57,9 +57,14 @@ def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
 
 def _targets(episodes: Sequence[Episode]) -> str:
     found = targets(episodes, "mappo")
+    kinds = [
+        (kind, f"{sum(t.met for t in found if t.kind == kind)} of {sum(t.kind == kind for t in found)}")
+        for kind in dict.fromkeys(t.kind for t in found)
+    ]
     rows = [(t.set, t.demand, t.measured, "met" if t.met else "**missed**") for t in found]
-    met = sum(t.met for t in found)
-    return f"{met} of {len(found)} are met by `mappo`.\n\n" + markdown_table(("set", "demand", "measured", ""), rows)
+    met = f"{sum(t.met for t in found)} of {len(found)} are met by `mappo`."
+    tables = markdown_table(("targets for", "met"), kinds), markdown_table(("set", "demand", "measured", ""), rows)
+    return "\n\n".join([met, tables[0].rstrip("\n"), tables[1]])
 
 
 def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:

@@ -22,6 +22,8 @@ class Target(NamedTuple):
     """One demand on one set."""
 
     set: str
+    kind: str
+    """What it is about."""
     demand: str
     measured: str
     met: bool
@@ -38,25 +40,25 @@ def targets(episodes: Sequence[Episode], policy: str) -> list[Target]:
     ]
 
 
-def _demands(held: HeldOut, mine: Sequence[Episode], rival: Sequence[Episode]) -> Iterator[tuple[str, str, bool]]:
-    """What is demanded, what was measured, and whether that will do."""
+def _demands(held: HeldOut, mine: Sequence[Episode], rival: Sequence[Episode]) -> Iterator[tuple[str, str, str, bool]]:
+    """The kind, what is demanded, what was measured, and whether that will do."""
     collided, arrived = sum(e.collisions > 0 for e in mine), sum(e.arrived for e in mine)
-    yield "no collision", f"in {collided} of {len(mine)} episodes", collided == 0
+    yield "collisions", "no collision", f"in {collided} of {len(mine)} episodes", collided == 0
     if held.scenario == "random_field":
         share, extra = arrived / len(mine), paired(mine, rival)
-        yield f"at least {_ARRIVED:.0%} arrive", f"{share:.1%}", share >= _ARRIVED
+        yield "arrival", f"at least {_ARRIVED:.0%} arrive", f"{share:.1%}", share >= _ARRIVED
         demand, mean = f"mean time no longer than {RIVAL}'s where both arrive", _mean(extra)
-        yield demand, f"{mean:+.1f} s over {len(extra)} episodes", mean <= 0.0
+        yield "time", demand, f"{mean:+.1f} s over {len(extra)} episodes", mean <= 0.0
     elif held.scenario != "lossy":
         ours, theirs = (_mean(measured(found, "task_time_s")) for found in (mine, rival))
         words = f"{ours:.1f} s against {theirs:.1f} s, {arrived} of {len(mine)} arrive"
         met = ours <= _SLOWER * theirs and arrived == len(mine)
-        yield f"all arrive, mean time at most {RIVAL}'s + 1 %", words, met
+        yield "arrival and time", f"all arrive, mean time at most {RIVAL}'s + 1 %", words, met
         clear = _OTHER_SIZES_M if "swarm.num_vehicles" in held.overrides else _PAPERS_BEST_M
         for what, least in (("obstacle_distance", clear), ("spacing", _SPACING_M)):
             if found := measured(mine, f"min_{what}_m"):
-                demand = f"worst {what.replace('_', ' ')} at least {least:g} m"
-                yield demand, f"{min(found):.2f} m", min(found) >= least
+                kind = what.replace("_", " ")
+                yield kind, f"worst {kind} at least {least:g} m", f"{min(found):.2f} m", min(found) >= least
 
 
 def paired(mine: Sequence[Episode], rival: Sequence[Episode]) -> list[float]:
