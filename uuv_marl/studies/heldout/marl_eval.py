@@ -55,5 +55,6 @@ def _evaluation(one: Trained, task: str, episodes: Sequence[Episode]) -> dict[st
         "efficiency": [round(e.efficiency, 4) for e in mine],
         "collisions": [float(e.collisions) for e in mine],
     }
-    means = {name: [round(sum(values) / len(values), 6)] for name, values in metrics.items()}
+    # Eight digits: the mean of 200 numbers of four digits has seven, and a tie would be rounded by how a Python adds.
+    means = {name: [round(sum(values) / len(values), 8)] for name, values in metrics.items()}
     return {"step_1": {"step_count": one.best.agent_steps, **means}, "absolute_metrics": metrics}
