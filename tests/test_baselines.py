@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, PolicyError, bio_inspired, granted, make, sdc, sff
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, bio_inspired, granted, make, sdc, sff
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -324,3 +324,11 @@ def test_gains_and_parameters_can_be_written_behind_a_name():
 def test_a_name_that_means_nothing_is_explained(name, message):
     with pytest.raises(PolicyError, match=message):
         make(name, load_scenario("starter"))
+
+
+def test_a_policy_that_decides_nothing_is_refused_when_it_is_made():
+    class Nothing(Policy):
+        pass
+
+    with pytest.raises(PolicyError, match=r"policy 'Nothing' must define decide\(percept\)"):
+        Nothing(load_scenario("starter"))

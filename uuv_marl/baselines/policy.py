@@ -65,6 +65,8 @@ class Policy:
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.name: str = getattr(self, "name", type(self).__name__)
         """By which messages call it."""
+        if type(self).act is Policy.act and type(self).decide is Policy.decide:
+            raise PolicyError(f"policy {self.name!r} must define decide(percept), or act(percept) if it has no memory")
         missing = [channel for channel in self.channels if channel not in scenario.sonar.channels]
         needs: list[str] = []
         if missing:
@@ -136,7 +138,7 @@ class Policy:
 
     def decide(self, percept: Percept) -> Float32:
         """Actions as ``act`` gives them, from the percept and ``memory``, which stay as they are."""
-        raise NotImplementedError(f"{self.name} must define decide(percept)")
+        raise NotImplementedError
 
     def _gone_on(self, clock: Clock | None) -> Bool:
         """Worlds that have gone on since the latest call, shape (world,); those that were reset are forgotten."""

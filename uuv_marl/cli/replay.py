@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from uuv_marl.cli.console import changes_of, console, explained, find_modules, progress_bar
+from uuv_marl.replay import FILMS, MOST_EPISODES
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
     from uuv_marl.replay.recording import Recording
 
-_MOST_POLICIES = 4
-_FILMS = (".mp4", ".gif", ".png")
 _SCENARIO, _POLICY = "single_obstacle", "bio_inspired"
 
 Write = Callable[["Sequence[Recording]", Path, Callable[[float], object]], object]
@@ -67,8 +66,8 @@ def replay(
 
         write = _writer(output, inspect or [])
         policies = list(dict.fromkeys(policy or []))
-        if len(policies) > _MOST_POLICIES:
-            raise ReplayError(f"at most {_MOST_POLICIES} policies can be shown side by side, got {len(policies)}")
+        if len(policies) > MOST_EPISODES:
+            raise ReplayError(f"at most {MOST_EPISODES} policies can be shown side by side, got {len(policies)}")
         if run is not None and (inspect or overrides):
             raise ReplayError(
                 f"{run} is saved, with neither sonar nor other numbers; leave it out for --inspect and --set, and give "
@@ -97,8 +96,8 @@ def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
     from uuv_marl.errors import ReplayError
 
     suffix = ".html" if output is None else output.suffix.lower()
-    if suffix not in (".html", *_FILMS):
-        raise ReplayError(f"--output {output} must end in {', '.join(('.html', *_FILMS[:-1]))} or {_FILMS[-1]}")
+    if suffix not in (".html", *FILMS):
+        raise ReplayError(f"--output {output} must end in {', '.join(('.html', *FILMS[:-1]))} or {FILMS[-1]}")
     if output is not None:
         _ready(output)
     if suffix == ".html":

@@ -15,13 +15,11 @@ from uuv_marl.envs.drawing.camera import CAMERAS
 from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
 from uuv_marl.errors import ReplayError
 from uuv_marl.extras import extra
+from uuv_marl.replay import FILMS, MOST_EPISODES
 from uuv_marl.replay.recording import Recording
 from uuv_marl.replay.scenes import Scenes
 
 Picture = NDArray[np.uint8]
-SUFFIXES = (".mp4", ".gif", ".png")
-MOST = 4
-"""Recordings side by side."""
 _LENGTH_S, _HOLD_S = {".mp4": 20.0, ".gif": 10.0}, 2.0
 """How long a film lasts where no speed is given, and how long it stays at its last picture [s]."""
 _FPS = {".mp4": 20, ".gif": 8}
@@ -65,8 +63,8 @@ def write_film(
         MissingExtraError: the extra ``render`` is not installed.
     """
     suffix = check_format(path)
-    if not 1 <= len(recordings) <= MOST:
-        raise ReplayError(f"a film shows 1 to {MOST} recordings side by side, got {len(recordings)}")
+    if not 1 <= len(recordings) <= MOST_EPISODES:
+        raise ReplayError(f"a film shows 1 to {MOST_EPISODES} recordings side by side, got {len(recordings)}")
     if camera not in CAMERAS:
         raise ReplayError(f"camera must be one of {list(CAMERAS)}, got {camera!r}")
     if speed is not None and not speed > 0.0:
@@ -94,8 +92,8 @@ def write_film(
 def check_format(path: Path) -> str:
     """The format that a path's suffix names. Raises ReplayError or MissingExtraError where it can't be written."""
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ReplayError(f"{path} must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+    if suffix not in FILMS:
+        raise ReplayError(f"{path} must end in {', '.join(FILMS[:-1])} or {FILMS[-1]}")
     if suffix == ".mp4":
         _av()
     return suffix

@@ -14,11 +14,9 @@ from pathlib import Path
 
 from uuv_marl.atomic import write_text
 from uuv_marl.errors import ReplayError
+from uuv_marl.replay import MOST_EPISODES
 from uuv_marl.replay.encode import payload
 from uuv_marl.replay.recording import Recording
-
-MOST_EPISODES = 4
-"""Side by side on one page."""
 
 _ASSETS = Path(__file__).parent / "page"
 _DECODER = Path(__file__).parent / "decode.js"

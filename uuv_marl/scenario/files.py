@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
-from typing import Any, NamedTuple, cast, get_args, get_origin
+from typing import Any, NamedTuple, cast
 
 import tomlkit
 from pydantic import ValidationError
@@ -14,6 +14,7 @@ from tomlkit.container import Container
 from tomlkit.items import AbstractTable
 
 from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario.messages import explain, short, shown
 from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.sections import Actuators, Vehicle
 
@@ -21,23 +22,6 @@ _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
 _VEHICLES = _FOLDER / "vehicles"
 _MAX_BYTES = 1_000_000
-_SHOWN = 80
-_EXPLANATIONS = {
-    "range": "{message}",
-    "float_type": "must be a number",
-    "int_type": "must be a whole number",
-    "bool_type": "must be true or false",
-    "string_type": "must be a text",
-    "tuple_type": "must be a list",
-    "literal_error": "must be {expected}",
-    "string_pattern_mismatch": "must hold letters, digits, _ and - only",
-    "model_type": "must be a table of fields",
-    "too_short": "must have at least {min_length} entries",
-    "too_long": "must have at most {max_length} entries",
-    "string_too_short": "must not be empty",
-    "string_too_long": "must have at most {max_length} characters",
-    "invalid_key": "must be a text",
-}
 
 
 def scenario_names() -> list[str]:
@@ -78,7 +62,7 @@ def load_scenario(
         ScenarioError: names the field, the value and the remedy.
     """
     if not isinstance(cast(object, overrides), Mapping | None):
-        raise ScenarioError(f"overrides must be a dictionary of fields and values, got {_shown(overrides)}")
+        raise ScenarioError(f"overrides must be a dictionary of fields and values, got {shown(overrides)}")
     data: dict[str, Any] = {}
     try:
         data = _data(scenario)
@@ -92,10 +76,10 @@ def load_scenario(
             _assign(data, "swarm.num_vehicles", int(num_vehicles) if whole else num_vehicles)
         return Scenario.model_validate(_frozen(data))
     except ValidationError as error:
-        raise ScenarioError("\n".join(_explain(dict(e), data) for e in error.errors()[:10])) from None
+        raise ScenarioError("\n".join(explain(dict(e), data) for e in error.errors()[:10])) from None
     except RecursionError:
         raise ScenarioError(
-            f"scenario {_shown(scenario)} or its overrides are nested too deeply; flatten them"
+            f"scenario {shown(scenario)} or its overrides are nested too deeply; flatten them"
         ) from None
 
 
@@ -104,14 +88,14 @@ def parse_override(text: str) -> tuple[str, object]:
     field, equals, value = text.partition("=")
     if not equals or not field.strip() or "\n" in text.strip():
         raise ScenarioError(
-            f"--set must look like field=value, on one line, got {_shown(text)}; for instance swarm.num_vehicles=20"
+            f"--set must look like field=value, on one line, got {shown(text)}; for instance swarm.num_vehicles=20"
         )
     try:
         return field.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return field.strip(), value.strip()
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"--set {_shown(field.strip())} can't be read: {error}; give a plain value") from None
+        raise ScenarioError(f"--set {shown(field.strip())} can't be read: {error}; give a plain value") from None
 
 
 def to_toml(scenario: Scenario) -> str:
@@ -175,13 +159,13 @@ class _File(NamedTuple):
 
 def _find(name: Any, beside: Path | None = None) -> Path:
     if not isinstance(name, str | os.PathLike):
-        raise ScenarioError(f"scenario must be a name, a path ending in .toml, or a Scenario, got {_shown(name)}")
+        raise ScenarioError(f"scenario must be a name, a path ending in .toml, or a Scenario, got {shown(name)}")
     text = os.fsdecode(cast(str, name))
     if text.endswith(".toml"):
         path = (beside or Path()) / text
         if not os.path.isfile(path):  # noqa: PTH113 - says no to names that no file can have
             raise ScenarioError(
-                f"scenario file {_shown(text)} does not exist; give the path of a TOML file, or a name: "
+                f"scenario file {shown(text)} does not exist; give the path of a TOML file, or a name: "
                 f"{', '.join(scenario_names())}"
             )
         return path
@@ -190,8 +174,7 @@ def _find(name: Any, beside: Path | None = None) -> Path:
     near = difflib.get_close_matches(text, scenario_names(), n=1, cutoff=0.4)
     hint = f"did you mean {near[0]!r}? " if near else ""
     raise ScenarioError(
-        f"scenario {_shown(text)} is unknown; {hint}give one of {', '.join(scenario_names())}, "
-        "or a path ending in .toml"
+        f"scenario {shown(text)} is unknown; {hint}give one of {', '.join(scenario_names())}, or a path ending in .toml"
     )
 
 
@@ -206,7 +189,7 @@ def _vehicle(name: str, beside: Path | None = None) -> _File:
             raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; a vehicle's file gives all numbers")
     other = next((key for key in file.data if key not in needed), None)
     if other is not None:
-        raise ScenarioError(f"vehicle {file.path} holds {_shown(other)}; it may hold vehicle and actuators only")
+        raise ScenarioError(f"vehicle {file.path} holds {shown(other)}; it may hold vehicle and actuators only")
     return file
 
 
@@ -217,7 +200,7 @@ def _find_vehicle(name: str, beside: Path | None = None) -> Path:
     near = difflib.get_close_matches(name, vehicle_names(), n=1, cutoff=0.4)
     hint = f"did you mean {near[0]!r}? " if near else ""
     raise ScenarioError(
-        f"vehicle {_shown(name)} is unknown; {hint}give one of {', '.join(vehicle_names())}, or a path ending in .toml"
+        f"vehicle {shown(name)} is unknown; {hint}give one of {', '.join(vehicle_names())}, or a path ending in .toml"
     )
 
 
@@ -244,7 +227,7 @@ def _chain(path: Path) -> list[_File]:
         last = chain[-1]
         name = last.data.get("extends")
         if not isinstance(name, str | None):
-            raise ScenarioError(f"{last.path}: extends must be a scenario's name or file, got {_shown(name)}")
+            raise ScenarioError(f"{last.path}: extends must be a scenario's name or file, got {shown(name)}")
         parent = _BASE if name is None else _find(name, last.path.parent)
         if any(parent.samefile(file.path) for file in chain):
             raise ScenarioError(f"{path}: extends must not lead back to {parent}; name another scenario")
@@ -295,7 +278,7 @@ def _assign(data: dict[str, Any], field: str, value: object) -> None:
         entries = cast(list[Any], place)
         entries[_index(entries, last, field)] = value
     else:
-        raise ScenarioError(f"{_short(field)} is unknown: {_short('.'.join(path))} is a value, not a table")
+        raise ScenarioError(f"{short(field)} is unknown: {short('.'.join(path))} is a value, not a table")
 
 
 def _step(place: Any, part: str, field: str) -> Any:
@@ -303,7 +286,7 @@ def _step(place: Any, part: str, field: str) -> Any:
         entries = cast(list[Any], place)
         return entries[_index(entries, part, field)]
     if not isinstance(place, dict):
-        raise ScenarioError(f"{_short(field)} is unknown: a value comes before {_shown(part)}")
+        raise ScenarioError(f"{short(field)} is unknown: a value comes before {shown(part)}")
     return cast(dict[str, Any], place).setdefault(part, {})
 
 
@@ -314,7 +297,7 @@ def _index(entries: Sequence[Any], part: str, field: str) -> int:
     found = (places | names).get(part)
     if found is None:
         known = ", ".join(names or places) or "none"
-        raise ScenarioError(f"{_short(field)} is unknown: there is no entry {_shown(part)}; use one of {known}")
+        raise ScenarioError(f"{short(field)} is unknown: there is no entry {shown(part)}; use one of {known}")
     return found
 
 
@@ -324,58 +307,3 @@ def _frozen(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return tuple(_frozen(entry) for entry in cast(Sequence[Any], value))
     return value
-
-
-def _explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
-    """One line of our own for one of pydantic's errors."""
-    kind, got = error["type"], error["input"]
-    if kind == "value_error":
-        return str(error["ctx"]["error"])
-    place: Any = data
-    names: list[str] = []
-    for part in error["loc"]:
-        try:
-            place = cast(dict[Any, Any], place)[part]
-        except (KeyError, IndexError, TypeError):
-            place = None
-        name = cast(dict[str, Any], place).get("name") if isinstance(part, int) and isinstance(place, dict) else None
-        names.append(str(name or part))
-    field = _short(".".join(names)) or "''"
-    if kind == "missing":
-        return f"{field} is missing; set it in the scenario's file or override it"
-    if kind == "extra_forbidden":
-        return f"{field} is unknown{_nearest(error['loc'])}"
-    explanation = _EXPLANATIONS.get(kind, "is not usable: {message}")
-    return f"{field} {explanation.format(**error.get('ctx', {}), message=error['msg'])}, got {_shown(got)}"
-
-
-def _nearest(location: Sequence[str | int]) -> str:
-    """What an unknown field may mean: the same name elsewhere, else a like one here, else a like one elsewhere."""
-    last, prefix = str(location[-1]), "".join(f"{0 if isinstance(part, int) else part}." for part in location[:-1])
-    every = list(_fields(Scenario))
-    here = dict.fromkeys(field.removeprefix(prefix).partition(".")[0] for field in every if field.startswith(prefix))
-    leaves = {field.rpartition(".")[2]: field for field in reversed(every)}
-    near = [leaves[last]] if last in leaves else difflib.get_close_matches(last, here, n=1, cutoff=0.5)
-    near = near or [leaves[name] for name in difflib.get_close_matches(last, leaves, n=1, cutoff=0.5)]
-    return f"; did you mean {near[0]!r}?" if near else f"; the fields here are {', '.join(here)}"
-
-
-def _fields(model: Any, prefix: str = "") -> Iterator[str]:
-    """All fields of a scenario as overrides address them; the first entry stands for a list's."""
-    for name, info in model.model_fields.items():
-        kind = info.annotation
-        inner = [part for part in (kind, *get_args(kind)) if hasattr(part, "model_fields")]
-        place = f"{prefix}{name}.0." if get_origin(kind) is tuple else f"{prefix}{name}."
-        yield from _fields(inner[0], place) if inner else [prefix + name]
-
-
-def _shown(value: object) -> str:
-    """A value as a message can hold it."""
-    try:
-        return _short(repr(value))
-    except (ValueError, RecursionError):
-        return f"{type(value).__name__} that is too large to show"
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."

@@ -60,7 +60,7 @@ class PlainEngine:
             self.state.tick[w] += 1
             self.apply_losses(w)
             self.measure(w)
-            self.sink(w)
+            self.lose_touching(w)
             self.check_arrival(w)
         self.facts.saturated[w] /= max(len(acting) * self.rules.holds, 1)
         self.perceive(w)
@@ -135,7 +135,7 @@ class PlainEngine:
         facts.contacts[w] += np.add(met, touched)
         facts.collisions[w] += sum(met) // 2 + sum(touched)  # two vehicles have one collision
 
-    def sink(self, w: int) -> None:
+    def lose_touching(self, w: int) -> None:
         """Lose whom a contact ends."""
         for i in self.living(w):
             if self.rules.contact_ends and self.facts.contacts[w, i] > 0:
