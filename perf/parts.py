@@ -40,7 +40,7 @@ def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> A
             motion.load(w, water.state, workspace.now)
             if move:
                 motion.load_action(w, action, workspace.now)
-                world.control_hold(w, True, water, model, workspace.now)
+                world.control_hold(w, True, water, model, workspace.now, None)
             if sort:
                 grid = world.sort_into_cells(w, water, model, workspace)
                 if measure:
@@ -58,7 +58,7 @@ def loop(move: bool, sort: bool, measure: bool, hear: bool, perceive: bool) -> A
 def stepped(num, action, water, model, workspace):
     """The whole step."""
     for w in range(num):
-        world.step_world(w, action, water, model, workspace)
+        world.step_world(w, action, water, model, workspace, None)
 
 
 def part(name: str) -> Maker:
