@@ -16,14 +16,13 @@ from uuv_marl.sim.engine import EngineName, make_engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
-from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_arrays
+from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_tables
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
 from uuv_marl.sim.trajectory import arrival_times
 
 _log = logging.getLogger("uuv_marl")
-_TABLES = (State, Course, Facts, Senses)
 
 
 class Swarm:
@@ -195,15 +194,14 @@ class Swarm:
 
     def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
-        for table in _TABLES:
-            check(table, arrays, self._sizes)
+        for table in (*self._world, *sea_tables(self._sea)):
+            check(type(table), arrays, self._sizes)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {
             "duration_s": self._duration_s,
             "keys": self.keys,
-            **{k: array for table in self._world for k, array in table._asdict().items()},
-            **sea_arrays(self._sea),
+            **{k: array for table in (*self._world, *sea_tables(self._sea)) for k, array in table._asdict().items()},
         }
 
     def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:
