@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from floor import KERNELS, loop
 from numpy.typing import NDArray
-from worker import Case, Maker, repeated, serve
+from worker import Case, Maker, built, repeated, serve
 
 import uuv_marl
 from uuv_marl import load_scenario
@@ -15,7 +15,7 @@ from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.envs.task import make_task
 from uuv_marl.sim.swarm import Swarm
 
-SETS, SETTLE_STEPS, SETTLE_S, BUILD_S = 8, 200, 10.0, 20.0
+SETS, SETTLE_STEPS, SETTLE_S = 8, 200, 10.0
 
 
 def random_actions(agents: int, worlds: int) -> NDArray[np.float32]:
@@ -42,11 +42,7 @@ def vector_env(agents: int, worlds: int) -> Case:
 
 def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
     """``parallel_env``: dicts of agents, worlds one after the other, reset when over. A unit is a step of one world."""
-    envs, start = [], time.perf_counter()
-    while len(envs) < worlds and time.perf_counter() - start < BUILD_S:
-        env = uuv_marl.parallel_env(num_vehicles=agents, info_terms=info_terms)
-        env.reset(seed=len(envs))
-        envs.append(env)
+    envs = built(lambda: uuv_marl.parallel_env(num_vehicles=agents, info_terms=info_terms), worlds)
     names = envs[0].possible_agents
     actions = [dict(zip(names, one, strict=True)) for one in random_actions(agents, 1)[:, 0]]
 

@@ -13,8 +13,9 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+BUILD_S = 20.0
 MEMORY_SHARE = 0.7
 """Of the machine's memory; with more, a case fails."""
 TOLD = (
@@ -47,6 +48,16 @@ def repeated(step: Callable[[int], object], amount: float, **facts: object) -> C
             step(k)
 
     return Case(run, amount, facts)
+
+
+def built(make: Callable[[], Any], worlds: int) -> list[Any]:
+    """As many of the environments as are built within ``BUILD_S``, reset to the seeds 0, 1, ..."""
+    envs: list[Any] = []
+    start = time.perf_counter()
+    while len(envs) < worlds and time.perf_counter() - start < BUILD_S:
+        envs.append(make())
+        envs[-1].reset(seed=len(envs) - 1)
+    return envs
 
 
 def seconds_of(case: Case, units: int) -> float:
