@@ -39,6 +39,7 @@ SPEED = Kind("m/s", 4.0, -MAX_SPEED, MAX_SPEED)
 YAW_RATE = Kind("rad/s", 1.0, -MAX_SPEED, MAX_SPEED)
 FLAG = Kind("1", 1.0, 0.0, 1.0)
 DIRECTION = Kind("1", 1.0, -1.0, 1.0)
+AGE = Kind("s", 1.0, 0.0, 4096.0)
 IDENTITY = Kind("1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES)
 
 
@@ -90,7 +91,33 @@ def _link(sectors: int, _active: int) -> Table:
     )
 
 
-CHANNELS = {"compass": _compass, "link": _link}
+def _current(_sectors: int, _active: int) -> Table:
+    return (
+        PerceptField("ground_velocity", (2,), SPEED, "own surge and sway velocity over ground"),
+        PerceptField("water_velocity", (2,), SPEED, "own surge and sway velocity through the water"),
+    )
+
+
+def _age(sectors: int, _active: int) -> Table:
+    return (PerceptField("age", (sectors,), AGE, "per sub-sector: time since the reception of its reading"),)
+
+
+def _ranged(sectors: int, _active: int) -> Table:
+    return (PerceptField("ranged", (sectors,), FLAG, "per sub-sector: 1 if the array measures ranges, else 0"),)
+
+
+def _modem(sectors: int, _active: int) -> Table:
+    return (
+        PerceptField("modem_identity", (sectors,), IDENTITY, "per sub-sector: 1 + index of the vehicle heard, where a "
+                     "message of it has arrived, else 0"),
+        PerceptField("modem_velocity", (sectors, 2), SPEED, "per sub-sector: its velocity over ground when it sent"),
+        PerceptField("modem_age", (sectors,), AGE, "per sub-sector: time since it sent"),
+    )  # fmt: skip
+
+
+CHANNELS = {
+    "compass": _compass, "link": _link, "current": _current, "age": _age, "ranged": _ranged, "modem": _modem
+}  # fmt: skip
 """Rows that a channel adds, by its name in ``sonar.channels``, in the order of the table."""
 
 

@@ -10,9 +10,11 @@ from typing import Annotated
 
 from pydantic import Field
 
-from uuv_marl.scenario import sections
+from uuv_marl.scenario import sea, sections
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
+MAX_READINGS = 64
+"""Most control holds that the processing of a sonar's reading may take."""
 MAX_STEPS = 10_000
 """Most integration steps in a decision; compiled code can't be interrupted."""
 
@@ -42,6 +44,13 @@ class Scenario(sections.Section):
     arrival: sections.Arrival
     time_limit: sections.TimeLimit
     disturbance: sections.Disturbance
+    current: sea.Current
+    latency: sea.Latency
+    noise: sea.Noise
+    navigation: sea.Navigation
+    modem: sea.Modem
+    mismatch: sea.Mismatch
+    faults: Annotated[tuple[sea.Fault, ...], Field(max_length=64)]
     reward: sections.Reward
 
     @property
@@ -54,6 +63,7 @@ class Scenario(sections.Section):
         _check_course(self)
         _check_losses(self)
         _check_times(self)
+        _check_sonar(self)
         check_vehicle(self.vehicle, self.actuators, self.timing, self.start.speed_max_mps)
         if self.trajectory.speed_mps > top_speed(self.vehicle, self.actuators):
             warn_of_speed(self.trajectory.speed_mps)
@@ -130,6 +140,28 @@ def _check_times(scenario: Scenario) -> None:
             f"timing.decision_period_s = {period:g} takes {steps:,} steps of timing.integration_step_s = "
             f"{timing.integration_step_s:g}; at most {MAX_STEPS:,} are possible: lower it or raise the step"
         )
+
+
+def _check_sonar(scenario: Scenario) -> None:
+    """Readings come no faster than sound travels, and faults name arrays that there are."""
+    latency, arrays = scenario.latency, scenario.sonar.arrays
+    far = max((array.range_m for array in arrays if array.kind == "active"), default=0.0)
+    least = 2.0 * far / latency.sound_speed_mps
+    if 0.0 < latency.active_period_s < least:
+        raise ValueError(
+            f"latency.active_period_s must be at least {least:.4g}, in which sound returns from the active arrays' "
+            f"range of {far:g} m, or 0 (at every control hold), got {latency.active_period_s:g}"
+        )
+    readings = latency.processing_s / scenario.timing.control_hold_s
+    if readings > MAX_READINGS:
+        raise ValueError(
+            f"latency.processing_s = {latency.processing_s:g} is {readings:,.0f} control holds; at most {MAX_READINGS} "
+            "readings are kept: lower it or raise timing.control_hold_s"
+        )
+    names = [array.name for array in arrays]
+    for fault in scenario.faults:
+        if fault.array is not None and fault.array not in names:
+            raise ValueError(f"faults.array must be one of {', '.join(names)}, got {fault.array!r}")
 
 
 @cache

@@ -16,6 +16,7 @@ from uuv_marl.sim.engine import EngineName, make_engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_arrays
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
@@ -53,7 +54,8 @@ class Swarm:
         self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)
         self._world = World(self.state, self.course, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
-        self._engine = make_engine(engine, scenario, self._world)
+        self._sea = make_sea(scenario, self.keys, self._sizes)
+        self._engine = make_engine(engine, scenario, self._world, self._sea)
 
     @property
     def percept(self) -> Percept:
@@ -69,6 +71,20 @@ class Swarm:
     def heading(self) -> NDArray[np.float64]:
         """Cosine and sine of every vehicle's heading psi, shape (world, vehicle, 2)."""
         return self._senses.heading
+
+    @property
+    def flow(self) -> NDArray[np.float64]:
+        """Velocity of the water at each vehicle, north and east [m/s], shape (world, vehicle, 2)."""
+        return np.zeros_like(self.state.before) if self._sea is None else self._sea.flow.flow
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """Every vehicle's velocity over ground, surge and sway in its body frame [m/s], shape (world, vehicle, 2)."""
+        if self._sea is None:
+            return self.state.nu[:, :, :2]
+        (c, s), (x, y) = np.moveaxis(self.heading, -1, 0), np.moveaxis(self._sea.flow.flow, -1, 0)
+        drift = np.stack([c * x + s * y, c * y - s * x], axis=-1)
+        return self.state.nu[:, :, :2] + drift * self.state.alive[:, :, None]
 
     @property
     def duration_s(self) -> NDArray[np.float64]:
@@ -143,6 +159,8 @@ class Swarm:
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
+        if self._sea is not None:
+            draw_sea(w, self.scenario, course, times[-1], self._sea)
         self._engine.observe(w)
 
     def observe(self) -> Percept:
@@ -185,6 +203,7 @@ class Swarm:
             "duration_s": self._duration_s,
             "keys": self.keys,
             **{k: array for table in self._world for k, array in table._asdict().items()},
+            **sea_arrays(self._sea),
         }
 
     def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:
