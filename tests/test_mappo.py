@@ -17,7 +17,9 @@ import torch
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Features, forward, load_checkpoint
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, load_checkpoint
+from uuv_marl.baselines.features import BARRIER, Features
+from uuv_marl.baselines.learned import forward
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
 from uuv_marl.sim.swarm import Swarm

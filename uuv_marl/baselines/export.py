@@ -1,6 +1,6 @@
 """Learned policies as ONNX models: the whole way from observation to action, barrier and bounds included.
 
-The graph repeats ``learned.Features`` and Eq. 20-21 for a batch of vehicles, without loops. As there, features and
+The graph repeats ``features.Features`` and Eq. 20-21 for a batch of vehicles, without loops. As there, features and
 forces are computed in double precision and the network in single.
 """
 
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
-from uuv_marl.baselines.learned import MOST_BARRIER, Learned, Trained
+from uuv_marl.baselines.features import MOST_BARRIER
+from uuv_marl.baselines.learned import Learned, Trained
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.registry import granted, policy_class
 from uuv_marl.extras import extra
@@ -184,7 +185,7 @@ def _act(g: _Graph, policy: Learned) -> _Value:
 
 
 def _look(g: _Graph, flat: _Value, layout: PerceptLayout, gains: Gains, limits: Limits) -> tuple[_Value, _Value]:
-    """``learned.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts."""
+    """``features.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts."""
     sizes = {row.name: row.size for row in layout.table}
     percept = dict(zip(sizes, g.split(flat, list(sizes.values())), strict=True))
     sectors, active = sizes["heard"], sizes["echo"]

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
+from uuv_marl.baselines.checkpoint import is_checkpoint
 from uuv_marl.baselines.floors import Idle, Random
-from uuv_marl.baselines.learned import Trained, is_checkpoint, shipped
+from uuv_marl.baselines.learned import Trained, shipped
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import MOST_BARRIER
+from uuv_marl.baselines.features import MOST_BARRIER
 from uuv_marl.envs.sb3 import SharedRows
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario

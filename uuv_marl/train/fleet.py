@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import BARRIER, Features
+from uuv_marl.baselines.features import BARRIER, Features
 from uuv_marl.envs.task import refuse_losses
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm

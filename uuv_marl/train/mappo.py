@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import Layer
+from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import Layer
+from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.crew import Crew
