@@ -1,5 +1,7 @@
 """The PettingZoo environments: ``parallel_env`` (all agents at once) and ``env`` (AEC, one after the other)."""
 
+import itertools
+import math
 from collections.abc import Mapping
 from typing import Any, cast
 
@@ -103,18 +105,19 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
             return {}, {}, {}, {}, {}
         outcome = self._task.step(self._action_array(actions))
         acted, rows = self.agents, self._rows
-        going = outcome.acting[0, rows]
-        infos = self._infos(outcome, acted, rows)
-        if not going.all():
-            for agent, goes in zip(acted, going.tolist(), strict=True):
-                infos[agent] |= {} if goes else ending(self._task, 0, self._index[agent])
-            self.agents = [agent for agent, goes in zip(acted, going.tolist(), strict=True) if goes]
-            self._rows = np.array([self._index[agent] for agent in self.agents], np.int64)
-        self._view.update()
         observations = dict(zip(acted, outcome.observation[0, rows], strict=True))
         rewards = dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True))
-        flags = (outcome.terminated, outcome.truncated)
-        terminated, truncated = (dict(zip(acted, flag[0, rows].tolist(), strict=True)) for flag in flags)
+        terminated, truncated = dict.fromkeys(acted, False), dict.fromkeys(acted, False)
+        infos = self._infos(outcome, acted, rows)
+        going = outcome.acting[0, rows].tolist()
+        if not all(going):
+            for flags, array in ((terminated, outcome.terminated), (truncated, outcome.truncated)):
+                flags.update(zip(acted, array[0, rows].tolist(), strict=True))
+            self.agents = list(itertools.compress(acted, going))
+            for agent in infos.keys() - self.agents:
+                infos[agent] |= ending(self._task, 0, self._index[agent])
+            self._rows = np.array([self._index[agent] for agent in self.agents], np.int64)
+        self._view.update()
         return observations, rewards, terminated, truncated, infos
 
     def _infos(self, outcome: Outcome, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
@@ -124,22 +127,24 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
         return {agent: {"reward_terms": {name: of[k] for name, of in terms.items()}} for k, agent in enumerate(agents)}
 
     def _action_array(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
-        array = np.zeros((1, len(self.possible_agents), 2), np.float32)
         try:
             rows = [actions[agent] for agent in self.agents]
             masked = np.ma.MaskedArray in set(map(type, rows))  # an array of them would lose the masks
             given = None if masked else action_array(np.array(rows), (len(rows), 2), "actions")
         except (LookupError, TypeError, ValueError, RuntimeError, OverflowError):
             given = None
-        if given is None or not np.isfinite(given).all():
+        if given is None or not math.isfinite(np.vdot(given, given)):  # quick; finite numbers may overflow in it
             given = self._one_by_one(actions)
         if not actions.keys() <= self._index.keys():
             unknown = min(actions.keys() - self._index.keys(), key=str)
             raise ValueError(f"there is no agent {unknown!r}; agents are uuv_0 to {self.possible_agents[-1]}")
+        if len(given) == len(self.possible_agents):
+            return given[None]
+        array = np.zeros((1, len(self.possible_agents), 2), np.float32)
         array[0, self._rows] = given
         return array
 
-    def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> list[Float32]:
+    def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
         """Every agent's action. Raises ValueError with the first agent whose action can't be used."""
         if not isinstance(actions, Mapping):
             raise TypeError(f"actions must be a dictionary with an action for each agent, got {type(actions).__name__}")
@@ -150,7 +155,7 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
             given.append(action_array(cast(ArrayLike, actions[agent]), (2,), f"the action of {agent}"))
             if not np.isfinite(given[-1]).all():
                 raise ValueError(f"the action of {agent} must be finite, got {given[-1].tolist()}")
-        return given
+        return np.array(given)
 
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""

@@ -55,15 +55,6 @@ class RewardWeights(NamedTuple):
     s_u_m: float
 
 
-class RewardTerms(NamedTuple):
-    """What the latest step pays, shape (world, vehicle) each; zero for vehicles lost before."""
-
-    reward: Float64
-    """The sum of the terms."""
-    terms: Mapping[str, Float64]
-    """The weighted ``TERMS``."""
-
-
 def reward_weights(scenario: Scenario) -> RewardWeights:
     """The scenario's weights and lengths."""
     weight, limit = scenario.reward, scenario.constraints
@@ -75,16 +66,26 @@ def reward_weights(scenario: Scenario) -> RewardWeights:
 
 def reward_terms(swarm: Swarm) -> Mapping[str, Float64]:
     """The weighted ``TERMS`` of the latest step, shape (world, vehicle) each; zero for vehicles lost before."""
-    return compute_reward(swarm, reward_weights(swarm.scenario), np.ones(swarm.num_worlds, np.bool_)).terms
+    return named(compute_reward(swarm, reward_weights(swarm.scenario), np.ones(swarm.num_worlds, np.bool_))[1])
 
 
-def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> RewardTerms:
-    """The reward of the latest step for the worlds that are ``running``, shape (world,); others are paid nothing."""
+def named(terms: Float64) -> Mapping[str, Float64]:
+    """The terms that ``compute_reward`` gave, by name."""
+    return dict(zip(TERMS, terms, strict=True))
+
+
+def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> tuple[Float64, Float64]:
+    """What the latest step pays in the worlds that are ``running``, shape (world,); others are paid nothing.
+
+    Returns:
+        The reward, shape (world, vehicle), and the weighted ``TERMS`` that it sums, shape (term, world, vehicle); zero
+        for vehicles lost before.
+    """
     terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
     reward = np.zeros(terms.shape[1:])
     fill = _fill_one if swarm.num_worlds == 1 else _fill_all
     fill(running, swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward)
-    return RewardTerms(reward, dict(zip(TERMS, terms, strict=True)))
+    return reward, terms
 
 
 @compiled
