@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines import POLICIES, make
-from uuv_marl.benchmark.metrics import Meter, Metrics
+from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
 from uuv_marl.errors import DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
@@ -43,7 +43,7 @@ class Run(NamedTuple):
     seed: int
     metrics: Metrics
     series: dict[str, Float32]
-    """Samples over time, see ``Meter.series``."""
+    """Samples over time, see ``MetricsRecorder.series``."""
     routes: Routes
     """Sampled in time."""
     obstacles: Float32
@@ -107,9 +107,9 @@ def _batch(
     actor = make(policy, scenario, len(seeds), **parameters)
     percept = swarm.reset(list(seeds))
     actor.reset(list(seeds))
-    meter = Meter(swarm)
+    recorder = MetricsRecorder(swarm)
     active = np.ones(len(seeds), np.bool_)
-    meter.update(active)
+    recorder.update(active)
     limits, period = swarm.time_limit_s, scenario.timing.decision_period_s
     steps, step = math.ceil(limits.max() / period) + 1, 0
     every = max(round(ROUTE_PERIOD_S / period), math.ceil(steps * swarm.num_vehicles / MOST_SAMPLES), 1)
@@ -120,7 +120,7 @@ def _batch(
     while active.any():
         action = actor.act(percept)
         percept = swarm.step(action, active)
-        meter.update(active)
+        recorder.update(active)
         watch(swarm, action)
         step += 1
         ended = active & swarm.ended
@@ -131,8 +131,8 @@ def _batch(
             course, discs = swarm.course, int(swarm.course.num_obstacles[w])
             yield Run(
                 seed=seeds[w],
-                metrics=meter.metrics(w, int(actor.clamps[w])),
-                series=meter.series(w),
+                metrics=recorder.metrics(w, int(actor.clamps[w])),
+                series=recorder.series(w),
                 routes=_routes(swarm, samples, w),
                 obstacles=course.obstacles[w, :discs].astype(np.float32),
                 waypoints=course.waypoints[w, : int(course.last[w]) + 1].astype(np.float32),

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from uuv_marl.envs.task import make_task, refuse_losses
+from uuv_marl.envs.batched_env import make_batched_env, refuse_losses
 from uuv_marl.extras import extra
 
 with extra("benchmarl", "SwarmTask"):
@@ -28,7 +28,7 @@ class SwarmTaskClass(TaskClass):
         device: Any,
     ) -> Callable[[], EnvBase]:
         """A function that makes ``num_envs`` worlds."""
-        refuse_losses(make_task(**self._arguments).swarm.scenario, "BenchMARL")
+        refuse_losses(make_batched_env(**self._arguments).swarm.scenario, "BenchMARL")
         return lambda: SwarmEnv(num_envs, seed=seed, device=device, **self._arguments)
 
     @property
@@ -45,7 +45,7 @@ class SwarmTaskClass(TaskClass):
 
     def max_steps(self, env: EnvBase) -> int:  # noqa: ARG002
         """Decisions after which every episode is over."""
-        return make_task(**self._arguments).longest_episode
+        return make_batched_env(**self._arguments).longest_episode
 
     def has_render(self, env: EnvBase) -> bool:  # noqa: ARG002
         """TorchRL's environment draws nothing; ``uuv_marl.parallel_env`` does."""

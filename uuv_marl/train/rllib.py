@@ -15,7 +15,7 @@ from uuv_marl.envs.rllib import SwarmMultiAgentEnv
 from uuv_marl.errors import ClusterError
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.train.fleet import TRAINING_SEEDS
+from uuv_marl.train.env import TRAINING_SEEDS
 from uuv_marl.train.folder import Record, Say, opened, quiet
 from uuv_marl.train.shaping import OVERRIDES
 

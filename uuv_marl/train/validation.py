@@ -8,7 +8,7 @@ from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.train.fleet import TRAINING_SEEDS
+from uuv_marl.train.env import TRAINING_SEEDS
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
 """The first of the validation seeds: up to 999,999, which no training uses."""
@@ -17,7 +17,7 @@ SAFE_SPACING_M = 6.5
 """Distances below these cost: a little more than what we want of the worst seed."""
 
 
-class Verdict(NamedTuple):
+class ValidationResult(NamedTuple):
     """Over all episodes."""
 
     score: float
@@ -34,7 +34,7 @@ class Verdict(NamedTuple):
     """Of the worst episode."""
 
 
-def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]]) -> Verdict:
+def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]]) -> ValidationResult:
     """Run a checkpoint on a scenario's validation seeds.
 
     Args:
@@ -47,13 +47,13 @@ def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]])
         seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + count)
         events = evaluate(granted(str(policy), load_scenario(scenario, num_vehicles=n)), str(policy), seeds)
         metrics += [event.metrics for event in events if isinstance(event, Run)]
-    return judge(metrics)
+    return validation_result(metrics)
 
 
-def judge(metrics: Sequence[Metrics]) -> Verdict:
-    """The verdict on these episodes."""
+def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
+    """The result of these episodes."""
     times = [late for late in map(lateness, metrics) if late is not None]
-    return Verdict(
+    return ValidationResult(
         score=-sum(map(cost, metrics)) / len(metrics),
         arrived=len(times) / len(metrics),
         collisions=sum(int(_number(m, "collisions") or 0) for m in metrics),

@@ -24,7 +24,7 @@ ScenarioLike = str | os.PathLike[str] | Scenario
 Reward = Literal["individual", "team"] | RewardFunction
 
 
-class Outcome(NamedTuple):
+class StepResult(NamedTuple):
     """One step of every world. Arrays of shape (world, vehicle, ...), or (world,) where that is said."""
 
     observation: Float32
@@ -56,7 +56,7 @@ class Outcome(NamedTuple):
         return self.world_terminated | self.world_truncated
 
 
-class Task:
+class BatchedEnv:
     """A swarm with the reward and the endings of the environment's contract.
 
     Args:
@@ -126,7 +126,7 @@ class Task:
         if self._waiting:
             raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
 
-    def step(self, action: ArrayLike) -> Outcome:
+    def step(self, action: ArrayLike) -> StepResult:
         """One decision of every world; ``action`` has shape (world, vehicle, 2).
 
         A world whose episode is over stays as it is, its flags too, and is paid nothing, until it is reset.
@@ -143,7 +143,7 @@ class Task:
             last_tick = self._max_cycles * swarm.scenario.timing.holds_per_decision
             world_truncated |= (swarm.state.tick >= last_tick) & ~world_terminated
         self._over = world_terminated | world_truncated
-        return Outcome(
+        return StepResult(
             observation=observe(percept),
             reward=reward,
             terminated=before & (world_terminated[:, None] | ~alive),
@@ -192,7 +192,7 @@ class Changes(TypedDict, total=False):
     overrides: Mapping[str, object] | None
 
 
-class TaskOptions(Changes, total=False):
+class EnvOptions(Changes, total=False):
     """Arguments of every environment API beyond the scenario, explained by ``uuv_marl.parallel_env``."""
 
     max_cycles: int | None
@@ -211,7 +211,7 @@ def changed(
     return load_scenario(scenario, num_vehicles=num_vehicles, overrides={**(overrides or {}), **period})
 
 
-def make_task(
+def make_batched_env(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
     *,
@@ -219,9 +219,9 @@ def make_task(
     reward: Reward = "individual",
     engine: EngineName = "numba",
     **changes: Unpack[Changes],
-) -> Task:
-    """A task from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
-    return Task(changed(scenario, **changes), num_worlds, reward, max_cycles, engine)
+) -> BatchedEnv:
+    """A batch from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
+    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, engine)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:
