@@ -206,7 +206,14 @@ def changed(
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> Scenario:
-    """The scenario with the ``Changes``."""
+    """The scenario with what the arguments of an environment change in it.
+
+    Args:
+        scenario: a name, a TOML file or a ``Scenario``.
+        num_vehicles: replaces the scenario's.
+        decision_period: time between decisions [s], replaces ``timing.decision_period_s``.
+        overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
+    """
     period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
     return load_scenario(scenario, num_vehicles=num_vehicles, overrides={**(overrides or {}), **period})
 
@@ -220,7 +227,16 @@ def make_batched_env(
     engine: EngineName = "numba",
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
-    """A batch from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
+    """Worlds from the arguments that every environment API takes.
+
+    Args:
+        scenario: a name, a TOML file or a ``Scenario``.
+        num_worlds: worlds stepped together.
+        max_cycles: truncates after so many decisions; None for the scenario's time limit.
+        reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
+        engine: ``numba`` or ``plain``.
+        changes: ``num_vehicles``, ``decision_period`` [s] and ``overrides`` of the scenario, see ``changed``.
+    """
     return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, engine)
 
 

@@ -27,7 +27,14 @@ class SwarmTaskClass(TaskClass):
         seed: int | None,
         device: Any,
     ) -> Callable[[], EnvBase]:
-        """A function that makes ``num_envs`` worlds."""
+        """A function that makes the environment.
+
+        Args:
+            num_envs: worlds stepped together.
+            continuous_actions: ignored: forces are continuous.
+            seed: world w starts from ``seed + w``; None for fresh entropy.
+            device: where the tensors go.
+        """
         refuse_losses(make_batched_env(**self._arguments).swarm.scenario, "BenchMARL")
         return lambda: SwarmEnv(num_envs, seed=seed, device=device, **self._arguments)
 

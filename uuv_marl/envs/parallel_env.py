@@ -23,7 +23,7 @@ Infos = dict[str, dict[str, Any]]
 
 
 class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
-    """A swarm of UUVs that follows a trajectory around obstacles. See ``parallel_env`` for the arguments.
+    """A swarm of UUVs that follows a trajectory around obstacles; ``parallel_env`` makes one.
 
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
     and yaw torque as shares of full force, projected onto the unit disc.
@@ -31,6 +31,12 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
     An agent's last info tells how its part ended: ``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``
     (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users: ``reset(seed=s)`` seeds it
     from ``s``, and the environment itself never draws from it.
+
+    Args:
+        batch: the one world below.
+        render_mode: ``human``, ``rgb_array`` or None.
+        info_terms: put the reward's terms into every agent's info.
+        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form

@@ -83,8 +83,11 @@ def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> tuple
     """
     terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
     reward = np.zeros(terms.shape[1:])
-    fill = _fill_one if swarm.num_worlds == 1 else _fill_all
-    fill(running, swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward)
+    given = swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward
+    if swarm.num_worlds > 1:
+        _fill_all(running, *given)
+    elif running[0]:
+        _fill(0, *given)  # no threads, so that a forked process can step
     return reward, terms
 
 
@@ -98,6 +101,17 @@ def shortfall(share: float) -> float:
 def _fill(
     w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
 ) -> None:
+    """The reward of one world.
+
+    Args:
+        w: index of the world.
+        time_limit_s: when worlds are given up [s], shape (world,).
+        state: of all worlds.
+        facts: of all worlds.
+        weights: of the terms, and the lengths in them [m].
+        terms: the weighted terms, shape (term, world, vehicle), zero before; filled for this world.
+        reward: their sum, shape (world, vehicle), zero before; filled for this world.
+    """
     left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
     worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
     arrived = not math.isnan(facts.arrival_s[w, 0])
@@ -120,20 +134,6 @@ def _fill(
             reward[w, i] += terms[k, w, i]
 
 
-@compiled
-def _fill_one(
-    running: Bool,
-    time_limit_s: Float64,
-    state: State,
-    facts: Facts,
-    weights: RewardWeights,
-    terms: Float64,
-    reward: Float64,
-) -> None:
-    if running[0]:
-        _fill(0, time_limit_s, state, facts, weights, terms, reward)
-
-
 @compiled_parallel
 def _fill_all(
     running: Bool,
@@ -144,6 +144,17 @@ def _fill_all(
     terms: Float64,
     reward: Float64,
 ) -> None:
+    """``_fill`` for the worlds that run, over threads.
+
+    Args:
+        running: worlds to fill, shape (world,); the others stay zero.
+        time_limit_s: when worlds are given up [s], shape (world,).
+        state: of all worlds.
+        facts: of all worlds.
+        weights: of the terms, and the lengths in them [m].
+        terms: the weighted terms, shape (term, world, vehicle), zero before; filled.
+        reward: their sum, shape (world, vehicle), zero before; filled.
+    """
     for w in numba.prange(running.shape[0]):
         if running[w]:
             _fill(w, time_limit_s, state, facts, weights, terms, reward)

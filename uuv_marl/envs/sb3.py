@@ -43,7 +43,14 @@ class SharedEnvMixin:
         indices: Indices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Not possible: a row has no environment of its own."""
+        """Not possible: a row has no environment of its own.
+
+        Args:
+            method_name: what was to be called.
+            method_args: what with.
+            indices: for which rows.
+            method_kwargs: what with.
+        """
         raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of the whole environment")
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:  # noqa: ARG002

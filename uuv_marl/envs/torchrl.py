@@ -120,7 +120,15 @@ class SwarmEnv(EnvMixin, EnvBase):
         world_terminated: Bool,
         world_truncated: Bool,
     ) -> TensorDictBase:
-        """Arrays as a tensordict, with the endings of vehicles and worlds."""
+        """Arrays as a tensordict, with the endings of vehicles and worlds.
+
+        Args:
+            group: what stands under ``uuv``, arrays of shape (world, vehicle, ...).
+            terminated: of vehicles, shape (world, vehicle).
+            truncated: of vehicles, shape (world, vehicle).
+            world_terminated: shape (world,).
+            world_truncated: shape (world,).
+        """
         group |= _endings(terminated, truncated)
         root = {"state": self._batch.state(), **_endings(world_terminated, world_truncated)}
         batch = self.batch_size

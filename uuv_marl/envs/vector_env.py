@@ -28,7 +28,7 @@ Infos = dict[str, Any]
 
 
 class SwarmVectorEnv(EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]):
-    """Worlds stepped together. See ``vector_env`` for the arguments.
+    """Worlds stepped together; ``vector_env`` makes them.
 
     Observation of shape (num_envs, vehicle, entry), action of shape (num_envs, vehicle, 2), reward the mean over a
     world's vehicles. A world terminates when its swarm arrived or is lost as a whole, and the time limit truncates
@@ -43,6 +43,13 @@ class SwarmVectorEnv(EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]):
 
     ``infos``, arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated`` of
     this step, and ``agent_mask``, the vehicles that act in the next one. Rows of vehicles lost before are zero.
+
+    Args:
+        batch: the worlds below.
+        render_mode: ``rgb_array`` or None.
+        info_terms: put the reward's terms into the infos.
+        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED``, or its value.
+        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form

@@ -48,6 +48,15 @@ class TrainingFolder(Generic[R]):
     """``config.json``, ``progress.csv`` and ``checkpoints/`` of a training; ``opened`` makes one.
 
     Nothing is written before ``begin``.
+
+    Args:
+        path: new or empty, or with ``resume`` that of an earlier training.
+        settings: what must be the same throughout a training, as JSON can hold it.
+        resume: go on with what the folder holds.
+        start: the record before the first iteration, all of whose fields have defaults.
+
+    Raises:
+        ResultsError: the folder is used, holds no training, or one of other settings.
     """
 
     def __init__(self, path: Path, settings: Mapping[str, Any], resume: bool, start: R) -> None:

@@ -75,7 +75,14 @@ class Hyperparameters(PPOHyperparameters):
     """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
 
     def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Mappo":
-        """A training that has not begun."""
+        """A training that has not begun.
+
+        Args:
+            scenario: what to train on.
+            sizes: number of vehicles and of worlds of each swarm.
+            weights: of the reward.
+            seed: of weights, worlds and noise.
+        """
         return Mappo(self, scenario, sizes, weights, seed)
 
 

@@ -40,7 +40,14 @@ class Hyperparameters(PPOHyperparameters):
     """Standard deviation of actions at the start [full force]; then it is learned."""
 
     def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Ppo":
-        """A training that has not begun."""
+        """A training that has not begun.
+
+        Args:
+            scenario: what to train on.
+            sizes: number of vehicles and of worlds of each swarm.
+            weights: of the reward.
+            seed: of weights, worlds and noise.
+        """
         return Ppo(self, scenario, sizes, weights, seed)
 
 
