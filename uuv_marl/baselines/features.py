@@ -39,16 +39,28 @@ class Features:
         self.size = num_features(scenario.sonar.num_sectors, scenario.sonar.num_active_sectors)
 
     def look(self, flat: Float32, features: Float32, barrier: Float32, clamps: Int64) -> None:
-        """Fill features (world, vehicle, size) and barrier (world, vehicle, 2) [full force] from flat percepts.
+        """Fill features and barrier from flat percepts.
 
-        ``clamps`` (world,) counts numerical bounds that bound.
+        Args:
+            flat: percepts in physical units, shape (world, vehicle, entry).
+            features: filled, shape (world, vehicle, size).
+            barrier: filled with the force [full force], shape (world, vehicle, 2).
+            clamps: numerical bounds that bound, counted per world, shape (world,); added to.
         """
         _look(flat, self._at, self._gains, self._limits, features, barrier, clamps)
 
 
 @compiled
 def _put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
-    """A position [m] as four features: its direction, longer the nearer than about ``near`` it is, and itself."""
+    """A position [m] as four features: its direction, longer the nearer than about ``near`` it is, and itself.
+
+    Args:
+        p_x: forward [m].
+        p_y: to starboard [m].
+        near: distance at which the direction has a length of about two thirds [m].
+        out: a vehicle's features, shape (size,); four of them are filled.
+        k: index of the first.
+    """
     length = np.sqrt(p_x * p_x + p_y * p_y)
     weight = near / ((length + 0.5 * near) * max(length, 1e-3))
     far = 1.0 / max(64.0, 0.5 * length)
@@ -59,7 +71,17 @@ def _put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
 def _look(
     flat: Float32, at: Starts, gains: Gains, limits: Limits, features: Float32, barrier: Float32, clamps: Int64
 ) -> None:
-    """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do."""
+    """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        gains: of the barrier.
+        limits: of the actuators, and the surge resistance.
+        features: filled, shape (world, vehicle, size).
+        barrier: filled with the force [full force], shape (world, vehicle, 2).
+        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
+    """
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

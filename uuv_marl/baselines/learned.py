@@ -144,6 +144,14 @@ def _difference(then: Mapping[str, object], now: Mapping[str, object]) -> str:
 
 @compiled
 def _dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
+    """A layer without its activation.
+
+    Args:
+        x: shape (row, in).
+        weight: shape (in, out).
+        bias: shape (out,).
+        out: filled, shape (row, out).
+    """
     for i in range(x.shape[0]):
         for k in range(out.shape[1]):
             out[i, k] = bias[k]

@@ -72,6 +72,13 @@ def evaluate(
     The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed
     alone, not on the seeds beside it. ``watch`` sees every step, and ``parameters`` go to the policy.
 
+    Args:
+        scenario: grants what the policy declares (``uuv_marl.baselines.granted``).
+        policy: its name, see ``uuv_marl.baselines.make``.
+        seeds: of the episodes, one each.
+        watch: sees every step.
+        parameters: go to the policy.
+
     Raises:
         DivergenceError: the integration step could not follow a vehicle. Such a run has no metrics; those of the seeds
             beside it come first.
@@ -103,6 +110,15 @@ def _look_away(swarm: Swarm, action: Float32 | None) -> None:
 def _batch(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch, parameters: dict[str, object]
 ) -> Iterator[Run | Progress]:
+    """The episodes of seeds that are stepped together.
+
+    Args:
+        scenario: what to simulate.
+        policy: its name, see ``uuv_marl.baselines.make``.
+        seeds: of the episodes, one each.
+        watch: sees every step.
+        parameters: go to the policy.
+    """
     swarm = Swarm(scenario, len(seeds))
     actor = make(policy, scenario, len(seeds), **parameters)
     percept = swarm.reset(list(seeds))
