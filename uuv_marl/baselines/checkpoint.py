@@ -23,8 +23,8 @@ from uuv_marl.baselines.features import BARRIER, num_features
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
+from uuv_marl.sim.arrays import Float32
 
-Float32 = NDArray[np.float32]
 Row = tuple[str, int, str, float]
 
 WEIGHTS_FILE = "policy.safetensors"

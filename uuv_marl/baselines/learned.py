@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.checkpoint import (
     Card,
@@ -20,12 +19,11 @@ from uuv_marl.baselines.features import Features
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
 
 __all__ = ["Card", "Layer", "Learned", "Trained", "forward", "rows_of", "save_checkpoint", "shipped"]
-
-Float32 = NDArray[np.float32]
 
 
 class Learned(Policy):
@@ -47,21 +45,11 @@ class Learned(Policy):
         self.name, self.checkpoint, card = trained.name, trained.checkpoint, trained.checkpoint.card
         self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds)
-        tables = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, rows_of(self.layout)))
-        vehicles = () if any_vehicle else (card.vehicle, vehicle_of(scenario))
-        for what, other, remedy in (
-            ("percept", _difference(*tables), "use a scenario with the sonar suite of its training"),
-            (
-                "vehicle",
-                vehicles and _difference(*vehicles),
-                "leave it out, run it all the same with make(..., any_vehicle=True)",
-            ),
-        ):
-            if other:
-                raise PolicyError(
-                    f"{self.name} was trained on another {what} than scenario {scenario.name!r} has: {other}; {remedy}"
-                    ", or train on this one (uuv-marl train mappo --scenario)"
-                )
+        then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, rows_of(self.layout)))
+        self._need_same("percept", then, now, "use a scenario with the sonar suite of its training")
+        if not any_vehicle:
+            remedy = "leave it out, run it all the same with make(..., any_vehicle=True)"
+            self._need_same("vehicle", card.vehicle, vehicle_of(scenario), remedy)
         shortest, longest = card.decision_period_s
         if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
             raise PolicyError(
@@ -69,6 +57,23 @@ class Learned(Policy):
                 f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
             )
         self._features = Features(scenario, card.barrier)
+
+    def _need_same(self, what: str, then: Mapping[str, object], now: Mapping[str, object], remedy: str) -> None:
+        """Raise PolicyError where the scenario differs from that of the training.
+
+        Args:
+            what: is compared, for the message.
+            then: its entries in the training, by name.
+            now: its entries in the scenario, by name.
+            remedy: for the message.
+        """
+        other = next((name for name in {**then, **now} if then.get(name) != now.get(name)), None)
+        if other:
+            raise PolicyError(
+                f"{self.name} was trained on another {what} than scenario {self.scenario.name!r} has: {other} was "
+                f"{then.get(other)} and is {now.get(other)}; {remedy}, or train on this one (uuv-marl train mappo "
+                "--scenario)"
+            )
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
@@ -134,12 +139,6 @@ def forward(layers: Sequence[Layer], x: Float32) -> Float32:
         _dense(x, layer.weight, layer.bias, y)
         x = np.tanh(y) if k < len(layers) - 1 else y
     return x
-
-
-def _difference(then: Mapping[str, object], now: Mapping[str, object]) -> str:
-    """The first entry that differs, for a message; nothing where none does."""
-    other = (name for name in {**then, **now} if then.get(name) != now.get(name))
-    return next((f"{name} was {then.get(name)} and is {now.get(name)}" for name in other), "")
 
 
 @compiled

@@ -6,20 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from uuv_marl.envs.observation import observe
 from uuv_marl.envs.reward import RewardFunction, compute_reward, named, reward_weights
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
+from uuv_marl.sim.arrays import Bool, Float32, Float64
 from uuv_marl.sim.engine import EngineName
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 ScenarioLike = str | os.PathLike[str] | Scenario
 Reward = Literal["individual", "team"] | RewardFunction
 

@@ -2,12 +2,10 @@
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.percept import Percept
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.compiled import compiled_parallel
-
-Float32 = NDArray[np.float32]
 
 
 def observe(percept: Percept) -> Float32:

@@ -16,9 +16,9 @@ from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.sim.arguments import action_array
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.engine import EngineName
 
-Float32 = NDArray[np.float32]
 Infos = dict[str, dict[str, Any]]
 
 

@@ -13,15 +13,11 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Facts, State
+from uuv_marl.sim.arrays import Bool, Facts, Float64, State
 from uuv_marl.sim.compiled import compiled, compiled_parallel
 from uuv_marl.sim.swarm import Swarm
-
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""

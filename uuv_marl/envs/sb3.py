@@ -8,12 +8,13 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import EnvOptions, Float32, ScenarioLike, StepResult, make_batched_env, refuse_losses
+from uuv_marl.envs.batched_env import EnvOptions, ScenarioLike, StepResult, make_batched_env, refuse_losses
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.sim.arguments import action_array, whole_number
+from uuv_marl.sim.arrays import Float32
 
 with extra("train", "SwarmVecEnv"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv

@@ -8,11 +8,12 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import granted, make
-from uuv_marl.envs.batched_env import Changes, Float32, Reward, ScenarioLike, StepResult, changed, make_batched_env
+from uuv_marl.envs.batched_env import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.sim.arguments import action_array
+from uuv_marl.sim.arrays import Float32
 
 
 class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):

@@ -6,11 +6,12 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import Bool, EnvOptions, ScenarioLike, make_batched_env
+from uuv_marl.envs.batched_env import EnvOptions, ScenarioLike, make_batched_env
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.arguments import world_seeds
+from uuv_marl.sim.arrays import Bool
 
 with extra("torchrl", "SwarmEnv"):
     import torch

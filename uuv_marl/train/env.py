@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.features import BARRIER, Features
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.shaping import PRIVILEGED_SIZE, Weights, privileged_observation, shaped_reward
 
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
 Arrays = Mapping[str, NDArray[Any]]
 Seeds = Callable[[int], Sequence[int] | NDArray[np.integer] | None]
 """Seeds for so many worlds that start, or None for each to go on with its own stream."""
@@ -39,18 +38,12 @@ class Transition(NamedTuple):
 class EpisodeStats(NamedTuple):
     """Sums over episodes that ended."""
 
-    number: int = 0
-    arrived: int = 0
-    collisions: int = 0
-    returns: float = 0.0
+    number: float
+    arrived: float
+    collisions: float
+    returns: float
     """Of the mean over vehicles."""
-    decisions: int = 0
-
-    @staticmethod
-    def unpacked(array: NDArray[Any]) -> "EpisodeStats":
-        """From an array of all of it."""
-        number, arrived, collisions, returns, decisions = array
-        return EpisodeStats(int(number), int(arrived), int(collisions), float(returns), int(decisions))
+    decisions: float
 
 
 class TrainingEnv:
@@ -83,7 +76,7 @@ class TrainingEnv:
         self.observation = np.zeros((self.rows, self.size), np.float32)
         self._barrier = np.zeros((self.rows, 2), np.float32)
         self._sums = [np.zeros((worlds, 3)) for _, worlds in sizes]
-        self.episodes = EpisodeStats()
+        self._ended = np.zeros(len(EpisodeStats._fields))
         self.reset()
 
     def reset(self) -> None:
@@ -95,39 +88,33 @@ class TrainingEnv:
 
     def step(self, action: Float32) -> Transition:
         """One decision; ``action`` (row, 2) is what the actor adds to the barrier [full force]."""
-        transition = Transition(
-            reward=np.zeros(self.rows, np.float32),
-            terminated=np.zeros(self.rows, np.bool_),
-            truncated=np.zeros(self.rows, np.bool_),
-            final_obs=np.empty((0, self.size), np.float32),
-        )
-        final = [transition.final_obs]
+        reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
+        final = [np.empty((0, self.size), np.float32)]
         for k, swarm in enumerate(self._swarms):
             rows, shape = self._rows(k), (swarm.num_worlds, swarm.num_vehicles)
             swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
-            reward = shaped_reward(swarm, self._weights)
-            ends, arrived = swarm.endings(), swarm.arrived
-            for flags, values in zip((transition.terminated, transition.truncated), ends, strict=True):
-                flags[rows] = np.repeat(values, shape[1])
-            over = ends[0] | ends[1]
-            transition.reward[rows] = reward.reshape(-1)
-            self._sums[k] += np.stack([reward.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
+            paid, ends = shaped_reward(swarm, self._weights), np.array(swarm.endings())
+            reward[rows], ended[:, rows] = paid.reshape(-1), ends.repeat(shape[1], axis=1)
+            self._sums[k] += np.stack([paid.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
             self._look(k)
+            over = ends.any(axis=0)
             if over.any():
-                final.append(self.observation[rows][transition.truncated[rows]])
-                self._count(k, over, arrived)
-                self._restart(k, [int(w) for w in np.flatnonzero(over)])
+                final.append(self.observation[rows][ended[1, rows]])
+                returns, collisions, decisions = self._sums[k][over].sum(axis=0)
+                self._ended += [over.sum(), (over & swarm.arrived).sum(), collisions, returns, decisions]
+                self._sums[k][over] = 0.0
+                self._restart(k, np.flatnonzero(over).tolist())
                 self._look(k)
-        return transition._replace(final_obs=np.concatenate(final))
+        return Transition(reward, ended[0], ended[1], np.concatenate(final))
 
     def pop_episode_stats(self) -> EpisodeStats:
         """Sums over the episodes that ended since the last call."""
-        taken, self.episodes = self.episodes, EpisodeStats()
+        taken, self._ended = EpisodeStats(*self._ended.tolist()), np.zeros_like(self._ended)
         return taken
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All but the generator, for ``restore``."""
-        kept: dict[str, NDArray[Any]] = {"episodes": np.array(self.episodes, np.float64)}
+        kept: dict[str, NDArray[Any]] = {"episodes": self._ended.copy()}
         for k, (swarm, sums) in enumerate(zip(self._swarms, self._sums, strict=True)):
             kept |= {f"{k}.{name}": array for name, array in swarm.snapshot().items()}
             kept[f"{k}.sums"] = sums.copy()
@@ -139,7 +126,7 @@ class TrainingEnv:
             swarm.restore({name.split(".")[1]: array for name, array in snapshot.items() if name.startswith(f"{k}.")})
             self._sums[k][...] = snapshot[f"{k}.sums"]
             self._look(k)
-        self.episodes = EpisodeStats.unpacked(snapshot["episodes"])
+        self._ended[...] = snapshot["episodes"]
 
     def _rows(self, k: int) -> slice:
         return slice(int(self._ends[k - 1]) if k else 0, int(self._ends[k]))
@@ -155,15 +142,3 @@ class TrainingEnv:
 
     def _restart(self, k: int, worlds: Sequence[int]) -> None:
         self._swarms[k].reset(self._seeds(len(worlds)), worlds)
-
-    def _count(self, k: int, over: Bool, arrived: Bool) -> None:
-        returns, collisions, decisions = self._sums[k][over].sum(axis=0)
-        before = self.episodes
-        self.episodes = EpisodeStats(
-            before.number + int(over.sum()),
-            before.arrived + int((over & arrived).sum()),
-            before.collisions + int(collisions),
-            before.returns + float(returns),
-            before.decisions + int(decisions),
-        )
-        self._sums[k][over] = 0.0

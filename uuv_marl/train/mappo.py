@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with MAPPO"):
     import torch
     from torch import Tensor, nn
-
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,12 +8,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from uuv_marl.sim.arrays import Float32, Float64
 from uuv_marl.sim.swarm import Swarm
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
 
 OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
 """What training changes in a scenario: a fifth of the decisions, and an inner loop, as our tuned policies have it, so

@@ -1,6 +1,6 @@
 """How good a checkpoint is: deterministic episodes on validation seeds, through the benchmark's own ``evaluate``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -56,10 +56,10 @@ def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
     return ValidationResult(
         score=-sum(map(cost, metrics)) / len(metrics),
         arrived=len(times) / len(metrics),
-        collisions=sum(int(_number(m, "collisions") or 0) for m in metrics),
+        collisions=sum(m["collisions"] for m in metrics),
         lateness_s=sum(times) / len(times) if times else None,
-        min_spacing_m=_least(metrics, "min_spacing_m"),
-        min_obstacle_distance_m=_least(metrics, "min_obstacle_distance_m"),
+        min_spacing_m=_least(m["min_spacing_m"] for m in metrics),
+        min_obstacle_distance_m=_least(m["min_obstacle_distance_m"] for m in metrics),
     )
 
 
@@ -67,9 +67,9 @@ def cost(metrics: Metrics) -> float:
     """Of one episode [1]: lateness in minutes (2 where it never arrives), 2 with a collision, and short distances."""
     late = lateness(metrics)
     total = 2.0 if late is None else min(late / 60.0, 2.0)
-    total += 2.0 * min(_number(metrics, "collisions") or 0.0, 1.0)
-    for name, safe in (("min_obstacle_distance_m", SAFE_OBSTACLE_M), ("min_spacing_m", SAFE_SPACING_M)):
-        distance = _number(metrics, name)
+    total += 2.0 * min(metrics["collisions"], 1)
+    distances = metrics["min_obstacle_distance_m"], metrics["min_spacing_m"]
+    for distance, safe in zip(distances, (SAFE_OBSTACLE_M, SAFE_SPACING_M), strict=True):
         if distance is not None:
             total += min(max(1.0 - distance / safe, 0.0), 1.0)
     return total
@@ -77,14 +77,9 @@ def cost(metrics: Metrics) -> float:
 
 def lateness(metrics: Metrics) -> float | None:
     """Task time beyond the time that l(t) takes [s]; None where the swarm never arrived."""
-    time, duration = _number(metrics, "task_time_s"), _number(metrics, "duration_s")
-    return None if time is None or duration is None else time - duration
+    time = metrics["task_time_s"]
+    return None if time is None else time - metrics["duration_s"]
 
 
-def _number(metrics: Metrics, name: str) -> float | None:
-    value = metrics[name]
-    return None if value is None or isinstance(value, dict) else float(value)
-
-
-def _least(metrics: Sequence[Metrics], name: str) -> float | None:
-    return min((value for value in (_number(m, name) for m in metrics) if value is not None), default=None)
+def _least(values: Iterable[float | None]) -> float | None:
+    return min((value for value in values if value is not None), default=None)

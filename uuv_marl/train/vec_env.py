@@ -11,13 +11,12 @@ from uuv_marl.baselines.features import MOST_BARRIER
 from uuv_marl.envs.sb3 import SharedEnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.train.env import TrainingEnv
 from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with Stable-Baselines3"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
-
-Float32 = NDArray[np.float32]
 
 
 class TrainingVecEnv(SharedEnvMixin, VecEnv):
