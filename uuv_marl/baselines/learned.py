@@ -6,15 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from uuv_marl.baselines.checkpoint import (
-    Card,
-    Checkpoint,
-    Layer,
-    load_checkpoint,
-    rows_of,
-    save_checkpoint,
-    vehicle_of,
-)
+from uuv_marl.baselines.checkpoint import Card, Checkpoint, Layer, load_checkpoint, rows_of, save_checkpoint, vehicle_of
 from uuv_marl.baselines.features import Features
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept

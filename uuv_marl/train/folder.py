@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter
 
@@ -28,20 +28,6 @@ Say = Callable[[str], object]
 
 def quiet(_: str) -> None:
     """Says nothing."""
-
-
-class Record(NamedTuple):
-    """One iteration, a row of ``progress.csv``."""
-
-    iteration: int = 0
-    agent_steps: int = 0
-    """Sampled so far; one is one decision of one vehicle."""
-    episode_return: float | None = None
-    """Mean over the episodes that ended in this iteration, and over vehicles; None where none ended."""
-    episode_length: float | None = None
-    """Decisions, mean over the same episodes."""
-    seconds: float = 0.0
-    """Spent on training so far."""
 
 
 class TrainingFolder(Generic[R]):

@@ -303,12 +303,7 @@ class Mappo:
     """
 
     def __init__(
-        self,
-        by: Hyperparameters,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        weights: Weights,
-        seed: int,
+        self, by: Hyperparameters, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int
     ) -> None:
         self._by = by
         self._rng = np.random.default_rng(seed)

@@ -66,12 +66,7 @@ class Ppo:
     """
 
     def __init__(
-        self,
-        by: Hyperparameters,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        weights: Weights,
-        seed: int,
+        self, by: Hyperparameters, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int
     ) -> None:
         self._by, self._share = by, 0.0
         self._vec_env = TrainingVecEnv(scenario, sizes, weights)
