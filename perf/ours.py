@@ -14,7 +14,6 @@ import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.envs.sb3 import SwarmVecEnv
-from uuv_marl.envs.task import make_task
 from uuv_marl.sim.swarm import Swarm
 
 SETS, SETTLE_STEPS, SETTLE_S = 8, 200, 10.0
@@ -102,7 +101,9 @@ def adapter(name: str, agents: int, worlds: int) -> Case:
         data = env.reset().set(("uuv", "action"), torch.from_numpy(action))
         return repeated(lambda _: env.step(data.copy()), agents * worlds)
     if name in ("swarm_idle", "task_idle"):
-        env = make_task(num_worlds=worlds, **how)
+        from uuv_marl.envs.batched_env import make_batched_env  # 0.1.0, which versions.py runs too, has none
+
+        env = make_batched_env(num_worlds=worlds, **how)
         env.reset(0)
         env = env.swarm if name == "swarm_idle" else env
     else:

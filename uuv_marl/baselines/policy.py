@@ -209,7 +209,14 @@ class Policy:
 
 @compiled
 def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
-    """The action for a desired body-frame force [N]: thrust along x, torque by the lever arm along y. Eq. 22."""
+    """The action for a desired body-frame force [N]: thrust along x, torque by the lever arm along y. Eq. 22.
+
+    Args:
+        f_x: forward [N].
+        f_y: to starboard [N].
+        limits: of the actuators, and the surge resistance.
+        out: filled with the shares of full surge force and yaw torque, shape (2,).
+    """
     a_x, a_y = project(f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque)
     out[0], out[1] = a_x, a_y
 

@@ -112,8 +112,13 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
     """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
 
     Writes ``output/POLICY.json`` with the best parameters and ``POLICY.csv`` with every trial, and keeps Optuna's
-    journal beside them, from which Optuna unpickles: go on with none that you do not trust. ``report`` is called with
-    the number of trials done and the best cost [s].
+    journal beside them, from which Optuna unpickles: go on with none that you do not trust.
+
+    Args:
+        policy: name of one of ``SPACES``.
+        output: folder of the files.
+        trials: to reach in all, those before an interruption included.
+        report: called with the number of trials done and the best cost [s].
     """
     import optuna  # noqa: PLC0415 - an extra
 
