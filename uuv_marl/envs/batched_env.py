@@ -240,9 +240,9 @@ def make_batched_env(
 
 def refuse_losses(scenario: Scenario, api: str) -> None:
     """Raise ScenarioError where vehicles can be lost, for an API whose rows must all live to the episode's end."""
-    if scenario.disturbance.loss_times_s or scenario.contact.ends_vehicle:
+    if scenario.loses_vehicles:
         raise ScenarioError(
             f"{api} can't show that a vehicle is lost before the others, which scenario {scenario.name!r} allows; use "
             "uuv_marl.parallel_env, vector_env or the TorchRL or RLlib environment, or override "
-            "disturbance.loss_times_s=[] and contact.ends_vehicle=false"
+            "disturbance.loss_times_s=[], contact.ends_vehicle=false and no faults of kind member"
         )

@@ -58,6 +58,12 @@ class Scenario(sections.Section):
         """Most obstacles that a world of this scenario can hold."""
         return self.random_field.obstacles[1] if self.random_field else len(self.obstacles)
 
+    @property
+    def loses_vehicles(self) -> bool:
+        """Whether a vehicle can be lost before the episode ends."""
+        broken = any(fault.kind == "member" and fault.share > 0.0 for fault in self.faults)
+        return bool(self.disturbance.loss_times_s) or self.contact.ends_vehicle or broken
+
     def _check(self) -> None:
         _check_start(self)
         _check_course(self)
