@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.sea import AROUND_M
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.exponential import decay_mean, exp
@@ -24,7 +25,6 @@ from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields, SeaFields
 
 Float64 = NDArray[np.float64]
-_AROUND_M, _SQUARE_M = 250.0, 500.0
 _PEAK = 0.638172686
 """Largest speed around a Lamb-Oseen vortex, in circulation / (2 pi core): at 1.12091 core radii. [derived]"""
 
@@ -73,23 +73,6 @@ def water(scenario: Scenario) -> Water:
     )
 
 
-def max_eddies(scenario: Scenario) -> int:
-    """Most eddies of a world."""
-    if scenario.current.eddies == 0 or scenario.current.eddy_speed_mps == 0.0:
-        return 0
-    field = scenario.random_field
-    if field is None:
-        return num_eddies(scenario, np.array(scenario.trajectory.waypoints_m))
-    far = field.legs[1] * field.leg_length_m[1]  # a box's sides add up to the way at most times the root of 2
-    return num_eddies(scenario, np.array([[0.0, 0.0], [far, far]]) / math.sqrt(2.0))
-
-
-def num_eddies(scenario: Scenario, waypoints: Float64) -> int:
-    """Eddies in the box around a course, waypoints (point, 2) [m]: an even number, so that circulations sum to 0."""
-    sides = np.ptp(waypoints, axis=0) + 2.0 * _AROUND_M
-    return 2 * math.ceil(scenario.current.eddies * float(sides[0] * sides[1]) / (2.0 * _SQUARE_M**2) - 1e-9)
-
-
 def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: Water, flow: Flow) -> None:
     """The current of world w's new episode.
 
@@ -108,8 +91,8 @@ def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, wa
     flow.gust[w] = [water.deviation * part for part in normals(key, GUST, 0, 0, 0)]
     flow.eddies[w] = 0.0
     if flow.eddies.shape[1] > 0:
-        low, high = waypoints.min(axis=0) - _AROUND_M, waypoints.max(axis=0) + _AROUND_M
-        count = min(num_eddies(scenario, waypoints), flow.eddies.shape[1])
+        low, high = waypoints.min(axis=0) - AROUND_M, waypoints.max(axis=0) + AROUND_M
+        count = min(scenario.current.num_eddies(*np.ptp(waypoints, axis=0)), flow.eddies.shape[1])
         for k, sign in zip(range(count), itertools.cycle((1.0, -1.0)), strict=False):
             flow.eddies[w, k, :2] = low + np.array(uniforms(key, EDDY_PLACE, 0, 0, k)) * (high - low)
             flow.eddies[w, k, 2] = sign * water.circulation

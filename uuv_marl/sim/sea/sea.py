@@ -21,7 +21,6 @@ from uuv_marl.sim.sea.current import (
     advance_gust,
     draw_flow,
     know_velocities,
-    max_eddies,
     read_flow,
     water,
 )
@@ -55,7 +54,7 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
     """
     if not disturbances(scenario) and not set(SEA_CHANNELS) & set(scenario.sonar.channels):
         return None
-    sizes = {**sizes, "eddy": max_eddies(scenario), "plant": PLANT, "fault": len(scenario.faults)}
+    sizes = {**sizes, "eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults)}
     return Sea(keys, water(scenario), allocate(Flow, sizes), actuation(scenario), allocate(Hull, sizes))
 
 
