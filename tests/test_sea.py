@@ -222,7 +222,9 @@ def test_the_water_at_a_vehicle_is_the_field_there():
     swarm = swim(CURRENT | GUSTS | EDDIES, 25)
     for i in range(5):
         x, y, _ = swarm.state.eta[0, i]
-        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._sea.water, swarm._sea.flow)
+        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._sea.water.core, swarm._sea.flow)
+    np.testing.assert_array_equal(swarm.flow_field().at(swarm.state.eta[0, :, :2]), swarm.flow[0])
+    assert not Swarm(load_scenario("starter")).flow_field().at([[[1.0, 2.0]]]).any()
 
 
 # --- Forces ---

@@ -9,7 +9,7 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
@@ -56,6 +56,30 @@ class Flow(NamedTuple):
     gust: Annotated[Float64, "world 2", "What the process adds to it now [m/s]."]
     eddies: Annotated[Float64, "world eddy 3", "Centre north, east [m] and circulation [m2/s]; 0 in the padding."]
     flow: Annotated[Float64, "world vehicle 2", "Velocity of the water at each vehicle, north and east [m/s]."]
+
+
+class FlowField(NamedTuple):
+    """How the water of one world moves at one time, everywhere; a copy, which stays as it is."""
+
+    drift: Float64
+    """Velocity of the mean and the process together, north and east [m/s], shape (2,)."""
+    eddies: Float64
+    """Centre north, east [m] and circulation [m2/s], shape (eddy, 3)."""
+    core_m: float
+    """Radius of the eddies' cores."""
+
+    def at(self, points: ArrayLike) -> Float64:
+        """Velocity of the water, north and east [m/s], at points given by north and east [m]; both (..., 2)."""
+        points = np.asarray(points, np.float64)
+        flow = Flow(self.drift[None], np.zeros((1, 2)), self.eddies[None], np.zeros((1, 0, 2)))
+        velocity = [flow_at(0, x, y, self.core_m, flow) for x, y in points.reshape(-1, 2).tolist()]
+        return np.array(velocity, np.float64).reshape(points.shape)
+
+
+def flow_field(w: int, core_m: float, flow: Flow) -> FlowField:
+    """How the water of world w moves now."""
+    eddies = flow.eddies[w]
+    return FlowField(flow.mean[w] + flow.gust[w], eddies[eddies[:, 2] != 0.0], core_m)
 
 
 def water(scenario: Scenario) -> Water:
@@ -109,12 +133,12 @@ def eddy_flow(dx: float, dy: float, circulation: float, core: float) -> tuple[fl
 
 
 @compiled
-def flow_at(w: int, x: float, y: float, water: Water, flow: Flow) -> tuple[float, float]:
-    """Velocity of the water at a point of world w, north and east [m/s]."""
+def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float, float]:
+    """Velocity of the water at a point of world w, north and east [m/s]; ``core`` is the radius of eddies' cores."""
     v_x, v_y = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
     for k in range(flow.eddies.shape[1]):
         if flow.eddies[w, k, 2] != 0.0:
-            e_x, e_y = eddy_flow(x - flow.eddies[w, k, 0], y - flow.eddies[w, k, 1], flow.eddies[w, k, 2], water.core)
+            e_x, e_y = eddy_flow(x - flow.eddies[w, k, 0], y - flow.eddies[w, k, 1], flow.eddies[w, k, 2], core)
             v_x, v_y = v_x + e_x, v_y + e_y
     return v_x, v_y
 
@@ -132,7 +156,7 @@ def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) ->
 def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
     """The water's velocity at every vehicle of world w."""
     for i in range(state.eta.shape[1]):
-        flow.flow[w, i, 0], flow.flow[w, i, 1] = flow_at(w, state.eta[w, i, 0], state.eta[w, i, 1], water, flow)
+        flow.flow[w, i, 0], flow.flow[w, i, 1] = flow_at(w, state.eta[w, i, 0], state.eta[w, i, 1], water.core, flow)
 
 
 @compiled
