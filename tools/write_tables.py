@@ -8,7 +8,7 @@ from uuv_marl import load_scenario, scenario_names, uuv_swarm_v0
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
-from uuv_marl.percept import PerceptField, PerceptLayout
+from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "README.md", ROOT / "docs" / "environment.md", ROOT / "docs" / "scenarios.md"
@@ -57,9 +57,9 @@ def scenarios() -> str:
 
 
 def channels() -> str:
-    """The fields that both channels append to the observation."""
+    """The fields that all channels append to the observation."""
     plain = PerceptLayout.of(load_scenario("single_obstacle"))
-    full = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.channels": ["compass", "link"]}))
+    full = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.channels": list(CHANNELS)}))
     return fields(full.table[len(plain.table) :], plain.size)
 
 

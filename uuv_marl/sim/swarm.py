@@ -16,6 +16,7 @@ from uuv_marl.sim.engine import EngineName, make_engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
 from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_arrays
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
@@ -76,6 +77,21 @@ class Swarm:
     def flow(self) -> NDArray[np.float64]:
         """Velocity of the water at each vehicle, north and east [m/s], shape (world, vehicle, 2)."""
         return np.zeros_like(self.state.before) if self._sea is None else self._sea.flow.flow
+
+    @property
+    def currents(self) -> Flow | None:
+        """How the water of each world moves; None where nothing disturbs the scenario.
+
+        ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of one's own: the water at the
+        vehicles is read from them at the end of each control hold. A reset draws them anew.
+        """
+        return None if self._sea is None else self._sea.flow
+
+    def flow_field(self, world: int = 0) -> FlowField:
+        """How the water of a world moves now: ``swarm.flow_field().at([[100.0, 200.0]])``, north and east [m]."""
+        if self._sea is None:
+            return FlowField(np.zeros(2), np.zeros((0, 3)), self.scenario.current.eddy_core_m)
+        return flow_field(world, self._sea.water.core, self._sea.flow)
 
     @property
     def velocity(self) -> NDArray[np.float64]:

@@ -21,7 +21,6 @@ from uuv_marl.sim.sea.current import (
     advance_gust,
     draw_flow,
     know_velocities,
-    max_eddies,
     read_flow,
     water,
 )
@@ -59,7 +58,7 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
     if not disturbances(scenario) and not set(SEA_CHANNELS) & set(scenario.sonar.channels):
         return None
     peers = sizes["vehicle"] if "modem" in scenario.sonar.channels else 0
-    sizes = {**sizes, "eddy": max_eddies(scenario), "plant": PLANT, "fault": len(scenario.faults), "peer": peers}
+    sizes = {**sizes, "eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults), "peer": peers}
     return Sea(
         keys=keys,
         water=water(scenario),
