@@ -31,7 +31,7 @@ class Outcome(NamedTuple):
     reward: Float64
     """0 for vehicles that were lost before."""
     terminated: Bool
-    """The swarm arrived, or the vehicle was lost in this step."""
+    """The swarm arrived and that ends the episode, or the vehicle was lost in this step."""
     truncated: Bool
     """The time limit, for vehicles that are not lost."""
     acting: Bool
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
     world_reward: Float64
     """Shape (world,): the mean over all vehicles, before ``team`` adds anybody's own loss."""
     world_terminated: Bool
-    """Shape (world,): the swarm arrived, or all its vehicles are lost."""
+    """Shape (world,): the swarm arrived and that ends the episode, or all its vehicles are lost."""
     world_truncated: Bool
     """Shape (world,): the time limit."""
     terms: Mapping[str, Float64]
@@ -139,7 +139,7 @@ class Task:
         return Outcome(
             observation=observe(swarm),
             reward=reward,
-            terminated=before & (swarm.arrived[:, None] | ~alive),
+            terminated=before & (world_terminated[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
             acting=alive & ~self._over[:, None],
             world_reward=world_reward,
