@@ -3,8 +3,8 @@
 Sound by construction: terms per second are bounded and at most zero, arrival pays once, whether it ends the episode
 or not, so that arriving earlier never pays less; a lost vehicle is charged the worst that those terms could have cost
 it in the rest of the episode, an arrival, and a collision, so that dying never pays the one who dies (unless it would
-have collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps the
-swarm from arriving, the others gain from its loss.
+have collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps
+the swarm from arriving, the others gain from its loss.
 """
 
 import math
