@@ -29,7 +29,7 @@ class StepResult(NamedTuple):
     reward: Float64
     """0 for vehicles that were lost before."""
     terminated: Bool
-    """The swarm arrived, or the vehicle was lost in this step."""
+    """The swarm arrived and that ends the episode, or the vehicle was lost in this step."""
     truncated: Bool
     """The time limit, for vehicles that are not lost."""
     acting: Bool
@@ -37,7 +37,7 @@ class StepResult(NamedTuple):
     world_reward: Float64
     """Shape (world,): the mean over all vehicles, before ``team`` adds anybody's own loss."""
     world_terminated: Bool
-    """Shape (world,): the swarm arrived, or all its vehicles are lost."""
+    """Shape (world,): the swarm arrived and that ends the episode, or all its vehicles are lost."""
     world_truncated: Bool
     """Shape (world,): the time limit."""
     weighted: Float64 | None
