@@ -50,6 +50,17 @@ DAMPED = {"actuators.yaw_damping_nms": 600.0}
 MANY_LOSSES = {"disturbance.loss_times_s": [0.6, 1.0, 1.1, 1.2]}
 FINE = {"timing.decision_period_s": 0.5, "timing.integration_step_s": 0.02}
 LOSSES = {"disturbance.loss_times_s": [0.3, 1.25, 1.25]}
+SEA = {
+    "current.speed_mps": 0.4, "current.variation_mps": 0.2, "current.eddies": 6, "current.eddy_speed_mps": 0.5,
+    "mismatch.mass": 0.2, "mismatch.added_mass": 0.2, "mismatch.drag": 0.3, "mismatch.thrust": 0.2,
+    "actuators.thrust_lag_s": 0.5, "actuators.yaw_lag_s": 0.3, "actuators.yaw_authority": 0.7,
+    "sonar.channels": ["compass", "link", "current", "age", "modem"], "modem.period_s": 1.0,
+    "faults": [
+        {"kind": "thruster", "share": 0.4, "onset_s": 1.0},
+        {"kind": "yaw", "share": 0.3, "onset_s": 0.5, "duration_s": 1.0, "efficiency": 0.3},
+        {"kind": "member", "share": 0.2, "onset_s": 1.5},
+    ],
+}  # fmt: skip
 EPISODES = {
     **{name: (name, {"num_vehicles": n}, "") for n, name in enumerate(scenario_names(), 7)},
     "starter": ("starter", {}, "arrival"),
@@ -64,6 +75,8 @@ EPISODES = {
     "obstacles hide": ("multi_obstacle", {"num_vehicles": 12, "overrides": HIDING}, ""),
     "corners on a tick": ("tracking", {"overrides": CORNERS}, ""),
     "overlapping arrays": ("single_obstacle", {"num_vehicles": 7, "overrides": {"sonar.arrays": OVERLAPPING}}, ""),
+    "the sea": ("random_field", {"overrides": SEA}, "lost"),
+    "the sea, five holds": ("starter", {"overrides": {**SEA, **FINE}}, "lost arrival"),
     "five holds, coupled, damped": ("starter", {"overrides": {**FINE, **COUPLED, **DAMPED}}, "arrival"),
 }  # fmt: skip
 """Scenario, changes, and what must happen beside echoes and contacts."""

@@ -72,6 +72,8 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
         ("multi_obstacle", {"num_vehicles": 300}),
         ("lossy", {"overrides": {"sonar.channels": ["compass", "link"]}}),
         ("random_field", {"overrides": {"vehicle.m_kg": 250.0, "contact.ends_vehicle": True}}),
+        ("starter", {"overrides": {"current.eddies": 8, "current.eddy_speed_mps": 0.5}}),
+        ("random_field", {"overrides": {"sonar.channels": ["age"], "faults": [{"kind": "yaw", "share": 0.5}]}}),
     ]
     for name, change in changes:
         scenario = load_scenario(name, **change)
@@ -79,5 +81,6 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
             swarm = Swarm(scenario, worlds)
             swarm.reset(0)
             swarm.step(np.zeros((worlds, swarm.num_vehicles, 2)))
-    for entry in (world.observe_world, world.step_alone, world.step_worlds):
+    calm = (world.observe_world, world.step_alone, world.step_worlds)
+    for entry in (*calm, world.observe_world_at_sea, world.step_alone_at_sea, world.step_worlds_at_sea):
         assert len(entry.signatures) == 1, entry

@@ -39,6 +39,7 @@ SPEED = Kind("m/s", 4.0, -MAX_SPEED, MAX_SPEED)
 YAW_RATE = Kind("rad/s", 1.0, -MAX_SPEED, MAX_SPEED)
 FLAG = Kind("1", 1.0, 0.0, 1.0)
 DIRECTION = Kind("1", 1.0, -1.0, 1.0)
+AGE = Kind("s", 1.0, 0.0, 4096.0)
 IDENTITY = Kind("1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES)
 
 
@@ -61,7 +62,7 @@ Table = tuple[PerceptField, ...]
 
 def _sonar(sectors: int, active: int) -> Table:
     return (
-        PerceptField("velocity", (2,), SPEED, "own surge and sway velocity"),
+        PerceptField("velocity", (2,), SPEED, "own surge and sway velocity over ground (current.velocity)"),
         PerceptField("yaw_rate", (1,), YAW_RATE, "own yaw rate"),
         PerceptField("reference", (2,), POSITION, "vector to the reference point l(t); a longer one is cut to 4096 m"),
         PerceptField("reference_velocity", (2,), SPEED, "velocity of the reference point"),
@@ -86,11 +87,39 @@ def _compass(_sectors: int, _active: int) -> Table:
 def _link(sectors: int, _active: int) -> Table:
     return (
         PerceptField("link_identity", (sectors,), IDENTITY, "per sub-sector: 1 + index of the vehicle heard, else 0"),
-        PerceptField("link_velocity", (sectors, 2), SPEED, "per sub-sector: velocity of that vehicle, else 0"),
+        PerceptField(
+            "link_velocity", (sectors, 2), SPEED, "per sub-sector: velocity of that vehicle over ground, else 0"
+        ),
     )
 
 
-CHANNELS = {"compass": _compass, "link": _link}
+def _current(_sectors: int, _active: int) -> Table:
+    return (
+        PerceptField("ground_velocity", (2,), SPEED, "own surge and sway velocity over ground"),
+        PerceptField("water_velocity", (2,), SPEED, "own surge and sway velocity through the water"),
+    )
+
+
+def _age(sectors: int, _active: int) -> Table:
+    return (PerceptField("age", (sectors,), AGE, "per sub-sector: time since the reception of its reading"),)
+
+
+def _ranged(sectors: int, _active: int) -> Table:
+    return (PerceptField("ranged", (sectors,), FLAG, "per sub-sector: 1 if the array measures ranges, else 0"),)
+
+
+def _modem(sectors: int, _active: int) -> Table:
+    return (
+        PerceptField("modem_identity", (sectors,), IDENTITY, "per sub-sector: 1 + index of the vehicle heard, where a "
+                     "message of it has arrived, else 0"),
+        PerceptField("modem_velocity", (sectors, 2), SPEED, "per sub-sector: its velocity over ground when it sent"),
+        PerceptField("modem_age", (sectors,), AGE, "per sub-sector: time since it sent"),
+    )  # fmt: skip
+
+
+CHANNELS = {
+    "compass": _compass, "link": _link, "current": _current, "age": _age, "ranged": _ranged, "modem": _modem
+}  # fmt: skip
 """Rows that a channel adds, by its name in ``sonar.channels``, in the order of the table."""
 
 
@@ -130,6 +159,12 @@ class PerceptLayout:
         return tuple(self.starts.get(field.name, -1) for field in percept_table(0, 0))
 
     @functools.cached_property
+    def message_offsets(self) -> tuple[int, ...]:
+        """``offsets``, the modem's fields in place of the link's, whose order and shapes are the same."""
+        names = [field.name.replace("link_", "modem_") for field in percept_table(0, 0)]
+        return tuple(self.starts.get(name, -1) for name in names)
+
+    @functools.cached_property
     def scale(self) -> Float32:
         """Unit of each observation entry, in physical units; powers of two. Shape (size,)."""
         return self._spread([field.kind.scale for field in self.table])
@@ -163,8 +198,9 @@ class Percept:
 
     ``velocity`` (..., 2), ``yaw_rate`` (..., 1), ``reference`` (..., 2), ``reference_velocity`` (..., 2),
     ``heard`` (..., sector), ``neighbour`` (..., sector, 2), ``echo`` (..., active), ``echo_range`` (..., active),
-    ``echo_position`` (..., active, 2), and where granted ``compass`` (..., 2), ``link_identity`` (..., sector),
-    ``link_velocity`` (..., sector, 2). Any of them by ``percept["name"]``; ``percept.names`` lists those there are.
+    ``echo_position`` (..., active, 2), and where their channels are granted ``compass`` (..., 2), ``link_identity``
+    (..., sector), ``link_velocity`` (..., sector, 2) and those of docs/sea.md. Any of them by ``percept["name"]``;
+    ``percept.names`` lists those there are.
     """
 
     flat: Float32

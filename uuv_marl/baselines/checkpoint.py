@@ -32,18 +32,25 @@ WEIGHTS_FILE = "policy.safetensors"
 _CARD = "uuv_marl"
 _MOST_WEIGHT = 1e6
 """Larger weights are no result of training, and overflow in single precision."""
+_NOT_THE_VEHICLE = {
+    "vehicle.name",
+    "actuators.yaw_damping_nms",
+    "actuators.thrust_lag_s",
+    "actuators.yaw_lag_s",
+    "actuators.yaw_authority",
+}
 _FIRST_VEHICLE = "literature_185"
 """The vehicle of version 0.1.0, which wrote checkpoints without saying so."""
 
 
 def vehicle_of(scenario: Scenario) -> dict[str, float]:
-    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare themselves."""
+    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare, and disturbances."""
     return _numbers({"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()})
 
 
 def _numbers(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
     every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
-    return {field: every[field] for field in every if field not in ("vehicle.name", "actuators.yaw_damping_nms")}
+    return {field: every[field] for field in every if field not in _NOT_THE_VEHICLE}
 
 
 def _all_gains(gains: Any) -> Any:

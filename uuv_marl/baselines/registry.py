@@ -133,12 +133,16 @@ def _kind(name: str) -> Kind:
 
 
 def granted(name: str, scenario: Scenario) -> Scenario:
-    """The scenario with the channels and the inner loop that a policy declares, and no others."""
+    """The scenario with the channels and the inner loop that a policy declares, and no others.
+
+    A scenario that grants ``modem`` grants it in place of ``link``, which is an oracle.
+    """
     policy = policy_class(name)
+    told = "modem" if "modem" in scenario.sonar.channels else "link"
     return load_scenario(
         scenario,
         overrides={
-            "sonar.channels": list(policy.channels),
+            "sonar.channels": [told if channel == "link" else channel for channel in policy.channels],
             "actuators.yaw_damping_nms": policy.yaw_damping_nms,
         },
     )

@@ -116,7 +116,7 @@ class Sdc(Policy):
             -g.kappa * self.scenario.timing.decision_period_s * (memory.decisions - 1)
         ) + g.rho_inf
         _act(
-            flat, self.layout.offsets, g, self.limits, memory.slots, memory.depth, self.all_informed, rho,
+            flat, self.at, g, self.limits, memory.slots, memory.depth, self.all_informed, rho,
             action, self.clamps,
         )  # fmt: skip
         return action

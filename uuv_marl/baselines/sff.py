@@ -87,13 +87,13 @@ class Sff(Policy):
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Compare what is heard with what was heard."""
         period = self.scenario.timing.decision_period_s
-        _remember(self.flat(percept), self.layout.offsets, period, worlds, self.memory)
+        _remember(self.flat(percept), self.at, period, worlds, self.memory)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         flat = self.flat(percept)
         action = np.empty((*flat.shape[:2], 2), np.float32)
-        _decide(flat, self.layout.offsets, self.gains, self.limits, self.memory, action)
+        _decide(flat, self.at, self.gains, self.limits, self.memory, action)
         return action
 
 
@@ -223,7 +223,8 @@ def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, memory: Memory
         distance = max(math.hypot(q_x, q_y), 0.1)
         attraction = clustering(distance, g)
         f_x, f_y = f_x + attraction * q_x / distance, f_y + attraction * q_y / distance
-        mean_x, mean_y, num = mean_x + v_x, mean_y + v_y, num + 1
+        if see.link_identity[w, i, k] >= 1.0:
+            mean_x, mean_y, num = mean_x + v_x, mean_y + v_y, num + 1
     echoes = False
     for a in range(see.echo.shape[2]):
         echoes = echoes or see.echo[w, i, a] > 0.0

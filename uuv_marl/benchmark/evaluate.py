@@ -34,7 +34,7 @@ class Routes(NamedTuple):
     heading: Float32
     """Shape (time, vehicle) [rad], in [-pi, pi), clockwise from north."""
     velocity: Float32
-    """Shape (time, vehicle, 2) [m/s]."""
+    """Over ground, shape (time, vehicle, 2) [m/s]."""
 
 
 class Run(NamedTuple):
@@ -166,9 +166,8 @@ def _batch(
 
 def _sample(swarm: Swarm) -> tuple[Float32, Float32]:
     """Time (world,) and position, heading and velocity of everybody (world, vehicle, 5)."""
-    eta, nu = swarm.state.eta, swarm.state.nu
+    eta, (u, v) = swarm.state.eta, np.moveaxis(swarm.velocity, -1, 0)
     cos, sin = np.moveaxis(swarm.heading, -1, 0)
-    u, v = nu[:, :, 0], nu[:, :, 1]
     motion = np.stack([eta[:, :, 0], eta[:, :, 1], eta[:, :, 2], cos * u - sin * v, sin * u + cos * v], axis=2)
     motion[~swarm.state.alive] = np.nan
     return swarm.facts.time_s.astype(np.float32), motion.astype(np.float32)

@@ -29,7 +29,7 @@ class StepResult(NamedTuple):
     reward: Float64
     """0 for vehicles that were lost before."""
     terminated: Bool
-    """The swarm arrived, or the vehicle was lost in this step."""
+    """The swarm arrived and that ends the episode, or the vehicle was lost in this step."""
     truncated: Bool
     """The time limit, for vehicles that are not lost."""
     acting: Bool
@@ -37,7 +37,7 @@ class StepResult(NamedTuple):
     world_reward: Float64
     """Shape (world,): the mean over all vehicles, before ``team`` adds anybody's own loss."""
     world_terminated: Bool
-    """Shape (world,): the swarm arrived, or all its vehicles are lost."""
+    """Shape (world,): the swarm arrived and that ends the episode, or all its vehicles are lost."""
     world_truncated: Bool
     """Shape (world,): the time limit."""
     weighted: Float64 | None
@@ -240,9 +240,9 @@ def make_batched_env(
 
 def refuse_losses(scenario: Scenario, api: str) -> None:
     """Raise ScenarioError where vehicles can be lost, for an API whose rows must all live to the episode's end."""
-    if scenario.disturbance.loss_times_s or scenario.contact.ends_vehicle:
+    if scenario.loses_vehicles:
         raise ScenarioError(
             f"{api} can't show that a vehicle is lost before the others, which scenario {scenario.name!r} allows; use "
             "uuv_marl.parallel_env, vector_env or the TorchRL or RLlib environment, or override "
-            "disturbance.loss_times_s=[] and contact.ends_vehicle=false"
+            "disturbance.loss_times_s=[], contact.ends_vehicle=false and no faults of kind member"
         )

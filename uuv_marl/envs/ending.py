@@ -14,8 +14,10 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
         vehicle: index of the vehicle; None for the world as a whole.
 
     Returns:
-        ``is_success`` (``ending`` is ``arrival``; the name under which libraries look for it), ``ending`` (``arrival``,
-        ``time_limit``, ``lost``: this vehicle or all of them, or ``diverged``: the integration step is too long),
+        ``is_success`` (the swarm arrived, and this vehicle, or any of them, was there to the end; the name under which
+        libraries look for it), ``ending`` (``arrival``, ``time_limit``: also after an arrival where
+        ``arrival.ends_episode`` is false, ``lost``: this vehicle or all of them, or ``diverged``: the integration step
+        is too long),
         ``arrived`` (the swarm did), ``time_s`` since the reset, and ``collisions``, the contact episodes of the whole
         swarm until now.
     """
@@ -27,9 +29,9 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
     elif swarm.facts.diverged[world] >= 0:
         reason = "diverged"
     else:
-        reason = "arrival" if arrived else "time_limit"
+        reason = "arrival" if arrived and swarm.scenario.arrival.ends_episode else "time_limit"
     return {
-        "is_success": reason == "arrival",
+        "is_success": arrived and reason in ("arrival", "time_limit"),
         "ending": reason,
         "arrived": arrived,
         "time_s": float(swarm.facts.time_s[world]),

@@ -1,10 +1,10 @@
 """The reward: named terms of every vehicle, weighted by the scenario, and their sum.
 
-Sound by construction: terms per second are bounded and at most zero, arrival pays once and ends the episode, so that
-arriving earlier never pays less; a lost vehicle is charged the worst that those terms could have cost it in the rest of
-the episode, the arrival it misses, and a collision, so that dying never pays the one who dies (unless it would have
-collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps the
-swarm from arriving, the others gain from its loss.
+Sound by construction: terms per second are bounded and at most zero, arrival pays once, whether it ends the episode
+or not, so that arriving earlier never pays less; a lost vehicle is charged the worst that those terms could have cost
+it in the rest of the episode, an arrival, and a collision, so that dying never pays the one who dies (unless it would
+have collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps
+the swarm from arriving, the others gain from its loss.
 """
 
 import math
@@ -49,14 +49,18 @@ class RewardWeights(NamedTuple):
     s_l_m: float
     s_o_m: float
     s_u_m: float
+    settled_s: float
+    """The step that arrives ends less than this after ``Facts.arrival_s``, and every later one after it."""
 
 
 def reward_weights(scenario: Scenario) -> RewardWeights:
     """The scenario's weights and lengths."""
-    weight, limit = scenario.reward, scenario.constraints
+    weight, limit, timing = scenario.reward, scenario.constraints, scenario.timing
+    dwell = round(scenario.arrival.dwell_s / timing.control_hold_s)
     return RewardWeights(
-        scenario.timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
+        timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
         weight.collision, weight.arrival, limit.s_l_m, limit.s_o_m, limit.s_u_m,
+        settled_s=(dwell + timing.holds_per_decision - 0.5) * timing.control_hold_s,
     )  # fmt: skip
 
 
@@ -110,7 +114,7 @@ def _fill(
     """
     left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
     worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
-    arrived = not math.isnan(facts.arrival_s[w, 0])
+    arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is
     for i in range(state.alive.shape[1]):
         alive, lost = state.alive[w, i], facts.lost[w, i]
         if not (alive or lost):
@@ -124,7 +128,7 @@ def _fill(
         terms[4, w, i] = -weights.collision * facts.contacts[w, i]
         if lost:
             terms[5, w, i] = -(weights.collision + weights.arrival + worst_rate * left_s)
-        if alive and arrived:
+        if alive and arrives:
             terms[6, w, i] = weights.arrival
         for k in range(terms.shape[0]):
             reward[w, i] += terms[k, w, i]

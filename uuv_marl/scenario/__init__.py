@@ -5,6 +5,7 @@ every number with its source.
 """
 
 from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario.conditions import IDEAL, conditions, disturbances
 from uuv_marl.scenario.files import (
     differences,
     load_scenario,
@@ -19,6 +20,7 @@ from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.sections import MAX_RANGE_M, growth
 
 __all__ = [
-    "MAX_RANGE_M", "Scenario", "ScenarioError", "differences", "growth", "load_scenario", "load_vehicle",
+    "IDEAL", "MAX_RANGE_M", "Scenario", "ScenarioError", "conditions", "differences", "disturbances",
+    "growth", "load_scenario", "load_vehicle",
     "parse_override", "scenario_names", "show", "to_toml", "vehicle_names",
 ]  # fmt: skip

@@ -16,7 +16,7 @@ from tomlkit.items import AbstractTable
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario.messages import explain, short, shown
 from uuv_marl.scenario.scenario import Scenario
-from uuv_marl.scenario.sections import Actuators, Vehicle
+from uuv_marl.scenario.sections import Vehicle
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
@@ -181,7 +181,7 @@ def _find(name: Any, beside: Path | None = None) -> Path:
 def _vehicle(name: str, beside: Path | None = None) -> _File:
     """A vehicle's file, which must be complete: numbers of two vehicles are never mixed without a word."""
     file = _parse(_find_vehicle(name, beside))
-    needed = {"vehicle": set(Vehicle.model_fields), "actuators": set(Actuators.model_fields) - {"yaw_damping_nms"}}
+    needed = {"vehicle": set(Vehicle.model_fields), "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"}}
     for section, fields in needed.items():
         given = file.data.get(section)
         missing = sorted(fields - set(cast(dict[str, Any], given) if isinstance(given, dict) else ()))
@@ -296,8 +296,8 @@ def _index(entries: Sequence[Any], part: str, field: str) -> int:
     names = {str(table["name"]): k for k, table in tables.items() if "name" in table}
     found = (places | names).get(part)
     if found is None:
-        known = ", ".join(names or places) or "none"
-        raise ScenarioError(f"{short(field)} is unknown: there is no entry {shown(part)}; use one of {known}")
+        known = f"use one of {', '.join(names or places)}" if entries else "the list is empty: give it as a whole"
+        raise ScenarioError(f"{short(field)} is unknown: there is no entry {shown(part)}; {known}")
     return found
 
 

@@ -38,9 +38,10 @@ NonPositive = Annotated[float, within(-1_000_000, 0)]
 Speed = Annotated[float, within(0, 100)]
 Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
 Clock = Annotated[float, within(0.0001, 3_600)]
+Lag = Annotated[float, within(0, 3_600)]
 Legs = Annotated[int, within(1, 8)]
 Discs = Annotated[int, within(0, 64)]
-Channel = Literal["compass", "link"]
+Channel = Literal["compass", "link", "current", "age", "ranged", "modem"]
 Point = tuple[float, float]
 """North and east [m]."""
 
@@ -226,6 +227,12 @@ class Actuators(Section):
     """Turns the sideways component of a desired force into a torque (Eq. 22)."""
     yaw_damping_nms: NonNegative
     """Inner loop: torque -c r, added within the torque limit."""
+    thrust_lag_s: Lag
+    """Time constant with which thrust follows what is asked; 0: at once."""
+    yaw_lag_s: Lag
+    """The same of the torque."""
+    yaw_authority: Annotated[float, within(0, 1)]
+    """Share of the torque that reaches the water."""
 
 
 class SonarArray(Section):
@@ -266,7 +273,9 @@ class Sonar(Section):
     obstacles_hide_vehicles: bool
     """Whether an obstacle on the line of sight silences a vehicle."""
     channels: tuple[Channel, ...]
-    """Granted beyond the percept: ``compass`` (heading), ``link`` (neighbours' identity and velocity)."""
+    """Granted beyond the percept: ``compass`` (heading), ``link`` (an oracle of neighbours' identity and velocity),
+    ``modem`` (the same as their latest messages tell it), ``current`` (own velocity over ground and through the water),
+    ``age`` (of each sub-sector's reading), ``ranged`` (whether its range was measured)."""
     arrays: Annotated[tuple[SonarArray, ...], Field(min_length=1)]
     """The suite; their order is the order of sub-sectors in the percept."""
 
@@ -347,6 +356,8 @@ class Arrival(Section):
     """... for so long."""
     spread_m: Positive
     """Every vehicle this close to the end, for up to 54 vehicles."""
+    ends_episode: bool
+    """Whether an episode ends when the swarm arrives; else it runs to its time limit."""
 
 
 class TimeLimit(Section):

@@ -19,7 +19,9 @@ class State(NamedTuple):
     """What a step changes."""
 
     eta: Annotated[Float64, "world vehicle 3", "Pose: north [m], east [m], heading [rad]."]
-    nu: Annotated[Float64, "world vehicle 3", "Velocity in the body frame: surge, sway [m/s], yaw rate [rad/s]."]
+    nu: Annotated[
+        Float64, "world vehicle 3", "Velocity through the water, body frame: surge, sway [m/s]; yaw rate [rad/s]."
+    ]
     before: Annotated[Float64, "world vehicle 2", "Position one control hold ago, north and east [m]."]
     alive: Annotated[Bool, "world vehicle", "False for lost vehicles."]
     tick: Annotated[Int64, "world", "Control holds since the reset."]

@@ -10,6 +10,7 @@ import logging
 import os
 import tempfile
 import time
+import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -162,8 +163,18 @@ def compiled_inner(function: F) -> F:
     def ignore(*_args: object) -> None:
         return
 
-    dispatcher._insert, dispatcher._compile_for_args = ignore, refuse
+    dispatcher._insert, dispatcher._compile_for_args, dispatcher.is_inner = ignore, refuse, True
     return cast(F, dispatcher)
+
+
+@functools.cache
+def interpreted(function: F) -> F:
+    """The Python of a ``compiled_inner`` function and of those that it calls; functions with a door stay compiled."""
+    plain = cast(Any, function).py_func
+    used = {name: plain.__globals__[name] for name in plain.__code__.co_names if name in plain.__globals__}
+    inner = {name: interpreted(value) for name, value in used.items() if getattr(value, "is_inner", False)}
+    space = {**plain.__globals__, **inner}
+    return cast(F, types.FunctionType(plain.__code__, space, plain.__name__))
 
 
 def compiled_parallel(function: F) -> F:

@@ -13,8 +13,16 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import max_cells
 from uuv_marl.sim.model import model
 from uuv_marl.sim.plain import PlainEngine
+from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.workspace import scratch
-from uuv_marl.sim.world import observe_world, step_alone, step_worlds
+from uuv_marl.sim.world import (
+    observe_world,
+    observe_world_at_sea,
+    step_alone,
+    step_alone_at_sea,
+    step_worlds,
+    step_worlds_at_sea,
+)
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -54,20 +62,27 @@ class Engine(Protocol):
 class NumbaEngine:
     """One world runs serially, several run on Numba's threads."""
 
-    def __init__(self, scenario: Scenario, world: World) -> None:
-        self._world, self._model, self._num_worlds = world, model(scenario), len(world.state.tick)
+    def __init__(self, scenario: Scenario, world: World, sea: Sea | None) -> None:
+        self._world, self._model, self._num_worlds, self._sea = world, model(scenario), len(world.state.tick), sea
         n = scenario.swarm.num_vehicles
         threads = min(self._num_worlds, cast(Any, config).NUMBA_NUM_THREADS)
         self._scratch = scratch(threads, n, scenario.sonar.num_sectors, max_cells(n))
 
     def observe(self, w: int) -> None:
         """See ``Engine``."""
-        observe_world(w, self._world, self._model, self._scratch)
+        if self._sea is None:
+            observe_world(w, self._world, self._model, self._scratch)
+        else:
+            observe_world_at_sea(w, self._world, self._model, self._scratch, self._sea)
 
     def step(self, action: Float32, active: Bool | None) -> bool:
         """See ``Engine``."""
         if self._num_worlds == 1:
-            return (active is None or bool(active[0])) and step_alone(action, self._world, self._model, self._scratch)
+            if active is not None and not active[0]:
+                return False
+            if self._sea is None:
+                return step_alone(action, self._world, self._model, self._scratch)
+            return step_alone_at_sea(action, self._world, self._model, self._scratch, self._sea)
         if _threads_of_parent:
             raise RuntimeError(
                 "several worlds can't be stepped in a process forked after Numba's threads had started; "
@@ -75,12 +90,21 @@ class NumbaEngine:
             )
         running = np.ones(self._num_worlds, np.bool_) if active is None else active
         threads = min(get_num_threads(), len(self._scratch.reals))
-        return step_worlds(threads, running, action, *self._world, *self._model, self._scratch)
+        if self._sea is None:
+            return step_worlds(threads, running, action, *self._world, *self._model, self._scratch)
+        return step_worlds_at_sea(threads, running, action, *self._world, *self._model, self._scratch, *self._sea)
 
 
-def make_engine(name: EngineName, scenario: Scenario, world: World) -> Engine:
-    """An engine by name, that works on these arrays."""
+def make_engine(name: EngineName, scenario: Scenario, world: World, sea: Sea | None) -> Engine:
+    """An engine by name.
+
+    Args:
+        name: ``numba`` or ``plain``.
+        scenario: what to simulate.
+        world: the arrays that it works on.
+        sea: what disturbs them, None for nothing.
+    """
     engines: dict[EngineName, type[NumbaEngine | PlainEngine]] = {"numba": NumbaEngine, "plain": PlainEngine}
     if name not in engines:
         raise ValueError(f"engine must be 'numba' or 'plain', got {name!r}")
-    return engines[name](scenario, world)
+    return engines[name](scenario, world, sea)

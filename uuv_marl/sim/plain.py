@@ -20,9 +20,13 @@ from uuv_marl.percept import MAX_SPEED, Percept, PerceptLayout
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.scenario.sections import SonarArray
 from uuv_marl.sim.arrays import World
+from uuv_marl.sim.compiled import interpreted
 from uuv_marl.sim.model import model
+from uuv_marl.sim.sea.actuation import THRUSTER, YAW, is_lost
+from uuv_marl.sim.sea.sea import Sea, begin, drift, know, reads, take_readings
 from uuv_marl.sim.trigonometry import cos_sin as compiled_cos_sin
-from uuv_marl.sim.vehicle import Plant
+from uuv_marl.sim.vehicle import STILL, Plant
+from uuv_marl.sim.views import Fields, SeaFields
 from uuv_marl.sim.world import RUNAWAY
 
 Row = Sequence[float]
@@ -36,12 +40,18 @@ _cos_sin: Callable[[float], Pair] = getattr(compiled_cos_sin, "py_func", compile
 class PlainEngine:
     """Steps worlds one after the other in plain Python. See ``uuv_marl.sim.engine.Engine``."""
 
-    def __init__(self, scenario: Scenario, world: World) -> None:
+    def __init__(self, scenario: Scenario, world: World, sea: Sea | None) -> None:
+        self.world, self.sea = world, sea
         self.state, self.course, self.facts, self.senses = world
         numbers = model(scenario)
         self.plant, self.rules, self.sonar = numbers.plant, numbers.rules, scenario.sonar
         self.sectors = sub_sectors(scenario.sonar.arrays)
         self.percept = Percept(world.senses.percept, PerceptLayout.of(scenario))
+        absent = np.zeros((*world.state.alive.shape, 0, 2), np.float32)
+        every = dict.fromkeys(("compass", "link_identity", *SeaFields._fields), absent[..., 0])
+        every |= {"link_velocity": absent, "modem_velocity": absent, **{n: self.percept[n] for n in self.percept.names}}
+        self.fields = Fields(**{name: every[name] for name in Fields._fields})
+        self.sea_fields = SeaFields(**{name: every[name] for name in SeaFields._fields})
 
     def step(self, action: NDArray[np.float32], active: NDArray[np.bool_] | None) -> bool:
         """See ``Engine``."""
@@ -62,8 +72,17 @@ class PlainEngine:
             self.measure(w)
             self.lose_touching(w)
             self.check_arrival(w)
+            if self.sea is not None:
+                interpreted(drift)(w, self.world, self.sea)
+            if hold == self.rules.holds - 1 or (
+                self.sea is not None and interpreted(reads)(self.state.tick[w], self.sea)
+            ):
+                self.perceive(w)
+                if self.sea is not None:
+                    interpreted(take_readings)(w, self.world, self.sea, self.fields)
         self.facts.saturated[w] /= max(len(acting) * self.rules.holds, 1)
-        self.perceive(w)
+        if self.sea is not None:
+            interpreted(know)(w, self.world, self.sea, self.fields, self.sea_fields)
 
     def observe(self, w: int) -> None:
         """See ``Engine``."""
@@ -72,6 +91,9 @@ class PlainEngine:
         self.measure(w)
         self.check_arrival(w)
         self.perceive(w)
+        if self.sea is not None:
+            interpreted(begin)(w, self.world, self.sea)
+            interpreted(know)(w, self.world, self.sea, self.fields, self.sea_fields)
 
     def clear_facts(self, w: int) -> None:
         """Clear what is true of one decision."""
@@ -98,8 +120,7 @@ class PlainEngine:
             now: Row = [*state.eta[w, i].tolist(), *state.nu[w, i].tolist()]
             a = action[i] if decided_at is None else turned(action[i], now[2] - decided_at[i], self.plant)
             tau = actuators(a, now[5], self.plant)
-            for _ in range(self.rules.steps):
-                now = advance(now, tau, self.rules.step_s, self.plant)
+            now = self.swim(now, tau) if self.sea is None else self.swim_at_sea(w, i, now, tau, self.sea)
             x, y, psi, u, v, r = now
             if not abs(u) + abs(v) + abs(r) < RUNAWAY:  # or not a number: the vehicle stays where it was
                 facts.diverged[w] = i if facts.diverged[w] < 0 else facts.diverged[w]
@@ -109,6 +130,37 @@ class PlainEngine:
             facts.effort[w, i] += effort / self.rules.holds
             facts.saturated[w] += effort >= 1.0 - 1e-6
 
+    def swim(self, now: Row, tau: Row) -> Row:
+        """One control hold of a vehicle in still water."""
+        for _ in range(self.rules.steps):
+            now = advance(now, (tau, tau, tau), STILL, self.rules.step_s, self.plant)
+        return now
+
+    def swim_at_sea(self, w: int, i: int, now: Row, tau: Row, sea: Sea) -> Row:
+        """The same of vehicle i with numbers, lags and faults of its own, which the water carries along.
+
+        Args:
+            w: the world.
+            i: the vehicle.
+            now: pose, and velocity through the water.
+            tau: thrust [N] and torque [N m] as asked of it.
+            sea: the forces that reach the water are written.
+        """
+        numbers, hull, tick = sea.actuation, sea.hull, int(self.state.tick[w])
+        thrust, torque = tau[0] * float(hull.thrust[w, i]), tau[1] * numbers.yaw_authority
+        for f, kind in enumerate(numbers.kind):
+            if hull.broken[w, i, f, 0] <= tick < hull.broken[w, i, f, 1]:
+                thrust *= float(numbers.efficiency[f]) if kind == THRUSTER else 1.0
+                torque *= float(numbers.efficiency[f]) if kind == YAW else 1.0
+        plant, flow = Plant(*hull.plants[w, i].tolist()), sea.flow.flow[w, i].tolist()
+        for _ in range(self.rules.steps):
+            given = hull.tau[w, i].tolist()
+            thrusts = lagging(thrust, given[0], numbers.thrust_half, numbers.thrust_whole)
+            torques = lagging(torque, given[1], numbers.yaw_half, numbers.yaw_whole)
+            now = advance(now, list(zip(thrusts, torques, strict=True)), flow, self.rules.step_s, plant)
+            hull.tau[w, i] = thrusts[2], torques[2]
+        return now
+
     # --- What becomes true by it ---
 
     def apply_losses(self, w: int) -> None:
@@ -116,6 +168,10 @@ class PlainEngine:
         for tick, i in zip(self.rules.loss_ticks, self.course.losses[w], strict=True):
             if tick == self.state.tick[w]:
                 self.lose_vehicle(w, i)
+        if self.sea is not None:
+            for i in self.living(w):
+                if interpreted(is_lost)(w, i, self.state.tick[w], self.sea.actuation, self.sea.hull):
+                    self.lose_vehicle(w, i)
 
     def lose_vehicle(self, w: int, i: int) -> None:
         """Lose vehicle i."""
@@ -272,16 +328,25 @@ def actuators(a: Row, r: float, p: Plant) -> Pair:
     return p.max_force * a[0], cut(p.max_torque, p.max_torque * a[1] - p.yaw_damping * r)[0]
 
 
-def derivative(now: Row, tau: Row, p: Plant) -> Row:
-    """Rates of (x, y, psi, u, v, r): eta' = R(psi) nu, nu' = M^-1 (tau - C(nu) nu - D(nu) nu). Eq. 1-2, 4."""
+def lagging(asked: float, given: float, half: float, whole: float) -> tuple[float, float, float]:
+    """A force now, half a step and a step later: asked + (given - asked) e^(-t / lag), whose shares are given."""
+    if whole == 0.0:
+        return asked, asked, asked
+    return given, asked + (given - asked) * half, asked + (given - asked) * whole
+
+
+def derivative(now: Row, tau: Row, flow: Row, p: Plant) -> Row:
+    """Rates of (x, y, psi, u, v, r): eta' = R(psi) nu + flow, nu' = M^-1 (tau - C(nu) nu - D(nu) nu). Eq. 1-2, 4."""
     _, _, psi, u, v, r = now
     a = p.m * (p.x_G * r + v) - p.Y_vdot * v - p.Y_rdot * r
     b = p.m * u - p.X_udot * u
     f_u = tau[0] - -a * r - (p.X_u + p.X_uu * abs(u)) * u
     f_v = -b * r - ((p.Y_v + p.Y_vv * abs(v)) * v - (p.Y_r + p.Y_rr * abs(r)) * r)
     f_r = tau[1] - (a * u - b * v) - (-(p.N_v + p.N_rv * abs(r)) * v + (p.N_r + p.N_rr * abs(r)) * r)
+    north, east = to_world(u, v, cos_sin(psi))
     return (
-        *to_world(u, v, cos_sin(psi)),
+        north + flow[0],
+        east + flow[1],
         r,
         p.inverse_11 * f_u,
         p.inverse_22 * f_v + p.inverse_23 * f_r,
@@ -289,16 +354,24 @@ def derivative(now: Row, tau: Row, p: Plant) -> Row:
     )
 
 
-def advance(now: Row, tau: Row, h: float, p: Plant) -> Row:
-    """The state one step of h [s] later: the classical fourth-order Runge-Kutta method. Eq. 23-24."""
+def advance(now: Row, tau: Rows, flow: Row, h: float, p: Plant) -> Row:
+    """The state one step of h [s] later: the classical fourth-order Runge-Kutta method. Eq. 23-24.
+
+    Args:
+        now: the state, velocities relative to the water.
+        tau: thrust [N] and torque [N m] now, half a step and a step later.
+        flow: velocity of the water, north and east [m/s].
+        h: the step [s].
+        p: the vehicle.
+    """
 
     def after(rate: Row, seconds: float) -> Row:
         return [value + seconds * change for value, change in zip(now, rate, strict=True)]
 
-    k_1 = derivative(now, tau, p)
-    k_2 = derivative(after(k_1, 0.5 * h), tau, p)
-    k_3 = derivative(after(k_2, 0.5 * h), tau, p)
-    k_4 = derivative(after(k_3, h), tau, p)
+    k_1 = derivative(now, tau[0], flow, p)
+    k_2 = derivative(after(k_1, 0.5 * h), tau[1], flow, p)
+    k_3 = derivative(after(k_2, 0.5 * h), tau[1], flow, p)
+    k_4 = derivative(after(k_3, h), tau[2], flow, p)
     return after([a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k_1, k_2, k_3, k_4, strict=True)], h / 6.0)
 
 

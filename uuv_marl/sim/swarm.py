@@ -16,6 +16,9 @@ from uuv_marl.sim.engine import EngineName, make_engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.sea.actuation import hit
+from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
+from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_arrays
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
@@ -53,7 +56,8 @@ class Swarm:
         self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)
         self._world = World(self.state, self.course, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
-        self._engine = make_engine(engine, scenario, self._world)
+        self._sea = make_sea(scenario, self.keys, self._sizes)
+        self._engine = make_engine(engine, scenario, self._world, self._sea)
 
     @property
     def percept(self) -> Percept:
@@ -71,6 +75,35 @@ class Swarm:
         return self._senses.heading
 
     @property
+    def flow(self) -> NDArray[np.float64]:
+        """Velocity of the water at each vehicle, north and east [m/s], shape (world, vehicle, 2)."""
+        return np.zeros_like(self.state.before) if self._sea is None else self._sea.flow.flow
+
+    @property
+    def currents(self) -> Flow | None:
+        """How the water of each world moves; None where nothing disturbs the scenario.
+
+        ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of one's own: the water at the
+        vehicles is read from them at the end of each control hold. A reset draws them anew.
+        """
+        return None if self._sea is None else self._sea.flow
+
+    def flow_field(self, world: int = 0) -> FlowField:
+        """How the water of a world moves now: ``swarm.flow_field().at([[100.0, 200.0]])``, north and east [m]."""
+        if self._sea is None:
+            return FlowField(np.zeros(2), np.zeros((0, 3)), self.scenario.current.eddy_core_m)
+        return flow_field(world, self._sea.water.core, self._sea.flow)
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """Every vehicle's velocity over ground, surge and sway in its body frame [m/s], shape (world, vehicle, 2)."""
+        if self._sea is None:
+            return self.state.nu[:, :, :2]
+        (c, s), (x, y) = np.moveaxis(self.heading, -1, 0), np.moveaxis(self._sea.flow.flow, -1, 0)
+        drift = np.stack([c * x + s * y, c * y - s * x], axis=-1)
+        return self.state.nu[:, :, :2] + drift * self.state.alive[:, :, None]
+
+    @property
     def duration_s(self) -> NDArray[np.float64]:
         """Time that l(t) takes to its end, the bound on any task time, shape (world,)."""
         return self._duration_s
@@ -82,18 +115,25 @@ class Swarm:
         return limit.factor * self.duration_s + limit.extra_s
 
     @property
+    def faulty(self) -> NDArray[np.bool_]:
+        """Vehicles that a fault of the scenario has hit since the reset, shape (world, vehicle)."""
+        return np.zeros_like(self.state.alive) if self._sea is None else hit(self.state.tick, self._sea.hull)
+
+    @property
     def arrived(self) -> NDArray[np.bool_]:
-        """Worlds whose task is done, shape (world,)."""
+        """Worlds whose swarm has arrived, shape (world,)."""
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
     def endings(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """How episodes ended, shape (world,) each; both False for those that go on.
 
         Returns:
-            Terminated, by what happened: the swarm arrived, or all of it is lost. Truncated, that is cut off: by the
-            time limit, or because the world diverged.
+            Terminated, by what happened: the swarm arrived (where ``arrival.ends_episode``), or all of it is lost.
+            Truncated, that is cut off: by the time limit, or because the world diverged.
         """
-        terminated = self.arrived | ~self.state.alive.any(axis=1)
+        terminated = ~self.state.alive.any(axis=1)
+        if self.scenario.arrival.ends_episode:
+            terminated |= self.arrived
         late = self.facts.time_s >= self.time_limit_s - 1e-9
         return terminated, (late | (self.facts.diverged >= 0)) & ~terminated
 
@@ -143,6 +183,8 @@ class Swarm:
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
+        if self._sea is not None:
+            draw_sea(w, self.scenario, course, times[-1], self._sea)
         self._engine.observe(w)
 
     def observe(self) -> Percept:
@@ -185,6 +227,7 @@ class Swarm:
             "duration_s": self._duration_s,
             "keys": self.keys,
             **{k: array for table in self._world for k, array in table._asdict().items()},
+            **sea_arrays(self._sea),
         }
 
     def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:

@@ -141,12 +141,24 @@ def ahead(state: State6, h: float, rate: State6) -> State6:
 
 
 @compiled_inline
-def advance(state: State6, tau: Vector2, flow: Vector2, h: float, p: Plant) -> State6:
-    """The joint state h [s] later, tau and flow held: the classical fourth-order Runge-Kutta method (Eq. 23-24)."""
+def advance_lagging(
+    state: State6, tau: Vector2, tau_half: Vector2, tau_end: Vector2, flow: Vector2, h: float, p: Plant
+) -> State6:
+    """The joint state h [s] later: the classical fourth-order Runge-Kutta method (Eq. 23-24).
+
+    Args:
+        state: pose and velocity relative to the water.
+        tau: thrust [N] and torque [N m] at the start.
+        tau_half: the same h / 2 later.
+        tau_end: the same h later.
+        flow: velocity of the water, north and east [m/s], held.
+        h: the step [s].
+        p: the vehicle.
+    """
     a = derivative(state, tau, flow, p)
-    b = derivative(ahead(state, 0.5 * h, a), tau, flow, p)
-    c = derivative(ahead(state, 0.5 * h, b), tau, flow, p)
-    d = derivative(ahead(state, h, c), tau, flow, p)
+    b = derivative(ahead(state, 0.5 * h, a), tau_half, flow, p)
+    c = derivative(ahead(state, 0.5 * h, b), tau_half, flow, p)
+    d = derivative(ahead(state, h, c), tau_end, flow, p)
     x, y, psi, u, v, r = state
     w = h / 6.0
     return (
@@ -157,6 +169,12 @@ def advance(state: State6, tau: Vector2, flow: Vector2, h: float, p: Plant) -> S
         v + w * (a[4] + 2.0 * b[4] + 2.0 * c[4] + d[4]),
         r + w * (a[5] + 2.0 * b[5] + 2.0 * c[5] + d[5]),
     )
+
+
+@compiled_inline
+def advance(state: State6, tau: Vector2, flow: Vector2, h: float, p: Plant) -> State6:
+    """The joint state h [s] later, tau and flow held. See ``advance_lagging``."""
+    return advance_lagging(state, tau, tau, tau, flow, h, p)
 
 
 @compiled_inline

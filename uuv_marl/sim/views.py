@@ -67,6 +67,47 @@ def fields(flat: Float32, at: Starts) -> Fields:
     )
 
 
+class SeaFields(NamedTuple):
+    """Fields that a disturbed world can grant beyond ``Fields``, in the table's order; empty where not granted."""
+
+    ground_velocity: Float32
+    """Shape (world, vehicle, 2)."""
+    water_velocity: Float32
+    """Shape (world, vehicle, 2)."""
+    age: Float32
+    """Shape (world, vehicle, sector)."""
+    ranged: Float32
+    """Shape (world, vehicle, sector)."""
+    modem_identity: Float32
+    """Shape (world, vehicle, sector)."""
+    modem_velocity: Float32
+    """Shape (world, vehicle, sector, 2)."""
+    modem_age: Float32
+    """Shape (world, vehicle, sector)."""
+
+
+@compiled_inline
+def sea_fields(flat: Float32, at: Starts) -> SeaFields:
+    """Views of flat percepts (world, vehicle, entry). The order is the table's: tests/test_tables.py."""
+    sectors = at[5] - at[4]
+    return SeaFields(
+        ground_velocity=part(flat, at[12], 2)[0],
+        water_velocity=part(flat, at[13], 2)[0],
+        age=part(flat, at[14], sectors)[0],
+        ranged=part(flat, at[15], sectors)[0],
+        modem_identity=part(flat, at[16], sectors)[0],
+        modem_velocity=pairs(flat, max(at[17], 0), sectors if at[17] >= 0 else 0)[0],
+        modem_age=part(flat, at[18], sectors)[0],
+    )
+
+
+@compiled_inline
+def part(flat: Float32, start: int, num: int) -> tuple[Float32]:
+    """A view (world, vehicle, num) from an entry on, empty where that is -1."""
+    first = max(start, 0)
+    return (flat[:, :, first : first + (num if start >= 0 else 0)],)
+
+
 @compiled_inline
 def pairs(flat: Float32, start: int, num: int) -> tuple[Float32]:
     """A view (world, vehicle, num, 2) from an entry on, in a tuple, since compiled code returns no array alone."""

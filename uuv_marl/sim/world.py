@@ -17,16 +17,21 @@ from uuv_marl.sim.hearing import hear
 from uuv_marl.sim.model import Model, Rules
 from uuv_marl.sim.motion import apply_actuators, integrate, load, load_action, load_one
 from uuv_marl.sim.perception import write_percept
+from uuv_marl.sim.sea.actuation import Actuation, Hull, is_lost
+from uuv_marl.sim.sea.current import Flow, Water
+from uuv_marl.sim.sea.modem import Mail, Modem
+from uuv_marl.sim.sea.sea import Sea, begin, drift, integrate_at_sea, know, reads, take_readings
 from uuv_marl.sim.sonar import Suite
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
-from uuv_marl.sim.views import Starts, fields
+from uuv_marl.sim.views import Starts, fields, sea_fields
 from uuv_marl.sim.workspace import Columns, Scratch, Workspace, workspace
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
+UInt64 = NDArray[np.uint64]
 
 RUNAWAY = 1000.0
 """A vehicle whose velocities (surge, sway [m/s], yaw rate [rad/s]) add up to this has diverged. Assumed: no vehicle
@@ -34,11 +39,14 @@ under water is a hundredth as fast."""
 
 
 @compiled_inner
-def control_hold(w: int, first: bool, world: World, model: Model, now: Columns) -> None:
+def control_hold(w: int, first: bool, world: World, model: Model, now: Columns, sea: Sea | None) -> None:
     """Actions become forces, forces become motion. Eq. 1-4, 22-24."""
     state, facts, rules = world.state, world.facts, model.rules
     apply_actuators(first, now, model.plant)
-    integrate(rules.steps, rules.step_s, now, model.plant)
+    if sea is None:
+        integrate(rules.steps, rules.step_s, now, model.plant)
+    else:
+        integrate_at_sea(w, state, rules, now, sea)
     for i in range(state.eta.shape[1]):
         state.before[w, i, 0], state.before[w, i, 1] = state.eta[w, i, 0], state.eta[w, i, 1]
         if not state.alive[w, i]:
@@ -56,8 +64,12 @@ def control_hold(w: int, first: bool, world: World, model: Model, now: Columns) 
 
 
 @compiled_inner
-def apply_losses(w: int, world: World, rules: Rules) -> None:
+def apply_losses(w: int, world: World, rules: Rules, sea: Sea | None) -> None:
     """Vehicles whose scheduled time has come fall silent and stop."""
+    if sea is not None:
+        for i in range(world.state.alive.shape[1]):
+            if is_lost(w, i, world.state.tick[w], sea.actuation, sea.hull):
+                lose_vehicle(w, i, world)
     for k in range(rules.loss_ticks.shape[0]):
         if rules.loss_ticks[k] == world.state.tick[w]:
             lose_vehicle(w, world.course.losses[w, k], world)
@@ -153,10 +165,9 @@ def clear_facts(w: int, facts: Facts) -> None:
     facts.saturated[w] = 0.0
 
 
-@compiled
-def observe_world(w: int, world: World, model: Model, room: Scratch) -> None:
+@compiled_inner
+def observe_one(w: int, world: World, model: Model, own: Workspace, sea: Sea | None) -> None:
     """Facts and percepts of a world that has just been reset."""
-    own = workspace(room, 0)
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.facts.arrival_s[w] = math.nan
@@ -166,14 +177,29 @@ def observe_world(w: int, world: World, model: Model, room: Scratch) -> None:
     measure(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
     perceive(w, world, model, own, grid)
+    if sea is not None:
+        begin(w, world, sea)
+        know(w, world, sea, fields(world.senses.percept, model.at), sea_fields(world.senses.percept, model.at))
+
+
+@compiled
+def observe_world(w: int, world: World, model: Model, room: Scratch) -> None:
+    """Facts and percepts of a world that has just been reset."""
+    observe_one(w, world, model, workspace(room, 0), None)
+
+
+@compiled
+def observe_world_at_sea(w: int, world: World, model: Model, room: Scratch, sea: Sea) -> None:
+    """Facts and percepts of a disturbed world that has just been reset."""
+    observe_one(w, world, model, workspace(room, 0), sea)
 
 
 @compiled_inner
-def step_hold(w: int, first: bool, world: World, model: Model, workspace: Workspace) -> Grid:
+def step_hold(w: int, first: bool, world: World, model: Model, workspace: Workspace, sea: Sea | None) -> Grid:
     """One control hold of world w and what becomes true by it; the cells of the living afterwards."""
-    control_hold(w, first, world, model, workspace.now)
+    control_hold(w, first, world, model, workspace.now, sea)
     world.state.tick[w] += 1
-    apply_losses(w, world, model.rules)
+    apply_losses(w, world, model.rules, sea)
     grid = sort_into_cells(w, world, model, workspace)
     began = measure(w, world, model, workspace, grid)
     if model.rules.contact_ends and began > 0:
@@ -186,12 +212,18 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
 
 
 @compiled_inner
-def step_world(w: int, action: Float32, world: World, model: Model, workspace: Workspace) -> None:
-    """One decision period of a world. ``action`` (world, vehicle, 2) holds shares of full force, body frame.
+def step_world(w: int, action: Float32, world: World, model: Model, workspace: Workspace, sea: Sea | None) -> None:
+    """One decision period of a world. A world that has diverged stays as it is.
 
-    A world that has diverged stays as it is.
+    Args:
+        w: the world.
+        action: shares of full force, body frame, shape (world, vehicle, 2).
+        world: the arrays.
+        model: the scenario's numbers.
+        workspace: room to work in.
+        sea: what disturbs it, None for nothing; compiled code for nothing holds nothing of it.
     """
-    facts = world.facts
+    facts, holds = world.facts, model.rules.holds
     if facts.diverged[w] >= 0:
         return
     clear_facts(w, facts)
@@ -200,17 +232,30 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
         num_alive += int(world.state.alive[w, i])
     load(w, world.state, workspace.now)
     load_action(w, action, workspace.now)
-    grid = step_hold(w, True, world, model, workspace)
-    for _ in range(1, model.rules.holds):
-        grid = step_hold(w, False, world, model, workspace)
-    facts.saturated[w] /= max(num_alive * model.rules.holds, 1)
-    perceive(w, world, model, workspace, grid)
+    for hold in range(holds):
+        grid = step_hold(w, hold == 0, world, model, workspace, sea)
+        if sea is not None:
+            drift(w, world, sea)
+        if hold == holds - 1 or (sea is not None and reads(world.state.tick[w], sea)):
+            perceive(w, world, model, workspace, grid)
+            if sea is not None:
+                take_readings(w, world, sea, fields(world.senses.percept, model.at))
+    facts.saturated[w] /= max(num_alive * holds, 1)
+    if sea is not None:
+        know(w, world, sea, fields(world.senses.percept, model.at), sea_fields(world.senses.percept, model.at))
 
 
 @compiled
 def step_alone(action: Float32, world: World, model: Model, room: Scratch) -> bool:
     """One decision period of the only world; whether it has diverged."""
-    step_world(0, action, world, model, workspace(room, 0))
+    step_world(0, action, world, model, workspace(room, 0), None)
+    return world.facts.diverged[0] >= 0
+
+
+@compiled
+def step_alone_at_sea(action: Float32, world: World, model: Model, room: Scratch, sea: Sea) -> bool:
+    """One decision period of the only world, disturbed; whether it has diverged."""
+    step_world(0, action, world, model, workspace(room, 0), sea)
     return world.facts.diverged[0] >= 0
 
 
@@ -228,8 +273,31 @@ def step_worlds(
         own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
         for w in range(t * share, min((t + 1) * share, action.shape[0])):
             if active[w]:
-                step_world(w, action, world, model, own)
+                step_world(w, action, world, model, own, None)
+    return any_diverged(facts)
+
+
+@compiled_parallel
+def step_worlds_at_sea(
+    threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
+    plant: Plant, suite: Suite, rules: Rules, at: Starts, room: Scratch, keys: UInt64,
+    water: Water, flow: Flow, actuation: Actuation, hull: Hull, modem: Modem, mail: Mail,
+) -> bool:  # fmt: skip
+    """The same for disturbed worlds."""
+    share = (action.shape[0] + threads - 1) // threads
+    for t in numba.prange(threads):
+        own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
+        sea = Sea(keys, water, flow, actuation, hull, modem, mail)
+        for w in range(t * share, min((t + 1) * share, action.shape[0])):
+            if active[w]:
+                step_world(w, action, world, model, own, sea)
+    return any_diverged(facts)
+
+
+@compiled_inner
+def any_diverged(facts: Facts) -> bool:
+    """Whether any world has diverged."""
     diverged = False
-    for w in range(action.shape[0]):
+    for w in range(facts.diverged.shape[0]):
         diverged = diverged or facts.diverged[w] >= 0
     return diverged

@@ -1,0 +1,318 @@
+"""The water and the forces: laws of currents, lags, mismatch and faults. The sonar's are in test_sea_sonar.py."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import make
+from uuv_marl.scenario import IDEAL, conditions
+from uuv_marl.sim.compiled import interpreted
+from uuv_marl.sim.exponential import decay_mean, exp
+from uuv_marl.sim.random import normals
+from uuv_marl.sim.sea.actuation import followed, own_plant, varied, victims
+from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
+from uuv_marl.sim.sea.sea import SEA_CHANNELS
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
+
+OPEN = {"obstacles": []}
+CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
+GUSTS = {"current.variation_mps": 0.3, "current.variation_time_s": 2.0}
+EDDIES = {"current.eddies": 8, "current.eddy_speed_mps": 1.2}
+LAGS = {"actuators.thrust_lag_s": 0.6, "actuators.yaw_lag_s": 0.25}
+MISMATCH = {"mismatch.mass": 0.2, "mismatch.added_mass": 0.3, "mismatch.drag": 0.3, "mismatch.thrust": 0.2}
+FAULTS = {
+    "faults": [
+        {"kind": "thruster", "share": 0.4, "efficiency": 0.5, "onset_s": 1.0},
+        {"kind": "yaw", "share": 0.3, "onset_s": 0.5, "duration_s": 1.0},
+        {"kind": "member", "share": 0.2, "onset_s": 2.0},
+    ]
+}
+EVERYTHING = CURRENT | GUSTS | EDDIES | LAGS | MISMATCH | FAULTS
+
+
+def swim(overrides, decisions=40, worlds=1, seed=3, scenario="starter", **change):
+    """A swarm after decisions that are the same whatever disturbs it."""
+    swarm = Swarm(load_scenario(scenario, overrides=overrides, **change), worlds)
+    swarm.reset(seed)
+    rng = np.random.default_rng(7)
+    for _ in range(decisions):
+        swarm.step(rng.uniform(-1.0, 1.0, (worlds, swarm.num_vehicles, 2)))
+    return swarm
+
+
+# --- Off is as before ---
+
+
+def test_a_calm_scenario_has_no_sea_and_says_so():
+    scenario = load_scenario("starter")
+    assert Swarm(scenario)._sea is None
+    assert conditions(scenario) == IDEAL == "still water, no noise, no delay"
+    assert conditions(load_scenario("starter", overrides=CURRENT)) == "current 0.7 m/s"
+
+
+@pytest.mark.parametrize("channel", SEA_CHANNELS)
+def test_a_sea_in_which_nothing_is_on_moves_no_bit(channel):
+    for worlds in (1, 3):
+        calm, still = (swim({"sonar.channels": channels}, worlds=worlds) for channels in ([], [channel]))
+        theirs = still.snapshot()
+        theirs["percept"] = theirs["percept"][..., : calm.layout.size]
+        for name, array in calm.snapshot().items():
+            np.testing.assert_array_equal(array, theirs[name], name)
+
+
+@pytest.mark.parametrize("part", [CURRENT, GUSTS, EDDIES, LAGS, MISMATCH, FAULTS])
+def test_one_disturbance_moves_no_draw_of_another(part):
+    """Starts, courses and what else the seed decides are the same with it alone and with everything on."""
+    alone, among = (swim(change, 0, scenario="random_field") for change in (part, EVERYTHING))
+    for name in ("eta", "nu", "waypoints", "obstacles", "losses"):
+        np.testing.assert_array_equal(alone.snapshot()[name], among.snapshot()[name], name)
+    ours, theirs = alone._sea, among._sea
+    pairs = {
+        "current.speed_mps": (ours.flow.mean, theirs.flow.mean),
+        "current.variation_mps": (ours.flow.gust, theirs.flow.gust),
+        "current.eddies": (ours.flow.eddies, theirs.flow.eddies),
+        "mismatch.mass": (ours.hull.plants, theirs.hull.plants),
+        "faults": (ours.hull.broken, theirs.hull.broken),
+    }
+    for field, (own, other) in pairs.items():
+        if field in part:
+            np.testing.assert_array_equal(own, other, field)
+
+
+def test_a_disturbed_world_depends_on_its_seed_alone():
+    batch = swim(EVERYTHING, worlds=3, seed=[4, 5, 6])
+    actions = np.random.default_rng(7).uniform(-1.0, 1.0, (40, 3, 5, 2))
+    for w, seed in enumerate((4, 5, 6)):
+        alone = Swarm(batch.scenario)
+        alone.reset(seed)
+        for action in actions:
+            alone.step(action[w : w + 1])
+        for name, array in alone.snapshot().items():
+            if name != "streams":
+                np.testing.assert_array_equal(array[0], batch.snapshot()[name][w], name)
+
+
+def test_a_snapshot_resumes_bit_for_bit():
+    swarm = swim(EVERYTHING)
+    kept, other = swarm.snapshot(), Swarm(swarm.scenario)
+    other.reset(99)
+    other.restore(kept)
+    for each in (swarm, other):
+        for _ in range(20):
+            each.step(np.full((1, 5, 2), 0.4))
+    for name, array in swarm.snapshot().items():
+        np.testing.assert_array_equal(array, other.snapshot()[name], name)
+
+
+# --- Currents ---
+
+
+def test_a_uniform_current_carries_the_same_motion_along():
+    """Galilean invariance: headings and velocities through the water keep their bits, positions move by V t."""
+    calm, carried = swim(OPEN, 200), swim(OPEN | CURRENT, 200)
+    np.testing.assert_array_equal(calm.state.nu, carried.state.nu)
+    np.testing.assert_array_equal(calm.state.eta[:, :, 2], carried.state.eta[:, :, 2])
+    t = float(calm.facts.time_s[0])
+    shift = 0.7 * t * np.array([math.cos(math.radians(60)), math.sin(math.radians(60))])
+    np.testing.assert_allclose(carried.state.eta[..., :2] - calm.state.eta[..., :2], shift + np.zeros((1, 5, 2)),
+                               rtol=0, atol=1e-9 * (1 + t))  # fmt: skip
+
+
+def test_a_policy_that_follows_a_drifting_point_swims_as_in_still_water():
+    """Closed loop: l(t) drifts with the water, and everybody knows velocities through it."""
+    course = {"trajectory.waypoints_m": [[0.0, 0.0], [160.0, 0.0]], "random_field": None} | OPEN
+    drifting = {
+        "trajectory.waypoints_m": [[0.0, 0.0], [160.0, 20.0]],
+        "trajectory.speed_mps": math.hypot(4.0, 0.5),
+        "current.speed_mps": 0.5, "current.direction_deg": 90.0, "current.velocity": "water",
+    }  # fmt: skip
+    swarms = [
+        Swarm(load_scenario("single_obstacle", num_vehicles=8, overrides=course | more)) for more in ({}, drifting)
+    ]
+    start = None
+    for swarm in swarms:
+        swarm.reset(1)
+        start = swarm.snapshot() if start is None else start
+        swarm.state.eta[:], swarm.state.nu[:] = start["eta"], start["nu"]
+        swarm.observe()
+        policy = make("bio_inspired", swarm.scenario, 1)
+        policy.reset(0)
+        for _ in range(100):
+            swarm.step(policy.act(swarm.percept))
+    shift = swarms[1].state.eta - swarms[0].state.eta
+    np.testing.assert_allclose(shift[0], np.tile([0.0, 5.0, 0.0], (8, 1)), atol=1e-4)  # percepts are float32
+
+
+def test_without_thrust_a_vehicle_ends_up_with_the_water():
+    swarm = Swarm(load_scenario("starter", overrides=CURRENT | OPEN))
+    swarm.reset(0)
+    for _ in range(600):
+        swarm.step(np.zeros((1, 5, 2)))
+    speed = np.hypot(*np.moveaxis(swarm.velocity, -1, 0))
+    np.testing.assert_allclose(speed, 0.7, atol=1e-3)
+    np.testing.assert_allclose(swarm.percept["velocity"], swarm.velocity, rtol=1e-6)
+
+
+@pytest.mark.parametrize("hold_s", [0.1, 0.5, 2.0])
+def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(hold_s):
+    """20,000 draws: a mean within 5 / sqrt(n) deviations, a variance within 5 sqrt(2 / n)."""
+    tau = 3.0
+    overrides = {"current.variation_mps": 0.4, "current.variation_time_s": tau, "timing.control_hold_s": hold_s,
+                 "timing.decision_period_s": hold_s}  # fmt: skip
+    swarm = Swarm(load_scenario("starter", overrides=overrides), num_worlds=1)
+    swarm.reset(0)
+    sea = swarm._sea
+    steps, step = round(6.0 / hold_s), interpreted(advance_gust)
+    first, last = [], []
+    for key in np.random.default_rng(0).integers(0, 2**63, 2000).astype(np.uint64):
+        for tick in range(0, 5000, 1000):
+            sea.flow.gust[0] = 0.4 * np.array(normals(key, 999, tick, 0, 0))
+            first.append(sea.flow.gust[0].copy())
+            for k in range(1, steps + 1):
+                step(0, key, tick + k, sea.water, sea.flow)
+            last.append(sea.flow.gust[0].copy())
+    start, end = np.concatenate(first) / 0.4, np.concatenate(last) / 0.4
+    m = len(end)
+    assert abs(end.mean()) < 5 / math.sqrt(m)
+    assert abs(end.var() - 1) < 5 * math.sqrt(2 / m)
+    assert abs((start * end).mean() - math.exp(-6.0 / tau)) < 5 / math.sqrt(m)
+
+
+@given(st.floats(-200, 200), st.floats(-200, 200), st.floats(1, 50))
+def test_an_eddy_has_no_divergence_no_jumps_and_no_flow_at_its_centre(x, y, core):
+    h = 1e-4 * core
+    flow = {
+        (i, j): np.array(eddy_flow(x + i * h, y + j * h, 30.0, core)) for i, j in ((1, 0), (-1, 0), (0, 1), (0, -1))
+    }
+    steepest = 30.0 / (2 * math.pi * core * core)
+    divergence = (flow[1, 0][0] - flow[-1, 0][0] + flow[0, 1][1] - flow[0, -1][1]) / (2 * h)
+    assert abs(divergence) < 1e-6 * steepest + 1e-9
+    assert np.abs(flow[1, 0] - flow[-1, 0]).max() <= 2 * h * steepest * 1.01
+    assert eddy_flow(0.0, 0.0, 30.0, core) == (0.0, 0.0)
+
+
+def test_the_fastest_water_of_an_eddy_has_the_speed_that_is_asked_for():
+    swarm = swim(EDDIES, 0)
+    water, core = swarm._sea.water, swarm._sea.water.core
+    speeds = [math.hypot(*eddy_flow(r, 0.0, water.circulation, core)) for r in np.linspace(0.5 * core, 2 * core, 2001)]
+    assert max(speeds) == pytest.approx(1.2, rel=1e-6)
+
+
+def test_eddies_turn_by_turns_so_that_their_circulation_sums_to_nothing():
+    for name in ("starter", "random_field", "tracking"):
+        swarm = swim(EDDIES, 0, worlds=2, scenario=name)
+        eddies = swarm._sea.flow.eddies
+        assert eddies.shape[1] == swarm.scenario.max_eddies
+        for w in range(2):
+            there = eddies[w][eddies[w, :, 2] != 0.0]
+            assert len(there) > 0
+            assert there[:, 2].sum() == 0.0
+            points = swarm.course.waypoints[w]
+            assert (there[:, :2] >= points.min(0) - 250).all()
+            assert (there[:, :2] <= points.max(0) + 250).all()
+
+
+def test_the_water_at_a_vehicle_is_the_field_there():
+    swarm = swim(CURRENT | GUSTS | EDDIES, 25)
+    for i in range(5):
+        x, y, _ = swarm.state.eta[0, i]
+        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._sea.water.core, swarm._sea.flow)
+    np.testing.assert_array_equal(swarm.flow_field().at(swarm.state.eta[0, :, :2]), swarm.flow[0])
+    assert not Swarm(load_scenario("starter")).flow_field().at([[[1.0, 2.0]]]).any()
+
+
+# --- Forces ---
+
+
+@given(st.floats(-300, 0.01), st.floats(0, 50))
+def test_the_exponential_is_the_library_s(x, y):
+    assert exp(x) == pytest.approx(math.exp(x), rel=3e-16, abs=1e-300)
+    assert decay_mean(y) == pytest.approx(-math.expm1(-y) / y if y else 1.0, rel=1e-12)
+
+
+def test_a_lagging_force_follows_exactly_whatever_the_step():
+    """After t: asked (1 - e^(-t / lag))."""
+    for step in (0.01, 0.1, 0.5):
+        given_, half, whole = 0.0, exp(-0.5 * step / 0.6), exp(-step / 0.6)
+        for _ in range(round(2.0 / step)):
+            start, middle, given_ = followed(3000.0, given_, half, whole)
+            assert middle == pytest.approx(3000.0 + (start - 3000.0) * half)
+        assert given_ == pytest.approx(3000.0 * (1 - math.exp(-2.0 / 0.6)))
+
+
+def test_a_lag_keeps_the_integration_s_fourth_order():
+    p = plant(load_scenario("starter"))
+
+    def after_a_second(steps):
+        h, state, thrust, torque = 1.0 / steps, (0.0,) * 6, 0.0, 0.0
+        for _ in range(steps):
+            u = followed(1500.0, thrust, exp(-0.5 * h / 0.3), exp(-h / 0.3))
+            r = followed(200.0, torque, exp(-0.5 * h / 0.2), exp(-h / 0.2))
+            state = advance_lagging(state, *zip(u, r, strict=True), (0.0, 0.0), h, p)
+            thrust, torque = u[2], r[2]
+        return np.array(state)
+
+    exact = after_a_second(640)
+    errors = [np.abs(after_a_second(steps) - exact).max() for steps in (20, 40, 80)]
+    for coarse, fine in itertools.pairwise(errors):
+        assert 10 < coarse / fine < 24
+
+
+def test_authority_is_a_share_of_the_torque():
+    weak, weaker = swim({"actuators.yaw_authority": 0.5}, 1), swim({"actuators.yaw_authority": 0.25}, 1)
+    full = swim({"sonar.channels": ["age"]}, 1)
+    for swarm, share in ((weak, 0.5), (weaker, 0.25)):
+        np.testing.assert_allclose(swarm._sea.hull.tau[..., 1], share * full._sea.hull.tau[..., 1], rtol=1e-12)
+        np.testing.assert_array_equal(swarm._sea.hull.tau[..., 0], full._sea.hull.tau[..., 0])
+
+
+def test_a_vehicle_that_differs_swims_as_a_scenario_with_its_numbers():
+    swarm = swim(MISMATCH, 0)
+    nominal = plant(swarm.scenario)
+    for i in range(5):
+        own = Plant(*swarm._sea.hull.plants[0, i])
+        mass, drag, added = own.m / nominal.m, own.X_u / nominal.X_u, own.X_udot / nominal.X_udot
+        assert abs(mass - 1) <= 0.2
+        assert abs(drag - 1) <= 0.3
+        assert abs(added - 1) <= 0.3
+        theirs = plant(swarm.scenario.model_copy(update={"vehicle": varied(swarm.scenario.vehicle, mass, added, drag)}))
+        np.testing.assert_allclose(own, theirs, rtol=1e-12)
+    assert len({tuple(row) for row in swarm._sea.hull.plants[0]}) == 5
+
+
+def test_every_number_of_a_vehicle_has_a_column():
+    swarm = swim(MISMATCH, 0)
+    swarm._sea.hull.plants[0, 2] = np.arange(len(Plant._fields))
+    assert own_plant.py_func(0, 2, swarm._sea.hull) == Plant(*range(len(Plant._fields)))
+
+
+@given(st.floats(0, 1), st.floats(0, 1), st.integers(0, 2**32))
+def test_a_larger_share_has_the_smaller_one_s_victims(a, b, key):
+    few, many = (
+        set(victims(np.uint64(key), 0, load_scenario("starter", num_vehicles=10, overrides={
+            "faults": [{"kind": "yaw", "share": share}]})))
+        for share in sorted((a, b))
+    )  # fmt: skip
+    assert few <= many
+    assert len(few) == math.ceil(10 * min(a, b) - 1e-9)
+
+
+def test_faults_act_from_their_onset_for_their_duration():
+    swarm = Swarm(load_scenario("starter", overrides=FAULTS))
+    swarm.reset(0)
+    victim = [set(np.flatnonzero(swarm._sea.hull.broken[0, :, f, 0] < 10**6).tolist()) for f in range(3)]
+    assert [len(each) for each in victim] == [2, 2, 1]
+    for hold in range(25):
+        action = np.full((1, 5, 2), 0.5)
+        swarm.step(action)
+        thrust, torque = np.moveaxis(swarm._sea.hull.tau[0], -1, 0)
+        for i in np.flatnonzero(swarm.state.alive[0]):
+            assert thrust[i] == (750.0 if i in victim[0] and hold >= 10 else 1500.0)
+            assert (torque[i] == 0.0) == (i in victim[1] and 5 <= hold < 15)
+        assert set(np.flatnonzero(~swarm.state.alive[0])) == (victim[2] if hold >= 19 else set())

@@ -1,0 +1,67 @@
+"""What a scenario's sea does, in a few words, for headers of tables, pages and pictures."""
+
+from uuv_marl.scenario.scenario import Scenario
+
+IDEAL = "still water, no noise, no delay"
+"""The conditions of a scenario in which nothing is on."""
+
+
+def conditions(scenario: Scenario) -> str:
+    """What is on: ``current 0.5 m/s, sonar 0.3 s late``; ``IDEAL`` where nothing is."""
+    return ", ".join(disturbances(scenario)) or IDEAL
+
+
+def disturbances(scenario: Scenario) -> list[str]:
+    """A phrase with numbers for each disturbance that is on."""
+    parts = (_current(scenario), _latency(scenario), _noise(scenario), _rest(scenario))
+    return [phrase for part in parts for phrase, on in part.items() if on]
+
+
+def _current(scenario: Scenario) -> dict[str, bool]:
+    current = scenario.current
+    return {
+        f"current {current.speed_mps:g} m/s": current.speed_mps > 0.0,
+        f"current varies by {current.variation_mps:g} m/s": current.variation_mps > 0.0,
+        f"eddies of {current.eddy_speed_mps:g} m/s": current.eddies > 0 and current.eddy_speed_mps > 0.0,
+        "own velocity known through the water": current.velocity == "water",
+    }
+
+
+def _latency(scenario: Scenario) -> dict[str, bool]:
+    latency = scenario.latency
+    compensated = ", compensated" if latency.compensated else ""
+    return {
+        f"sound at {latency.sound_speed_mps:g} m/s": latency.travel_time,
+        f"sonar {latency.processing_s:g} s late{compensated}": latency.processing_s > 0.0,
+        f"a ping every {latency.active_period_s:g} s": latency.active_period_s > 0.0,
+        f"passive readings every {latency.passive_period_s:g} s": latency.passive_period_s > 0.0,
+    }
+
+
+def _noise(scenario: Scenario) -> dict[str, bool]:
+    noise = scenario.noise
+    return {
+        f"bearing noise {noise.bearing_deg:g} deg": noise.bearing_deg > 0.0,
+        f"range noise {noise.range_m:g} m + {noise.range_share:.3g}": noise.range_m > 0.0 or noise.range_share > 0.0,
+        f"passive range factor, log-sd {noise.passive_range_log_sd:g}": noise.passive_range_log_sd > 0.0,
+        "passive arrays hear bearings only": not noise.passive_ranges,
+        f"active arrays detect half at {noise.active_r50_m:g} m": noise.active_r50_m > 0.0,
+        f"passive arrays detect half at {noise.passive_r50_m:g} m": noise.passive_r50_m > 0.0,
+        f"silence begins at {noise.silence_probability:.3g} of readings": noise.silence_probability > 0.0,
+        f"false echoes {noise.false_echo_probability:.3g} per sub-sector": noise.false_echo_probability > 0.0,
+    }
+
+
+def _rest(scenario: Scenario) -> dict[str, bool]:
+    navigation, actuators, mismatch = scenario.navigation, scenario.actuators, scenario.mismatch
+    shares = (mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
+    broken = {f"{fault.kind} fault on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults}
+    return {
+        f"position drifts by {navigation.drift_share:.3g} of the way": navigation.drift_share > 0.0,
+        f"compass bias {navigation.compass_bias_deg:g} deg": navigation.compass_bias_deg > 0.0,
+        f"thrust lags {actuators.thrust_lag_s:g} s": actuators.thrust_lag_s > 0.0,
+        f"torque lags {actuators.yaw_lag_s:g} s": actuators.yaw_lag_s > 0.0,
+        f"yaw authority {actuators.yaw_authority:.3g}": actuators.yaw_authority < 1.0,
+        f"vehicles differ by up to {max(shares):.3g}": max(shares) > 0.0,
+        **broken,
+    }

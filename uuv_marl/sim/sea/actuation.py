@@ -1,0 +1,223 @@
+"""What pushes a vehicle, as it really is: lags, a share of yaw authority, numbers off the scenario's, faults.
+
+A fault breaks the thruster, the yaw torque or a sonar array of some vehicles, or loses them, for a time.
+"""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.sections import Vehicle
+from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
+from uuv_marl.sim.exponential import exp
+from uuv_marl.sim.model import Rules
+from uuv_marl.sim.random import uniform, uniforms
+from uuv_marl.sim.sea.purposes import MISMATCH, ONSET, VICTIM
+from uuv_marl.sim.tables import described
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
+from uuv_marl.sim.workspace import Columns
+
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+THRUSTER, YAW, ARRAY, MEMBER = range(4)
+_KINDS = {"thruster": THRUSTER, "yaw": YAW, "array": ARRAY, "member": MEMBER}
+_NEVER = 2**62
+"""A control hold that no episode reaches."""
+PLANT = len(Plant._fields)
+
+
+class Actuation(NamedTuple):
+    """Numbers of a scenario's lags, authority and faults."""
+
+    thrust_half: float
+    """Share of the difference between asked and given thrust that remains after half an integration step."""
+    thrust_whole: float
+    """The same after a whole one; 0 without a lag."""
+    yaw_half: float
+    """The same of the torque, after half an integration step."""
+    yaw_whole: float
+    """The same of the torque, after a whole one."""
+    yaw_authority: float
+    """Share of the torque that reaches the water."""
+    kind: Int64
+    """Of each fault: ``THRUSTER``, ``YAW``, ``ARRAY`` or ``MEMBER``, shape (fault,)."""
+    efficiency: Float64
+    """What a fault leaves of thrust or torque, shape (fault,)."""
+    array: Int64
+    """Index of the array that a fault breaks, -1 for none, shape (fault,)."""
+
+
+@described
+class Hull(NamedTuple):
+    """What each vehicle is like."""
+
+    plants: Annotated[Float64, "world vehicle plant", "Its own ``uuv_marl.sim.vehicle.Plant``, field by field."]
+    thrust: Annotated[Float64, "world vehicle", "Its thrust, as a share of the scenario's."]
+    tau: Annotated[Float64, "world vehicle 2", "Thrust [N] and torque [N m] that reach the water now."]
+    broken: Annotated[Int64, "world vehicle fault 2", "Control holds from which and up to which each fault acts."]
+
+
+def actuation(scenario: Scenario) -> Actuation:
+    """The scenario's lags, authority and faults as numbers for the compiled functions."""
+    actuators, names = scenario.actuators, [array.name for array in scenario.sonar.arrays]
+
+    def remains(seconds: float, lag_s: float) -> float:
+        return exp(-seconds / lag_s) if lag_s > 0.0 else 0.0
+
+    h = scenario.timing.integration_step_s
+    return Actuation(
+        thrust_half=remains(0.5 * h, actuators.thrust_lag_s),
+        thrust_whole=remains(h, actuators.thrust_lag_s),
+        yaw_half=remains(0.5 * h, actuators.yaw_lag_s),
+        yaw_whole=remains(h, actuators.yaw_lag_s),
+        yaw_authority=actuators.yaw_authority,
+        kind=np.array([_KINDS[fault.kind] for fault in scenario.faults], np.int64),
+        efficiency=np.array([fault.efficiency for fault in scenario.faults], np.float64),
+        array=np.array([names.index(f.array) if f.array is not None else -1 for f in scenario.faults], np.int64),
+    )
+
+
+def draw_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hull: Hull) -> None:
+    """The vehicles of world w's new episode.
+
+    Args:
+        w: the world.
+        key: of its episode.
+        duration_s: time that l(t) takes to its end, in which faults begin [s].
+        scenario: gives the shares.
+        hull: is written.
+    """
+    hull.tau[w] = 0.0
+    mismatch, nominal = scenario.mismatch, plant(scenario)
+    hull.plants[w], hull.thrust[w] = nominal, 1.0
+    if max(mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust) > 0.0:
+        for i in range(scenario.swarm.num_vehicles):
+            mass, added = uniforms(key, MISMATCH, 0, i, 0)
+            drag, thrust = uniforms(key, MISMATCH, 0, i, 1)
+            own = varied(
+                scenario.vehicle,
+                1.0 + mismatch.mass * (2.0 * mass - 1.0),
+                1.0 + mismatch.added_mass * (2.0 * added - 1.0),
+                1.0 + mismatch.drag * (2.0 * drag - 1.0),
+            )
+            hull.plants[w, i] = plant(scenario.model_copy(update={"vehicle": own}))
+            hull.thrust[w, i] = 1.0 + mismatch.thrust * (2.0 * thrust - 1.0)
+    hull.broken[w] = _NEVER
+    for f in range(len(scenario.faults)):
+        for i in victims(key, f, scenario):
+            hull.broken[w, i, f] = window(key, f, i, duration_s, scenario)
+
+
+def varied(vehicle: Vehicle, mass: float, added: float, drag: float) -> Vehicle:
+    """A vehicle whose mass (and moment of inertia), added masses and resistances are times these factors."""
+    factors = dict.fromkeys(("m_kg", "I_z_kgm2"), mass)
+    factors |= dict.fromkeys(("X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"), added)
+    factors |= dict.fromkeys(("X_u", "Y_v", "Y_r", "N_v", "N_r", "X_uu", "Y_vv", "Y_rr", "N_rv", "N_rr"), drag)
+    return vehicle.model_copy(update={name: factor * getattr(vehicle, name) for name, factor in factors.items()})
+
+
+def victims(key: np.uint64, fault: int, scenario: Scenario) -> list[int]:
+    """The vehicles that a fault hits: the first of an order drawn for each fault, whatever its share."""
+    n = scenario.swarm.num_vehicles
+    order = sorted(range(n), key=lambda i: uniform(key, VICTIM, 0, i, fault))
+    return order[: math.ceil(scenario.faults[fault].share * n - 1e-9)]
+
+
+def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario: Scenario) -> tuple[int, int]:
+    """Control holds from which and up to which a fault acts on a vehicle; l(t) takes ``duration_s`` to its end."""
+    given = scenario.faults[fault]
+    drawn = duration_s * uniform(key, ONSET, 0, vehicle, fault)
+    hold, onset = scenario.timing.control_hold_s, drawn if given.onset_s is None else given.onset_s
+    first = math.ceil(onset / hold - 1e-9)
+    return first, _NEVER if given.duration_s is None else first + math.ceil(given.duration_s / hold - 1e-9)
+
+
+def hit(tick: Int64, hull: Hull) -> Bool:
+    """The vehicles that a fault has hit before this control hold of each world, shape (world, vehicle)."""
+    first, end = hull.broken[..., 0], hull.broken[..., 1]
+    return ((first < end) & (first < tick[:, None, None])).any(axis=2)
+
+
+@compiled
+def acts(w: int, i: int, fault: int, tick: int, hull: Hull) -> bool:
+    """Whether a fault acts on vehicle i of world w in the control hold after this tick."""
+    return hull.broken[w, i, fault, 0] <= tick < hull.broken[w, i, fault, 1]
+
+
+@compiled_inner
+def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> None:
+    """Thrust and torque asked of the vehicles, lessened by mismatch, authority and faults."""
+    for i in range(hull.thrust.shape[1]):
+        now.tau_u[i] *= hull.thrust[w, i]
+        now.tau_r[i] *= numbers.yaw_authority
+    for f in range(numbers.kind.shape[0]):
+        for i in range(hull.thrust.shape[1]):
+            if acts(w, i, f, tick, hull):
+                if numbers.kind[f] == THRUSTER:
+                    now.tau_u[i] *= numbers.efficiency[f]
+                elif numbers.kind[f] == YAW:
+                    now.tau_r[i] *= numbers.efficiency[f]
+
+
+@compiled_inline
+def followed(asked: float, given: float, half: float, whole: float) -> tuple[float, float, float]:
+    """A lagging force at the start, in the middle and at the end of a step: asked + (given - asked) e^(-t / lag)."""
+    if whole == 0.0:
+        return asked, asked, asked
+    return given, asked + (given - asked) * half, asked + (given - asked) * whole
+
+
+@compiled_inner
+def integrate_each(
+    w: int, alive: Bool, rules: Rules, now: Columns, numbers: Actuation, hull: Hull, flow: Float64
+) -> None:
+    """One control hold of vehicles that differ, lag and are carried along. Eq. 1-4, 23-24.
+
+    Args:
+        w: the world.
+        alive: the vehicles that move, shape (world, vehicle).
+        rules: the scenario's clocks.
+        now: columns of the vehicles; thrust and torque as asked of them.
+        numbers: the scenario's lags.
+        hull: what each vehicle is like; the forces that reach the water are written.
+        flow: velocity of the water at each vehicle, north and east [m/s], shape (world, vehicle, 2).
+    """
+    for i in range(hull.tau.shape[1]):
+        if not alive[w, i]:
+            continue
+        p, current = own_plant(w, i, hull), (flow[w, i, 0], flow[w, i, 1])
+        for _ in range(rules.steps):
+            state = now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i]
+            u_0, u_1, u_2 = followed(now.tau_u[i], hull.tau[w, i, 0], numbers.thrust_half, numbers.thrust_whole)
+            r_0, r_1, r_2 = followed(now.tau_r[i], hull.tau[w, i, 1], numbers.yaw_half, numbers.yaw_whole)
+            now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i] = advance_lagging(
+                state, (u_0, r_0), (u_1, r_1), (u_2, r_2), current, rules.step_s, p
+            )
+            hull.tau[w, i, 0], hull.tau[w, i, 1] = u_2, r_2
+        now.psi[i] = wrap(now.psi[i])
+        now.cos[i], now.sin[i] = cos_sin(now.psi[i])
+
+
+@compiled_inline
+def own_plant(w: int, i: int, hull: Hull) -> Plant:
+    """Vehicle i's numbers. Every field has a column of its own: tests/test_tables.py."""
+    p = hull.plants[w, i]
+    return Plant(
+        p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16],
+        p[17], p[18], p[19], p[20], p[21], p[22],
+    )  # fmt: skip
+
+
+@compiled_inner
+def is_lost(w: int, i: int, tick: int, numbers: Actuation, hull: Hull) -> bool:
+    """Whether a fault has lost vehicle i of world w by the end of a control hold."""
+    lost = False
+    for f in range(numbers.kind.shape[0]):
+        lost = lost or (numbers.kind[f] == MEMBER and hull.broken[w, i, f, 0] <= tick)
+    return lost

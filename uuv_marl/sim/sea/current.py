@@ -1,0 +1,198 @@
+"""How the water moves: a mean, a Gauss-Markov process (Fossen 2021, section 10.3) and Lamb-Oseen eddies, summed.
+
+A vehicle's equations of motion hold relative to the water, and the water carries it along
+(``uuv_marl.sim.vehicle.derivative``). The field is read at each vehicle once per control hold.
+"""
+
+import itertools
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from uuv_marl.percept import MAX_SPEED
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.sea import AROUND_M
+from uuv_marl.sim.arrays import State, World
+from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.exponential import decay_mean, exp
+from uuv_marl.sim.perception import saturate
+from uuv_marl.sim.random import normals, uniform, uniforms
+from uuv_marl.sim.sea.purposes import DIRECTION, EDDY_PLACE, GUST
+from uuv_marl.sim.tables import described
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.sim.views import Fields, SeaFields
+
+Float64 = NDArray[np.float64]
+_PEAK = 0.638172686
+"""Largest speed around a Lamb-Oseen vortex, in circulation / (2 pi core): at 1.12091 core radii. [derived]"""
+
+
+class Water(NamedTuple):
+    """Numbers of a scenario's current."""
+
+    speed: float
+    """Of the mean [m/s]."""
+    direction: float
+    """Where it flows to [rad], NaN where the seed draws it."""
+    deviation: float
+    """Standard deviation of the process [m/s]."""
+    remains: float
+    """Share of the process's value that remains after a control hold."""
+    circulation: float
+    """Of an eddy [m2/s]."""
+    core: float
+    """Radius of an eddy's core [m]."""
+    over_ground: bool
+    """Whether a vehicle knows its velocity over ground, not through the water."""
+
+
+@described
+class Flow(NamedTuple):
+    """The current of each world."""
+
+    mean: Annotated[Float64, "world 2", "Velocity of the mean, north and east [m/s]."]
+    gust: Annotated[Float64, "world 2", "What the process adds to it now [m/s]."]
+    eddies: Annotated[Float64, "world eddy 3", "Centre north, east [m] and circulation [m2/s]; 0 in the padding."]
+    flow: Annotated[Float64, "world vehicle 2", "Velocity of the water at each vehicle, north and east [m/s]."]
+
+
+class FlowField(NamedTuple):
+    """How the water of one world moves at one time, everywhere; a copy, which stays as it is."""
+
+    drift: Float64
+    """Velocity of the mean and the process together, north and east [m/s], shape (2,)."""
+    eddies: Float64
+    """Centre north, east [m] and circulation [m2/s], shape (eddy, 3)."""
+    core_m: float
+    """Radius of the eddies' cores."""
+
+    def at(self, points: ArrayLike) -> Float64:
+        """Velocity of the water, north and east [m/s], at points given by north and east [m]; both (..., 2)."""
+        points = np.asarray(points, np.float64)
+        flow = Flow(self.drift[None], np.zeros((1, 2)), self.eddies[None], np.zeros((1, 0, 2)))
+        velocity = [flow_at(0, x, y, self.core_m, flow) for x, y in points.reshape(-1, 2).tolist()]
+        return np.array(velocity, np.float64).reshape(points.shape)
+
+
+def flow_field(w: int, core_m: float, flow: Flow) -> FlowField:
+    """How the water of world w moves now."""
+    eddies = flow.eddies[w]
+    return FlowField(flow.mean[w] + flow.gust[w], eddies[eddies[:, 2] != 0.0], core_m)
+
+
+def water(scenario: Scenario) -> Water:
+    """The scenario's current as numbers for the compiled functions."""
+    current = scenario.current
+    direction = current.direction_deg
+    return Water(
+        speed=current.speed_mps,
+        direction=math.nan if direction is None else math.radians(direction),
+        deviation=current.variation_mps,
+        remains=exp(-scenario.timing.control_hold_s / current.variation_time_s),
+        circulation=current.eddy_speed_mps * 2.0 * math.pi * current.eddy_core_m / _PEAK,
+        core=current.eddy_core_m,
+        over_ground=current.velocity == "ground",
+    )
+
+
+def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: Water, flow: Flow) -> None:
+    """The current of world w's new episode.
+
+    Args:
+        w: the world.
+        key: of its episode.
+        waypoints: corners of its course, shape (point, 2) [m].
+        scenario: gives the number of eddies.
+        water: the scenario's numbers.
+        flow: is written.
+    """
+    angle = water.direction
+    if math.isnan(angle):
+        angle = 2.0 * math.pi * uniform(key, DIRECTION, 0, 0, 0)
+    flow.mean[w] = [water.speed * part for part in cos_sin(angle)]
+    flow.gust[w] = [water.deviation * part for part in normals(key, GUST, 0, 0, 0)]
+    flow.eddies[w] = 0.0
+    if flow.eddies.shape[1] > 0:
+        low, high = waypoints.min(axis=0) - AROUND_M, waypoints.max(axis=0) + AROUND_M
+        count = min(scenario.current.num_eddies(*np.ptp(waypoints, axis=0)), flow.eddies.shape[1])
+        for k, sign in zip(range(count), itertools.cycle((1.0, -1.0)), strict=False):
+            flow.eddies[w, k, :2] = low + np.array(uniforms(key, EDDY_PLACE, 0, 0, k)) * (high - low)
+            flow.eddies[w, k, 2] = sign * water.circulation
+
+
+@compiled
+def eddy_flow(dx: float, dy: float, circulation: float, core: float) -> tuple[float, float]:
+    """Velocity, north and east [m/s], at (dx, dy) [m] from a Lamb-Oseen vortex; clockwise for circulation > 0.
+
+    v(r) = circulation / (2 pi r) (1 - exp(-r^2 / core^2)), smooth at its centre.
+    """
+    share = circulation / (2.0 * math.pi * core * core) * decay_mean((dx * dx + dy * dy) / (core * core))
+    return -share * dy, share * dx
+
+
+@compiled
+def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float, float]:
+    """Velocity of the water at a point of world w, north and east [m/s]; ``core`` is the radius of eddies' cores."""
+    v_x, v_y = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
+    for k in range(flow.eddies.shape[1]):
+        if flow.eddies[w, k, 2] != 0.0:
+            e_x, e_y = eddy_flow(x - flow.eddies[w, k, 0], y - flow.eddies[w, k, 1], flow.eddies[w, k, 2], core)
+            v_x, v_y = v_x + e_x, v_y + e_y
+    return v_x, v_y
+
+
+@compiled_inner
+def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) -> None:
+    """The process one control hold later, exactly: its mean and variance depend on no step."""
+    kick = water.deviation * math.sqrt(1.0 - water.remains * water.remains)
+    north, east = normals(key, GUST, tick, 0, 0)
+    flow.gust[w, 0] = water.remains * flow.gust[w, 0] + kick * north
+    flow.gust[w, 1] = water.remains * flow.gust[w, 1] + kick * east
+
+
+@compiled_inner
+def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
+    """The water's velocity at every vehicle of world w."""
+    for i in range(state.eta.shape[1]):
+        flow.flow[w, i, 0], flow.flow[w, i, 1] = flow_at(w, state.eta[w, i, 0], state.eta[w, i, 1], water.core, flow)
+
+
+@compiled
+def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]:
+    """Velocity of vehicle j over ground, north and east [m/s]."""
+    (c, s), u, v = cos_sin(state.eta[w, j, 2]), state.nu[w, j, 0], state.nu[w, j, 1]
+    return c * u - s * v + flow.flow[w, j, 0], s * u + c * v + flow.flow[w, j, 1]
+
+
+@compiled_inner
+def know_velocities(w: int, world: World, water: Water, flow: Flow, see: Fields, more: SeaFields) -> None:
+    """Write each vehicle's own velocity, and by the link its neighbours', as the current makes them.
+
+    Args:
+        w: the world.
+        world: its arrays; percepts hold what is true in still water.
+        water: the scenario's current.
+        flow: the water now.
+        see: fields of the percepts, which are written.
+        more: fields of the sea's channels, which are written.
+    """
+    state, heading = world.state, world.senses.heading
+    for i in range(state.alive.shape[1]):
+        if not state.alive[w, i]:
+            continue
+        c, s = heading[w, i, 0], heading[w, i, 1]
+        v_x, v_y = over_ground(w, i, state, flow)
+        ahead, abeam = saturate(c * v_x + s * v_y, MAX_SPEED), saturate(c * v_y - s * v_x, MAX_SPEED)
+        if more.ground_velocity.shape[2] > 0:
+            more.ground_velocity[w, i, 0], more.ground_velocity[w, i, 1] = ahead, abeam
+            more.water_velocity[w, i, 0], more.water_velocity[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
+        if water.over_ground and (flow.flow[w, i, 0] != 0.0 or flow.flow[w, i, 1] != 0.0):
+            see.velocity[w, i, 0], see.velocity[w, i, 1] = ahead, abeam
+        for k in range(see.link_identity.shape[2]):
+            j = world.senses.heard[w, i, k]
+            if j >= 0:
+                v_x, v_y = over_ground(w, j, state, flow)
+                see.link_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
+                see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)

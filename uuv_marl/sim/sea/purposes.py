@@ -1,0 +1,7 @@
+"""What random numbers of an episode are for: one purpose for each draw, so that no disturbance moves another's."""
+
+DIRECTION, GUST, EDDY_PLACE = 1, 2, 3
+MISMATCH, VICTIM, ONSET = 10, 11, 12
+BEARING_RANGE, FACTOR, DETECTION, SILENCE, FALSE_ECHO = 20, 21, 22, 23, 24
+DRIFT, COMPASS = 30, 31
+MESSAGE = 40
