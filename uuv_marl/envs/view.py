@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from uuv_marl.envs.drawing.options import RenderOptions, look
 from uuv_marl.envs.drawing.scene import Memory, Scene
 from uuv_marl.envs.task import Task
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario import Scenario, conditions
 from uuv_marl.sim.swarm import Swarm
 
 
@@ -98,6 +98,11 @@ class TaskBased:
         self._view = View(task, render_mode, self.metadata["render_modes"], options, sonar_of)
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": self._view.fps}
+
+    def __repr__(self) -> str:
+        scenario, swarm = self.scenario, self.swarm
+        worlds = "" if swarm.num_worlds == 1 else f"{swarm.num_worlds} worlds, "
+        return f"{type(self).__name__}({scenario.name}: {worlds}{swarm.num_vehicles} vehicles, {conditions(scenario)})"
 
     @property
     def scenario(self) -> Scenario:

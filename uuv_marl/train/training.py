@@ -22,7 +22,7 @@ from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, rows_of, sav
 from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario import Scenario, conditions, load_scenario
 from uuv_marl.train.fleet import Episodes
 from uuv_marl.train.folder import Say, opened, quiet, versions
 from uuv_marl.train.mappo import Hyperparameters, Mappo
@@ -215,7 +215,8 @@ def train(
         record, stopped = folder.record, False
         if record.agent_steps >= settings.steps:
             return
-        say(f"Training on swarms of {', '.join(f'{n} vehicles ({worlds} worlds)' for n, worlds in settings.sizes)}.")
+        sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in settings.sizes)
+        say(f"Training on swarms of {sizes}; {conditions(scenario)}.")
         torch.set_num_threads(1)  # sums in another order give other bits
         training = Training(settings)
         if folder.checkpoint:
