@@ -21,7 +21,7 @@ from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
 from uuv_marl.replay.traces import from_trace
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train.shaping import VIEW_SIZE, view
+from uuv_marl.train.shaping import PRIVILEGED_SIZE, privileged_observation
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
@@ -69,10 +69,10 @@ def test_the_global_state_holds_the_velocity_over_ground():
 
 
 def test_a_critic_sees_how_the_centre_moves_over_ground():
-    seen = np.zeros((2, 1, 5, VIEW_SIZE), np.float32)
+    seen = np.zeros((2, 1, 5, PRIVILEGED_SIZE), np.float32)
     calm, moved = carried()
-    view(calm, seen[0])
-    view(moved, seen[1])
+    privileged_observation(calm, seen[0])
+    privileged_observation(moved, seen[1])
     np.testing.assert_allclose((seen[1] - seen[0])[0, :, 6:8], turned(FLOW, moved) / 4.0, atol=1e-5)
 
 

@@ -159,6 +159,12 @@ class PerceptLayout:
         return tuple(self.starts.get(field.name, -1) for field in percept_table(0, 0))
 
     @functools.cached_property
+    def message_offsets(self) -> tuple[int, ...]:
+        """``offsets``, the modem's fields in place of the link's, whose order and shapes are the same."""
+        names = [field.name.replace("link_", "modem_") for field in percept_table(0, 0)]
+        return tuple(self.starts.get(name, -1) for name in names)
+
+    @functools.cached_property
     def scale(self) -> Float32:
         """Unit of each observation entry, in physical units; powers of two. Shape (size,)."""
         return self._spread([field.kind.scale for field in self.table])

@@ -1,23 +1,12 @@
 """The global state for centralised critics: one flat vector of a world, and the table that explains it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from uuv_marl.percept import (
-    DIRECTION,
-    FLAG,
-    LENGTH,
-    POSITION,
-    SPEED,
-    YAW_RATE,
-    Kind,
-    PerceptField,
-    PerceptLayout,
-)
+from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, Kind, PerceptField, PerceptLayout
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.swarm import Swarm
 
-Float32 = NDArray[np.float32]
 _TIME = Kind("1", 1.0, 0.0, 2.0)
 
 

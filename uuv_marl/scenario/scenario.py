@@ -61,6 +61,12 @@ class Scenario(sections.Section):
         return self.random_field.obstacles[1] if self.random_field else len(self.obstacles)
 
     @property
+    def loses_vehicles(self) -> bool:
+        """Whether a vehicle can be lost before the episode ends."""
+        broken = any(fault.kind == "member" and fault.share > 0.0 for fault in self.faults)
+        return bool(self.disturbance.loss_times_s) or self.contact.ends_vehicle or broken
+
+    @property
     def max_eddies(self) -> int:
         """Most eddies that a world of this scenario can hold."""
         if self.random_field is None:

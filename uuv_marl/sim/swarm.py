@@ -16,6 +16,7 @@ from uuv_marl.sim.engine import EngineName, make_engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.sea.actuation import hit
 from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
 from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_arrays
 from uuv_marl.sim.start import start_state
@@ -114,18 +115,25 @@ class Swarm:
         return limit.factor * self.duration_s + limit.extra_s
 
     @property
+    def faulty(self) -> NDArray[np.bool_]:
+        """Vehicles that a fault of the scenario has hit since the reset, shape (world, vehicle)."""
+        return np.zeros_like(self.state.alive) if self._sea is None else hit(self.state.tick, self._sea.hull)
+
+    @property
     def arrived(self) -> NDArray[np.bool_]:
-        """Worlds whose task is done, shape (world,)."""
+        """Worlds whose swarm has arrived, shape (world,)."""
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
     def endings(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """How episodes ended, shape (world,) each; both False for those that go on.
 
         Returns:
-            Terminated, by what happened: the swarm arrived, or all of it is lost. Truncated, that is cut off: by the
-            time limit, or because the world diverged.
+            Terminated, by what happened: the swarm arrived (where ``arrival.ends_episode``), or all of it is lost.
+            Truncated, that is cut off: by the time limit, or because the world diverged.
         """
-        terminated = self.arrived | ~self.state.alive.any(axis=1)
+        terminated = ~self.state.alive.any(axis=1)
+        if self.scenario.arrival.ends_episode:
+            terminated |= self.arrived
         late = self.facts.time_s >= self.time_limit_s - 1e-9
         return terminated, (late | (self.facts.diverged >= 0)) & ~terminated
 

@@ -19,6 +19,7 @@ from uuv_marl.sim.motion import apply_actuators, integrate, load, load_action, l
 from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sea.actuation import Actuation, Hull, is_lost
 from uuv_marl.sim.sea.current import Flow, Water
+from uuv_marl.sim.sea.modem import Mail, Modem
 from uuv_marl.sim.sea.sea import Sea, begin, drift, integrate_at_sea, know, reads, take_readings
 from uuv_marl.sim.sonar import Suite
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
@@ -280,13 +281,13 @@ def step_worlds(
 def step_worlds_at_sea(
     threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
     plant: Plant, suite: Suite, rules: Rules, at: Starts, room: Scratch, keys: UInt64,
-    water: Water, flow: Flow, actuation: Actuation, hull: Hull,
+    water: Water, flow: Flow, actuation: Actuation, hull: Hull, modem: Modem, mail: Mail,
 ) -> bool:  # fmt: skip
     """The same for disturbed worlds."""
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
         own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
-        sea = Sea(keys, water, flow, actuation, hull)
+        sea = Sea(keys, water, flow, actuation, hull, modem, mail)
         for w in range(t * share, min((t + 1) * share, action.shape[0])):
             if active[w]:
                 step_world(w, action, world, model, own, sea)

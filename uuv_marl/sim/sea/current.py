@@ -160,9 +160,9 @@ def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
 
 
 @compiled
-def over_ground(w: int, j: int, state: State, heading: Float64, flow: Flow) -> tuple[float, float]:
-    """Velocity of vehicle j over ground, north and east [m/s]; ``heading`` holds cosines and sines."""
-    c, s, u, v = heading[w, j, 0], heading[w, j, 1], state.nu[w, j, 0], state.nu[w, j, 1]
+def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]:
+    """Velocity of vehicle j over ground, north and east [m/s]."""
+    (c, s), u, v = cos_sin(state.eta[w, j, 2]), state.nu[w, j, 0], state.nu[w, j, 1]
     return c * u - s * v + flow.flow[w, j, 0], s * u + c * v + flow.flow[w, j, 1]
 
 
@@ -183,7 +183,7 @@ def know_velocities(w: int, world: World, water: Water, flow: Flow, see: Fields,
         if not state.alive[w, i]:
             continue
         c, s = heading[w, i, 0], heading[w, i, 1]
-        v_x, v_y = over_ground(w, i, state, heading, flow)
+        v_x, v_y = over_ground(w, i, state, flow)
         ahead, abeam = saturate(c * v_x + s * v_y, MAX_SPEED), saturate(c * v_y - s * v_x, MAX_SPEED)
         if more.ground_velocity.shape[2] > 0:
             more.ground_velocity[w, i, 0], more.ground_velocity[w, i, 1] = ahead, abeam
@@ -193,6 +193,6 @@ def know_velocities(w: int, world: World, water: Water, flow: Flow, see: Fields,
         for k in range(see.link_identity.shape[2]):
             j = world.senses.heard[w, i, k]
             if j >= 0:
-                v_x, v_y = over_ground(w, j, state, heading, flow)
+                v_x, v_y = over_ground(w, j, state, flow)
                 see.link_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
                 see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)

@@ -24,6 +24,7 @@ from uuv_marl.sim.sea.current import (
     read_flow,
     water,
 )
+from uuv_marl.sim.sea.modem import Mail, Modem, draw_mail, exchange, know_mail, modem
 from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.views import Fields, SeaFields
 from uuv_marl.sim.workspace import Columns
@@ -42,6 +43,8 @@ class Sea(NamedTuple):
     flow: Flow
     actuation: Actuation
     hull: Hull
+    modem: Modem
+    mail: Mail
 
 
 def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea | None:
@@ -54,8 +57,17 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
     """
     if not disturbances(scenario) and not set(SEA_CHANNELS) & set(scenario.sonar.channels):
         return None
-    sizes = {**sizes, "eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults)}
-    return Sea(keys, water(scenario), allocate(Flow, sizes), actuation(scenario), allocate(Hull, sizes))
+    peers = sizes["vehicle"] if "modem" in scenario.sonar.channels else 0
+    sizes = {**sizes, "eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults), "peer": peers}
+    return Sea(
+        keys=keys,
+        water=water(scenario),
+        flow=allocate(Flow, sizes),
+        actuation=actuation(scenario),
+        hull=allocate(Hull, sizes),
+        modem=modem(scenario),
+        mail=allocate(Mail, sizes),
+    )
 
 
 def draw_sea(w: int, scenario: Scenario, course: Course, duration_s: float, sea: Sea) -> None:
@@ -71,13 +83,14 @@ def draw_sea(w: int, scenario: Scenario, course: Course, duration_s: float, sea:
     key = np.uint64(sea.keys[w])
     draw_flow(w, key, course.waypoints[w, : course.last[w] + 1], scenario, sea.water, sea.flow)
     draw_hulls(w, key, duration_s, scenario, sea.hull)
+    draw_mail(w, sea.mail)
 
 
 def sea_arrays(sea: Sea | None) -> dict[str, NDArray[Any]]:
     """All that changes, by name, for snapshots."""
     if sea is None:
         return {}
-    return {**sea.flow._asdict(), **sea.hull._asdict()}
+    return {**sea.flow._asdict(), **sea.hull._asdict(), **sea.mail._asdict()}
 
 
 @compiled_inner
@@ -100,6 +113,7 @@ def drift(w: int, world: World, sea: Sea) -> None:
     """The sea at the end of a control hold, whose number is already counted."""
     advance_gust(w, sea.keys[w], world.state.tick[w], sea.water, sea.flow)
     read_flow(w, world.state, sea.water, sea.flow)
+    exchange(w, sea.keys[w], world, sea.modem, sea.mail, sea.flow)
 
 
 @compiled_inner
@@ -123,3 +137,4 @@ def take_readings(w: int, world: World, sea: Sea, see: Fields) -> None:
 def know(w: int, world: World, sea: Sea, see: Fields, more: SeaFields) -> None:
     """Percepts that hold what is true become what vehicles know."""
     know_velocities(w, world, sea.water, sea.flow, see, more)
+    know_mail(w, world, sea.mail, more)
