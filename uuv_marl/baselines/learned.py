@@ -44,14 +44,19 @@ _FIRST_VEHICLE = "literature_185"
 """The vehicle of version 0.1.0, which wrote checkpoints without saying so."""
 
 
+NOT_THE_VEHICLE = ("name", "yaw_damping_nms", "thrust_lag_s", "yaw_lag_s", "yaw_authority")
+"""Fields in which a scenario may differ from a training's: the inner loop, which policies declare themselves, and what
+disturbs the actuators, like all that disturbs a vehicle."""
+
+
 def vehicle_of(scenario: Scenario) -> dict[str, float]:
-    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare themselves."""
+    """Hull and actuators of a scenario, by field; without ``NOT_THE_VEHICLE``."""
     return _numbers({"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()})
 
 
 def _numbers(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
     every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
-    return {field: every[field] for field in every if field not in ("vehicle.name", "actuators.yaw_damping_nms")}
+    return {field: every[field] for field in every if field.partition(".")[2] not in NOT_THE_VEHICLE}
 
 
 def _all_gains(gains: Any) -> Any:
