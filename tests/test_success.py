@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from uuv_marl.envs.task import Task
 
 import uuv_marl
 from uuv_marl import load_scenario
@@ -9,7 +10,6 @@ from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
 from uuv_marl.envs.reward import reward_terms
-from uuv_marl.envs.task import Task
 from uuv_marl.sim.swarm import Swarm
 
 SPREAD_M = 80.0

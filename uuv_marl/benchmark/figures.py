@@ -24,7 +24,14 @@ _TICKS_M = (-20, -10, -5, 0, 5, 10, 20, 50, 100, 200)
 
 
 def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Path]:
-    """All pictures of a scenario, as PNG in ``figures/``; the paths."""
+    """All pictures of a scenario, as PNG in ``figures/``; the paths.
+
+    Args:
+        results: with the runs; the pictures go into its folder.
+        scenario: its name.
+        policies: their names; those without runs are left out.
+        seeds: whose runs are drawn.
+    """
     present = [policy for policy in policies if results.select(scenario, policy, seeds)]
     if not present:
         return []
@@ -133,7 +140,14 @@ def _nearest(trace: Trace) -> Float32:
 def _over_time(
     curves: Mapping[str, Sequence[Trace]], value: Callable[[Trace], Float32], limits: Mapping[str, float], what: str
 ) -> tuple[Figure, list[Axes]]:
-    """Median and range over seeds, a panel for each policy with all others' medians behind; the used panels."""
+    """Median and range over seeds, a panel for each policy with all others' medians behind; the used panels.
+
+    Args:
+        curves: time series of the runs of each policy.
+        value: what is drawn of a run, shape (time,).
+        limits: lines across all panels [m], by their words in the legend.
+        what: label of the vertical axis.
+    """
     figure, axes = _grid(len(curves), (3.1, 2.7))
     bands = {policy: _band([(trace["time_s"], value(trace)) for trace in traces]) for policy, traces in curves.items()}
     for ax, (policy, traces) in zip(axes, curves.items(), strict=False):

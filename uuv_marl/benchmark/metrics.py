@@ -94,7 +94,7 @@ def measure(swarm: Swarm) -> Sample:
     )
 
 
-class Meter:
+class MetricsRecorder:
     """Gathers samples of a batch of worlds and sums up each when it ends."""
 
     def __init__(self, swarm: Swarm) -> None:

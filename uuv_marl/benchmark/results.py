@@ -201,7 +201,14 @@ class Results:
 
 
 def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
-    """Where the time series of a run are, in the folder of its ``results.json``."""
+    """Where the time series of a run are.
+
+    Args:
+        folder: of the ``results.json``.
+        scenario: its name.
+        policy: its name.
+        seed: of the run.
+    """
     return folder / "traces" / f"{run_name(scenario, policy, seed)}.npz"
 
 

@@ -31,7 +31,16 @@ def run_missing(
     report: Report,
     evaluator: Evaluate = evaluate,
 ) -> None:
-    """Run what ``results`` lacks; every finished seed is kept at once."""
+    """Run what ``results`` lacks; every finished seed is kept at once.
+
+    Args:
+        results: takes the runs.
+        scenarios: to run on.
+        policies: their names.
+        seeds: of the runs on each scenario with each policy.
+        report: called with scenario, policy and the share of their work that is done.
+        evaluator: runs a policy on a scenario over seeds.
+    """
     for scenario in scenarios:
         for policy in policies:
             results.use(policy)
@@ -53,6 +62,12 @@ def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[st
 
     That distance is between two vehicles or to an obstacle's surface, whichever is smaller. Of equals the first counts,
     by scenario, policy and seed as given.
+
+    Args:
+        results: with the runs.
+        scenarios: to look at.
+        policies: their names.
+        seeds: to look at.
     """
 
     def badness(row: Row) -> tuple[int, bool, float]:

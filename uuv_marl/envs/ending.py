@@ -2,14 +2,14 @@
 
 from typing import Any
 
-from uuv_marl.envs.task import Task
+from uuv_marl.envs.batched_env import BatchedEnv
 
 
-def ending(task: Task, world: int, vehicle: int | None = None) -> dict[str, Any]:
+def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:
     """Why a world's episode ended, or a vehicle's part in it, as plain Python values.
 
     Args:
-        task: as the step left it in which the world, or the vehicle, came to its end.
+        batch: as the step left it in which the world, or the vehicle, came to its end.
         world: index of the world.
         vehicle: index of the vehicle; None for the world as a whole.
 
@@ -21,7 +21,7 @@ def ending(task: Task, world: int, vehicle: int | None = None) -> dict[str, Any]
         ``arrived`` (the swarm did), ``time_s`` since the reset, and ``collisions``, the contact episodes of the whole
         swarm until now.
     """
-    swarm = task.swarm
+    swarm = batch.swarm
     arrived = bool(swarm.arrived[world])
     alive = swarm.state.alive[world]
     if not (alive.any() if vehicle is None else alive[vehicle]):
@@ -35,5 +35,5 @@ def ending(task: Task, world: int, vehicle: int | None = None) -> dict[str, Any]
         "ending": reason,
         "arrived": arrived,
         "time_s": float(swarm.facts.time_s[world]),
-        "collisions": int(task.collisions[world]),
+        "collisions": int(batch.collisions[world]),
     }

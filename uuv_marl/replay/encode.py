@@ -141,31 +141,29 @@ def _coded(values: Float32, coding: Coding) -> dict[str, Any]:
     """An array of numbers in units, NaN where one is missing."""
     missing = np.isnan(values)
     scaled = _filled(values.astype(np.float64), missing) / coding.unit
-    data = (
-        _smooth(scaled, coding)
-        if coding.stride > 1
-        else pack(_differences(np.rint(scaled).astype(np.int32), coding.order))
-    )
+    whole = np.rint(scaled).astype(np.int32)
+    data = _smooth(scaled, coding) if coding.stride > 1 else _differences(whole, coding.order)
     mask = pack(_differences(missing.astype(np.int32), 1)) if missing.any() else None
-    return _entry(values.shape, "float32", coding.unit, coding.stride, coding.order, mask, data)
+    return _entry(values, data, coding.unit, coding.stride, coding.order, mask)
 
 
 def _bits(values: Float32) -> dict[str, Any]:
     """An array of which every bit is kept."""
-    return _entry(values.shape, "float32", None, 1, 2, None, pack(_differences(values.view(np.int32), 2)))
+    return _entry(values, _differences(values.view(np.int32), 2))
 
 
 def _whole(values: Int32, order: int) -> dict[str, Any]:
     """An array of whole numbers."""
-    return _entry(values.shape, "int32", None, 1, order, None, pack(_differences(values, order)))
+    return _entry(values, _differences(values, order), order=order)
 
 
 def _entry(
-    shape: tuple[int, ...], dtype: str, scale: float | None, stride: int, order: int, missing: str | None, data: str
-) -> dict[str, Any]:
+    values: NDArray[Any], data: Int32, scale: float | None = None, stride: int = 1, order: int = 2,
+    missing: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
     return {
-        "shape": list(shape), "dtype": dtype, "scale": scale, "stride": stride, "order": order, "missing": missing,
-        "data": data,
+        "shape": list(values.shape), "dtype": str(values.dtype), "scale": scale, "stride": stride, "order": order,
+        "missing": missing, "data": pack(data),
     }  # fmt: skip
 
 
@@ -185,7 +183,7 @@ def _differences(values: Int32, order: int) -> Int32:
     return np.moveaxis(values, 0, -1).ravel()
 
 
-def _smooth(scaled: NDArray[np.float64], coding: Coding) -> str:
+def _smooth(scaled: NDArray[np.float64], coding: Coding) -> Int32:
     """Samples from coarse to fine; each level's differences stand in the order of the vehicles, then of time."""
     whole = np.zeros(scaled.shape, np.int32)
     whole[:: coding.stride] = np.rint(scaled[:: coding.stride])
@@ -197,7 +195,7 @@ def _smooth(scaled: NDArray[np.float64], coding: Coding) -> str:
         whole[now] = np.where(np.abs(guess - scaled[now]) <= coding.slack, guess, np.rint(scaled[now]))
         levels.append(_differences(whole[now] - guess, 0))
         half //= 2
-    return pack(np.concatenate(levels))
+    return np.concatenate(levels)
 
 
 def _between(whole: Int32, now: NDArray[np.int64], half: int) -> Int32:

@@ -74,14 +74,14 @@ class _Tape:
 
     def __call__(self, swarm: Swarm, action: Float32 | None) -> None:
         """Keep the state of world 0, as ``evaluate``'s watch."""
-        eta, nu, facts = swarm.state.eta[0], swarm.state.nu[0], swarm.facts
+        eta, velocity, facts = swarm.state.eta[0], swarm.velocity[0], swarm.facts
         seen = list(self._inspect)
         percept = swarm.percept
         self._add("time_s", facts.time_s[0])
         self._add("reference", facts.reference[0, :2])
         self._add("position", eta[:, :2])
         self._add("heading", eta[:, 2])
-        self._add("speed", np.hypot(nu[:, 0], nu[:, 1]))
+        self._add("speed", np.hypot(velocity[:, 0], velocity[:, 1]))
         self._add("force", np.sqrt(facts.effort[0]))
         self._add("spacing", facts.spacing[0])
         self._add("clearance", facts.clearance[0])

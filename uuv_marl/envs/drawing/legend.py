@@ -27,7 +27,7 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
         found.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))
         near += "" if limits.s_o_m == limits.s_u_m else f", obstacle {limits.s_o_m:g} m"
     found += [(near, _dart(ink.AMBER)), ("collision", _hit)]
-    if scene.scenario.disturbance.loss_times_s or scene.scenario.contact.ends_vehicle:
+    if scene.scenario.loses_vehicles:
         found.append(("lost", _lost))
     return found
 
