@@ -80,11 +80,9 @@ PEERS := perf-mpe2 perf-vmas perf-jaxmarl
 
 perf: .venv/dev.stamp $(foreach name,$(PEERS),.venv-$(name)/$(name).stamp)
 	$(BIN)/python perf/compare.py $(ARGS)
-	$(BIN)/python perf/report.py
 
 perf-training: .venv/dev.stamp .venv-perf-supersuit/perf-supersuit.stamp .venv-rllib/rllib.stamp
 	$(BIN)/python perf/compare.py --training $(ARGS)
-	$(BIN)/python perf/report.py
 
 .PHONY: versions
 versions: .venv/dev.stamp

@@ -2,7 +2,8 @@
 
 Every case runs in its own process and its library's virtual environment. All of a cell of the table (so many agents, so
 many worlds) are built, then measured in turn, round after round, so that a slow phase of the machine hits all alike.
-What cannot run is recorded with its reason. The file is written after every cell; perf/report.py writes the pages.
+What cannot run is recorded with its reason. The file is written after every cell, and the cell's rows of a Markdown
+table are printed: median [lowest, highest] of the rates, and of their ratios to the cell's first case round by round.
 """
 
 import argparse
@@ -13,13 +14,15 @@ import os
 import platform
 import signal
 import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from statistics import median
 from typing import Any, NamedTuple
+
+from floor import KERNELS, least_seconds
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -27,8 +30,6 @@ RESULTS, TRAININGS = HERE / "results.json", HERE / "training.json"
 AGENTS, WORLDS = (3, 54, 500), (1, 64, 1024)
 FLOOR_CELLS = ((54, 1), (54, 64), (500, 1), (500, 64))
 CURVE = (3, 10, 54, 200, 500, 1000, 2000, 5000, 10000)
-CEILINGS = ("pairs", "keeps", "sines", "copy")
-PARTS = ("part_moved", "part_sorted", "part_measured", "part_heard", "part_perceived", "part_stepped")
 ADAPTERS = ("swarm_idle", "task_idle", "vector_env_idle", "sb3_idle", "torchrl_idle")
 TRAINED = ("mappo", "ppo", "plain")
 PEERS = ("mpe2", "vmas", "jaxmarl")
@@ -50,7 +51,6 @@ class Library(NamedTuple):
 
 LIBRARIES = {
     "uuv_marl": Library(".venv", "ours.py"),
-    "parts": Library(".venv", "parts.py"),
     **{peer: Library(f".venv-perf-{peer}", f"peer_{peer}.py") for peer in PEERS},
     "train": Library(".venv", "trainings.py", ONE_THREAD),
     "supersuit": Library(".venv-perf-supersuit", "trainings.py", ONE_THREAD),
@@ -74,11 +74,10 @@ def plan(training: bool) -> Iterator[Cell]:
         return
     for agents in AGENTS:
         for worlds in WORLDS:
-            names = ("core", "vector_env", "parallel_env", *(CEILINGS if (agents, worlds) in FLOOR_CELLS else ()))
+            names = ("core", "vector_env", "parallel_env", *(KERNELS if (agents, worlds) in FLOOR_CELLS else ()))
             ours = dict.fromkeys(names, ("uuv_marl", worlds))
             yield Cell("rates", agents, ours | {peer: (peer, worlds) for peer in PEERS})
     yield Cell("terms", 54, dict.fromkeys(("parallel_env", "parallel_env_terms"), ("uuv_marl", 1)))
-    yield Cell("profile", 54, dict.fromkeys(PARTS, ("parts", 64)))
     yield Cell("adapters", 54, dict.fromkeys(ADAPTERS, ("uuv_marl", 64)))
     yield Cell("training", 54, {"ppo": ("uuv_marl", 64), "mpe2_ppo": ("mpe2", 4), "vmas_ppo": ("vmas", 64)})
     for agents in CURVE:
@@ -172,7 +171,7 @@ def noted(record: Record) -> Iterator[None]:
         record["failed"] = str(reason)
 
 
-def key(record: Record) -> tuple[object, ...]:
+def key(record: Record) -> tuple[str, str, int, int]:
     """What a record is about."""
     return record["kind"], record["case"], record["agents"], record["worlds"]
 
@@ -199,8 +198,26 @@ def earlier(path: Path, only: list[str]) -> dict[str, Any]:
     return found
 
 
+def table_rows(records: Sequence[Record]) -> Iterator[tuple[object, ...]]:
+    """A cell's rows of the table, and the share that the floor (docs/speed.md) has of a step where it was measured."""
+    first = records[0]["rates"] if records else []
+    for record in records:
+        ratios = [rate / other for rate, other in zip(record["rates"], first, strict=False)]
+        yield *key(record), spread(record["rates"], ",.1f") or record["failed"], spread(ratios, ".3f")
+    best = [max(record["rates"]) for record in records if record["case"] in KERNELS and record["rates"]]
+    if first and records[0]["case"] == "core" and len(best) == len(KERNELS):
+        _, _, agents, worlds = key(records[0])
+        shares = [least_seconds(agents, worlds, best) * rate / (agents * worlds) for rate in first]
+        yield "floor", "of a step", agents, worlds, spread(shares, ".2%"), ""
+
+
+def spread(values: Sequence[float], spec: str) -> str:
+    """Median [lowest, highest]; nothing of nothing."""
+    return f"{median(values):{spec}} [{min(values):{spec}}, {max(values):{spec}}]" if values else ""
+
+
 def main() -> None:
-    """Measure, and write the results file."""
+    """Measure, write the results file and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--training", action="store_true", help="whole trainings instead: make perf-training")
     parser.add_argument("--only", nargs="+", default=[], help="cases, libraries, kinds (rates, terms, curve ...)")
@@ -211,6 +228,7 @@ def main() -> None:
     output = given.output or (TRAININGS if given.training else RESULTS)
     results = earlier(output, given.only)
     results |= {"rounds": given.rounds, "seconds": given.seconds, "load": round(os.getloadavg()[0], 2)}
+    print("| kind | case | agents | worlds | rate [1/s] | ratio to the first case |\n|" + " --- |" * 6)
     for cell in plan(given.training):
         asked = {n: at for n, at in cell.cases.items() if not given.only or {n, at[0], cell.kind} & {*given.only}}
         records, about = measure(cell._replace(cases=asked), given.rounds, given.seconds)
@@ -218,9 +236,8 @@ def main() -> None:
         results["cases"] = [old for old in results["cases"] if key(old) not in new] + records
         results["libraries"] |= about
         output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-        for record in records:
-            rates = " ".join(f"{rate:,.0f}" for rate in sorted(record["rates"])) or record["failed"]
-            sys.stderr.write(f"{record['case']} {record['agents']} x {record['worlds']}: {rates}\n")
+        for row in table_rows(records):
+            print(f"| {' | '.join(map(str, row))} |", flush=True)
 
 
 if __name__ == "__main__":

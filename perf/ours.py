@@ -1,21 +1,22 @@
 """Cases of uuv_marl for perf/compare.py: the batched core, its public environments, training, and the ceilings."""
 
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
+from compare import ADAPTERS
 from floor import KERNELS, loop
 from numpy.typing import NDArray
-from worker import Case, Maker, repeated, serve
+from worker import Case, Maker, built, repeated, serve
 
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.envs.sb3 import SwarmVecEnv
-from uuv_marl.envs.task import make_task
 from uuv_marl.sim.swarm import Swarm
 
-SETS, SETTLE_STEPS, SETTLE_S, BUILD_S = 8, 200, 10.0, 20.0
+SETS, SETTLE_STEPS, SETTLE_S = 8, 200, 10.0
 
 
 def random_actions(agents: int, worlds: int) -> NDArray[np.float32]:
@@ -25,10 +26,8 @@ def random_actions(agents: int, worlds: int) -> NDArray[np.float32]:
 
 def core(agents: int, worlds: int) -> Case:
     """``Swarm.step``: motion, sonar, percepts."""
-    swarm, actions = (
-        Swarm(load_scenario("single_obstacle", num_vehicles=agents), worlds),
-        random_actions(agents, worlds),
-    )
+    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=agents), worlds)
+    actions = random_actions(agents, worlds)
     swarm.reset(0)
     return repeated(lambda k: swarm.step(actions[k % SETS]), agents * worlds, entries=swarm.layout.size)
 
@@ -42,11 +41,7 @@ def vector_env(agents: int, worlds: int) -> Case:
 
 def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
     """``parallel_env``: dicts of agents, worlds one after the other, reset when over. A unit is a step of one world."""
-    envs, start = [], time.perf_counter()
-    while len(envs) < worlds and time.perf_counter() - start < BUILD_S:
-        env = uuv_marl.parallel_env(num_vehicles=agents, info_terms=info_terms)
-        env.reset(seed=len(envs))
-        envs.append(env)
+    envs = built(lambda: uuv_marl.parallel_env(num_vehicles=agents, info_terms=info_terms), worlds)
     names = envs[0].possible_agents
     actions = [dict(zip(names, one, strict=True)) for one in random_actions(agents, 1)[:, 0]]
 
@@ -93,54 +88,41 @@ def ppo(agents: int, worlds: int) -> Case:
     return training(SwarmVecEnv(worlds, num_vehicles=agents))
 
 
-def adapter(name: str) -> Maker:
+def adapter(name: str, agents: int, worlds: int) -> Case:
     """A step of one API, with idle vehicles on worlds that never end while they are measured."""
+    how: Any = {"num_vehicles": agents, "overrides": {"time_limit.extra_s": 1e6}}
+    action: Any = np.zeros((worlds, agents, 2), np.float32)
+    if name == "torchrl_idle":
+        import torch
 
-    def made(agents: int, worlds: int) -> Case:
-        how: Any = {"num_vehicles": agents, "overrides": {"time_limit.extra_s": 1e6}}
-        action: Any = np.zeros((worlds, agents, 2), np.float32)
-        if name == "torchrl_idle":
-            import torch
+        from uuv_marl.envs.torchrl import SwarmEnv
 
-            from uuv_marl.envs.torchrl import SwarmEnv
+        env: Any = SwarmEnv(worlds, seed=0, **how)
+        data = env.reset().set(("uuv", "action"), torch.from_numpy(action))
+        return repeated(lambda _: env.step(data.copy()), agents * worlds)
+    if name in ("swarm_idle", "task_idle"):
+        from uuv_marl.envs.batched_env import make_batched_env  # 0.1.0, which versions.py runs too, has none
 
-            env: Any = SwarmEnv(worlds, seed=0, **how)
-            data = env.reset().set(("uuv", "action"), torch.from_numpy(action))
-            return repeated(lambda _: env.step(data.copy()), agents * worlds)
-        if name in ("swarm_idle", "task_idle"):
-            env = make_task(num_worlds=worlds, **how)
-            env.reset(0)
-            env = env.swarm if name == "swarm_idle" else env
-        else:
-            env = (SwarmVecEnv if name == "sb3_idle" else uuv_marl.vector_env)(worlds, **how)
-            env.reset()
-            action = action.reshape(env.action_space.shape if name == "vector_env_idle" else (-1, 2))
-        return repeated(lambda _: env.step(action), agents * worlds)
-
-    return made
+        env = make_batched_env(num_worlds=worlds, **how)
+        env.reset(0)
+        env = env.swarm if name == "swarm_idle" else env
+    else:
+        env = (SwarmVecEnv if name == "sb3_idle" else uuv_marl.vector_env)(worlds, **how)
+        env.reset()
+        action = action.reshape(env.action_space.shape if name == "vector_env_idle" else (-1, 2))
+    return repeated(lambda _: env.step(action), agents * worlds)
 
 
-def ceiling(kind: str) -> Maker:
+def ceiling(kind: str, agents: int, worlds: int) -> Case:
     """A loop that does nothing but one part of a step's work."""
-    return lambda agents, worlds: Case(*loop(kind, agents, worlds))
-
-
-def compiled(maker: Maker) -> Maker:
-    """The same case, its code compiled before the clock runs, as JAX's is."""
-
-    def made(agents: int, worlds: int) -> Case:
-        case = maker(agents, worlds)
-        case.run(1)
-        return case
-
-    return made
+    return Case(*loop(kind, agents, worlds))
 
 
 CASES: dict[str, Maker] = {
     case.__name__: case for case in (core, vector_env, parallel_env, parallel_env_terms, idle, bio_inspired, ppo)
 }
-CASES |= {name: adapter(name) for name in ("swarm_idle", "task_idle", "vector_env_idle", "sb3_idle", "torchrl_idle")}
-CASES |= {kind: ceiling(kind) for kind in KERNELS}
+CASES |= {name: partial(adapter, name) for name in ADAPTERS}
+CASES |= {kind: partial(ceiling, kind) for kind in KERNELS}
 
 if __name__ == "__main__":
-    serve({name: compiled(case) for name, case in CASES.items()})
+    serve(CASES, warm=True)

@@ -46,17 +46,9 @@ class Rows(VecEnv):
     close = set_attr = env_method = _unused
 
 
-def training(env: VecEnv) -> Case:
-    """A unit is a rollout of ``STEPS`` steps of all rows, and the learning from it."""
-    network, amount = {"net_arch": [64, 64]}, STEPS * env.num_envs
-    model = PPO(
-        "MlpPolicy",
-        env,
-        n_steps=STEPS,
-        batch_size=BATCH,
-        n_epochs=EPOCHS,
-        policy_kwargs=network,
-        seed=100_000,
-        device="cpu",
-    )
+def training(env: VecEnv, seed: int | None = 100_000, **changes: Any) -> Case:
+    """A unit is a rollout of all rows, and the learning from it; ``changes`` replace settings."""
+    settings = {"n_steps": STEPS, "batch_size": BATCH, "n_epochs": EPOCHS, "policy_kwargs": {"net_arch": [64, 64]}}
+    model = PPO("MlpPolicy", env, seed=seed, device="cpu", **(settings | changes))
+    amount = model.n_steps * env.num_envs
     return Case(lambda units: model.learn(units * amount, reset_num_timesteps=False), amount)

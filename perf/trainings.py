@@ -51,14 +51,12 @@ def ppo(agents: int, worlds: int) -> Case:
 
 def sb3_ppo(env: Any, seed: int | None) -> Case:
     """Stable-Baselines3's PPO on a ``VecEnv``; a unit is an iteration."""
-    from stable_baselines3 import PPO
+    from ppo import training
 
-    model, rows = PPO(
-        "MlpPolicy", env, learning_rate=LEARNING_RATE, n_steps=DECISIONS, batch_size=MINIBATCH, n_epochs=EPOCHS,
-        gamma=GAMMA, gae_lambda=GAE_LAMBDA, clip_range=CLIP, policy_kwargs={"net_arch": list(HIDDEN)}, seed=seed,
-        device="cpu",
-    ), DECISIONS * env.num_envs  # fmt: skip
-    return repeated(lambda _: model.learn(rows, reset_num_timesteps=False), rows)
+    return training(
+        env, seed, learning_rate=LEARNING_RATE, n_steps=DECISIONS, batch_size=MINIBATCH, n_epochs=EPOCHS, gamma=GAMMA,
+        gae_lambda=GAE_LAMBDA, clip_range=CLIP, policy_kwargs={"net_arch": list(HIDDEN)},
+    )  # fmt: skip
 
 
 def plain(agents: int, worlds: int) -> Case:

@@ -13,8 +13,9 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+BUILD_S = 20.0
 MEMORY_SHARE = 0.7
 """Of the machine's memory; with more, a case fails."""
 TOLD = (
@@ -49,6 +50,16 @@ def repeated(step: Callable[[int], object], amount: float, **facts: object) -> C
     return Case(run, amount, facts)
 
 
+def built(make: Callable[[], Any], worlds: int) -> list[Any]:
+    """As many of the environments as are built within ``BUILD_S``, reset to the seeds 0, 1, ..."""
+    envs: list[Any] = []
+    start = time.perf_counter()
+    while len(envs) < worlds and time.perf_counter() - start < BUILD_S:
+        envs.append(make())
+        envs[-1].reset(seed=len(envs) - 1)
+    return envs
+
+
 def seconds_of(case: Case, units: int) -> float:
     """How long so many units take [s]."""
     start = time.perf_counter()
@@ -65,14 +76,19 @@ def units_within(case: Case, seconds: float) -> int:
     return max(1, round(units * seconds / spent))
 
 
-def serve(makers: Mapping[str, Maker]) -> None:
-    """Build and time; an answer is a JSON object on a line. A process that can't ends, the reason its last words."""
+def serve(makers: Mapping[str, Maker], warm: bool = False) -> None:
+    """Build and time; an answer is a JSON object on a line. A process that can't ends, the reason its last words.
+
+    ``warm`` has the code compiled before the clock runs, as JAX's is.
+    """
     name, (agents, worlds), (seconds, limit) = sys.argv[1], map(int, sys.argv[2:4]), map(float, sys.argv[4:])
     most = int(MEMORY_SHARE * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     signal.setitimer(signal.ITIMER_REAL, limit)
     start = time.perf_counter()
     case = makers[name](agents, worlds)
+    if warm:
+        case.run(1)
     build_s, first_s = time.perf_counter() - start, seconds_of(case, 1)
     units = units_within(case, seconds) if first_s < limit / 50 and seconds else 1
     versions = {library: version(library) for library in TOLD if library in sys.modules}

@@ -23,6 +23,25 @@ SINKS = {
     "start.spacing_m": 45.0,
     "start.gap_m": 45.0,
 }
+MEDIUM = {
+    "current.speed_mps": 0.5, "current.variation_mps": 0.2, "current.eddies": 4, "current.eddy_speed_mps": 0.5,
+    "latency.travel_time": True, "latency.processing_s": 0.3, "latency.compensated": True,
+    "latency.active_period_s": 0.5, "latency.passive_period_s": 0.3,
+    "noise.bearing_deg": 2.0, "noise.range_share": 0.02, "noise.silence_probability": 0.05, "noise.silence_readings": 3,
+    "noise.passive_range_log_sd": 0.1, "noise.passive_r50_m": 100.0, "noise.active_r50_m": 75.0,
+    "noise.false_echo_probability": 0.02,
+    "navigation.drift_share": 0.02, "navigation.compass_bias_deg": 2.0,
+    "actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2, "mismatch.drag": 0.2, "mismatch.mass": 0.1,
+    "faults": [{"kind": "array", "share": 0.2, "array": "bow"}, {"kind": "thruster", "share": 0.2}],
+    "sonar.echo_reports": "surface", "arrival.ends_episode": False,
+}  # fmt: skip
+"""Everything that can disturb a world, in the middle of its range."""
+SEA = MEDIUM | {
+    "sonar.channels": ["compass", "current", "age", "ranged", "modem"],
+    "modem.loss_probability": 0.1,
+}
+"""The same, and all that vehicles can be told of it."""
+SINKING = {"faults": [{"kind": "member", "share": 0.4, "onset_s": 2.0}]}
 BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
 
 
@@ -106,6 +125,8 @@ def cases():
         *(Case(f"{name}-times_out", name, TIMES_OUT) for name in scenarios),
         *(Case(f"{name}-arrives", name, ARRIVES) for name in scenarios),
         Case("sinks", "single_obstacle", SINKS, 1.0, 350),
+        Case("sea", "starter", SEA | TIMES_OUT, 0.5, 60),
+        Case("sea-loses", "starter", SEA | TIMES_OUT | SINKING, 0.5, 60),
         Case("own_period", "random_field", BRIEF, 0.1),
         Case("team_reward", "lossy", TIMES_OUT, options={"reward": "team"}),
         Case("own_reward", "random_field", ARRIVES, options={"reward": own_reward}),

@@ -54,7 +54,7 @@ SEA = {
     "current.speed_mps": 0.4, "current.variation_mps": 0.2, "current.eddies": 6, "current.eddy_speed_mps": 0.5,
     "mismatch.mass": 0.2, "mismatch.added_mass": 0.2, "mismatch.drag": 0.3, "mismatch.thrust": 0.2,
     "actuators.thrust_lag_s": 0.5, "actuators.yaw_lag_s": 0.3, "actuators.yaw_authority": 0.7,
-    "sonar.channels": ["compass", "link", "current", "age"],
+    "sonar.channels": ["compass", "link", "current", "age", "modem"], "modem.period_s": 1.0,
     "faults": [
         {"kind": "thruster", "share": 0.4, "onset_s": 1.0},
         {"kind": "yaw", "share": 0.3, "onset_s": 0.5, "duration_s": 1.0, "efficiency": 0.3},

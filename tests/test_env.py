@@ -320,6 +320,15 @@ def test_what_is_no_action_is_refused_by_name(action, message):
         env.step({**good, 5: np.zeros(2)})
 
 
+def test_an_action_is_as_good_as_its_direction_however_large():
+    runs = set()
+    for size in (2.0, 1e30, float(np.finfo(np.float32).max)):
+        env = uuv_marl.parallel_env(num_vehicles=2)
+        env.reset(seed=0)
+        runs.add(env.step(dict.fromkeys(env.agents, np.array([0.0, -size], np.float32)))[0]["uuv_1"].tobytes())
+    assert len(runs) == 1
+
+
 def test_numbers_of_every_kind_are_rounded_alike():
     runs = set()
     for kind in (np.float32, np.float64, np.int8, bool, list, tuple):

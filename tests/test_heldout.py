@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import trim_mean
 from typer.testing import CliRunner
 
-from uuv_marl.baselines.learned import WEIGHTS_FILE
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark.tables import estimate
 from uuv_marl.cli import app
 from uuv_marl.studies.heldout import across, figures, job, page

@@ -17,17 +17,19 @@ import torch
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Features, forward, load_checkpoint
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, load_checkpoint
+from uuv_marl.baselines.features import BARRIER, Features
+from uuv_marl.baselines.learned import forward
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train import fleet as fleets
+from uuv_marl.train import env as env_module
 from uuv_marl.train import training as trainings
-from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
+from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.mappo import Hyperparameters, Learner, annealed, gae
-from uuv_marl.train.shaping import OVERRIDES, VIEW_SIZE, Weights, lead, shaped, view
-from uuv_marl.train.training import Record, Settings, Training, train
-from uuv_marl.train.validation import VALIDATION_SEEDS, cost, judge
+from uuv_marl.train.shaping import OVERRIDES, PRIVILEGED_SIZE, Weights, lead, privileged_observation, shaped_reward
+from uuv_marl.train.training import Record, Settings, Trainer, train
+from uuv_marl.train.validation import VALIDATION_SEEDS, cost, validation_result
 
 OPEN_WATER = {
     "timing.decision_period_s": 0.5,
@@ -53,7 +55,7 @@ def test_advantages_by_hand():
 
 
 class Problem:
-    """Rows that see noise and are paid by a function of (seen, action); every ``length`` steps all of them end."""
+    """Rows that see noise and are paid by a function of (observation, action); all end every ``length`` steps."""
 
     features, size, rows = 2, 3, 64
 
@@ -63,19 +65,19 @@ class Problem:
         self._draw()
 
     def _draw(self):
-        self.seen = self._rng.uniform(-1, 1, (self.rows, self.size)).astype(np.float32)
+        self.observation = self._rng.uniform(-1, 1, (self.rows, self.size)).astype(np.float32)
 
     def step(self, action):
         self._t += 1
-        reward = np.asarray(self._pay(self.seen, action), np.float32)
+        reward = np.asarray(self._pay(self.observation, action), np.float32)
         self._draw()
         over = np.full(self.rows, self._t % self._length == 0)
         none = np.zeros(self.rows, np.bool_)
-        return Moment(
+        return Transition(
             reward=reward,
             terminated=none if self._cut_off else over,
             truncated=over if self._cut_off else none,
-            last=self.seen[over] if self._cut_off else self.seen[none],
+            final_obs=self.observation[over] if self._cut_off else self.observation[none],
         )
 
 
@@ -96,8 +98,8 @@ def test_a_one_step_task_is_solved():
     The error of seeds 0 to 4 was 0.007 to 0.012, the same with AVX-512 and with torch's default kernels.
     """
 
-    def pay(seen, action):
-        return 3.0 * seen[:, 2] - 10.0 * np.sum((action - seen[:, :2] * (0.5, -0.5)) ** 2, axis=1)
+    def pay(observation, action):
+        return 3.0 * observation[:, 2] - 10.0 * np.sum((action - observation[:, :2] * (0.5, -0.5)) ** 2, axis=1)
 
     problem = Problem(pay)
     learner, _ = learned(problem, 120, Hyperparameters(hidden=(32,), horizon=8, minibatch=128, kl_stop=0.05))
@@ -114,7 +116,7 @@ def test_values_of_a_steady_income(cut_off, values):
     Seeds 0 to 4 gave 9.998 to 10.001, and 2.303 to 2.305, with AVX-512 and with torch's default kernels.
     """
     by = Hyperparameters(hidden=(16,), horizon=16, minibatch=256, gamma=0.9, value_decay=0.9)
-    learner, _ = learned(Problem(lambda seen, _: np.ones(len(seen)), 4, cut_off), 80, by)
+    learner, _ = learned(Problem(lambda observation, _: np.ones(len(observation)), 4, cut_off), 80, by)
     value = learner.value(np.random.default_rng(2).uniform(-1, 1, (200, 3)).astype(np.float32)).mean()
     assert value == pytest.approx(10.0 if cut_off else 2.33, rel=0.05)
     assert values[0] * 0.95 < value < values[1] * 1.05
@@ -122,11 +124,11 @@ def test_values_of_a_steady_income(cut_off, values):
 
 def test_a_new_scale_of_returns_keeps_values():
     learner = Learner(2, 3, TINY, np.random.default_rng(0))
-    seen = np.random.default_rng(1).standard_normal((20, 3), np.float32)
+    observation = np.random.default_rng(1).standard_normal((20, 3), np.float32)
     learner._follow(torch.linspace(-50.0, -30.0, 9, dtype=torch.float64))
-    before = learner.value(seen)
+    before = learner.value(observation)
     learner._follow(torch.linspace(0.0, 900.0, 9, dtype=torch.float64))
-    np.testing.assert_allclose(learner.value(seen), before, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(learner.value(observation), before, rtol=1e-3, atol=1e-3)
     assert learner._scale()[0] == pytest.approx((0.99 * -40 + 450) / 1.99)
 
 
@@ -137,7 +139,7 @@ def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
     for limit in (0.01, 1e9):
         by = Hyperparameters(hidden=(16,), horizon=8, minibatch=64, actor_epochs=20, kl_stop=limit)
         learner = Learner(2, 3, by, np.random.default_rng(seed))
-        batch, _ = learner.sample(Problem(lambda seen, action: action[:, 0]), 0.3)
+        batch, _ = learner.sample(Problem(lambda observation, action: action[:, 0]), 0.3)
         divergence.append(learner.update(batch, 0.3, 3e-3).kl)
     assert 0.01 < divergence[0] < 0.03
     assert divergence[1] > 2.0 * divergence[0]
@@ -146,7 +148,7 @@ def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
 def open_water(sizes, seed=0, weights=None, **overrides):
     scenario = load_scenario("tracking", overrides={**OPEN_WATER, **overrides})
     rng = np.random.default_rng(seed)
-    return Fleet(scenario, sizes, weights or Weights(), lambda num: rng.integers(*TRAINING_SEEDS, num))
+    return TrainingEnv(scenario, sizes, weights or Weights(), lambda num: rng.integers(*TRAINING_SEEDS, num))
 
 
 def test_a_swarm_of_one_finds_the_force_that_follows():
@@ -155,12 +157,12 @@ def test_a_swarm_of_one_finds_the_force_that_follows():
     Seeds 0 to 4 end 0.4 to 1.4 m from it with AVX-512 and 0.6 to 1.6 m with torch's default kernels; 5 m are allowed.
     Their mean wish, not yet bounded to what the vehicle has, was at most 0.10 beside that force.
     """
-    fleet = open_water([(1, 64)], **{"trajectory.waypoints_m": [[0.0, 0.0], [320.0, 0.0]]})
+    env = open_water([(1, 64)], **{"trajectory.waypoints_m": [[0.0, 0.0], [320.0, 0.0]]})
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=512)
-    learner = Learner(fleet.features, fleet.size, by, np.random.default_rng(0))
+    learner = Learner(env.features, env.size, by, np.random.default_rng(0))
     for k in range(80):
         noise = annealed((0.4, 0.1), k / 80)
-        batch, _ = learner.sample(fleet, noise)
+        batch, _ = learner.sample(env, noise)
         learner.update(batch, noise, annealed((3e-3, 5e-4), k / 80))
     scenario = load_scenario(
         "tracking", num_vehicles=1, overrides={**OPEN_WATER, "trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
@@ -182,54 +184,54 @@ def test_a_short_training_beats_random_by_far():
     """Idle vehicles are paid -2.57 and random ones -4.22. Seeds 0 to 6 reached -0.85 to -1.25 with AVX-512's kernels of
     torch, and -0.88 to -1.20 with its default ones; at least -1.67 is asked for."""
     weights = Weights(distance_m=50.0, centre=0.0, spacing=8.0, spacing_m=10.0)
-    fleet = open_water([(4, 8), (9, 4)], weights=weights)
+    env = open_water([(4, 8), (9, 4)], weights=weights)
     rng = np.random.default_rng(0)
     floors = []
     for scale in (0.0, 1.0):
-        actions = (scale * rng.uniform(-1.0, 1.0, (60, fleet.rows, 2))).astype(np.float32)
-        floors.append(np.mean([fleet.step(action).reward for action in actions]))
-    fleet = open_water([(4, 8), (9, 4)], weights=weights)
+        actions = (scale * rng.uniform(-1.0, 1.0, (60, env.rows, 2))).astype(np.float32)
+        floors.append(np.mean([env.step(action).reward for action in actions]))
+    env = open_water([(4, 8), (9, 4)], weights=weights)
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=1024)
-    _learner, rewards = learned(fleet, 60, by, noise=(0.5, 0.2))
+    _learner, rewards = learned(env, 60, by, noise=(0.5, 0.2))
     assert np.mean(rewards[-5:]) > 0.65 * max(floors), "rewards are negative; the last five are a whole episode"
 
 
-def test_a_fleet_ends_worlds_and_starts_them_anew(monkeypatch):
-    monkeypatch.setattr(fleets, "PATIENCE_S", 0.0)  # cut off when l(t) comes to rest, after 2 s
-    fleet = open_water([(1, 2), (3, 2)], **{"trajectory.waypoints_m": [[0.0, 0.0], [8.0, 0.0]]})
-    assert fleet.seen.shape == (8, fleet.features + VIEW_SIZE)
+def test_a_training_env_ends_worlds_and_starts_them_anew(monkeypatch):
+    monkeypatch.setattr(env_module, "PATIENCE_S", 0.0)  # cut off when l(t) comes to rest, after 2 s
+    env = open_water([(1, 2), (3, 2)], **{"trajectory.waypoints_m": [[0.0, 0.0], [8.0, 0.0]]})
+    assert env.observation.shape == (8, env.features + PRIVILEGED_SIZE)
     idle = np.zeros((8, 2), np.float32)
     for _ in range(3):
-        moment = fleet.step(idle)
-        assert not (moment.terminated | moment.truncated).any()
-        assert moment.last.shape == (0, fleet.size)
-    before = fleet.seen.copy()
-    moment = fleet.step(idle)
-    assert moment.truncated.all()
-    assert moment.last.shape == fleet.seen.shape
-    assert np.abs(moment.last - before).max() < np.abs(fleet.seen - before).max()
-    assert fleet.take_episodes().number == 4
-    assert fleet.take_episodes().number == 0
+        transition = env.step(idle)
+        assert not (transition.terminated | transition.truncated).any()
+        assert transition.final_obs.shape == (0, env.size)
+    before = env.observation.copy()
+    transition = env.step(idle)
+    assert transition.truncated.all()
+    assert transition.final_obs.shape == env.observation.shape
+    assert np.abs(transition.final_obs - before).max() < np.abs(env.observation - before).max()
+    assert env.pop_episode_stats().number == 4
+    assert env.pop_episode_stats().number == 0
 
 
 def test_arrival_terminates():
-    fleet = open_water(
+    env = open_water(
         [(1, 2)],
         **{"trajectory.waypoints_m": [[0.0, 0.0], [4.0, 0.0]], "arrival.radius_m": 500.0, "arrival.spread_m": 500.0},
     )
     idle = np.zeros((2, 2), np.float32)
-    moments = [fleet.step(idle) for _ in range(13)]
-    assert [bool(m.terminated.all()) for m in moments] == [False] * 11 + [True, False]
-    assert not any(m.truncated.any() for m in moments)
-    assert fleet.take_episodes().arrived == 2
+    transitions = [env.step(idle) for _ in range(13)]
+    assert [bool(m.terminated.all()) for m in transitions] == [False] * 11 + [True, False]
+    assert not any(m.truncated.any() for m in transitions)
+    assert env.pop_episode_stats().arrived == 2
 
 
 def test_training_worlds_are_not_those_of_validation():
-    fleet = TINY.begin(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights(), 0).fleet
+    env = TINY.begin(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights(), 0).env
     seeds = []
-    fleet._swarms[0].reset = lambda drawn, worlds: seeds.extend(drawn)
+    env._swarms[0].reset = lambda drawn, worlds: seeds.extend(drawn)
     for _ in range(500):
-        fleet._restart(0, [0, 1])
+        env._restart(0, [0, 1])
     assert TRAINING_SEEDS == (100_000, VALIDATION_SEEDS)
     assert 100_000 <= min(seeds) < 110_000
     assert 890_000 < max(seeds) < VALIDATION_SEEDS
@@ -250,7 +252,7 @@ def test_the_reward_by_hand(place):
             -260 / 50 - 0.01,
         ]
     )
-    np.testing.assert_allclose(shaped(swarm, only)[0], expected - [0, 0, 8], rtol=1e-12)
+    np.testing.assert_allclose(shaped_reward(swarm, only)[0], expected - [0, 0, 8], rtol=1e-12)
 
 
 def test_moving_the_centre_is_paid_in_full():
@@ -275,8 +277,8 @@ def test_the_critics_view_does_not_depend_on_the_order_of_vehicles():
         swarm.state.eta[0], swarm.state.nu[0] = swarm.state.eta[0, rows], swarm.state.nu[0, rows]
         swarm.state.before[0] = swarm.state.eta[0, :, :2]
         swarm.observe()
-        views.append(np.zeros((1, 12, VIEW_SIZE), np.float32))
-        view(swarm, views[-1])
+        views.append(np.zeros((1, 12, PRIVILEGED_SIZE), np.float32))
+        privileged_observation(swarm, views[-1])
     np.testing.assert_allclose(views[0][:, order], views[1], atol=1e-5)
     assert np.isfinite(views[0]).all()
 
@@ -291,7 +293,7 @@ def settings(**changes):
 @pytest.fixture
 def no_validation(monkeypatch):
     verdicts = itertools.cycle([-1.0, -0.5, -0.8])
-    monkeypatch.setattr(trainings, "validate", lambda *_: judge([episode()])._replace(score=next(verdicts)))
+    monkeypatch.setattr(trainings, "validate", lambda *_: validation_result([episode()])._replace(score=next(verdicts)))
 
 
 def files(folder):
@@ -321,7 +323,7 @@ def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, no_validation)
 
 
 def test_a_seed_is_a_training(tmp_path, no_validation):
-    trained = [Training(settings(seed=seed)) for seed in (0, 0, 1)]
+    trained = [Trainer(settings(seed=seed)) for seed in (0, 0, 1)]
     for training in trained:
         training.iterate(Record())
     one, same, other = (training.algorithm.arrays() for training in trained)
@@ -331,16 +333,16 @@ def test_a_seed_is_a_training(tmp_path, no_validation):
 
 def test_the_best_policy_is_kept_and_can_be_started_from(tmp_path, monkeypatch):
     scores = iter([-1.0, -0.5, -0.8, -0.9])
-    monkeypatch.setattr(trainings, "validate", lambda *_: judge([episode()])._replace(score=next(scores)))
+    monkeypatch.setattr(trainings, "validate", lambda *_: validation_result([episode()])._replace(score=next(scores)))
     records = list(train(tmp_path / "a", settings(validate_every=1, steps=4 * 168)))
     assert [record.best for record in records] == [-1.0, -0.5, -0.5, -0.5]
     made = load_checkpoint(tmp_path / "a" / "best")
     assert made.card.training["record"]["iteration"] == 2
-    again = Training(settings(start=str(tmp_path / "a" / "best"), seed=9))
-    x = np.random.default_rng(0).standard_normal((30, again.algorithm.fleet.features), np.float32)
+    again = Trainer(settings(start=str(tmp_path / "a" / "best"), seed=9))
+    x = np.random.default_rng(0).standard_normal((30, again.algorithm.env.features), np.float32)
     np.testing.assert_allclose(forward(made.layers, x), again.algorithm.learner.act(x), atol=1e-5)
     with pytest.raises(ResultsError, match="learner.safetensors can't be used.*give a folder best or a checkpoint"):
-        Training(settings(start=str(tmp_path / "nowhere")))
+        Trainer(settings(start=str(tmp_path / "nowhere")))
 
 
 def test_a_policy_is_validated_by_the_benchmark_itself(tmp_path):
@@ -385,8 +387,8 @@ def test_costs_by_hand():
     assert cost(episode()) == 0.5
     assert cost(episode(task_time_s=None)) == 2.0
     assert cost(episode(collisions=7, min_obstacle_distance_m=6.5, min_spacing_m=3.25)) == 0.5 + 2.0 + 0.5 + 0.5
-    verdict = judge([episode(), episode(task_time_s=None, min_obstacle_distance_m=20.0, collisions=2)])
-    assert verdict == (-2.25, 0.5, 2, 30.0, 6.5, 20.0)
+    result = validation_result([episode(), episode(task_time_s=None, min_obstacle_distance_m=20.0, collisions=2)])
+    assert result == (-2.25, 0.5, 2, 30.0, 6.5, 20.0)
 
 
 @pytest.mark.parametrize("stop", [1, 3])
@@ -495,7 +497,7 @@ DAMAGES = {
 def kept(tmp_path_factory):
     folder = tmp_path_factory.mktemp("kept") / "a"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(trainings, "validate", lambda *_: judge([episode()]))
+        patch.setattr(trainings, "validate", lambda *_: validation_result([episode()]))
         first = train(folder, settings())
         for _ in range(2):
             next(first)
@@ -586,10 +588,10 @@ def test_modules_of_optional_libraries_name_their_extra(module, library, name):
 
 def test_the_command(tmp_path, monkeypatch):
     before = signal.getsignal(signal.SIGINT)  # ignored where the tests run in the background
-    seen = []
+    calls = []
 
     def fake(output, settings, *, resume, say, stop):
-        seen.append((output, settings, resume))
+        calls.append((output, settings, resume))
         yield Record(1, 500, 2.0, -1.5, 0.01, 0.5, -0.25, -0.25, 1.0, 0, 3.0, 7.0, 15.0)
         for _ in range(resume * seed):
             os.kill(os.getpid(), signal.SIGINT)
@@ -604,7 +606,7 @@ def test_the_command(tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     assert "250 agent-steps/s" in done.output
     assert "arrived 100%" in done.output
-    output, settings, resume = seen[0]
+    output, settings, resume = calls[0]
     assert (output, settings.seed, settings.steps, settings.algorithm.noise, resume) == (
         tmp_path,
         3,

@@ -9,17 +9,18 @@ from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnv
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.learned import WEIGHTS_FILE, forward, load_checkpoint
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, load_checkpoint
+from uuv_marl.baselines.learned import forward
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import ppo as ppos
 from uuv_marl.train import training as trainings
-from uuv_marl.train.crew import Crew
-from uuv_marl.train.fleet import Fleet
+from uuv_marl.train.env import TrainingEnv
 from uuv_marl.train.ppo import Hyperparameters, Ppo
 from uuv_marl.train.shaping import Weights
 from uuv_marl.train.training import Settings, train
-from uuv_marl.train.validation import judge
+from uuv_marl.train.validation import validation_result
+from uuv_marl.train.vec_env import TrainingVecEnv
 
 OPEN_WATER = {
     "timing.decision_period_s": 0.5,
@@ -43,19 +44,19 @@ class OneStep(VecEnv):
     """Rows see two numbers (x1, x2) and are paid most where the action is (x1, -x2) / 2; every step ends them."""
 
     def __init__(self, *_):
-        self.render_mode, self.paid, self._rng = None, 0.0, np.random.default_rng(1)
+        self.render_mode, self.reward_sum, self._rng = None, 0.0, np.random.default_rng(1)
         super().__init__(64, Box(-1.0, 1.0, (2,)), Box(-8.0, 8.0, (2,), np.float32))
 
     def reset(self):
-        self.seen = self._rng.uniform(-1, 1, (64, 2)).astype(np.float32)
-        return self.seen
+        self.observation = self._rng.uniform(-1, 1, (64, 2)).astype(np.float32)
+        return self.observation
 
     def step_async(self, actions):
-        self._reward = -10.0 * np.sum((actions - self.seen * (0.5, -0.5)) ** 2, axis=1)
+        self._reward = -10.0 * np.sum((actions - self.observation * (0.5, -0.5)) ** 2, axis=1)
 
     def step_wait(self):
-        self.paid += float(self._reward.mean())
-        infos = [{"terminal_observation": row, "TimeLimit.truncated": False} for row in self.seen]
+        self.reward_sum += float(self._reward.mean())
+        infos = [{"terminal_observation": row, "TimeLimit.truncated": False} for row in self.observation]
         return self.reset(), self._reward.astype(np.float32), np.ones(64, np.bool_), infos
 
     def close(self): ...
@@ -70,7 +71,7 @@ class OneStep(VecEnv):
 
 def test_a_one_step_task_is_solved(monkeypatch):
     """Seeds 0 to 4 miss by 0.007 to 0.011, the same with AVX-512 and with torch's default kernels."""
-    monkeypatch.setattr(ppos, "Crew", OneStep)
+    monkeypatch.setattr(ppos, "TrainingVecEnv", OneStep)
     by = Hyperparameters(hidden=(32,), horizon=8, minibatch=128, kl_stop=0.05, learning_rate=(3e-3, 5e-4))
     algorithm = Ppo(by, open_water(), SIZES, Weights(), 0)
     rewards = [algorithm.iterate(k / 100)[0] for k in range(100)]
@@ -102,19 +103,19 @@ def test_endings_are_told_as_sb3_wants_them():
         (arrives, True),
         ({**arrives, "arrival.radius_m": 1e-3, "time_limit.extra_s": 5.0}, False),
     ):
-        crew = Crew(open_water(**overrides), [(1, 1), (3, 1)], Weights())
-        crew.seed(0)
-        start = crew.reset()
+        vec_env = TrainingVecEnv(open_water(**overrides), [(1, 1), (3, 1)], Weights())
+        vec_env.seed(0)
+        start = vec_env.reset()
         for _ in range(12):
-            seen, _, dones, infos = crew.step(np.zeros((4, 2), np.float32))
+            observation, _, dones, infos = vec_env.step(np.zeros((4, 2), np.float32))
         assert dones.all()
         for row in range(4):
             assert infos[row].get("TimeLimit.truncated", False) is not arrived
             if not arrived:
                 last = infos[row]["terminal_observation"]
                 assert last.shape == start[row].shape
-                assert np.abs(last - seen[row]).max() > 0.01, "what comes next is another episode's start"
-        episodes = crew.fleet.take_episodes()
+                assert np.abs(last - observation[row]).max() > 0.01, "what comes next is another episode's start"
+        episodes = vec_env.env.pop_episode_stats()
         assert (episodes.number, episodes.arrived, episodes.decisions) == (2, 2 * arrived, 24)
 
 
@@ -158,9 +159,9 @@ def files(folder):
 def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch):
     """Bit for bit, with episodes that end all the time, whatever others draw from the global generators meanwhile."""
     scores = itertools.cycle([-1.0, -0.5])
-    verdict = judge([{"task_time_s": None, "duration_s": 1.0, "collisions": 0, "min_spacing_m": 7.0,
+    result = validation_result([{"task_time_s": None, "duration_s": 1.0, "collisions": 0, "min_spacing_m": 7.0,
                       "min_obstacle_distance_m": None}])  # fmt: skip
-    monkeypatch.setattr(trainings, "validate", lambda *_: verdict._replace(score=next(scores)))
+    monkeypatch.setattr(trainings, "validate", lambda *_: result._replace(score=next(scores)))
     before = torch.get_rng_state()
     records = list(train(tmp_path / "whole", settings()))
     assert torch.equal(torch.get_rng_state(), before), "the global generators are left as they were"
@@ -186,8 +187,8 @@ def test_a_short_training_beats_random_by_far():
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=272, epochs=6, kl_stop=0.1, learning_rate=(3e-3, 3e-4))
     algorithm = Ppo(by, open_water(), sizes, Weights(), 0)
     rewards = [algorithm.iterate(k / 60)[0] for k in range(60)]
-    fleet = Fleet(open_water(), sizes, Weights(), lambda num: range(100_000, 100_000 + num))
+    env = TrainingEnv(open_water(), sizes, Weights(), lambda num: range(100_000, 100_000 + num))
     rng = np.random.default_rng(0)
-    actions = rng.uniform(-1.0, 1.0, (60, fleet.rows, 2)).astype(np.float32)
-    floor = np.mean([fleet.step(action).reward for action in actions])
+    actions = rng.uniform(-1.0, 1.0, (60, env.rows, 2)).astype(np.float32)
+    floor = np.mean([env.step(action).reward for action in actions])
     assert np.mean(rewards[-8:]) > floor / 2, "rewards are negative: less than half of the cost"

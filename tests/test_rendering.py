@@ -9,35 +9,78 @@ import pytest
 import uuv_marl
 from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark import style
+from uuv_marl.envs.batched_env import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim, nice
+from uuv_marl.envs.drawing.current import ARROW, paint_current
 from uuv_marl.envs.drawing.frame import Frame, Panel, _numbers, pixels
 from uuv_marl.envs.drawing.legend import _flow, rows
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.envs.drawing.scene import TRAIL_S, Memory
 from uuv_marl.envs.solo import SoloEnv
-from uuv_marl.envs.task import make_task
 from uuv_marl.envs.vector_env import vector_env
 
 SIZE = (600, 500)
 
 
 def played(scenario="starter", policy="bio_inspired", seconds=10.0, sonar_of=None, seed=0, **changes):
-    """The scene of an episode after some seconds, and its task and memory."""
-    task = make_task(granted(policy, uuv_marl.load_scenario(scenario, **changes)))
-    actor = make(policy, task.swarm.scenario)
-    task.reset(seed)
+    """The scene of an episode after some seconds, its worlds and its memory."""
+    batch = make_batched_env(granted(policy, uuv_marl.load_scenario(scenario, **changes)))
+    actor = make(policy, batch.swarm.scenario)
+    batch.reset(seed)
     actor.reset(seed)
-    memory = Memory(task)
-    memory.note(task)
-    while task.swarm.facts.time_s[0] < seconds - 1e-6:
-        task.step(actor.act(task.swarm.percept))
-        memory.note(task)
-    return memory.scene(task, 0, sonar_of), task, memory
+    memory = Memory(batch)
+    memory.note(batch)
+    while batch.swarm.facts.time_s[0] < seconds - 1e-6:
+        batch.step(actor.act(batch.swarm.percept))
+        memory.note(batch)
+    return memory.scene(batch, 0, sonar_of), batch, memory
 
 
 def colour(picture, at):
     return tuple(int(part) for part in picture[round(at[1]), round(at[0])])
+
+
+CURRENT = {"current.speed_mps": 1.0, "current.direction_deg": 90.0}
+
+
+def arrow_px(**changes):
+    """What a current paints in the middle of a picture, where an arrow is: pixels to the right and down of it."""
+    scene, _, _ = played(seconds=0.0, overrides={**CURRENT, **changes})
+    surface = pygame.Surface((200, 200), depth=32)
+    surface.fill(ink.WATER)
+    paint_current(surface, scene, Camera(np.array([100.0, 100.0]), 1.0, (200, 200)), 400.0, 1.0)
+    down, right = np.nonzero((pixels(surface) != ink.WATER).any(axis=-1))
+    return right - 100, down - 100
+
+
+def test_the_current_is_an_arrow_along_the_water_as_long_as_it_is_fast():
+    for degrees, (right, down) in ((90.0, (1, 0)), (0.0, (0, -1)), (-90.0, (-1, 0)), (180.0, (0, 1))):
+        x, y = arrow_px(**{"current.direction_deg": degrees})
+        along, across = right * x + down * y, down * x - right * y
+        assert abs(along.min() + ARROW / 2) <= 1
+        assert abs(along.max() - ARROW / 2) <= 1
+        assert np.abs(across[along < 0]).max() <= 1  # the tip is ahead
+        assert np.abs(across[along > 0]).max() >= 2
+    half = arrow_px(**{"current.speed_mps": 0.7})
+    assert half[0].max() - half[0].min() == pytest.approx(0.7 * ARROW, abs=1.5)
+
+
+def test_still_water_is_drawn_as_before_and_a_sea_is_named_in_the_legend():
+    calm, moved = (played(seconds=0.0, overrides=change)[0] for change in ({"obstacles": []}, CURRENT))
+    assert calm.water is None
+    words = [[entry[2] for entry in _flow(800, scene, 12)] for scene in (calm, moved)]
+    assert "current, 1 m/s" in words[1]
+    assert words[1][-1] == "sea: current 1 m/s"
+    assert not [word for word in words[0] if "current" in word or "sea" in word]
+    long = played(seconds=0.0, overrides={**CURRENT, "mismatch.mass": 0.1, "noise.bearing_deg": 2.0})[0]
+    (*_, (row, x, cut, _)) = _flow(200, long, 12)
+    assert cut.endswith("…")
+    assert x + ink.text(cut, 12).get_width() <= 200
+    assert row == rows(200, long, 12) - 1
+    painter, camera = Painter(SIZE), aim("follow", [moved], SIZE)
+    with_arrows = pixels(painter.paint(moved, camera))
+    assert (with_arrows != pixels(painter.paint(moved._replace(water=None), camera))).any()
 
 
 @pytest.mark.parametrize("kind", ["follow", "map"])
@@ -104,33 +147,33 @@ def test_steps_of_a_scale_are_nice():
 
 
 def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
-    task = make_task("starter", 2)
-    memory = Memory(task)
-    task.reset(0)
-    memory.note(task)
-    start = task.swarm.state.eta[:, :, :2].copy()
-    state = task.swarm.state
+    batch = make_batched_env("starter", 2)
+    memory = Memory(batch)
+    batch.reset(0)
+    memory.note(batch)
+    start = batch.swarm.state.eta[:, :, :2].copy()
+    state = batch.swarm.state
     for k in range(300):
         if k == 100:  # head-on, 4 m apart
             state.eta[0, :2] = [[-50.0, 0.0, 0.0], [-46.0, 0.0, np.pi]]
             state.nu[0, :2] = [4.0, 0.0, 0.0]
-        task.step(np.zeros((2, 5, 2), np.float32))
-        memory.note(task)
-    scene = memory.scene(task, 0, None)
-    assert scene.collisions == int(task.collisions[0]) > 0
+        batch.step(np.zeros((2, 5, 2), np.float32))
+        memory.note(batch)
+    scene = memory.scene(batch, 0, None)
+    assert scene.collisions == int(batch.collisions[0]) > 0
     assert len(scene.trail) == TRAIL_S
     assert 10.0 < scene.hits[0, 2] < 11.0
     np.testing.assert_allclose(scene.hits[0, :2], [-48.0, 0.0], atol=2.0)
-    assert not memory.scene(task, 1, None).hits.size
-    memory.note(task)
-    assert len(memory.scene(task, 0, None).trail) == TRAIL_S
-    task.reset(worlds=[0])
-    memory.note(task)
-    fresh = memory.scene(task, 0, None)
+    assert not memory.scene(batch, 1, None).hits.size
+    memory.note(batch)
+    assert len(memory.scene(batch, 0, None).trail) == TRAIL_S
+    batch.reset(worlds=[0])
+    memory.note(batch)
+    fresh = memory.scene(batch, 0, None)
     assert not fresh.hits.size
     assert len(fresh.trail) <= 1
-    assert len(memory.scene(task, 1, None).trail) == TRAIL_S
-    assert not np.allclose(start[1], memory.scene(task, 1, None).position)
+    assert len(memory.scene(batch, 1, None).trail) == TRAIL_S
+    assert not np.allclose(start[1], memory.scene(batch, 1, None).position)
 
 
 def test_a_collision_is_marked_and_counted_in_its_colour():
@@ -150,15 +193,15 @@ def test_a_collision_is_marked_and_counted_in_its_colour():
 
 
 def test_the_numbers_are_those_of_the_swarm():
-    scene, task, _ = played("single_obstacle", seconds=70.0)
-    facts = task.swarm.facts
+    scene, batch, _ = played("single_obstacle", seconds=70.0)
+    facts = batch.swarm.facts
     numbers = {short: value for _, short, value, _ in _numbers(scene)}
     assert numbers["time"] == "70.0 s"
     assert numbers["vehicles"] == "54"
     assert numbers["spacing"] == f"{facts.spacing[0].min():.1f} m"
     assert numbers["clearance"] == f"{facts.clearance[0].min():.1f} m"
     assert numbers["collisions"] == "0"
-    away = np.linalg.norm(task.swarm.state.eta[0, :, :2].mean(axis=0) - facts.reference[0, :2])
+    away = np.linalg.norm(batch.swarm.state.eta[0, :, :2].mean(axis=0) - facts.reference[0, :2])
     assert numbers["to l(t)"] == (f"{away:.1f} m" if away < 100 else f"{away:.0f} m")
     lossy, _, _ = played("lossy", seconds=50.0)
     assert {short: value for _, short, value, _ in _numbers(lossy)}["vehicles"] == "52 of 54"
@@ -168,13 +211,13 @@ def test_the_numbers_are_those_of_the_swarm():
 
 
 def test_the_sonar_shown_is_what_the_vehicle_hears():
-    scene, task, memory = played("single_obstacle", seconds=70.0, sonar_of=10)
-    heard = task.swarm.heard[0, 10]
-    eta = task.swarm.state.eta[0]
+    scene, batch, memory = played("single_obstacle", seconds=70.0, sonar_of=10)
+    heard = batch.swarm.heard[0, 10]
+    eta = batch.swarm.state.eta[0]
     c, s = np.cos(eta[10, 2]), np.sin(eta[10, 2])
     places = eta[10, :2] + scene.sonar.neighbour @ np.array([[c, s], [-s, c]])
     np.testing.assert_allclose(places, eta[heard[heard >= 0], :2], atol=1e-3)
-    np.testing.assert_array_equal(scene.sonar.echo_range, task.swarm.percept["echo_range"][0, 10])
+    np.testing.assert_array_equal(scene.sonar.echo_range, batch.swarm.percept["echo_range"][0, 10])
     camera = aim("follow", [scene], SIZE)
     picture = pixels(Painter(SIZE).paint(scene, camera)).astype(int)
     pink = np.abs(picture - ink.PINK).max(axis=2) < 60
@@ -182,8 +225,8 @@ def test_the_sonar_shown_is_what_the_vehicle_hears():
     assert np.mean([pink[round(y) - 1 : round(y) + 2, round(x) - 1 : round(x) + 2].any() for x, y in halfway]) > 0.9
     without = pixels(Painter(SIZE).paint(scene._replace(sonar=None), camera)).astype(int)
     assert not (np.abs(without - ink.PINK).max(axis=2) < 20).any()
-    task.swarm.state.alive[0, 10] = False
-    assert memory.scene(task, 0, 10).sonar is None
+    batch.swarm.state.alive[0, 10] = False
+    assert memory.scene(batch, 0, 10).sonar is None
 
 
 def test_the_legend_explains_what_can_be_seen_and_nothing_else():
@@ -326,7 +369,7 @@ def test_a_paused_window_goes_on_by_single_steps(window):
 
 
 def test_keys_change_speed_camera_and_sonar(window):
-    shown = window._view._canvas
+    shown = window._renderer._canvas
     for name in ("K_PLUS", "K_c", "K_TAB", "K_TAB"):
         key(name)
     window.step(idle(window))
@@ -358,7 +401,7 @@ def test_fast_windows_leave_steps_out(window):
     for _ in range(8):
         key("K_PLUS")
     drawn = []
-    shown = window._view._canvas
+    shown = window._renderer._canvas
     paint, shown._draw = shown._draw, lambda *args: drawn.append(paint(*args))
     started = pygame.time.get_ticks()
     for _ in range(64):

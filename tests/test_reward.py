@@ -6,21 +6,21 @@ import pytest
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
+from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.envs.reward import TERMS, reward_terms
-from uuv_marl.envs.task import Task
 from uuv_marl.sim.swarm import Swarm
 
 
 def mean_return(name, scenario):
-    task = Task(scenario, 3)
+    batch = BatchedEnv(scenario, 3)
     policy = make(name, scenario, 3)
-    task.reset(0)
+    batch.reset(0)
     policy.reset(0)
     total, active = np.zeros(3), np.ones(3, bool)
     while active.any():
-        outcome = task.step(policy.act(task.swarm.percept))
-        total += np.where(active, outcome.reward.mean(axis=1), 0.0)
-        active &= ~task.swarm.ended
+        result = batch.step(policy.act(batch.swarm.percept))
+        total += np.where(active, result.reward.mean(axis=1), 0.0)
+        active &= ~batch.swarm.ended
     return total
 
 
@@ -33,20 +33,20 @@ def test_the_controller_beats_the_floors_everywhere(scenario_name):
 
 def test_step_terms_are_never_positive_and_arrival_pays_once(place):
     scenario = load_scenario("single_obstacle", num_vehicles=4)
-    task = Task(scenario, 8)
-    task.reset(0)
+    batch = BatchedEnv(scenario, 8)
+    batch.reset(0)
     rng = np.random.default_rng(0)
     for _ in range(100):
-        task.step(rng.uniform(-1, 1, (8, 4, 2)).astype(np.float32))
-        for name, term in reward_terms(task.swarm).items():
+        batch.step(rng.uniform(-1, 1, (8, 4, 2)).astype(np.float32))
+        for name, term in reward_terms(batch.swarm).items():
             assert (term <= 0).all(), name
 
 
 def returns(scenario, arrival_tick=None, die_at=None, bump_at=None, ticks=60):
     """Return of a scripted swarm that rests at its end; it arrives, loses vehicle 0 or bumps it when told."""
-    task = Task(scenario)
-    task.reset(0)
-    swarm, total = task.swarm, np.zeros(swarm_size := scenario.swarm.num_vehicles)
+    batch = BatchedEnv(scenario)
+    batch.reset(0)
+    swarm, total = batch.swarm, np.zeros(swarm_size := scenario.swarm.num_vehicles)
     for k in range(ticks):
         near = arrival_tick is not None and k >= arrival_tick
         swarm.state.tick[0] = 2000 + k
@@ -59,13 +59,13 @@ def returns(scenario, arrival_tick=None, die_at=None, bump_at=None, ticks=60):
         if k == die_at:
             swarm.state.alive[0, 0] = False
         task_alive = swarm.state.alive[0].copy()
-        outcome = task.step(np.zeros((1, swarm_size, 2), np.float32))
-        total += outcome.reward[0]
+        result = batch.step(np.zeros((1, swarm_size, 2), np.float32))
+        total += result.reward[0]
         if die_at == k:
             swarm.facts.lost[0, 0] = True
             total[0] += sum(term[0, 0] for term in reward_terms(swarm).values())
         assert task_alive.sum() >= swarm_size - 1
-        if outcome.terminated[0, -1]:
+        if result.terminated[0, -1]:
             break
     return total
 
@@ -102,12 +102,12 @@ def test_a_lost_vehicle_is_charged_more_than_staying_could_cost():
     idle = np.zeros((1, 6, 2), np.float32)
     total = {}
     for scenario in (lossy, calm):
-        task = Task(scenario)
-        task.reset(0)
+        batch = BatchedEnv(scenario)
+        batch.reset(0)
         total[scenario] = np.zeros(6)
-        while not task.swarm.ended[0]:
-            total[scenario] += task.step(idle).reward[0]
-        victim = task.swarm.course.losses[0]
+        while not batch.swarm.ended[0]:
+            total[scenario] += batch.step(idle).reward[0]
+        victim = batch.swarm.course.losses[0]
         if len(victim):
             dead = int(victim[0])
     assert total[lossy][dead] < total[calm][dead]
@@ -119,13 +119,13 @@ def test_dying_never_pays_the_one_who_dies(reward):
     base = load_scenario("single_obstacle", num_vehicles=12, overrides={"time_limit.factor": 0.5})
     totals, lost = [], []
     for losses in ([], [30.0]):
-        task = Task(load_scenario(base, overrides={"disturbance.loss_times_s": losses}), reward=reward)
-        task.reset(3)
-        lost += task.swarm.course.losses[0].tolist()
+        batch = BatchedEnv(load_scenario(base, overrides={"disturbance.loss_times_s": losses}), reward=reward)
+        batch.reset(3)
+        lost += batch.swarm.course.losses[0].tolist()
         total = np.zeros(12)
-        while not task.swarm.ended[0]:
-            outcome = task.step(np.zeros((1, 12, 2), np.float32))
-            total += outcome.reward[0] * (outcome.terminated[0] | task.swarm.state.alive[0])
+        while not batch.swarm.ended[0]:
+            result = batch.step(np.zeros((1, 12, 2), np.float32))
+            total += result.reward[0] * (result.terminated[0] | batch.swarm.state.alive[0])
         totals.append(total)
     whole, dead = totals
     assert dead[lost] < whole[lost]

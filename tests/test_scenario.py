@@ -31,9 +31,8 @@ def test_every_number_carries_its_source(name):
             ("version", "title", "source", "name")
         ):
             comment = line.partition("#")[2]
-            assert re.search(
-                r"section|Table|Eq\.|assumed|Repoulias|none in the paper|nobody|as in the paper", comment
-            ), line
+            known = r"section|Table|Eq\.|assumed|Repoulias|none in the paper|nobody|as in the paper|MBARI|Nanomodem"
+            assert re.search(known, comment), line
 
 
 @pytest.mark.parametrize("name", ["tracking", "single_obstacle", "multi_obstacle"])
@@ -59,6 +58,18 @@ def test_show_is_complete_and_loads(name, tmp_path):
     path.write_text(text)
     assert load_scenario(path) == load_scenario(name)
     assert "Repoulias" in text
+
+
+def test_a_sea_goes_out_and_in_again(tmp_path):
+    faults = [{"kind": "array", "share": 0.1, "array": "bow"}, {"kind": "yaw", "share": 0.2, "onset_s": 3.0}]
+    sea = {"current.speed_mps": 0.5, "current.direction_deg": 30.0, "modem.period_s": 9.0, "faults": faults}
+    scenario = load_scenario(BASE, overrides=sea)
+    path = tmp_path / f"{BASE}.toml"
+    path.write_text(to_toml(scenario))
+    assert load_scenario(path) == scenario
+    assert load_scenario(scenario, overrides={"faults.1.share": 0.3}).faults[1].share == 0.3
+    path.write_text(show(path))
+    assert load_scenario(path) == scenario
 
 
 def test_durations_are_the_papers_bounds():
@@ -160,9 +171,67 @@ BAD = [
     ({"actuators.max_torque_nm": 43621.0, "vehicle.N_rr": 1.55}, "max_torque_nm = 43621; use at most"),
     ({"swarm.num_vehicles.deep": 1}, "swarm.num_vehicles.deep is unknown"),
 ]
+ARRAY, MEMBER = ({"kind": kind, "share": 0.1} for kind in ("array", "member"))
+BAD_SEA = [
+    ({"current.speed_mps": float("nan")}, "current.speed_mps must lie within 0 to 100, got nan"),
+    ({"current.speed_mps": "fast"}, "current.speed_mps must be a number, got 'fast'"),
+    ({"current.velocity": "bottom"}, "current.velocity must be 'ground' or 'water', got 'bottom'"),
+    ({"current.variation_time_s": 0.0}, "current.variation_time_s must lie within 0.0001 to 3,600, got 0.0"),
+    ({"current.eddies": 2.5}, "current.eddies must be a whole number, got 2.5"),
+    (
+        {"current.eddies": 64, "current.eddy_speed_mps": 1.0, "trajectory.waypoints_m": [[0.0, 0.0], [1e6, 1e6]]},
+        "current.eddies = 64 makes 256,256,064 eddies around this course; at most 4,096 are possible: lower it",
+    ),
+    ({"current": 3}, "current must be a table of fields, got 3"),
+    ({"current.speed": 1.0}, "current.speed is unknown; did you mean 'speed_mps'"),
+    ({"curent.speed_mps": 1.0}, "curent is unknown; did you mean 'current'"),
+    ({"latency.travel_time": 1}, "latency.travel_time must be true or false, got 1"),
+    ({"latency.processing_s": 2.5}, "latency.processing_s must lie within 0 to 2, got 2.5"),
+    (
+        {"latency.processing_s": 2.0, "timing.control_hold_s": 0.01, "timing.integration_step_s": 0.01},
+        "latency.processing_s = 2 is 200 control holds; at most 64 readings are kept: lower it or raise timing.control",
+    ),
+    ({"latency.active_period_s": 0.1}, "latency.active_period_s must be at least 0.1333, .* range of 100 m, or 0 "),
+    ({"noise.silence_probability": 1.5}, "noise.silence_probability must lie within 0 to 1, got 1.5"),
+    ({"noise.false_echo_probability": -0.1}, "noise.false_echo_probability must lie within 0 to 1, got -0.1"),
+    ({"noise.silence_readings": 0}, "noise.silence_readings must lie within 1 to 10,000, got 0"),
+    ({"navigation.compass_bias_deg": float("inf")}, "navigation.compass_bias_deg must lie within 0 to 180, got inf"),
+    ({"modem.loss_probability": 2}, "modem.loss_probability must lie within 0 to 1, got 2"),
+    ({"modem.period_s": 0.0}, "modem.period_s must lie within 0.001 to 36,000, got 0.0"),
+    ({"mismatch.mass": 0.95}, "mismatch.mass must lie within 0 to 0.9, got 0.95"),
+    ({"actuators.yaw_authority": 1.5}, "actuators.yaw_authority must lie within 0 to 1, got 1.5"),
+    ({"actuators.thrust_lag_s": -1.0}, "actuators.thrust_lag_s must lie within 0 to 3,600, got -1.0"),
+    ({"sonar.channels": ["modm"]}, "sonar.channels.0 must be 'compass', .* or 'modem', got 'modm'"),
+    ({"faults": "yaw"}, "faults must be a list, got 'yaw'"),
+    ({"faults": [3]}, "faults.0 must be a table of fields, got 3"),
+    ({"faults": [{"kind": "yaw"}]}, "faults.0.share is missing; set it"),
+    ({"faults": [{"kind": "engine", "share": 0.1}]}, "faults.0.kind must be 'thruster', .* got 'engine'"),
+    ({"faults": [MEMBER | {"share": 1.1}]}, "faults.0.share must lie within 0 to 1, got 1.1"),
+    ({"faults": [MEMBER | {"efficency": 0.5}]}, "faults.0.efficency is unknown; did you mean 'efficiency'"),
+    (
+        {"faults": [MEMBER | {"efficiency": 0.5}]},
+        "efficiency is of kinds thruster and yaw alone, got 0.5 .*leave",
+    ),
+    ({"faults": [MEMBER | {"duration_s": 5.0}]}, "faults.duration_s is of no use to kind member, got 5.*leave it out"),
+    (
+        {"faults": [MEMBER | {"array": "bow"}]},
+        "faults.array must name the array of a fault of kind array, .* got 'bow'",
+    ),
+    ({"faults": [ARRAY]}, "faults.array must name the array of a fault of kind array, .* got None"),
+    ({"faults": [ARRAY | {"array": "stern"}]}, "faults.0.array must be one of bow, port, starboard, got 'stern'"),
+    (
+        {"faults": [MEMBER | {"share": 1.0}]},
+        "faults and .* may lose 54 of 54 vehicles; .*must remain: lower",
+    ),
+    ({"faults": [MEMBER] * 65}, "faults must have at most 64 entries"),
+    (
+        {"faults.0.share": 0.2},
+        "faults.0.share is unknown: .* the list is empty: give it as a whole",
+    ),
+]
 
 
-@pytest.mark.parametrize(("overrides", "message"), BAD)
+@pytest.mark.parametrize(("overrides", "message"), [*BAD, *BAD_SEA])
 def test_bad_values_name_field_value_and_remedy(overrides, message):
     with pytest.raises(ScenarioError, match=message):
         load_scenario(BASE, overrides=overrides)

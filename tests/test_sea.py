@@ -15,7 +15,7 @@ from uuv_marl.sim.compiled import interpreted
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
 from uuv_marl.sim.sea.actuation import followed, own_plant, varied, victims
-from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at, max_eddies
+from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.sea.sea import SEA_CHANNELS
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
@@ -208,7 +208,7 @@ def test_eddies_turn_by_turns_so_that_their_circulation_sums_to_nothing():
     for name in ("starter", "random_field", "tracking"):
         swarm = swim(EDDIES, 0, worlds=2, scenario=name)
         eddies = swarm._sea.flow.eddies
-        assert eddies.shape[1] == max_eddies(swarm.scenario)
+        assert eddies.shape[1] == swarm.scenario.max_eddies
         for w in range(2):
             there = eddies[w][eddies[w, :, 2] != 0.0]
             assert len(there) > 0
@@ -222,7 +222,9 @@ def test_the_water_at_a_vehicle_is_the_field_there():
     swarm = swim(CURRENT | GUSTS | EDDIES, 25)
     for i in range(5):
         x, y, _ = swarm.state.eta[0, i]
-        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._sea.water, swarm._sea.flow)
+        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._sea.water.core, swarm._sea.flow)
+    np.testing.assert_array_equal(swarm.flow_field().at(swarm.state.eta[0, :, :2]), swarm.flow[0])
+    assert not Swarm(load_scenario("starter")).flow_field().at([[[1.0, 2.0]]]).any()
 
 
 # --- Forces ---

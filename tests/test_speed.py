@@ -1,6 +1,5 @@
-"""The step keeps its distance to what the machine can do; what perf/ measures runs, and its pages say what it found."""
+"""The step keeps its distance to what the machine can do; and what perf/ measures runs and is told."""
 
-import hashlib
 import json
 import subprocess
 import sys
@@ -9,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import uuv_marl
 from uuv_marl import load_scenario
@@ -104,14 +102,6 @@ def test_the_floor_counts_what_a_step_must_do(perf):
     assert floor.least_seconds(5, 2, (10.0, 40.0, 80.0, 1e9)) == pytest.approx(2 * (10 / 10 + 20 / 40 + 40 / 80))
 
 
-def test_the_parts_of_a_step_run(perf, monkeypatch):
-    parts = perf("parts")
-    assert {*parts.CASES} == {*perf("compare").PARTS}
-    monkeypatch.setitem(parts.PARTS, "all", (True,) * 5)  # compiled once
-    for name in ("all", "part_stepped"):
-        parts.part(name)(3, 2).run(1)
-
-
 def test_a_comparison_measures_what_it_can_and_says_why_the_rest_cannot_run(perf, tmp_path, monkeypatch):
     pytest.importorskip("stable_baselines3")
     compare = perf("compare")
@@ -166,72 +156,20 @@ def test_two_versions_are_the_same_only_if_every_run_is(perf, tmp_path, monkeypa
         assert "| episodes | 2 | none |" in capsys.readouterr().out
 
 
-def record(kind, case, agents, worlds, rates, **more):
-    where = {"kind": kind, "case": case, "agents": agents, "worlds": worlds}
-    return {**where, "library": "made up", "date": "2026-11-01T10:00:00+00:00", "rates": rates, **more}
+def record(case, rates, **more):
+    return {"kind": "rates", "case": case, "agents": 54, "worlds": 2, "rates": rates, **more}
 
 
-@pytest.fixture
-def made_up(perf, tmp_path):
-    """A results file of a few cases."""
-    results = {
-        "machine": {"cpu": "Abacus", "cores": 2, "memory_gib": 1, "system": "Linux"},
-        "libraries": {"vmas": {"python": "3.11.7", "versions": {"vmas": "1.5.2"}}},
-        "rounds": 2, "seconds": 0.4, "load": 0.25,
-        "cases": [
-            record("rates", "vector_env", 54, 64, [4000.0, 6000.0], facts={"entries": 98}),
-            record("rates", "jaxmarl", 54, 64, [1000.0, 2000.0]),
-            record("rates", "vmas", 500, 1024, [], failed="not ready within 180 s"),
-            record("rates", "mpe2", 500, 64, [92.0], facts={"built": 7}),
-            record("rates", "core", 54, 1, [54 / 2e-4]),
-            *(record("rates", kind, 54, 1, [1e9]) for kind in ("pairs", "keeps", "sines", "copy")),
-            record("training", "ppo", 54, 64, [5e4]),
-            record("curve", "idle", 10000, 1, [2e6, 4e6]),
-            record("adapters", "task_idle", 54, 64, [200.0, 400.0]),
-            record("adapters", "sb3_idle", 54, 64, [100.0, 300.0]),
-        ],
-    }  # fmt: skip
-    (tmp_path / "results.json").write_text(json.dumps(results))
-    return perf("report").Cases(tmp_path / "results.json")
-
-
-def test_the_tables_show_rates_ratios_and_reasons(perf, made_up):
-    report = perf("report")
-    page = report.filled("".join(f"<!-- {name} -->\n<!-- /{name} -->\n" for name in report.TABLES), made_up)
-    assert "| `vector_env` / JaxMARL | 5.00k | 1.50k | 3.33 | 3.50 (54 agents, 64 worlds) |" in page
-    row = next(line for line in page.splitlines() if line.startswith("| 54 | 64 | – | 5.00k [4.00k, 6.00k]"))
-    assert row.endswith("| 1.50k [1.00k, 2.00k] |")
-    assert "| 54 | 64 | 3.50 [3.00, 4.00] | – | – |" in page
-    assert "VMAS, 500 agents x 1024 worlds: not ready within 180 s." in page
-    assert "MPE2, 500 agents x 64 worlds: 7 of the worlds" in page
-    assert "| 10,000 | 0.375 [0.250, 0.500] | – |" in page
-    assert "50.0k (once) (64)" in page
-    assert "| `sb3_idle` | 200 [100, 300] | 0.625 [0.500, 0.750] |" in page
-    assert "Abacus, 2 cores" in page
-    least = max((3 * 54 * 53 / 2 + 8 * 54) / 1e9, 54 * (8 + 96 + 4 * 98) / 1e9)
-    assert f"| {1e6 * least:.1f} | 200.0 | {least / 2e-4:.2%}" in page
-    assert report.filled(page, made_up) == page
-
-
-def test_the_picture_has_both_panels(perf, made_up):
-    figure = perf("report").draw(made_up)
-    assert [axes.get_ylabel() for axes in figure.axes] == [
-        "time per vehicle and step [µs]",
-        "agent-steps per second [1/s]",
-    ]
-    (legend,) = figure.legends
-    assert {text.get_text() for text in legend.get_texts()} == {
-        "Swarm.step, tracking",
-        "Swarm.step",
-        "vector_env",
-        "JaxMARL",
-    }
-
-
-@pytest.mark.docs
-def test_page_and_picture_are_those_of_the_results_file(perf):
-    compare, report = perf("compare"), perf("report")
-    page = report.SPEED.read_text()
-    assert page == report.filled(page, report.Cases(compare.RESULTS))
-    with Image.open(report.PICTURE) as picture:
-        assert picture.info["Source"] == hashlib.sha256(compare.RESULTS.read_bytes()).hexdigest()
+def test_the_table_shows_rates_ratios_in_a_round_reasons_and_the_floor(perf):
+    kernels = [record(name, [1e9]) for name in perf("floor").KERNELS]
+    gone = record("vmas", [], failed="not ready within 180 s")
+    records = [record("core", [54e4, 27e4]), record("jaxmarl", [27e4, 27e4]), gone, *kernels]
+    rows = [" | ".join(map(str, row)) for row in perf("compare").table_rows(records)]
+    assert rows[0] == "rates | core | 54 | 2 | 405,000.0 [270,000.0, 540,000.0] | 1.000 [1.000, 1.000]"
+    assert rows[1] == "rates | jaxmarl | 54 | 2 | 270,000.0 [270,000.0, 270,000.0] | 0.750 [0.500, 1.000]"
+    assert rows[2] == "rates | vmas | 54 | 2 | not ready within 180 s | "
+    least = max(3 * 54 * 53 / 2 + 8 * 54, 54 * (8 + 96 + 4 * 98)) / 1e9
+    low, high = (f"{least * rate / 54:.2%}" for rate in (27e4, 54e4))
+    assert rows[-1].startswith("floor | of a step | 54 | 2 | ")
+    assert rows[-1].endswith(f"[{low}, {high}] | ")
+    assert len(list(perf("compare").table_rows(records[1:]))) == len(records) - 1

@@ -1,7 +1,6 @@
 """Write the tables between ``<!-- name -->`` and ``<!-- /name -->`` of README.md and docs from the code and results."""
 
 import re
-from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import uuv_marl
@@ -9,10 +8,11 @@ from uuv_marl import load_scenario, scenario_names, uuv_swarm_v0
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
-from uuv_marl.percept import PerceptField, PerceptLayout
+from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "README.md", ROOT / "docs" / "environment.md", ROOT / "docs" / "scenarios.md"
+MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
 
 
@@ -56,99 +56,44 @@ def scenarios() -> str:
     return table(("name", "what", "vehicles", "obstacles (at most)", "source"), lines)
 
 
-def facts() -> str:
-    """The environment at a glance, in the form that PettingZoo's pages have."""
-    env = uuv_marl.parallel_env("single_obstacle")
-    agents, timing = env.possible_agents, env.scenario.timing
-    return table(
-        ("what", "value"),
-        [
-            ("name", f"`{env.metadata['name']}`"),
-            ("import", "`from uuv_marl import uuv_swarm_v0`, or `import uuv_marl`"),
-            ("agents", f"{len(agents)}: `{agents[0]}` to `{agents[-1]}`; `num_vehicles` sets any number from 1"),
-            ("actions", f"continuous, `{env.action_space('uuv_0')}`"),
-            ("observations", f"`Box`, float32, shape {env.observation_space('uuv_0').shape}, finite bounds"),
-            ("state", f"`Box`, float32, shape {env.state_space.shape}"),
-            ("parallel API, AEC API", "yes, yes"),
-            ("time between two decisions (`decision_period`)", f"{timing.decision_period_s:g} s"),
-            ("time for which a force is held, integration step",
-             f"{timing.control_hold_s:g} s, {timing.integration_step_s:g} s"),
-            ("render modes", ", ".join(f"`{mode}`" for mode in env.metadata["render_modes"])),
-        ],
-    )  # fmt: skip
-
-
 def channels() -> str:
-    """The fields that both channels append to the observation."""
+    """The fields that all channels append to the observation."""
     plain = PerceptLayout.of(load_scenario("single_obstacle"))
-    full = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.channels": ["compass", "link"]}))
+    full = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.channels": list(CHANNELS)}))
     return fields(full.table[len(plain.table) :], plain.size)
 
 
-def actions() -> str:
-    """The two entries of an action."""
-    limits = load_scenario("single_obstacle").actuators
-    return table(
-        ("entry", "meaning", "unit", "value at 1"),
-        [
-            ("0", "surge force, ahead positive", "N", f"{limits.max_force_n:g}"),
-            ("1", "yaw torque, to starboard positive", "N m", f"{limits.max_torque_nm:g}"),
-        ],
-    )
-
-
-def rewards() -> str:
-    """The reward's terms and their weights."""
-    scenario = load_scenario("single_obstacle")
-    weights, limits = scenario.reward.model_dump(), scenario.constraints
+def filled() -> dict[str, str]:
+    """The tables of ``tables.md``, by name."""
+    env = uuv_marl.parallel_env("single_obstacle")
+    scenario, agents = env.scenario, env.possible_agents
+    weights = scenario.reward.model_dump()
     terms = [(f"`{name}`", what, f"{weights[name]:g}" if name in weights else "") for name, what in TERMS.items()]
-    lengths = f"s_l = {limits.s_l_m:g} m, s_o = {limits.s_o_m:g} m, s_u = {limits.s_u_m:g} m."
-    return f"{table(('term', 'value', 'weight w'), terms)}\n\n{lengths}"
+    text = Path(__file__).with_name("tables.md").read_text(encoding="utf-8")
+    values = {
+        "env": env, "scenario": scenario, "agents": agents, "last": agents[-1],
+        "action": env.action_space(agents[0]), "observation": env.observation_space(agents[0]),
+        "render_modes": ", ".join(f"`{mode}`" for mode in env.metadata["render_modes"]),
+        "terms": table(("term", "value", "weight w"), terms), "hulls": 2 * scenario.contact.hull_radius_m,
+    }  # fmt: skip
+    return dict(MARKED.findall(text.format(**values)))
 
 
-def endings() -> str:
-    """What ends an episode, for whom, and how."""
-    scenario = load_scenario("single_obstacle")
-    arrival, limit, hull = scenario.arrival, scenario.time_limit, scenario.contact.hull_radius_m
-    arrived = (
-        f"arrival: l(t) has stopped, the swarm's centre has been within {arrival.radius_m:g} m of the end for "
-        f"{arrival.dwell_s:g} s, and every vehicle is within {arrival.spread_m:g} m x max(1, sqrt(n/54)) of it"
-    )
-    late = f"the time limit, {limit.factor:g} x the trajectory's duration + {limit.extra_s:g} s, or `max_cycles` steps"
-    lost = "a vehicle is lost: at `disturbance.loss_times_s` (`lossy`), or by a collision if `contact.ends_vehicle`"
-    ends = [
-        (arrived, "all vehicles", "terminated"),
-        (late, "all vehicles", "truncated"),
-        (lost, "that vehicle", "terminated"),
-        ("the last vehicle is lost", "the world", "terminated"),
-    ]
-    collision = (
-        f"Two vehicles collide when their centres are nearer than {2 * hull:g} m; a vehicle collides with an obstacle\n"
-        f"when its centre is nearer than {hull:g} m to the surface."
-    )
-    return f"{table(('what happens', 'whose episode ends', 'how'), ends)}\n\n{collision}"
-
-
-TABLES: Mapping[str, Callable[[], str]] = {
-    "benchmark": benchmark,
-    "scenarios": scenarios,
-    "facts": facts,
-    "observation": lambda: fields(PerceptLayout.of(load_scenario("single_obstacle")).table),
-    "channels": channels,
-    "actions": actions,
-    "rewards": rewards,
-    "endings": endings,
-    "state": lambda: fields(state_table(load_scenario("single_obstacle"))),
-    "history": lambda: table(("version", "what changed"), list(uuv_swarm_v0.HISTORY.items())),
+TABLES = filled() | {
+    "benchmark": benchmark(),
+    "scenarios": scenarios(),
+    "observation": fields(PerceptLayout.of(load_scenario("single_obstacle")).table),
+    "channels": channels(),
+    "state": fields(state_table(load_scenario("single_obstacle"))),
+    "history": table(("version", "what changed"), list(uuv_swarm_v0.HISTORY.items())),
 }
 """The tables by the names of their marks."""
 
 
 def written(page: Path) -> str:
     """A page with every marked table written anew."""
-    marked = r"<!-- (\w+) -->\n.*?<!-- /\1 -->"
-    anew = lambda found: f"<!-- {found[1]} -->\n{TABLES[found[1]]()}\n<!-- /{found[1]} -->"  # noqa: E731
-    return re.sub(marked, anew, page.read_text(encoding="utf-8"), flags=re.S)
+    anew = lambda found: f"<!-- {found[1]} -->\n{TABLES[found[1]]}\n<!-- /{found[1]} -->"  # noqa: E731
+    return MARKED.sub(anew, page.read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

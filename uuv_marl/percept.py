@@ -62,7 +62,7 @@ Table = tuple[PerceptField, ...]
 
 def _sonar(sectors: int, active: int) -> Table:
     return (
-        PerceptField("velocity", (2,), SPEED, "own surge and sway velocity"),
+        PerceptField("velocity", (2,), SPEED, "own surge and sway velocity over ground (current.velocity)"),
         PerceptField("yaw_rate", (1,), YAW_RATE, "own yaw rate"),
         PerceptField("reference", (2,), POSITION, "vector to the reference point l(t); a longer one is cut to 4096 m"),
         PerceptField("reference_velocity", (2,), SPEED, "velocity of the reference point"),
@@ -87,7 +87,9 @@ def _compass(_sectors: int, _active: int) -> Table:
 def _link(sectors: int, _active: int) -> Table:
     return (
         PerceptField("link_identity", (sectors,), IDENTITY, "per sub-sector: 1 + index of the vehicle heard, else 0"),
-        PerceptField("link_velocity", (sectors, 2), SPEED, "per sub-sector: velocity of that vehicle, else 0"),
+        PerceptField(
+            "link_velocity", (sectors, 2), SPEED, "per sub-sector: velocity of that vehicle over ground, else 0"
+        ),
     )
 
 
@@ -157,6 +159,12 @@ class PerceptLayout:
         return tuple(self.starts.get(field.name, -1) for field in percept_table(0, 0))
 
     @functools.cached_property
+    def message_offsets(self) -> tuple[int, ...]:
+        """``offsets``, the modem's fields in place of the link's, whose order and shapes are the same."""
+        names = [field.name.replace("link_", "modem_") for field in percept_table(0, 0)]
+        return tuple(self.starts.get(name, -1) for name in names)
+
+    @functools.cached_property
     def scale(self) -> Float32:
         """Unit of each observation entry, in physical units; powers of two. Shape (size,)."""
         return self._spread([field.kind.scale for field in self.table])
@@ -190,8 +198,9 @@ class Percept:
 
     ``velocity`` (..., 2), ``yaw_rate`` (..., 1), ``reference`` (..., 2), ``reference_velocity`` (..., 2),
     ``heard`` (..., sector), ``neighbour`` (..., sector, 2), ``echo`` (..., active), ``echo_range`` (..., active),
-    ``echo_position`` (..., active, 2), and where granted ``compass`` (..., 2), ``link_identity`` (..., sector),
-    ``link_velocity`` (..., sector, 2). Any of them by ``percept["name"]``; ``percept.names`` lists those there are.
+    ``echo_position`` (..., active, 2), and where their channels are granted ``compass`` (..., 2), ``link_identity``
+    (..., sector), ``link_velocity`` (..., sector, 2) and those of docs/sea.md. Any of them by ``percept["name"]``;
+    ``percept.names`` lists those there are.
     """
 
     flat: Float32

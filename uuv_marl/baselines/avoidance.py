@@ -28,6 +28,15 @@ def pass_obstacle(
 
     The nearest echo acts as a beta-agent (Olfati-Saber 2006). The sideways push goes to the side on which the
     vehicle already passes, port if dead ahead. Strengths in N, ranges in m.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        repulsion: strength of the push away [N].
+        repulsion_range: range to the surface at which it vanishes [m].
+        tangential: strength of the push sideways [N].
+        tangential_range: range to the surface at which it vanishes [m].
     """
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):

@@ -1,6 +1,6 @@
 """Learned policies as ONNX models: the whole way from observation to action, barrier and bounds included.
 
-The graph repeats ``learned.Features`` and Eq. 20-21 for a batch of vehicles, without loops. As there, features and
+The graph repeats ``features.Features`` and Eq. 20-21 for a batch of vehicles, without loops. As there, features and
 forces are computed in double precision and the network in single.
 """
 
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
-from uuv_marl.baselines.learned import MOST_BARRIER, Learned, Trained
+from uuv_marl.baselines.features import MOST_BARRIER
+from uuv_marl.baselines.learned import Learned, Trained
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.registry import granted, policy_class
 from uuv_marl.extras import extra
@@ -38,7 +39,14 @@ class _Graph:
         self.constants: list[onnx.TensorProto] = []
 
     def __call__(self, operator: str, *inputs: Any, name: str = "", **attributes: Any) -> "_Value":
-        """The output of a new node. Inputs are values, arrays, or numbers, which become double constants."""
+        """The output of a new node.
+
+        Args:
+            operator: of ONNX.
+            inputs: values, arrays, or numbers, which become double constants.
+            name: of the output; made up where empty.
+            attributes: of the operator.
+        """
         name = name or f"{operator}_{len(self.nodes)}"
         values = [each if isinstance(each, _Value) else self._constant(each) for each in inputs]
         self.nodes.append(helper.make_node(operator, [value.name for value in values], [name], name, **attributes))
@@ -184,7 +192,15 @@ def _act(g: _Graph, policy: Learned) -> _Value:
 
 
 def _look(g: _Graph, flat: _Value, layout: PerceptLayout, gains: Gains, limits: Limits) -> tuple[_Value, _Value]:
-    """``learned.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts."""
+    """``features.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts.
+
+    Args:
+        g: takes the nodes.
+        flat: percepts in physical units, double, shape (vehicle, entry).
+        layout: of the percepts.
+        gains: of the barrier.
+        limits: of the actuators, and the surge resistance.
+    """
     sizes = {row.name: row.size for row in layout.table}
     percept = dict(zip(sizes, g.split(flat, list(sizes.values())), strict=True))
     sectors, active = sizes["heard"], sizes["echo"]

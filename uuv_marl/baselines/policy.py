@@ -58,7 +58,7 @@ class Policy:
     """Table of what is remembered (``uuv_marl.sim.tables``): a NamedTuple of arrays over world, vehicle, sector and
     active sub-sector. Zero is nothing: so it starts, and so it is forgotten."""
     channels: ClassVar[tuple[str, ...]] = ()
-    """Channels needed beyond the percept: ``compass``, ``link``."""
+    """Channels needed beyond the percept: ``compass``, ``link``, for which ``modem`` can stand in."""
     yaw_damping_nms: ClassVar[float] = 0.0
     """Inner loop that the policy was designed with [N m s]."""
 
@@ -67,7 +67,8 @@ class Policy:
         """By which messages call it."""
         if type(self).act is Policy.act and type(self).decide is Policy.decide:
             raise PolicyError(f"policy {self.name!r} must define decide(percept), or act(percept) if it has no memory")
-        missing = [channel for channel in self.channels if channel not in scenario.sonar.channels]
+        has = scenario.sonar.channels
+        missing = [name for name in self.channels if name not in has and not (name == "link" and "modem" in has)]
         needs: list[str] = []
         if missing:
             needs.append(f"the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)} (sonar.channels)")
@@ -83,6 +84,8 @@ class Policy:
         self.scenario = scenario
         self.num_worlds = num_worlds
         self.layout = PerceptLayout.of(scenario)
+        self.at = self.layout.offsets if "link" in has else self.layout.message_offsets
+        """Where each field starts in a flat percept; the link's fields are the modem's where only that is granted."""
         self.limits = Limits.of(scenario)
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)
         """How often a numerical clamp bound since the reset, shape (world,)."""
@@ -206,7 +209,14 @@ class Policy:
 
 @compiled
 def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
-    """The action for a desired body-frame force [N]: thrust along x, torque by the lever arm along y. Eq. 22."""
+    """The action for a desired body-frame force [N]: thrust along x, torque by the lever arm along y. Eq. 22.
+
+    Args:
+        f_x: forward [N].
+        f_y: to starboard [N].
+        limits: of the actuators, and the surge resistance.
+        out: filled with the shares of full surge force and yaw torque, shape (2,).
+    """
     a_x, a_y = project(f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque)
     out[0], out[1] = a_x, a_y
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
+from uuv_marl.baselines.checkpoint import is_checkpoint
 from uuv_marl.baselines.floors import Idle, Random
-from uuv_marl.baselines.learned import Trained, is_checkpoint, shipped
+from uuv_marl.baselines.learned import Trained, shipped
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
@@ -132,12 +133,16 @@ def _kind(name: str) -> Kind:
 
 
 def granted(name: str, scenario: Scenario) -> Scenario:
-    """The scenario with the channels and the inner loop that a policy declares, and no others."""
+    """The scenario with the channels and the inner loop that a policy declares, and no others.
+
+    A scenario that grants ``modem`` grants it in place of ``link``, which is an oracle.
+    """
     policy = policy_class(name)
+    told = "modem" if "modem" in scenario.sonar.channels else "link"
     return load_scenario(
         scenario,
         overrides={
-            "sonar.channels": list(policy.channels),
+            "sonar.channels": [told if channel == "link" else channel for channel in policy.channels],
             "actuators.yaw_damping_nms": policy.yaw_damping_nms,
         },
     )
@@ -176,7 +181,15 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
 
 
 def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
-    """The policy with these parameters: keyword arguments of its kind, and single gains."""
+    """The policy with these parameters: keyword arguments of its kind, and single gains.
+
+    Args:
+        name: as the user wrote it, for messages.
+        kind: what makes the policy.
+        scenario: that it is made for.
+        num_worlds: first axis of the percepts.
+        parameters: by name; texts stand for what they say.
+    """
     constructor: Any = kind
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     if isinstance(parameters.get("gains"), str):

@@ -116,7 +116,7 @@ class Sdc(Policy):
             -g.kappa * self.scenario.timing.decision_period_s * (memory.decisions - 1)
         ) + g.rho_inf
         _act(
-            flat, self.layout.offsets, g, self.limits, memory.slots, memory.depth, self.all_informed, rho,
+            flat, self.at, g, self.limits, memory.slots, memory.depth, self.all_informed, rho,
             action, self.clamps,
         )  # fmt: skip
         return action
@@ -168,6 +168,20 @@ def _act(
     action: Float32,
     clamps: Int64,
 ) -> None:
+    """The law for every vehicle.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        g: the law's gains.
+        limits: of the actuators, and the surge resistance.
+        slots: place of every vehicle in the formation [m], north and east, shape (world, vehicle, 2).
+        depth: distance of its place from the informed vehicle's [m], shape (world, vehicle).
+        all_informed: every vehicle uses the reference; else the informed one alone.
+        rho: half width of the funnel [m], shape (world,).
+        action: filled with shares of full force, shape (world, vehicle, 2).
+        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
+    """
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -195,6 +209,19 @@ def _force(
     informed: bool,
     rho: float,
 ) -> tuple[float, float, int]:
+    """Body-frame force on one vehicle [N], forward and to starboard, and 1 where the funnel's bound binds.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        g: the law's gains.
+        limits: of the actuators, and the surge resistance.
+        slots: place of every vehicle in the formation [m], north and east, shape (vehicle, 2).
+        depth: distance of its place from the informed vehicle's [m], shape (vehicle,).
+        informed: this vehicle uses the reference.
+        rho: half width of the funnel [m].
+    """
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])
     # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.

@@ -87,13 +87,13 @@ class Sff(Policy):
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Compare what is heard with what was heard."""
         period = self.scenario.timing.decision_period_s
-        _remember(self.flat(percept), self.layout.offsets, period, worlds, self.memory)
+        _remember(self.flat(percept), self.at, period, worlds, self.memory)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         flat = self.flat(percept)
         action = np.empty((*flat.shape[:2], 2), np.float32)
-        _decide(flat, self.layout.offsets, self.gains, self.limits, self.memory, action)
+        _decide(flat, self.at, self.gains, self.limits, self.memory, action)
         return action
 
 
@@ -124,6 +124,15 @@ def _recall(identity: float, known: Float32) -> int:
 
 @compiled
 def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Memory) -> None:
+    """What every vehicle hears, beside what it heard before.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        period: between two decisions [s].
+        worlds: those that run, shape (world,).
+        memory: of all worlds.
+    """
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -133,7 +142,15 @@ def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Me
 
 @compiled
 def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None:
-    """What one vehicle hears, beside what it heard; the frame has turned by its yaw rate times the period since."""
+    """What one vehicle hears, beside what it heard; the frame has turned by its yaw rate times the period since.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        period: between two decisions [s].
+        memory: of all worlds; brought up to date for this vehicle.
+    """
     who, where, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
     r = float(see.yaw_rate[w, i, 0])
     c, s = math.cos(r * period), math.sin(r * period)
@@ -155,6 +172,16 @@ def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None
 
 @compiled
 def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory, action: Float32) -> None:
+    """The law for every vehicle.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        g: the law's gains.
+        limits: of the actuators, and the surge resistance.
+        memory: of all worlds.
+        action: filled with shares of full force, shape (world, vehicle, 2).
+    """
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -164,6 +191,16 @@ def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory,
 
 @compiled
 def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, memory: Memory) -> tuple[float, float]:
+    """Body-frame force on one vehicle [N], forward and to starboard.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        g: the law's gains.
+        limits: of the actuators, and the surge resistance.
+        memory: of all worlds.
+    """
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
@@ -186,7 +223,8 @@ def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, memory: Memory
         distance = max(math.hypot(q_x, q_y), 0.1)
         attraction = clustering(distance, g)
         f_x, f_y = f_x + attraction * q_x / distance, f_y + attraction * q_y / distance
-        mean_x, mean_y, num = mean_x + v_x, mean_y + v_y, num + 1
+        if see.link_identity[w, i, k] >= 1.0:
+            mean_x, mean_y, num = mean_x + v_x, mean_y + v_y, num + 1
     echoes = False
     for a in range(see.echo.shape[2]):
         echoes = echoes or see.echo[w, i, a] > 0.0

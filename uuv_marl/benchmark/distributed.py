@@ -94,6 +94,12 @@ def evaluate_on_cluster(scenario: Scenario, policy: str, seeds: Sequence[int], *
     A run depends on its seed alone, so neither the chunks nor the nodes change it, as long as all nodes have the same
     kind of processor. Ending the iteration cancels what is unfinished.
 
+    Args:
+        scenario: what to simulate.
+        policy: its name, see ``uuv_marl.baselines.make``.
+        seeds: of the episodes, one each.
+        parameters: go to the policy.
+
     Raises:
         ClusterError: a node has other code of uuv_marl, or a worker died repeatedly.
         PolicyError: a node can't import the policy.
@@ -121,6 +127,15 @@ def chunks(seeds: Sequence[int], num_cpus: int) -> list[Sequence[int]]:
 def _chunk(
     scenario: Scenario, policy: str, seeds: Sequence[int], parameters: dict[str, object], fingerprint: str
 ) -> list[Run]:
+    """The runs of a few seeds, on a node of the cluster.
+
+    Args:
+        scenario: what to simulate.
+        policy: its name, see ``uuv_marl.baselines.make``.
+        seeds: of the episodes, one each.
+        parameters: go to the policy.
+        fingerprint: of the code that the node must have.
+    """
     if source_fingerprint() != fingerprint:
         raise ClusterError(
             f"node {os.uname().nodename} has other code of uuv_marl than this machine; install the same on all"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines import POLICIES, make
-from uuv_marl.benchmark.metrics import Meter, Metrics
+from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
 from uuv_marl.errors import DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
@@ -34,7 +34,7 @@ class Routes(NamedTuple):
     heading: Float32
     """Shape (time, vehicle) [rad], in [-pi, pi), clockwise from north."""
     velocity: Float32
-    """Shape (time, vehicle, 2) [m/s]."""
+    """Over ground, shape (time, vehicle, 2) [m/s]."""
 
 
 class Run(NamedTuple):
@@ -43,7 +43,7 @@ class Run(NamedTuple):
     seed: int
     metrics: Metrics
     series: dict[str, Float32]
-    """Samples over time, see ``Meter.series``."""
+    """Samples over time, see ``MetricsRecorder.series``."""
     routes: Routes
     """Sampled in time."""
     obstacles: Float32
@@ -71,6 +71,13 @@ def evaluate(
 
     The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed
     alone, not on the seeds beside it. ``watch`` sees every step, and ``parameters`` go to the policy.
+
+    Args:
+        scenario: grants what the policy declares (``uuv_marl.baselines.granted``).
+        policy: its name, see ``uuv_marl.baselines.make``.
+        seeds: of the episodes, one each.
+        watch: sees every step.
+        parameters: go to the policy.
 
     Raises:
         DivergenceError: the integration step could not follow a vehicle. Such a run has no metrics; those of the seeds
@@ -103,13 +110,22 @@ def _look_away(swarm: Swarm, action: Float32 | None) -> None:
 def _batch(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch, parameters: dict[str, object]
 ) -> Iterator[Run | Progress]:
+    """The episodes of seeds that are stepped together.
+
+    Args:
+        scenario: what to simulate.
+        policy: its name, see ``uuv_marl.baselines.make``.
+        seeds: of the episodes, one each.
+        watch: sees every step.
+        parameters: go to the policy.
+    """
     swarm = Swarm(scenario, len(seeds))
     actor = make(policy, scenario, len(seeds), **parameters)
     percept = swarm.reset(list(seeds))
     actor.reset(list(seeds))
-    meter = Meter(swarm)
+    recorder = MetricsRecorder(swarm)
     active = np.ones(len(seeds), np.bool_)
-    meter.update(active)
+    recorder.update(active)
     limits, period = swarm.time_limit_s, scenario.timing.decision_period_s
     steps, step = math.ceil(limits.max() / period) + 1, 0
     every = max(round(ROUTE_PERIOD_S / period), math.ceil(steps * swarm.num_vehicles / MOST_SAMPLES), 1)
@@ -120,7 +136,7 @@ def _batch(
     while active.any():
         action = actor.act(percept)
         percept = swarm.step(action, active)
-        meter.update(active)
+        recorder.update(active)
         watch(swarm, action)
         step += 1
         ended = active & swarm.ended
@@ -131,8 +147,8 @@ def _batch(
             course, discs = swarm.course, int(swarm.course.num_obstacles[w])
             yield Run(
                 seed=seeds[w],
-                metrics=meter.metrics(w, int(actor.clamps[w])),
-                series=meter.series(w),
+                metrics=recorder.metrics(w, int(actor.clamps[w])),
+                series=recorder.series(w),
                 routes=_routes(swarm, samples, w),
                 obstacles=course.obstacles[w, :discs].astype(np.float32),
                 waypoints=course.waypoints[w, : int(course.last[w]) + 1].astype(np.float32),
@@ -150,9 +166,8 @@ def _batch(
 
 def _sample(swarm: Swarm) -> tuple[Float32, Float32]:
     """Time (world,) and position, heading and velocity of everybody (world, vehicle, 5)."""
-    eta, nu = swarm.state.eta, swarm.state.nu
+    eta, (u, v) = swarm.state.eta, np.moveaxis(swarm.velocity, -1, 0)
     cos, sin = np.moveaxis(swarm.heading, -1, 0)
-    u, v = nu[:, :, 0], nu[:, :, 1]
     motion = np.stack([eta[:, :, 0], eta[:, :, 1], eta[:, :, 2], cos * u - sin * v, sin * u + cos * v], axis=2)
     motion[~swarm.state.alive] = np.nan
     return swarm.facts.time_s.astype(np.float32), motion.astype(np.float32)

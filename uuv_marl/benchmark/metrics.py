@@ -1,4 +1,4 @@
-"""The metrics, one definition each. Distances are taken from the start to arrival, or to the time limit."""
+"""The metrics, one definition each. Distances are taken from the start to the episode's end."""
 
 from typing import NamedTuple
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
+from uuv_marl.benchmark.success import Success, SuccessRecorder
 from uuv_marl.sim.swarm import Swarm
 
 Float64 = NDArray[np.float64]
@@ -21,10 +22,10 @@ class Shares(TypedDict):
     s_u: float
 
 
-class Metrics(TypedDict):
+class Metrics(Success):
     """What one run is summed up to; docs/results-format.md defines every key. None where there is nothing to measure.
 
-    Distances are in m and taken from the start to arrival, or to the time limit; times are in s.
+    Distances are in m and taken from the start to the episode's end; times are in s.
     """
 
     task_time_s: float | None
@@ -93,7 +94,7 @@ def measure(swarm: Swarm) -> Sample:
     )
 
 
-class Meter:
+class MetricsRecorder:
     """Gathers samples of a batch of worlds and sums up each when it ends."""
 
     def __init__(self, swarm: Swarm) -> None:
@@ -101,12 +102,14 @@ class Meter:
         self._samples: list[Sample] = []
         self._clearances: list[Float64] = []
         self._collisions = np.zeros(swarm.num_worlds, np.int64)
+        self._success = SuccessRecorder(swarm)
 
     def update(self, active: Bool) -> None:
         """Measure the swarm after a reset or step of the ``active`` worlds."""
         self._samples.append(measure(self._swarm))
         self._clearances.append(self._swarm.facts.obstacle_clearance.copy())
         self._collisions += np.where(active, self._swarm.facts.collisions, 0)
+        self._success.update(active)
 
     def series(self, world: int) -> dict[str, NDArray[np.float32]]:
         """A world's samples over time: every field of ``Sample``, and ``obstacle_distance_m`` (time, obstacle)."""
@@ -147,6 +150,7 @@ class Meter:
             "clamps": clamps,
             "saturation_share": float(table["saturation"][1:].mean()),
             "vehicles_lost": int((~self._swarm.state.alive[world]).sum()),
+            **self._success.metrics(world),
         }
 
     def _table(self, world: int) -> dict[str, Float64]:

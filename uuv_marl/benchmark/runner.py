@@ -11,7 +11,7 @@ from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import Results, Row
 from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
-from uuv_marl.scenario import Scenario, differences, scenario_names
+from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed", "mappo")
 """The paper's Table 2, then the stronger variants, then the learned policy."""
@@ -31,7 +31,16 @@ def run_missing(
     report: Report,
     evaluator: Evaluate = evaluate,
 ) -> None:
-    """Run what ``results`` lacks; every finished seed is kept at once."""
+    """Run what ``results`` lacks; every finished seed is kept at once.
+
+    Args:
+        results: takes the runs.
+        scenarios: to run on.
+        policies: their names.
+        seeds: of the runs on each scenario with each policy.
+        report: called with scenario, policy and the share of their work that is done.
+        evaluator: runs a policy on a scenario over seeds.
+    """
     for scenario in scenarios:
         for policy in policies:
             results.use(policy)
@@ -53,6 +62,12 @@ def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[st
 
     That distance is between two vehicles or to an obstacle's surface, whichever is smaller. Of equals the first counts,
     by scenario, policy and seed as given.
+
+    Args:
+        results: with the runs.
+        scenarios: to look at.
+        policies: their names.
+        seeds: to look at.
     """
 
     def badness(row: Row) -> tuple[int, bool, float]:
@@ -69,7 +84,7 @@ def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     note = f"; CHANGED: {', '.join(changed)}" if changed else ""
     return (
         f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
-        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}{note}"
+        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}, {conditions(scenario)}{note}"
     )
 
 

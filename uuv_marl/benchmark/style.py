@@ -31,9 +31,13 @@ def house_style() -> Generator[None]:
 def panels(
     num: int, columns: int = 4, size: tuple[float, float] = (5.2, 4.4), **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with at least ``num`` panels of this size [inch], by row; those beyond ``num`` are empty.
+    """A figure with at least ``num`` panels, by row; those beyond ``num`` are empty.
 
-    ``columns`` is the most that stand side by side; ``options`` go to ``Figure.subplots``.
+    Args:
+        num: how many.
+        columns: most that stand side by side.
+        size: width and height of each [inch].
+        options: go to ``Figure.subplots``.
     """
     rows = -(-num // columns)
     across = -(-num // rows)

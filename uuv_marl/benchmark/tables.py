@@ -49,6 +49,7 @@ class Cells(NamedTuple):
 
 CAPTION = (
     "Interquartile mean over seeds [95 % bootstrap interval]; worst seed; times over the seeds that arrived. "
+    "Arrived is the paper's success: the whole swarm rests at the end, whether it touched anything or not. "
     "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles, and its time mean. "
     "Within Eq. 7: mean share of the time in which all vehicles are within s_l of l(t), keep s_o from obstacles, "
     "and s_u from each other. "
@@ -95,7 +96,14 @@ def _iqm(*data: Float64, axis: int = -1) -> Float64:
 
 
 def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Cells]:
-    """The table's cells, a row for each policy that has runs."""
+    """The table's cells, a row for each policy that has runs.
+
+    Args:
+        results: with the runs.
+        scenario: its name.
+        policies: their names, in the order of the rows.
+        seeds: whose runs count.
+    """
     rows: list[Cells] = []
     as_in_paper = not differences(results.scenarios[scenario])
     for policy in policies:
@@ -107,6 +115,14 @@ def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Seq
 
 
 def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigure | None) -> Cells:
+    """A policy's row.
+
+    Args:
+        policy: its name.
+        known: what it has beyond the percept.
+        runs: its runs, at least one.
+        paper: what the paper says of it, if anything.
+    """
     times = _values(runs, "task_time_s")
     distances, spacings = _values(runs, "min_obstacle_distance_m"), _values(runs, "min_spacing_m")
     collisions = [run.metrics["collisions"] for run in runs]

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import tomllib
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -29,53 +30,19 @@ class Range(NamedTuple):
     log: bool = False
 
 
-_OBSTACLE = {
-    "repulsion": Range(500.0, 32000.0, log=True),
-    "repulsion_range": Range(5.0, 45.0),
-    "tangential": Range(300.0, 30000.0, log=True),
-    "tangential_range": Range(50.0, 110.0),
-}
-_BIO = {
-    "zeta_l": Range(20.0, 320.0, log=True),
-    "zeta_n": Range(0.4, 10.0, log=True),
-    "delta_n": Range(40.0, 100.0),
-    "zeta_o": Range(0.8, 80.0, log=True),
-    "delta_o": Range(60.0, 200.0),
-}
-_SFF = {
-    "pull": Range(300.0, 7500.0, log=True),
-    "pull_length": Range(20.0, 100.0),
-    "cluster": Range(120.0, 3000.0, log=True),
-    "cluster_distance": Range(10.0, 26.0),
-    "cluster_width": Range(4.0, 20.0),
-    "cluster_range": Range(20.0, 60.0),
-    "velocity": Range(30.0, 3000.0, log=True),
-    "blend": Range(0.0, 0.6),
-    **_OBSTACLE,
-    "drag": Range(0.0, 1.0),
-}
-_SFF_INFORMED = {**_SFF, "drag": Range(0.8, 1.1), "reference_velocity": Range(40.0, 4000.0, log=True)}
-_SDC = {
-    "consensus": Range(500.0, 12500.0, log=True),
-    "rho_0": Range(50.0, 250.0),
-    "rho_inf": Range(10.0, 70.0),
-    "kappa": Range(0.004, 0.1, log=True),
-    "reference": Range(0.1, 10.0, log=True),
-    "velocity": Range(50.0, 5000.0, log=True),
-    "short": Range(300.0, 30000.0, log=True),
-    "short_range": Range(6.0, 14.0),
-    **_OBSTACLE,
-    "drag": Range(0.8, 1.1),
-    "reference_velocity": Range(40.0, 4000.0, log=True),
-}
+def _ranges() -> dict[str, dict[str, Range]]:
+    """The tables of ``spaces.toml``."""
+    tables = tomllib.loads(Path(__file__).with_name("spaces.toml").read_text(encoding="utf-8"))
+    return {name: {free: Range(**bounds) for free, bounds in table.items()} for name, table in tables.items()}
 
+
+_RANGES = _ranges()
+_SFF = _RANGES["sff"] | _RANGES["obstacle"]
+_SDC = _RANGES["sdc"] | _RANGES["obstacle"] | _RANGES["informed"]
 SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
-    "bio_inspired_plus": (
-        _BIO,
-        partial(bio_inspired.Gains, feed_forward=bio_inspired.FEED_FORWARD),
-    ),
-    "sff": (_SFF, sff.Gains),
-    "sff_informed": (_SFF_INFORMED, sff.Gains),
+    "bio_inspired_plus": (_RANGES["bio_inspired"], partial(bio_inspired.Gains, feed_forward=bio_inspired.FEED_FORWARD)),
+    "sff": (_SFF | _RANGES["uninformed"], sff.Gains),
+    "sff_informed": (_SFF | _RANGES["informed"], sff.Gains),
     "sdc": (_SDC, sdc.Gains),
     "sdc_informed": (_SDC, sdc.Gains),
 }
@@ -145,8 +112,13 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
     """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
 
     Writes ``output/POLICY.json`` with the best parameters and ``POLICY.csv`` with every trial, and keeps Optuna's
-    journal beside them, from which Optuna unpickles: go on with none that you do not trust. ``report`` is called with
-    the number of trials done and the best cost [s].
+    journal beside them, from which Optuna unpickles: go on with none that you do not trust.
+
+    Args:
+        policy: name of one of ``SPACES``.
+        output: folder of the files.
+        trials: to reach in all, those before an interruption included.
+        report: called with the number of trials done and the best cost [s].
     """
     import optuna  # noqa: PLC0415 - an extra
 

@@ -1,5 +1,6 @@
 """``uuv-marl benchmark``, and ``tune``, which found the gains of what it compares."""
 
+import functools
 import itertools
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -7,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import TaskID
 
-from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, working
+from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, shown, working
 
 if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
@@ -70,17 +70,12 @@ def benchmark(
         find_modules(policies)
         for name, loaded in itertools.product(policies, scenarios):
             make(name, granted(name, loaded))  # refused now, not after hours of others' runs
-        evaluator, cluster = _where(ray, policies)
+        evaluator, cluster = evaluator_at(ray, policies)
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
-            tasks: dict[tuple[str, str], TaskID] = {}
-
-            def report(name: str, policy_name: str, share: float) -> None:
-                key = (name, policy_name)
-                if key not in tasks:
-                    tasks[key] = bar.add_task(f"{name}: {policy_name}", total=1.0)
-                bar.update(tasks[key], completed=share)
+            line = functools.cache(lambda name, policy_name: shown(bar, f"{name}: {policy_name}"))
+            report = lambda name, policy_name, share: line(name, policy_name)(share)  # noqa: E731
 
             with cluster:
                 runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
@@ -91,13 +86,13 @@ def benchmark(
         for path in pictures:
             console.print(f"  {path}", highlight=False)
         worst = runner.worst(results, scenarios, policies, wanted)
-        shown = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
+        again = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
         console.print(_WORST.format(worst=worst), markup=False, highlight=False)
-        console.print(f"  {shown}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"  {again}", markup=False, highlight=False, soft_wrap=True)
         console.print(_NEXT.format(output=output), markup=False, highlight=False)
 
 
-def _where(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
+def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
     """What runs the seeds, and the connection that it needs: this machine, or the Ray cluster at an address."""
     from uuv_marl.benchmark.evaluate import evaluate
 
@@ -132,11 +127,7 @@ def tune(
                 raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
         with extra("tune", "tuning"), working(f"The finished trials are in {output}", alone=output) as bar:
             for name in policy or SPACES:
-                task = bar.add_task(name, total=trials)
-                path = search(
-                    name, output, trials,
-                    lambda done, best, task=task, name=name: bar.update(
-                        task, completed=done, description=f"{name}: best {best:.1f} s"
-                    ),
-                )  # fmt: skip
+                line = shown(bar, name, trials)
+                report = lambda done, best, line=line, name=name: line(done, f"{name}: best {best:.1f} s")  # noqa: E731
+                path = search(name, output, trials, report)
                 bar.console.print(f"{path}", highlight=False)

@@ -4,7 +4,7 @@ import errno
 import sys
 import sysconfig
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
@@ -63,6 +63,12 @@ def progress_bar() -> Progress:
         TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console,
     )  # fmt: skip
+
+
+def shown(bar: Progress, name: str, total: float = 1.0) -> Callable[..., None]:
+    """A new line of the bar: to be called with how much of ``total`` is done, and with words in place of the name."""
+    task = bar.add_task(name, total=total)
+    return lambda done, words=name: bar.update(task, completed=done, description=words)
 
 
 @contextmanager

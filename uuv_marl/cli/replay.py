@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uuv_marl.cli.console import changes_of, console, explained, find_modules, progress_bar
+from uuv_marl.cli.console import changes_of, console, explained, find_modules, progress_bar, shown
 from uuv_marl.replay import FILMS, MOST_EPISODES
 
 if TYPE_CHECKING:
@@ -82,9 +82,9 @@ def replay(
                 else:
                     recordings = _saved(run, scenario, policies, seed)
                 path = output or _ready(_default(recordings))
-                task = bar.add_task("writing", total=1.0)
-                write(recordings, path, lambda share: bar.update(task, completed=share))
-                bar.update(task, completed=1.0)
+                report = shown(bar, "writing")
+                write(recordings, path, report)
+                report(1.0)
         except KeyboardInterrupt:
             console.print("Stopped; nothing was written.")
             raise typer.Exit(130) from None
@@ -150,8 +150,7 @@ def _simulated(
         make(policy, granted(policy, scenario))
     recordings: list[Recording] = []
     for policy in policies:
-        task = bar.add_task(f"{scenario.name}: {policy}", total=1.0)
-        report = lambda share, task=task: bar.update(task, completed=share)  # noqa: E731
+        report = shown(bar, f"{scenario.name}: {policy}")
         recordings.append(record(scenario, policy, seed, inspect, report))
         report(1.0)
     return recordings

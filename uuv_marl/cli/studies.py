@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import console, explained, extra, working
+from uuv_marl.cli.console import console, explained, extra, shown, working
 
 
 def reproduce(
@@ -31,12 +31,9 @@ def reproduce(
         from uuv_marl.studies.reproduce import reproduce as run
 
         with working(f"The finished runs are in {output}", alone=output) as bar:
-            task = bar.add_task("reproduce", total=1.0)
-            written = run(
-                output, seeds, only or [],
-                lambda what, share: bar.update(task, completed=share, description=what[:60]),
-            )  # fmt: skip
-            bar.update(task, completed=1.0, description="reproduce")
+            report = shown(bar, "reproduce")
+            written = run(output, seeds, only or [], lambda what, share: report(share, what[:60]))
+            report(1.0)
         for path in written:
             console.print(f"  {path}", highlight=False)
 
@@ -56,11 +53,8 @@ def identify(
         with extra("tune", "identification"), working(f"The finished trials are in {output}", alone=output) as bar:
             from uuv_marl.studies.dynamics.identify import identify as search
 
-            task = bar.add_task("identify", total=trials)
-            path = search(
-                output, trials,
-                lambda done, best: bar.update(task, completed=done, description=f"largest error {best:.1%}"),
-            )  # fmt: skip
+            report = shown(bar, "identify", trials)
+            path = search(output, trials, lambda done, best: report(done, f"largest error {best:.1%}"))
         console.print(f"{path}", highlight=False)
 
 
@@ -92,12 +86,9 @@ def heldout(
         from uuv_marl.studies.heldout.page import write_page
 
         with working(f"The finished episodes are in {output}") as bar:
-            task = bar.add_task("held out", total=1.0)
-            results, trained = run(
-                output, trainings, only or [], seeds,
-                lambda what, share: bar.update(task, completed=share, description=what[-60:]),
-            )  # fmt: skip
-            bar.update(task, completed=1.0, description="held out")
+            report = shown(bar, "held out")
+            results, trained = run(output, trainings, only or [], seeds, lambda what, share: report(share, what[-60:]))
+            report(1.0)
         with locked(output, wait_s=60.0):
             for path in write_page(output, episodes_of(results, trained), trained):
                 console.print(f"  {path}", highlight=False)

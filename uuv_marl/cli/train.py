@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from uuv_marl.cli.console import console, explained, extra, progress_bar
+from uuv_marl.cli.console import console, explained, extra, progress_bar, shown
 
 app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
 
@@ -141,12 +141,12 @@ def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str
     """Show a training in a bar, with a text for each field that was known so far; how it stood at last."""
     last, known = "no iteration was needed: --steps are done already", {}
     with progress_bar() as bar:
-        task = bar.add_task("starting", total=steps)
+        report = shown(bar, "starting", steps)
         for record in records:
             known |= {name: value for name, value in record._asdict().items() if value is not None}
             told = [text.format(**known) for name, text in texts.items() if name in known]
             last = ", ".join([f"{record.agent_steps / record.seconds:,.0f} agent-steps/s", *told])
-            bar.update(task, completed=record.agent_steps, description=last)
+            report(record.agent_steps, last)
     return last
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from uuv_marl.envs.task import make_task, refuse_losses
+from uuv_marl.envs.batched_env import make_batched_env, refuse_losses
 from uuv_marl.extras import extra
 
 with extra("benchmarl", "SwarmTask"):
@@ -27,8 +27,15 @@ class SwarmTaskClass(TaskClass):
         seed: int | None,
         device: Any,
     ) -> Callable[[], EnvBase]:
-        """A function that makes ``num_envs`` worlds."""
-        refuse_losses(make_task(**self._arguments).swarm.scenario, "BenchMARL")
+        """A function that makes the environment.
+
+        Args:
+            num_envs: worlds stepped together.
+            continuous_actions: ignored: forces are continuous.
+            seed: world w starts from ``seed + w``; None for fresh entropy.
+            device: where the tensors go.
+        """
+        refuse_losses(make_batched_env(**self._arguments).swarm.scenario, "BenchMARL")
         return lambda: SwarmEnv(num_envs, seed=seed, device=device, **self._arguments)
 
     @property
@@ -45,7 +52,7 @@ class SwarmTaskClass(TaskClass):
 
     def max_steps(self, env: EnvBase) -> int:  # noqa: ARG002
         """Decisions after which every episode is over."""
-        return make_task(**self._arguments).longest_episode
+        return make_batched_env(**self._arguments).longest_episode
 
     def has_render(self, env: EnvBase) -> bool:  # noqa: ARG002
         """TorchRL's environment draws nothing; ``uuv_marl.parallel_env`` does."""

@@ -2,24 +2,26 @@
 
 from typing import Any
 
-from uuv_marl.envs.task import Task
+from uuv_marl.envs.batched_env import BatchedEnv
 
 
-def ending(task: Task, world: int, vehicle: int | None = None) -> dict[str, Any]:
+def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:
     """Why a world's episode ended, or a vehicle's part in it, as plain Python values.
 
     Args:
-        task: as the step left it in which the world, or the vehicle, came to its end.
+        batch: as the step left it in which the world, or the vehicle, came to its end.
         world: index of the world.
         vehicle: index of the vehicle; None for the world as a whole.
 
     Returns:
-        ``is_success`` (``ending`` is ``arrival``; the name under which libraries look for it), ``ending`` (``arrival``,
-        ``time_limit``, ``lost``: this vehicle or all of them, or ``diverged``: the integration step is too long),
+        ``is_success`` (the swarm arrived, and this vehicle, or any of them, was there to the end; the name under which
+        libraries look for it), ``ending`` (``arrival``, ``time_limit``: also after an arrival where
+        ``arrival.ends_episode`` is false, ``lost``: this vehicle or all of them, or ``diverged``: the integration step
+        is too long),
         ``arrived`` (the swarm did), ``time_s`` since the reset, and ``collisions``, the contact episodes of the whole
         swarm until now.
     """
-    swarm = task.swarm
+    swarm = batch.swarm
     arrived = bool(swarm.arrived[world])
     alive = swarm.state.alive[world]
     if not (alive.any() if vehicle is None else alive[vehicle]):
@@ -27,11 +29,11 @@ def ending(task: Task, world: int, vehicle: int | None = None) -> dict[str, Any]
     elif swarm.facts.diverged[world] >= 0:
         reason = "diverged"
     else:
-        reason = "arrival" if arrived else "time_limit"
+        reason = "arrival" if arrived and swarm.scenario.arrival.ends_episode else "time_limit"
     return {
-        "is_success": reason == "arrival",
+        "is_success": arrived and reason in ("arrival", "time_limit"),
         "ending": reason,
         "arrived": arrived,
         "time_s": float(swarm.facts.time_s[world]),
-        "collisions": int(task.collisions[world]),
+        "collisions": int(batch.collisions[world]),
     }

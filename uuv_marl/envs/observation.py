@@ -2,18 +2,15 @@
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from uuv_marl.percept import Percept
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.compiled import compiled_parallel
-from uuv_marl.sim.swarm import Swarm
-
-Float32 = NDArray[np.float32]
 
 
-def observe(swarm: Swarm) -> Float32:
-    """What all vehicles observe now, a new array (world, vehicle, entry): ``Percept.to_observation``, over threads."""
-    percept = swarm.percept
-    if swarm.num_worlds == 1:
+def observe(percept: Percept) -> Float32:
+    """What all vehicles observe, a new array (world, vehicle, entry): ``Percept.to_observation``, over threads."""
+    if len(percept.flat) == 1:
         return percept.to_observation()
     observation = np.empty_like(percept.flat)
     _scale(percept.flat, np.float32(1.0) / percept.layout.scale, observation)

@@ -1,5 +1,7 @@
 """The PettingZoo environments: ``parallel_env`` (all agents at once) and ``env`` (AEC, one after the other)."""
 
+import itertools
+import math
 from collections.abc import Mapping
 from typing import Any, cast
 
@@ -9,19 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
+from uuv_marl.envs.batched_env import BatchedEnv, Reward, ScenarioLike, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
-from uuv_marl.envs.task import Outcome, Reward, ScenarioLike, Task, make_task
-from uuv_marl.envs.view import OneWorld
+from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.sim.arguments import action_array
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.engine import EngineName
 
-Float32 = NDArray[np.float32]
 Infos = dict[str, dict[str, Any]]
 
 
-class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
-    """A swarm of UUVs that follows a trajectory around obstacles. See ``parallel_env`` for the arguments.
+class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
+    """A swarm of UUVs that follows a trajectory around obstacles; ``parallel_env`` makes one.
 
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
     and yaw torque as shares of full force, projected onto the unit disc.
@@ -29,6 +31,12 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
     An agent's last info tells how its part ended: ``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``
     (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users: ``reset(seed=s)`` seeds it
     from ``s``, and the environment itself never draws from it.
+
+    Args:
+        batch: the one world below.
+        render_mode: ``human``, ``rgb_array`` or None.
+        info_terms: put the reward's terms into every agent's info.
+        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form
@@ -39,31 +47,31 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
 
     def __init__(
         self,
-        task: Task,
+        batch: BatchedEnv,
         render_mode: str | None = None,
         info_terms: bool = False,
         render_options: RenderOptions | None = None,
     ) -> None:
-        self._show(task, render_mode, render_options)
+        self._wrap(batch, render_mode, render_options)
         self._info_terms = info_terms
         self.np_random = np.random.default_rng()
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         self._rows: slice | NDArray[np.int64] = slice(None)
-        layout = task.swarm.layout
+        layout = batch.swarm.layout
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
-        self.state_space = Box(task.state_layout.low, task.state_layout.high)
+        self.state_space = Box(batch.state_layout.low, batch.state_layout.high)
 
     @property
     def max_cycles(self) -> int | None:
         """Decisions after which an episode is truncated, None for the scenario's time limit."""
-        return self._task.max_cycles
+        return self._batch.max_cycles
 
     @max_cycles.setter
     def max_cycles(self, value: int | None) -> None:
-        self._task.max_cycles = value
+        self._batch.max_cycles = value
 
     def observation_space(self, agent: str) -> Space[Any]:
         """The same object for every call."""
@@ -79,12 +87,12 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
         options: dict[str, Any] | None = None,  # noqa: ARG002 - PettingZoo's signature
     ) -> tuple[dict[str, Float32], Infos]:
         """Start an episode. Without a seed the environment's own random stream goes on. ``options`` are ignored."""
-        observation = self._task.reset(seed)[0]
+        observation = self._batch.reset(seed)[0]
         if seed is not None:
             self.np_random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0,)))
         self.agents = list(self.possible_agents)
         self._rows = slice(None)
-        self._view.update()
+        self._renderer.update()
         return {agent: observation[i] for i, agent in enumerate(self.agents)}, {agent: {} for agent in self.agents}
 
     def step(
@@ -97,49 +105,53 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
             RuntimeError: before ``reset``, or with actions after the episode's end.
         """
         if not self.agents:
-            self._task.need_reset("step")
+            self._batch.need_reset("step")
             if actions:
                 raise RuntimeError("the episode is over; call reset() to start an episode")
             return {}, {}, {}, {}, {}
-        outcome = self._task.step(self._action_array(actions))
+        result = self._batch.step(self._action_array(actions))
         acted, rows = self.agents, self._rows
-        going = outcome.acting[0, rows]
-        infos = self._infos(outcome, acted, rows)
-        if not going.all():
-            for agent, goes in zip(acted, going.tolist(), strict=True):
-                infos[agent] |= {} if goes else ending(self._task, 0, self._index[agent])
-            self.agents = [agent for agent, goes in zip(acted, going.tolist(), strict=True) if goes]
+        observations = dict(zip(acted, result.observation[0, rows], strict=True))
+        rewards = dict(zip(acted, result.reward[0, rows].tolist(), strict=True))
+        terminated = dict.fromkeys(acted, False)
+        truncated = terminated.copy()
+        infos = self._infos(result, acted, rows)
+        going = result.acting[0, rows].tolist()
+        if not all(going):
+            for flags, array in ((terminated, result.terminated), (truncated, result.truncated)):
+                flags.update(zip(acted, array[0, rows].tolist(), strict=True))
+            self.agents = list(itertools.compress(acted, going))
+            for agent in infos.keys() - self.agents:
+                infos[agent] |= ending(self._batch, 0, self._index[agent])
             self._rows = np.array([self._index[agent] for agent in self.agents], np.int64)
-        self._view.update()
-        observations = dict(zip(acted, outcome.observation[0, rows], strict=True))
-        rewards = dict(zip(acted, outcome.reward[0, rows].tolist(), strict=True))
-        flags = (outcome.terminated, outcome.truncated)
-        terminated, truncated = (dict(zip(acted, flag[0, rows].tolist(), strict=True)) for flag in flags)
+        self._renderer.update()
         return observations, rewards, terminated, truncated, infos
 
-    def _infos(self, outcome: Outcome, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
+    def _infos(self, result: StepResult, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
         if not self._info_terms:
             return {agent: {} for agent in agents}
-        terms = {name: term[0, rows].tolist() for name, term in outcome.terms.items()}
+        terms = {name: term[0, rows].tolist() for name, term in result.terms.items()}
         return {agent: {"reward_terms": {name: of[k] for name, of in terms.items()}} for k, agent in enumerate(agents)}
 
     def _action_array(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
-        array = np.zeros((1, len(self.possible_agents), 2), np.float32)
         try:
             rows = [actions[agent] for agent in self.agents]
             masked = np.ma.MaskedArray in set(map(type, rows))  # an array of them would lose the masks
             given = None if masked else action_array(np.array(rows), (len(rows), 2), "actions")
         except (LookupError, TypeError, ValueError, RuntimeError, OverflowError):
             given = None
-        if given is None or not np.isfinite(given).all():
+        if given is None or not math.isfinite(np.vdot(given, given)):  # quick; finite numbers may overflow in it
             given = self._one_by_one(actions)
-        if not actions.keys() <= self._index.keys():
+        if len(actions) > len(given) and not actions.keys() <= self._index.keys():
             unknown = min(actions.keys() - self._index.keys(), key=str)
             raise ValueError(f"there is no agent {unknown!r}; agents are uuv_0 to {self.possible_agents[-1]}")
+        if len(given) == len(self.possible_agents):
+            return given[None]
+        array = np.zeros((1, len(self.possible_agents), 2), np.float32)
         array[0, self._rows] = given
         return array
 
-    def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> list[Float32]:
+    def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
         """Every agent's action. Raises ValueError with the first agent whose action can't be used."""
         if not isinstance(actions, Mapping):
             raise TypeError(f"actions must be a dictionary with an action for each agent, got {type(actions).__name__}")
@@ -150,11 +162,11 @@ class SwarmParallelEnv(OneWorld, ParallelEnv[str, Float32, Float32 | None]):
             given.append(action_array(cast(ArrayLike, actions[agent]), (2,), f"the action of {agent}"))
             if not np.isfinite(given[-1]).all():
                 raise ValueError(f"the action of {agent} must be finite, got {given[-1].tolist()}")
-        return given
+        return np.array(given)
 
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""
-        return self._task.state()[0]
+        return self._batch.state()[0]
 
 
 def parallel_env(
@@ -187,11 +199,11 @@ def parallel_env(
         engine: ``numba``, or ``plain``: the same run, bit for bit, from the plain Python of ``uuv_marl/sim/plain.py``,
             tens to hundreds of times slower.
     """
-    task = make_task(
+    batch = make_batched_env(
         scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
         overrides=overrides, engine=engine,
     )  # fmt: skip
-    return SwarmParallelEnv(task, render_mode, info_terms, render_options)
+    return SwarmParallelEnv(batch, render_mode, info_terms, render_options)
 
 
 def env(*args: Any, **kwargs: Any) -> AECEnv[str, Float32, Float32 | None]:

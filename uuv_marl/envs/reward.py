@@ -1,10 +1,10 @@
 """The reward: named terms of every vehicle, weighted by the scenario, and their sum.
 
-Sound by construction: terms per second are bounded and at most zero, arrival pays once and ends the episode, so that
-arriving earlier never pays less; a lost vehicle is charged the worst that those terms could have cost it in the rest of
-the episode, the arrival it misses, and a collision, so that dying never pays the one who dies (unless it would have
-collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps the
-swarm from arriving, the others gain from its loss.
+Sound by construction: terms per second are bounded and at most zero, arrival pays once, whether it ends the episode
+or not, so that arriving earlier never pays less; a lost vehicle is charged the worst that those terms could have cost
+it in the rest of the episode, an arrival, and a collision, so that dying never pays the one who dies (unless it would
+have collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps
+the swarm from arriving, the others gain from its loss.
 """
 
 import math
@@ -13,15 +13,11 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Facts, State
+from uuv_marl.sim.arrays import Bool, Facts, Float64, State
 from uuv_marl.sim.compiled import compiled, compiled_parallel
 from uuv_marl.sim.swarm import Swarm
-
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""
@@ -53,38 +49,46 @@ class RewardWeights(NamedTuple):
     s_l_m: float
     s_o_m: float
     s_u_m: float
-
-
-class RewardTerms(NamedTuple):
-    """What the latest step pays, shape (world, vehicle) each; zero for vehicles lost before."""
-
-    reward: Float64
-    """The sum of the terms."""
-    terms: Mapping[str, Float64]
-    """The weighted ``TERMS``."""
+    settled_s: float
+    """The step that arrives ends less than this after ``Facts.arrival_s``, and every later one after it."""
 
 
 def reward_weights(scenario: Scenario) -> RewardWeights:
     """The scenario's weights and lengths."""
-    weight, limit = scenario.reward, scenario.constraints
+    weight, limit, timing = scenario.reward, scenario.constraints, scenario.timing
+    dwell = round(scenario.arrival.dwell_s / timing.control_hold_s)
     return RewardWeights(
-        scenario.timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
+        timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
         weight.collision, weight.arrival, limit.s_l_m, limit.s_o_m, limit.s_u_m,
+        settled_s=(dwell + timing.holds_per_decision - 0.5) * timing.control_hold_s,
     )  # fmt: skip
 
 
 def reward_terms(swarm: Swarm) -> Mapping[str, Float64]:
     """The weighted ``TERMS`` of the latest step, shape (world, vehicle) each; zero for vehicles lost before."""
-    return compute_reward(swarm, reward_weights(swarm.scenario), np.ones(swarm.num_worlds, np.bool_)).terms
+    return named(compute_reward(swarm, reward_weights(swarm.scenario), np.ones(swarm.num_worlds, np.bool_))[1])
 
 
-def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> RewardTerms:
-    """The reward of the latest step for the worlds that are ``running``, shape (world,); others are paid nothing."""
+def named(terms: Float64) -> Mapping[str, Float64]:
+    """The terms that ``compute_reward`` gave, by name."""
+    return dict(zip(TERMS, terms, strict=True))
+
+
+def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> tuple[Float64, Float64]:
+    """What the latest step pays in the worlds that are ``running``, shape (world,); others are paid nothing.
+
+    Returns:
+        The reward, shape (world, vehicle), and the weighted ``TERMS`` that it sums, shape (term, world, vehicle); zero
+        for vehicles lost before.
+    """
     terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
     reward = np.zeros(terms.shape[1:])
-    fill = _fill_one if swarm.num_worlds == 1 else _fill_all
-    fill(running, swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward)
-    return RewardTerms(reward, dict(zip(TERMS, terms, strict=True)))
+    given = swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward
+    if swarm.num_worlds > 1:
+        _fill_all(running, *given)
+    elif running[0]:
+        _fill(0, *given)  # no threads, so that a forked process can step
+    return reward, terms
 
 
 @compiled
@@ -97,9 +101,20 @@ def shortfall(share: float) -> float:
 def _fill(
     w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
 ) -> None:
+    """The reward of one world.
+
+    Args:
+        w: index of the world.
+        time_limit_s: when worlds are given up [s], shape (world,).
+        state: of all worlds.
+        facts: of all worlds.
+        weights: of the terms, and the lengths in them [m].
+        terms: the weighted terms, shape (term, world, vehicle), zero before; filled for this world.
+        reward: their sum, shape (world, vehicle), zero before; filled for this world.
+    """
     left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
     worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
-    arrived = not math.isnan(facts.arrival_s[w, 0])
+    arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is
     for i in range(state.alive.shape[1]):
         alive, lost = state.alive[w, i], facts.lost[w, i]
         if not (alive or lost):
@@ -113,24 +128,10 @@ def _fill(
         terms[4, w, i] = -weights.collision * facts.contacts[w, i]
         if lost:
             terms[5, w, i] = -(weights.collision + weights.arrival + worst_rate * left_s)
-        if alive and arrived:
+        if alive and arrives:
             terms[6, w, i] = weights.arrival
         for k in range(terms.shape[0]):
             reward[w, i] += terms[k, w, i]
-
-
-@compiled
-def _fill_one(
-    running: Bool,
-    time_limit_s: Float64,
-    state: State,
-    facts: Facts,
-    weights: RewardWeights,
-    terms: Float64,
-    reward: Float64,
-) -> None:
-    if running[0]:
-        _fill(0, time_limit_s, state, facts, weights, terms, reward)
 
 
 @compiled_parallel
@@ -143,6 +144,17 @@ def _fill_all(
     terms: Float64,
     reward: Float64,
 ) -> None:
+    """``_fill`` for the worlds that run, over threads.
+
+    Args:
+        running: worlds to fill, shape (world,); the others stay zero.
+        time_limit_s: when worlds are given up [s], shape (world,).
+        state: of all worlds.
+        facts: of all worlds.
+        weights: of the terms, and the lengths in them [m].
+        terms: the weighted terms, shape (term, world, vehicle), zero before; filled.
+        reward: their sum, shape (world, vehicle), zero before; filled.
+    """
     for w in numba.prange(running.shape[0]):
         if running[w]:
             _fill(w, time_limit_s, state, facts, weights, terms, reward)

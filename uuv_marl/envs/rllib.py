@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 from uuv_marl.envs.parallel_env import Infos, parallel_env
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Float32
 
 with extra("distributed", "SwarmMultiAgentEnv"):
     from ray.rllib.env.multi_agent_env import MultiAgentEnv  # pyright: ignore[reportMissingImports]
     from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
 
-Float32 = NDArray[np.float32]
 
 ENV_NAME = "uuv_swarm_v0"
 """The name under which ``register`` makes the environment known."""

@@ -8,12 +8,13 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from uuv_marl.envs.batched_env import EnvOptions, ScenarioLike, StepResult, make_batched_env, refuse_losses
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
-from uuv_marl.envs.task import Float32, Outcome, ScenarioLike, TaskOptions, make_task, refuse_losses
-from uuv_marl.envs.view import TaskBased
+from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.sim.arguments import action_array, whole_number
+from uuv_marl.sim.arrays import Float32
 
 with extra("train", "SwarmVecEnv"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
@@ -21,7 +22,7 @@ with extra("train", "SwarmVecEnv"):
 Indices = None | int | Iterable[int]
 
 
-class SharedRows:
+class SharedEnvMixin:
     """What SB3 asks of a row's own environment, where rows share one."""
 
     _get_indices: Callable[[Indices], Iterable[int]]
@@ -37,13 +38,16 @@ class SharedRows:
         )
 
     def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: Indices = None,
-        **method_kwargs: Any,
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Not possible: a row has no environment of its own."""
+        """Not possible: a row has no environment of its own.
+
+        Args:
+            method_name: what was to be called.
+            method_args: what with.
+            indices: for which rows.
+            method_kwargs: what with.
+        """
         raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of the whole environment")
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:  # noqa: ARG002
@@ -51,7 +55,7 @@ class SharedRows:
         return [False for _ in self._get_indices(indices)]
 
 
-class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
+class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
     """``num_worlds`` x vehicles rows; row ``world * vehicles + i`` is vehicle i of a world.
 
     Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
@@ -78,16 +82,16 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
         *,
         render_mode: str | None = None,
         render_options: RenderOptions | None = None,
-        **options: Unpack[TaskOptions],
+        **options: Unpack[EnvOptions],
     ) -> None:
-        self._show(make_task(scenario, num_worlds, **options), render_mode, render_options)
+        self._wrap(make_batched_env(scenario, num_worlds, **options), render_mode, render_options)
         refuse_losses(self.scenario, "SwarmVecEnv")
         self._shape = (num_worlds, self.swarm.num_vehicles)
         layout = self.swarm.layout
         super().__init__(
             num_worlds * self.swarm.num_vehicles, Box(layout.low, layout.high), Box(-1.0, 1.0, (2,), np.float32)
         )
-        self.metadata = {**self.metadata, "render_fps": self._view.fps}  # SB3 has just written its own
+        self.metadata = {**self.metadata, "render_fps": self._renderer.fps}  # SB3 has just written its own
         self._seed: int | None = None
         self._actions: Float32 | None = None
         self._returns = np.zeros(self._shape)
@@ -102,10 +106,10 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
 
     def reset(self) -> Float32:
         """Start all worlds; without ``seed`` before it their random streams go on. Shape (row, entry)."""
-        observation = self._task.reset(self._seed)
+        observation = self._batch.reset(self._seed)
         self._seed = None
         self._forget(np.ones(self._shape[0], np.bool_))
-        self._view.update()
+        self._renderer.update()
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return observation.reshape(self.num_envs, -1)
 
@@ -118,32 +122,32 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
         """Observations, rewards, dones and infos of every row."""
         if self._actions is None:
             raise RuntimeError("step_wait came before step_async; call step(actions)")
-        outcome, self._actions = self._task.step(self._actions), None
-        self._returns += outcome.reward
+        result, self._actions = self._batch.step(self._actions), None
+        self._returns += result.reward
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        observation, over = outcome.observation, outcome.over
+        observation, over = result.observation, result.over
         if over.any():
             worlds = np.flatnonzero(over).tolist()
             for world in worlds:
-                self._end(world, outcome, infos)
-            observation = self._task.reset(worlds=worlds)
+                self._end(world, result, infos)
+            observation = self._batch.reset(worlds=worlds)
             self._forget(over)
-        self._view.update()
+        self._renderer.update()
         return (
             observation.reshape(self.num_envs, -1),
-            outcome.reward.astype(np.float32).reshape(-1),
+            result.reward.astype(np.float32).reshape(-1),
             np.repeat(over, self._shape[1]),
             infos,
         )
 
-    def _end(self, world: int, outcome: Outcome, infos: list[dict[str, Any]]) -> None:
+    def _end(self, world: int, result: StepResult, infos: list[dict[str, Any]]) -> None:
         """Write what SB3 wants to know of an ended world into the infos of its rows."""
         seconds = round(time.perf_counter() - self._starts[world], 6)
-        shared = {**ending(self._task, world), "TimeLimit.truncated": bool(outcome.world_truncated[world])}
+        shared = {**ending(self._batch, world), "TimeLimit.truncated": bool(result.world_truncated[world])}
         for i in range(self._shape[1]):
             infos[world * self._shape[1] + i] = {
-                "terminal_observation": outcome.observation[world, i],
+                "terminal_observation": result.observation[world, i],
                 **shared,
                 "episode": {"r": float(self._returns[world, i]), "l": int(self._lengths[world]), "t": seconds},
             }
@@ -153,9 +157,9 @@ class SwarmVecEnv(SharedRows, TaskBased, VecEnv):
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of every world."""
-        self._task.need_reset("render()")
-        return [self._view.draw(world) for world in range(self._shape[0])]
+        self._batch.need_reset("render()")
+        return [self._renderer.draw(world) for world in range(self._shape[0])]
 
     def close(self) -> None:
         """Free the canvas."""
-        self._view.close()
+        self._renderer.close()

@@ -8,14 +8,15 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import granted, make
+from uuv_marl.envs.batched_env import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
-from uuv_marl.envs.task import Changes, Float32, Outcome, Reward, ScenarioLike, changed, make_task
-from uuv_marl.envs.view import OneWorld
+from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.sim.arguments import action_array
+from uuv_marl.sim.arrays import Float32
 
 
-class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
+class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
     """The learner is vehicle 0 and acts by ``step``; all others run the policy ``others``.
 
     Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the swarm
@@ -49,7 +50,9 @@ class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
         **changes: Unpack[Changes],
     ) -> None:
         suited = granted(others, changed(scenario, **changes))
-        self._show(make_task(suited, max_cycles=max_cycles, reward=reward), render_mode, render_options, sonar_of=0)
+        self._wrap(
+            make_batched_env(suited, max_cycles=max_cycles, reward=reward), render_mode, render_options, sonar_of=0
+        )
         self._others = make(others, self.scenario)
         self._info_terms = info_terms
         layout = self.swarm.layout
@@ -62,10 +65,10 @@ class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
     ) -> tuple[Float32, dict[str, Any]]:
         """Start an episode: with a seed that of ``parallel_env``, without one its random stream goes on."""
         super().reset(seed=seed, options=options)
-        observation = self._task.reset(seed)
+        observation = self._batch.reset(seed)
         # Policies that draw follow the world's seed, and go on from the environment's stream where there is none.
         self._others.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
-        self._view.update()
+        self._renderer.update()
         self._running = True
         return observation[0, 0], {}
 
@@ -78,19 +81,19 @@ class SoloEnv(OneWorld, gymnasium.Env[Float32, Float32]):
             raise ValueError(f"the action must be finite, got {own.tolist()}")
         actions = self._others.act(self.swarm.percept)
         actions[0, 0] = own
-        outcome = self._task.step(actions)
-        self._running = bool(outcome.acting[0, 0])
-        self._view.update()
+        result = self._batch.step(actions)
+        self._running = bool(result.acting[0, 0])
+        self._renderer.update()
         return (
-            outcome.observation[0, 0],
-            float(outcome.reward[0, 0]),
-            bool(outcome.terminated[0, 0]),
-            bool(outcome.truncated[0, 0]),
-            self._info(outcome),
+            result.observation[0, 0],
+            float(result.reward[0, 0]),
+            bool(result.terminated[0, 0]),
+            bool(result.truncated[0, 0]),
+            self._info(result),
         )
 
-    def _info(self, outcome: Outcome) -> dict[str, Any]:
-        info: dict[str, Any] = {} if self._running else ending(self._task, 0, 0)
+    def _info(self, result: StepResult) -> dict[str, Any]:
+        info: dict[str, Any] = {} if self._running else ending(self._batch, 0, 0)
         if self._info_terms:
-            info["reward_terms"] = {name: float(term[0, 0]) for name, term in outcome.terms.items()}
+            info["reward_terms"] = {name: float(term[0, 0]) for name, term in result.terms.items()}
         return info

@@ -1,23 +1,12 @@
 """The global state for centralised critics: one flat vector of a world, and the table that explains it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from uuv_marl.percept import (
-    DIRECTION,
-    FLAG,
-    LENGTH,
-    POSITION,
-    SPEED,
-    YAW_RATE,
-    Kind,
-    PerceptField,
-    PerceptLayout,
-)
+from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, Kind, PerceptField, PerceptLayout
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.swarm import Swarm
 
-Float32 = NDArray[np.float32]
 _TIME = Kind("1", 1.0, 0.0, 2.0)
 
 
@@ -28,7 +17,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
         PerceptField("alive", (n,), FLAG, "per vehicle: 1, or 0 once it is lost"),
         PerceptField("position", (n, 2), POSITION, "per vehicle: position relative to l(t), north and east"),
         PerceptField("heading", (n, 2), DIRECTION, "per vehicle: cosine and sine of the heading from north"),
-        PerceptField("velocity", (n, 2), SPEED, "per vehicle: surge and sway velocity"),
+        PerceptField("velocity", (n, 2), SPEED, "per vehicle: surge and sway velocity over ground"),
         PerceptField("yaw_rate", (n,), YAW_RATE, "per vehicle: yaw rate"),
         PerceptField("reference_velocity", (2,), SPEED, "velocity of l(t), north and east"),
         PerceptField("end", (2,), POSITION, "end of the trajectory relative to l(t), north and east"),
@@ -55,7 +44,7 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
         alive,
         (state.eta[:, :, :2] - origin) * alive,
         swarm.heading * alive,
-        state.nu[:, :, :2] * alive,
+        swarm.velocity * alive,
         state.nu[:, :, 2:] * alive,
         facts.reference[:, 2:],
         course.waypoints[worlds, course.last] - origin[:, 0],

@@ -6,11 +6,12 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.task import Bool, ScenarioLike, TaskOptions, make_task
-from uuv_marl.envs.view import TaskBased
+from uuv_marl.envs.batched_env import EnvOptions, ScenarioLike, make_batched_env
+from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.arguments import world_seeds
+from uuv_marl.sim.arrays import Bool
 
 with extra("torchrl", "SwarmEnv"):
     import torch
@@ -21,7 +22,7 @@ with extra("torchrl", "SwarmEnv"):
 GROUP = "uuv"
 
 
-class SwarmEnv(TaskBased, EnvBase):
+class SwarmEnv(EnvMixin, EnvBase):
     """Worlds with batch size (num_worlds,), float32 and bool, on the CPU unless ``device`` says otherwise.
 
     Under ``uuv``: ``observation`` (vehicle, entry), ``mask`` (vehicle,), ``action`` (vehicle, 2), ``reward``
@@ -46,11 +47,11 @@ class SwarmEnv(TaskBased, EnvBase):
         *,
         seed: int | None = None,
         device: torch.device | str = "cpu",
-        **options: Unpack[TaskOptions],
+        **options: Unpack[EnvOptions],
     ) -> None:
-        task = make_task(scenario, num_worlds, **options)
+        batch = make_batched_env(scenario, num_worlds, **options)
         super().__init__(device=device, batch_size=torch.Size([num_worlds]))
-        self._task = task
+        self._batch = batch
         self._pending: list[int | None]
         self._set_seed(seed)
         self.group_map = {GROUP: [f"uuv_{i}" for i in range(self.swarm.num_vehicles)]}
@@ -73,7 +74,7 @@ class SwarmEnv(TaskBased, EnvBase):
             return Composite({GROUP: Composite(entries, shape=group), **(root or {})}, shape=worlds, device=self.device)
 
         observation = {"observation": boxed(self.swarm.layout, group), "mask": flags(*group)}
-        self.observation_spec = nested(observation, {"state": boxed(self._task.state_layout, worlds)})
+        self.observation_spec = nested(observation, {"state": boxed(self._batch.state_layout, worlds)})
         self.action_spec = nested({"action": Bounded(-1.0, 1.0, torch.Size((*group, 2)), self.device, torch.float32)})
         self.reward_spec = nested({"reward": Unbounded(torch.Size((*group, 1)), self.device, torch.float32)})
         self.done_spec = nested(endings(*group), endings(*worlds))
@@ -91,7 +92,7 @@ class SwarmEnv(TaskBased, EnvBase):
         marked = None if tensordict is None else tensordict.get("_reset", None)
         every = range(self.swarm.num_worlds)
         worlds = list(every) if marked is None else torch.where(marked.reshape(-1))[0].tolist()
-        observation = self._task.reset([self._pending[world] for world in worlds], worlds)
+        observation = self._batch.reset([self._pending[world] for world in worlds], worlds)
         for world in worlds:
             self._pending[world] = None
         alive = self.swarm.state.alive
@@ -101,15 +102,15 @@ class SwarmEnv(TaskBased, EnvBase):
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         """One decision of every vehicle of every world."""
-        outcome = self._task.step(tensordict.get((GROUP, "action")).detach().cpu().numpy())
+        result = self._batch.step(tensordict.get((GROUP, "action")).detach().cpu().numpy())
         alive = self.swarm.state.alive
         group = {
-            "observation": outcome.observation,
+            "observation": result.observation,
             "mask": alive.copy(),
-            "reward": outcome.reward.astype(np.float32)[:, :, None],
+            "reward": result.reward.astype(np.float32)[:, :, None],
         }
         return self._tensordict(
-            group, outcome.terminated | ~alive, outcome.truncated, outcome.world_terminated, outcome.world_truncated
+            group, result.terminated | ~alive, result.truncated, result.world_terminated, result.world_truncated
         )
 
     def _tensordict(
@@ -120,9 +121,17 @@ class SwarmEnv(TaskBased, EnvBase):
         world_terminated: Bool,
         world_truncated: Bool,
     ) -> TensorDictBase:
-        """Arrays as a tensordict, with the endings of vehicles and worlds."""
+        """Arrays as a tensordict, with the endings of vehicles and worlds.
+
+        Args:
+            group: what stands under ``uuv``, arrays of shape (world, vehicle, ...).
+            terminated: of vehicles, shape (world, vehicle).
+            truncated: of vehicles, shape (world, vehicle).
+            world_terminated: shape (world,).
+            world_truncated: shape (world,).
+        """
         group |= _endings(terminated, truncated)
-        root = {"state": self._task.state(), **_endings(world_terminated, world_truncated)}
+        root = {"state": self._batch.state(), **_endings(world_terminated, world_truncated)}
         batch = self.batch_size
         made = TensorDict({key: torch.from_numpy(array) for key, array in root.items()}, batch)
         inner = {key: torch.from_numpy(array) for key, array in group.items()}

@@ -9,17 +9,26 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from uuv_marl.envs.batched_env import (
+    BatchedEnv,
+    Bool,
+    EnvOptions,
+    Float32,
+    Float64,
+    ScenarioLike,
+    StepResult,
+    make_batched_env,
+)
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
-from uuv_marl.envs.task import Bool, Float32, Float64, Outcome, ScenarioLike, Task, TaskOptions, make_task
-from uuv_marl.envs.view import TaskBased
+from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
 
 Infos = dict[str, Any]
 
 
-class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
-    """Worlds stepped together. See ``vector_env`` for the arguments.
+class SwarmVectorEnv(EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]):
+    """Worlds stepped together; ``vector_env`` makes them.
 
     Observation of shape (num_envs, vehicle, entry), action of shape (num_envs, vehicle, 2), reward the mean over a
     world's vehicles. A world terminates when its swarm arrived or is lost as a whole, and the time limit truncates
@@ -34,6 +43,13 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
 
     ``infos``, arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated`` of
     this step, and ``agent_mask``, the vehicles that act in the next one. Rows of vehicles lost before are zero.
+
+    Args:
+        batch: the worlds below.
+        render_mode: ``rgb_array`` or None.
+        info_terms: put the reward's terms into the infos.
+        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED``, or its value.
+        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form
@@ -45,24 +61,24 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
 
     def __init__(
         self,
-        task: Task,
+        batch: BatchedEnv,
         render_mode: str | None = None,
         info_terms: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         render_options: RenderOptions | None = None,
     ) -> None:
-        self._show(task, render_mode, render_options)
+        self._wrap(batch, render_mode, render_options)
         self._info_terms = info_terms
         self.autoreset_mode = self.metadata["autoreset_mode"] = AutoresetMode(autoreset_mode)
-        self.num_envs = task.swarm.num_worlds
+        self.num_envs = batch.swarm.num_worlds
         self._due = np.zeros(self.num_envs, np.bool_)
         """Worlds that the next step resets."""
-        n, layout = task.swarm.num_vehicles, task.swarm.layout
+        n, layout = batch.swarm.num_vehicles, batch.swarm.layout
         self.single_observation_space = Box(np.tile(layout.low, (n, 1)), np.tile(layout.high, (n, 1)))
         self.single_action_space = Box(-1.0, 1.0, (n, 2))
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.state_space = Box(task.state_layout.low, task.state_layout.high)
+        self.state_space = Box(batch.state_layout.low, batch.state_layout.high)
         self.closed = False
 
     def reset(self, *, seed: SeedLike = None, options: dict[str, Any] | None = None) -> tuple[Float32, Infos]:
@@ -76,52 +92,52 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
         mask = self._mask(options)
         worlds = np.flatnonzero(mask).tolist()
         seeds = world_seeds(seed, range(self.num_envs))
-        observation = self._task.reset([seeds[world] for world in worlds], worlds)
+        observation = self._batch.reset([seeds[world] for world in worlds], worlds)
         if isinstance(seed, int | np.integer):
             super().reset(seed=int(seed))
         self._due = self._due & ~mask
-        self._view.update()
+        self._renderer.update()
         return observation, _masked({"agent_mask": self.swarm.state.alive.copy()}, mask)
 
     def step(self, actions: ArrayLike) -> tuple[Float32, Float64, Bool, Bool, Infos]:
         """One decision of every vehicle of every world, and the resets that ``autoreset_mode`` asks for."""
-        outcome, due = self._task.step(actions), self._due
+        result, due = self._batch.step(actions), self._due
         if due.any():
-            outcome = outcome._replace(
-                terminated=outcome.terminated & ~due[:, None],
-                truncated=outcome.truncated & ~due[:, None],
-                world_terminated=outcome.world_terminated & ~due,
-                world_truncated=outcome.world_truncated & ~due,
+            result = result._replace(
+                terminated=result.terminated & ~due[:, None],
+                truncated=result.truncated & ~due[:, None],
+                world_terminated=result.world_terminated & ~due,
+                world_truncated=result.world_truncated & ~due,
             )
-        observation, over, infos = outcome.observation, outcome.over, self._infos(outcome)
+        observation, over, infos = result.observation, result.over, self._infos(result)
         if over.any():
             infos |= self._endings(observation, over)
         resets = over if self.autoreset_mode is AutoresetMode.SAME_STEP else due
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._due = over
         if resets.any():
-            observation = self._task.reset(worlds=np.flatnonzero(resets).tolist())
-            infos["agent_mask"] = self.swarm.state.alive & (outcome.acting | resets[:, None])
-        self._view.update()
-        return observation, outcome.world_reward, outcome.world_terminated, outcome.world_truncated, infos
+            observation = self._batch.reset(worlds=np.flatnonzero(resets).tolist())
+            infos["agent_mask"] = self.swarm.state.alive & (result.acting | resets[:, None])
+        self._renderer.update()
+        return observation, result.world_reward, result.world_terminated, result.world_truncated, infos
 
-    def _infos(self, outcome: Outcome) -> Infos:
+    def _infos(self, result: StepResult) -> Infos:
         infos: Infos = {
-            "agent_reward": outcome.reward,
-            "agent_terminated": outcome.terminated,
-            "agent_truncated": outcome.truncated,
-            "agent_mask": outcome.acting,
+            "agent_reward": result.reward,
+            "agent_terminated": result.terminated,
+            "agent_truncated": result.truncated,
+            "agent_mask": result.acting,
         }
         if self._info_terms:
-            infos["reward_terms"] = dict(outcome.terms)
+            infos["reward_terms"] = dict(result.terms)
         return _masked(infos, np.ones(self.num_envs, np.bool_))
 
     def _endings(self, observation: Float32, over: Bool) -> Infos:
         """How worlds ended, before their reset."""
         infos: Infos = {}
-        same_step, state = self.autoreset_mode is AutoresetMode.SAME_STEP, self._task.state()
+        same_step, state = self.autoreset_mode is AutoresetMode.SAME_STEP, self._batch.state()
         for world in np.flatnonzero(over).tolist():
-            info = ending(self._task, world)
+            info = ending(self._batch, world)
             if same_step:
                 info = {"final_obs": observation[world], "final_info": {**info, "state": state[world]}}
             infos = self._add_info(infos, info, world)
@@ -138,16 +154,16 @@ class SwarmVectorEnv(TaskBased, VectorEnv[Float32, Float32, NDArray[Any]]):
 
     def state(self) -> Float32:
         """The global state for centralised critics, shape (num_envs, entry), see ``uuv_marl.envs.state``."""
-        return self._task.state()
+        return self._batch.state()
 
     def render(self) -> tuple[Any, ...]:
         """A picture (height, width, 3) of every world."""
-        self._task.need_reset("render()")
-        return tuple(self._view.draw(world) for world in range(self.num_envs))
+        self._batch.need_reset("render()")
+        return tuple(self._renderer.draw(world) for world in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
         """Nothing shows a window here; frees the canvas."""
-        self._view.close()
+        self._renderer.close()
 
 
 def _masked(infos: Infos, mask: Bool) -> Infos:
@@ -163,7 +179,7 @@ def vector_env(
     render_options: RenderOptions | None = None,
     info_terms: bool = False,
     autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
-    **options: Unpack[TaskOptions],
+    **options: Unpack[EnvOptions],
 ) -> SwarmVectorEnv:
     """A Gymnasium vector environment of ``num_envs`` worlds.
 
@@ -182,5 +198,5 @@ def vector_env(
             for ``uuv_marl.parallel_env``. ``reward`` shapes ``infos["agent_reward"]``; the row's own is the mean over
             all vehicles.
     """
-    task = make_task(scenario, whole_number("num_envs", num_envs, 1), **options)
-    return SwarmVectorEnv(task, render_mode, info_terms, autoreset_mode, render_options)
+    batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), **options)
+    return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

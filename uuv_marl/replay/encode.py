@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl import __version__
+from uuv_marl.envs.drawing.camera import shown_speed
 from uuv_marl.replay.recording import Float32, Recording
-from uuv_marl.scenario import Scenario, growth
+from uuv_marl.scenario import Scenario, conditions, growth
 
 Int32 = NDArray[np.int32]
 
@@ -55,6 +56,7 @@ CODINGS = {
     "echo_range": Coding(0.25, stride=1, order=1),
     "echo_position": Coding(0.25, stride=1, order=1),
     "action": Coding(0.02, stride=1, order=1),
+    "drift": Coding(0.01),
 }
 """In m, rad, m/s and shares of full force. A hull is 2 m wide, and a pixel of a whole map about 1 m; the sonar of
 inspected vehicles is drawn by their own, finer heading."""
@@ -83,11 +85,18 @@ def _episode(recording: Recording) -> dict[str, Any]:
             "spread_m": arrival.spread_m * growth(scenario.swarm.num_vehicles),
             "dwell_s": arrival.dwell_s,
         },
+        "conditions": conditions(scenario),
+        "current": None if recording.water is None else _current(scenario),
         "sonar": _sonar(scenario),
         "events": [event._asdict() for event in recording.events],
         "inspected": list(recording.inspections),
         "arrays": _arrays(recording),
     }
+
+
+def _current(scenario: Scenario) -> dict[str, float]:
+    """What the page needs beside the arrays ``drift`` and ``eddies`` to draw the current."""
+    return {"core_m": scenario.current.eddy_core_m, "shown_mps": shown_speed(scenario)}
 
 
 def _sonar(scenario: Scenario) -> list[dict[str, Any]]:
@@ -119,6 +128,8 @@ def _arrays(recording: Recording) -> dict[str, Any]:
         "spacing": recording.spacing,
     }
     exact = {**recording.series, "waypoints": recording.waypoints, "obstacles": recording.obstacles}
+    if recording.water is not None:
+        smooth["drift"], exact["eddies"] = recording.water
     arrays = {"time_s": _coded(recording.time_s, Coding(tick_s, stride=1))}
     arrays |= {name: _bits(np.asarray(values, np.float32)) for name, values in exact.items()}
     if recording.inspections:
@@ -141,31 +152,29 @@ def _coded(values: Float32, coding: Coding) -> dict[str, Any]:
     """An array of numbers in units, NaN where one is missing."""
     missing = np.isnan(values)
     scaled = _filled(values.astype(np.float64), missing) / coding.unit
-    data = (
-        _smooth(scaled, coding)
-        if coding.stride > 1
-        else pack(_differences(np.rint(scaled).astype(np.int32), coding.order))
-    )
+    whole = np.rint(scaled).astype(np.int32)
+    data = _smooth(scaled, coding) if coding.stride > 1 else _differences(whole, coding.order)
     mask = pack(_differences(missing.astype(np.int32), 1)) if missing.any() else None
-    return _entry(values.shape, "float32", coding.unit, coding.stride, coding.order, mask, data)
+    return _entry(values, data, coding.unit, coding.stride, coding.order, mask)
 
 
 def _bits(values: Float32) -> dict[str, Any]:
     """An array of which every bit is kept."""
-    return _entry(values.shape, "float32", None, 1, 2, None, pack(_differences(values.view(np.int32), 2)))
+    return _entry(values, _differences(values.view(np.int32), 2))
 
 
 def _whole(values: Int32, order: int) -> dict[str, Any]:
     """An array of whole numbers."""
-    return _entry(values.shape, "int32", None, 1, order, None, pack(_differences(values, order)))
+    return _entry(values, _differences(values, order), order=order)
 
 
 def _entry(
-    shape: tuple[int, ...], dtype: str, scale: float | None, stride: int, order: int, missing: str | None, data: str
-) -> dict[str, Any]:
+    values: NDArray[Any], data: Int32, scale: float | None = None, stride: int = 1, order: int = 2,
+    missing: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
     return {
-        "shape": list(shape), "dtype": dtype, "scale": scale, "stride": stride, "order": order, "missing": missing,
-        "data": data,
+        "shape": list(values.shape), "dtype": str(values.dtype), "scale": scale, "stride": stride, "order": order,
+        "missing": missing, "data": pack(data),
     }  # fmt: skip
 
 
@@ -185,7 +194,7 @@ def _differences(values: Int32, order: int) -> Int32:
     return np.moveaxis(values, 0, -1).ravel()
 
 
-def _smooth(scaled: NDArray[np.float64], coding: Coding) -> str:
+def _smooth(scaled: NDArray[np.float64], coding: Coding) -> Int32:
     """Samples from coarse to fine; each level's differences stand in the order of the vehicles, then of time."""
     whole = np.zeros(scaled.shape, np.int32)
     whole[:: coding.stride] = np.rint(scaled[:: coding.stride])
@@ -197,7 +206,7 @@ def _smooth(scaled: NDArray[np.float64], coding: Coding) -> str:
         whole[now] = np.where(np.abs(guess - scaled[now]) <= coding.slack, guess, np.rint(scaled[now]))
         levels.append(_differences(whole[now] - guess, 0))
         half //= 2
-    return pack(np.concatenate(levels))
+    return np.concatenate(levels)
 
 
 def _between(whole: Int32, now: NDArray[np.int64], half: int) -> Int32:

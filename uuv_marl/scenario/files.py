@@ -296,8 +296,8 @@ def _index(entries: Sequence[Any], part: str, field: str) -> int:
     names = {str(table["name"]): k for k, table in tables.items() if "name" in table}
     found = (places | names).get(part)
     if found is None:
-        known = ", ".join(names or places) or "none"
-        raise ScenarioError(f"{short(field)} is unknown: there is no entry {shown(part)}; use one of {known}")
+        known = f"use one of {', '.join(names or places)}" if entries else "the list is empty: give it as a whole"
+        raise ScenarioError(f"{short(field)} is unknown: there is no entry {shown(part)}; {known}")
     return found
 
 

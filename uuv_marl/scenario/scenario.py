@@ -15,6 +15,10 @@ from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
 MAX_READINGS = 64
 """Most control holds that the processing of a sonar's reading may take."""
+MAX_EDDIES = 4_096
+"""Most eddies of a world; every vehicle's water is the sum over all of them."""
+MAX_PAST = 1024
+"""Most control holds that sound may take to cross a sonar's range."""
 MAX_STEPS = 10_000
 """Most integration steps in a decision; compiled code can't be interrupted."""
 
@@ -58,12 +62,34 @@ class Scenario(sections.Section):
         """Most obstacles that a world of this scenario can hold."""
         return self.random_field.obstacles[1] if self.random_field else len(self.obstacles)
 
+    @property
+    def loses_vehicles(self) -> bool:
+        """Whether a vehicle can be lost before the episode ends."""
+        broken = any(fault.kind == "member" and fault.share > 0.0 for fault in self.faults)
+        return bool(self.disturbance.loss_times_s) or self.contact.ends_vehicle or broken
+
+    @property
+    def max_eddies(self) -> int:
+        """Most eddies that a world of this scenario can hold."""
+        if self.random_field is None:
+            north, east = zip(*self.trajectory.waypoints_m or (), strict=True)
+            return self.current.num_eddies(max(north) - min(north), max(east) - min(east))
+        # The sides of a box add up to the way through it at most times the root of 2.
+        side = self.random_field.legs[1] * self.random_field.leg_length_m[1] / math.sqrt(2.0)
+        return self.current.num_eddies(side, side)
+
     def _check(self) -> None:
         _check_start(self)
         _check_course(self)
         _check_losses(self)
         _check_times(self)
         _check_sonar(self)
+        _check_faults(self)
+        if self.max_eddies > MAX_EDDIES:
+            raise ValueError(
+                f"current.eddies = {self.current.eddies} makes {self.max_eddies:,} eddies around this course; at most "
+                f"{MAX_EDDIES:,} are possible: lower it or shorten the course"
+            )
         check_vehicle(self.vehicle, self.actuators, self.timing, self.start.speed_max_mps)
         if self.trajectory.speed_mps > top_speed(self.vehicle, self.actuators):
             warn_of_speed(self.trajectory.speed_mps)
@@ -115,10 +141,12 @@ def _check_course(scenario: Scenario) -> None:
 def _check_losses(scenario: Scenario) -> None:
     """Somebody is left."""
     losses, n = len(scenario.disturbance.loss_times_s), scenario.swarm.num_vehicles
-    if losses >= n:
+    members = sum(math.ceil(fault.share * n - 1e-9) for fault in scenario.faults if fault.kind == "member")
+    if losses + members >= n:
         raise ValueError(
-            f"disturbance.loss_times_s loses {losses} of {n} vehicles; "
-            "at least one must remain: shorten it or raise swarm.num_vehicles"
+            f"{'faults and ' if members else ''}disturbance.loss_times_s may lose {min(losses + members, n)} of {n} "
+            f"vehicles; at least one must remain: {'lower a share, ' if members else ''}shorten it or raise "
+            "swarm.num_vehicles"
         )
 
 
@@ -143,9 +171,9 @@ def _check_times(scenario: Scenario) -> None:
 
 
 def _check_sonar(scenario: Scenario) -> None:
-    """Readings come no faster than sound travels, and faults name arrays that there are."""
-    latency, arrays = scenario.latency, scenario.sonar.arrays
-    far = max((array.range_m for array in arrays if array.kind == "active"), default=0.0)
+    """Readings come no faster than sound travels, and no more are kept than there is room for."""
+    latency = scenario.latency
+    far = max((array.range_m for array in scenario.sonar.arrays if array.kind == "active"), default=0.0)
     least = 2.0 * far / latency.sound_speed_mps
     if 0.0 < latency.active_period_s < least:
         raise ValueError(
@@ -158,10 +186,14 @@ def _check_sonar(scenario: Scenario) -> None:
             f"latency.processing_s = {latency.processing_s:g} is {readings:,.0f} control holds; at most {MAX_READINGS} "
             "readings are kept: lower it or raise timing.control_hold_s"
         )
-    names = [array.name for array in arrays]
-    for fault in scenario.faults:
+
+
+def _check_faults(scenario: Scenario) -> None:
+    """Faults name arrays that there are."""
+    names = [array.name for array in scenario.sonar.arrays]
+    for k, fault in enumerate(scenario.faults):
         if fault.array is not None and fault.array not in names:
-            raise ValueError(f"faults.array must be one of {', '.join(names)}, got {fault.array!r}")
+            raise ValueError(f"faults.{k}.array must be one of {', '.join(names)}, got {fault.array!r}")
 
 
 @cache

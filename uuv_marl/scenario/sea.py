@@ -1,5 +1,6 @@
 """What a sea does to vehicles and their sonar, as sections of a scenario; off in ``base.toml``, with sources there."""
 
+import math
 from typing import Annotated, Literal
 
 from uuv_marl.scenario.sections import Clock, NonNegative, Radius, Section, Speed, within
@@ -9,6 +10,8 @@ Angle = Annotated[float, within(0, 180)]
 Share = Annotated[float, within(0, 0.9)]
 MAX_DELAY_S = 2.0
 """Longest processing of a reading."""
+AROUND_M, _SQUARE_M = 250.0, 500.0
+"""How far around a course's box there are eddies, and the side of the square that they are counted by."""
 
 
 class Current(Section):
@@ -30,6 +33,18 @@ class Current(Section):
     """Radius of its core."""
     velocity: Literal["ground", "water"]
     """What a vehicle knows its own velocity over: the ground (a log that reaches the bottom), or through the water."""
+
+    @property
+    def flows(self) -> bool:
+        """Whether the water moves."""
+        return self.speed_mps > 0.0 or self.variation_mps > 0.0 or (self.eddies > 0 and self.eddy_speed_mps > 0.0)
+
+    def num_eddies(self, north_m: float, east_m: float) -> int:
+        """Eddies in and around a course's box with these sides: an even number, so that circulations sum to 0."""
+        if self.eddies == 0 or self.eddy_speed_mps == 0.0:
+            return 0
+        squares = (north_m + 2.0 * AROUND_M) * (east_m + 2.0 * AROUND_M) / _SQUARE_M**2
+        return 2 * math.ceil(self.eddies * squares / 2.0 - 1e-9)
 
 
 class Latency(Section):
@@ -138,4 +153,17 @@ class Fault(Section):
 
     def _check(self) -> None:
         if (self.kind == "array") != (self.array is not None):
-            raise ValueError(f"faults.array must be given for faults of kind array, and no others, got {self.array!r}")
+            raise ValueError(
+                f"faults.array must name the array of a fault of kind array, and of no other kind, got {self.array!r} "
+                f"for kind {self.kind}"
+            )
+        if self.efficiency > 0.0 and self.kind not in ("thruster", "yaw"):
+            raise ValueError(
+                f"faults.efficiency is of kinds thruster and yaw alone, got {self.efficiency:g} for kind {self.kind}; "
+                "leave it out"
+            )
+        if self.duration_s is not None and self.kind == "member":
+            raise ValueError(
+                f"faults.duration_s is of no use to kind member, got {self.duration_s:g}: who is lost stays lost; "
+                "leave it out"
+            )

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,8 @@ from uuv_marl.sim.engine import EngineName, make_engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.sea.actuation import hit
+from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
 from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_tables
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
@@ -77,6 +79,21 @@ class Swarm:
         return np.zeros_like(self.state.before) if self._sea is None else self._sea.flow.flow
 
     @property
+    def currents(self) -> Flow | None:
+        """How the water of each world moves; None where nothing disturbs the scenario.
+
+        ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of one's own: the water at the
+        vehicles is read from them at the end of each control hold. A reset draws them anew.
+        """
+        return None if self._sea is None else self._sea.flow
+
+    def flow_field(self, world: int = 0) -> FlowField:
+        """How the water of a world moves now: ``swarm.flow_field().at([[100.0, 200.0]])``, north and east [m]."""
+        if self._sea is None:
+            return FlowField(np.zeros(2), np.zeros((0, 3)), self.scenario.current.eddy_core_m)
+        return flow_field(world, self._sea.water.core, self._sea.flow)
+
+    @property
     def velocity(self) -> NDArray[np.float64]:
         """Every vehicle's velocity over ground, surge and sway in its body frame [m/s], shape (world, vehicle, 2)."""
         if self._sea is None:
@@ -97,18 +114,24 @@ class Swarm:
         return limit.factor * self.duration_s + limit.extra_s
 
     @property
+    def faulty(self) -> NDArray[np.bool_]:
+        """Vehicles that a fault of the scenario has hit since the reset, shape (world, vehicle)."""
+        return np.zeros_like(self.state.alive) if self._sea is None else hit(self.state.tick, self._sea.hull)
+
+    @property
     def arrived(self) -> NDArray[np.bool_]:
-        """Worlds whose task is done, shape (world,)."""
+        """Worlds whose swarm has arrived, shape (world,)."""
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
     def endings(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """How episodes ended, shape (world,) each; both False for those that go on.
 
         Returns:
-            Terminated, by what happened: the swarm arrived, or all of it is lost. Truncated, that is cut off: by the
-            time limit, or because the world diverged.
+            Terminated, by what happened: the swarm arrived (where ``arrival.ends_episode``), or all of it is lost.
+            Truncated, that is cut off: by the time limit, or because the world diverged.
         """
-        terminated = self.arrived | ~self.state.alive.any(axis=1)
+        done = self.arrived & self.scenario.arrival.ends_episode
+        terminated = done | ~self.state.alive.any(axis=1)
         late = self.facts.time_s >= self.time_limit_s - 1e-9
         return terminated, (late | (self.facts.diverged >= 0)) & ~terminated
 
@@ -195,7 +218,7 @@ class Swarm:
     def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
         for table in (*self._world, *sea_tables(self._sea)):
-            check(type(table), arrays, self._sizes)
+            check(cast(type[Any], type(table)), arrays, self._sizes)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {

@@ -19,6 +19,7 @@ from uuv_marl.sim.motion import apply_actuators, integrate, load, load_action, l
 from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sea.actuation import Actuation, Hull, is_lost
 from uuv_marl.sim.sea.current import Flow, Water
+from uuv_marl.sim.sea.modem import Mail, Modem
 from uuv_marl.sim.sea.navigation import Navigation, Track
 from uuv_marl.sim.sea.noise import Ears, Noise
 from uuv_marl.sim.sea.readings import Hits, Readings
@@ -286,13 +287,15 @@ def step_worlds_at_sea(
     threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
     plant: Plant, suite: Suite, rules: Rules, at: Starts, room: Scratch, keys: UInt64,
     water: Water, flow: Flow, actuation: Actuation, hull: Hull, listening: Listening, readings: Readings,
-    hits: Hits, noise: Noise, ears: Ears, navigation: Navigation, track: Track,
+    hits: Hits, noise: Noise, ears: Ears, navigation: Navigation, track: Track, modem: Modem, mail: Mail,
 ) -> bool:  # fmt: skip
     """The same for disturbed worlds."""
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
         own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
-        sea = Sea(keys, water, flow, actuation, hull, listening, readings, hits, noise, ears, navigation, track)
+        sea = Sea(
+            keys, water, flow, actuation, hull, listening, readings, hits, noise, ears, navigation, track, modem, mail
+        )
         for w in range(t * share, min((t + 1) * share, action.shape[0])):
             if active[w]:
                 step_world(w, action, world, model, own, sea)

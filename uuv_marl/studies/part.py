@@ -1,19 +1,18 @@
 """Parts of the reproduction: tables from runs, and a picture from the tables alone."""
 
-import tomllib
 from collections.abc import Callable, Mapping
-from importlib import resources
 from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
 from uuv_marl.studies.columns import Columns
+from uuv_marl.studies.data import read_toml
 from uuv_marl.studies.suite import Case, Suite
 
 Tables = Mapping[str, Columns]
 Share = Callable[[float], None]
 """Called with the share of the work that is done."""
-_WORDS = tomllib.loads(resources.files("uuv_marl.studies").joinpath("parts.toml").read_text(encoding="utf-8"))
+_WORDS = read_toml("parts.toml")
 
 
 class Part(NamedTuple):

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from importlib import resources
 from pathlib import Path
 from string import Template
 
@@ -11,6 +10,7 @@ import numpy as np
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.studies.columns import Columns, Float64, groups, read_columns, where
+from uuv_marl.studies.data import read_text
 from uuv_marl.studies.dynamics.identify import METRICS, pareto, trials
 from uuv_marl.studies.dynamics.unknowns import OBJECTIVES
 from uuv_marl.studies.paper.ledger import Entry, markdown, read_ledger
@@ -32,8 +32,7 @@ def page(folder: Path, parts: Sequence[Part]) -> str:
     entries = read_ledger(folder / "ledger.json")
     seeds = json.loads((folder / "ledger.json").read_text(encoding="utf-8"))["seeds"]
     tables = {name: read_columns(folder / "data" / f"{name}.csv") for name in NEEDED}
-    story = Template(resources.files("uuv_marl.studies").joinpath("story.md").read_text(encoding="utf-8"))
-    return story.substitute(
+    return Template(read_text("story.md")).substitute(
         # A caption does not say again what the picture's title says.
         {p.name.replace("-", "_"): f"![{p.title}](figures/{p.name}.png)\n\n*{p.caption}.*" for p in parts},
         seeds=str(seeds),

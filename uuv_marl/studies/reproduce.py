@@ -93,8 +93,8 @@ def draw(part: Part, tables: Tables, path: Path) -> Path:
 
 
 def _code() -> str:
-    """Hash of the code that parts come from."""
+    """Hash of the code and of the stated numbers that parts come from."""
     digest = hashlib.sha256(source_fingerprint().encode())
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in sorted(p for p in Path(__file__).parent.rglob("*.*") if p.suffix in (".py", ".toml")):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter
 
@@ -30,24 +30,19 @@ def quiet(_: str) -> None:
     """Says nothing."""
 
 
-class Record(NamedTuple):
-    """One iteration, a row of ``progress.csv``."""
-
-    iteration: int = 0
-    agent_steps: int = 0
-    """Sampled so far; one is one decision of one vehicle."""
-    episode_return: float | None = None
-    """Mean over the episodes that ended in this iteration, and over vehicles; None where none ended."""
-    episode_length: float | None = None
-    """Decisions, mean over the same episodes."""
-    seconds: float = 0.0
-    """Spent on training so far."""
-
-
 class TrainingFolder(Generic[R]):
     """``config.json``, ``progress.csv`` and ``checkpoints/`` of a training; ``opened`` makes one.
 
     Nothing is written before ``begin``.
+
+    Args:
+        path: new or empty, or with ``resume`` that of an earlier training.
+        settings: what must be the same throughout a training, as JSON can hold it.
+        resume: go on with what the folder holds.
+        start: the record before the first iteration, all of whose fields have defaults.
+
+    Raises:
+        ResultsError: the folder is used, holds no training, or one of other settings.
     """
 
     def __init__(self, path: Path, settings: Mapping[str, Any], resume: bool, start: R) -> None:

@@ -1,8 +1,9 @@
 """MAPPO (Yu et al. 2022): PPO for all vehicles at once, with one actor that they share and a critic that sees all.
 
 The actor is local and small, so that it runs without torch (``uuv_marl.baselines.learned``). The critic's input adds
-means and extremes over the world (``uuv_marl.train.shaping.view``), so that neither depends on how many vehicles there
-are. Action noise is not learned but annealed. One seed gives one training, bit for bit, on one thread. Needs ``train``.
+means and extremes over the world (``shaping.privileged_observation``), so that neither depends on how many vehicles
+there are. Action noise is not learned but annealed. One seed gives one training, bit for bit, on one thread.
+Needs ``train``.
 """
 
 import itertools
@@ -14,22 +15,20 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import Layer
+from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.train.fleet import TRAINING_SEEDS, Fleet, Moment
+from uuv_marl.sim.arrays import Bool, Float32
+from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with MAPPO"):
     import torch
     from torch import Tensor, nn
 
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Proximal:
+class PPOHyperparameters:
     """Numbers that every PPO has, for a network that all vehicles share."""
 
     hidden: tuple[int, ...] = (96, 96)
@@ -57,7 +56,7 @@ class Proximal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperparameters(Proximal):
+class Hyperparameters(PPOHyperparameters):
     """Of the algorithm; see ``Learner`` and ``gae``."""
 
     name: str = "mappo"
@@ -74,27 +73,34 @@ class Hyperparameters(Proximal):
     """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
 
     def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Mappo":
-        """A training that has not begun."""
+        """A training that has not begun.
+
+        Args:
+            scenario: what to train on.
+            sizes: number of vehicles and of worlds of each swarm.
+            weights: of the reward.
+            seed: of weights, worlds and noise.
+        """
         return Mappo(self, scenario, sizes, weights, seed)
 
 
 class Environment(Protocol):
-    """What sampling needs: a ``Fleet``, or a problem with a known answer."""
+    """What sampling needs: a ``TrainingEnv``, or a problem with a known answer."""
 
     features: int
     size: int
     rows: int
-    seen: Float32
+    observation: Float32
 
-    def step(self, action: Float32) -> Moment:
+    def step(self, action: Float32) -> Transition:
         """One decision of every row."""
         ...
 
 
-class Batch(NamedTuple):
+class Rollout(NamedTuple):
     """Samples as rows."""
 
-    seen: Tensor
+    observation: Tensor
     action: Tensor
     mean: Tensor
     """Of the policy that sampled."""
@@ -154,38 +160,38 @@ class Learner:
         return [Layer(w.numpy().T.copy(), b.numpy().copy()) for w, b in zip(weights, biases, strict=True)]
 
     @torch.no_grad()
-    def act(self, seen: Float32) -> Float32:
+    def act(self, observation: Float32) -> Float32:
         """Mean action of every row."""
-        return self.actor(torch.from_numpy(seen)[:, : self._features]).numpy()
+        return self.actor(torch.from_numpy(observation)[:, : self._features]).numpy()
 
     @torch.no_grad()
-    def value(self, seen: Float32) -> Float32:
+    def value(self, observation: Float32) -> Float32:
         """Expected return of every row, shape (..., row) for inputs (..., row, size)."""
         mean, std = self._scale()
-        return self.critic(torch.from_numpy(seen)).squeeze(-1).numpy() * np.float32(std) + np.float32(mean)
+        return self.critic(torch.from_numpy(observation)).squeeze(-1).numpy() * np.float32(std) + np.float32(mean)
 
-    def sample(self, env: Environment, noise: float) -> tuple[Batch, float]:
+    def sample(self, env: Environment, noise: float) -> tuple[Rollout, float]:
         """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
         by, shape = self.by, (self.by.horizon, env.rows)
-        seen = np.empty((by.horizon + 1, env.rows, env.size), np.float32)
+        observation = np.empty((by.horizon + 1, env.rows, env.size), np.float32)
         action, mean = np.empty((*shape, 2), np.float32), np.empty((*shape, 2), np.float32)
         reward, paid, ended = np.empty(shape, np.float32), 0.0, np.empty(shape, np.bool_)
         for t in range(by.horizon):
-            seen[t] = env.seen
-            mean[t] = self.act(seen[t])
+            observation[t] = env.observation
+            mean[t] = self.act(observation[t])
             action[t] = mean[t] + np.float32(noise) * self._rng.standard_normal(mean[t].shape, np.float32)
-            moment = env.step(action[t])
-            paid += float(moment.reward.mean()) / by.horizon
-            reward[t], ended[t] = moment.reward, moment.terminated | moment.truncated
-            if len(moment.last):
-                reward[t][moment.truncated] += np.float32(by.gamma) * self.value(moment.last)
-        seen[-1] = env.seen
-        value = self.value(seen)
+            transition = env.step(action[t])
+            paid += float(transition.reward.mean()) / by.horizon
+            reward[t], ended[t] = transition.reward, transition.terminated | transition.truncated
+            if len(transition.final_obs):
+                reward[t][transition.truncated] += np.float32(by.gamma) * self.value(transition.final_obs)
+        observation[-1] = env.observation
+        value = self.value(observation)
         advantage = gae(reward, value, ended, by.gamma, by.gae_lambda)
-        arrays = (seen[:-1], action, mean, advantage, advantage + value[:-1])
-        return Batch(*(torch.from_numpy(array.reshape(-1, *array.shape[2:])) for array in arrays)), paid
+        arrays = (observation[:-1], action, mean, advantage, advantage + value[:-1])
+        return Rollout(*(torch.from_numpy(array.reshape(-1, *array.shape[2:])) for array in arrays)), paid
 
-    def update(self, batch: Batch, noise: float, learning_rate: float) -> Update:
+    def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
         """Some epochs of PPO on a batch, and of regression to its returns."""
         by = self.by
         for optimiser, rate in zip(self._optimisers, (1.0, by.critic_rate), strict=True):
@@ -194,18 +200,18 @@ class Learner:
         error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
         kl = self._improve(batch._replace(advantage=_standard(batch.advantage)), noise)
-        self._regress(batch.seen, batch.returns)
+        self._regress(batch.observation, batch.returns)
         self._updates += 1
         fresh = max(1.0 - by.average, 10.0 / (9.0 + self._updates))  # about the last tenth at first
         for mean, now in zip(self._average, self.actor.parameters(), strict=True):
             mean.lerp_(now.detach(), fresh)
         return Update(kl, 1.0 - error)
 
-    def _improve(self, batch: Batch, noise: float) -> float:
+    def _improve(self, batch: Rollout, noise: float) -> float:
         """PPO's clipped objective; the last divergence measured."""
         by, kl = self.by, 0.0
-        features = batch.seen[:, : self._features].contiguous()
-        for rows in self._minibatches(len(batch.seen), by.actor_epochs):
+        features = batch.observation[:, : self._features].contiguous()
+        for rows in self._minibatches(len(batch.observation), by.actor_epochs):
             old, action = batch.mean[rows], batch.action[rows]
             new = self.actor(features.index_select(0, rows))
             log_ratio = ((action - old).square() - (action - new).square()).sum(-1) / (2.0 * noise * noise)
@@ -217,11 +223,11 @@ class Learner:
             self._descend(0, self.actor, -torch.minimum(ratio * advantage, clipped * advantage).mean())
         return kl
 
-    def _regress(self, seen: Tensor, returns: Tensor) -> None:
+    def _regress(self, observation: Tensor, returns: Tensor) -> None:
         mean, std = self._scale()
         target = (returns - mean) / std
-        for rows in self._minibatches(len(seen), self.by.critic_epochs):
-            loss = (self.critic(seen.index_select(0, rows)).squeeze(-1) - target[rows]).square().mean()
+        for rows in self._minibatches(len(observation), self.by.critic_epochs):
+            loss = (self.critic(observation.index_select(0, rows)).squeeze(-1) - target[rows]).square().mean()
             self._descend(1, self.critic, loss)
 
     def _descend(self, k: int, net: nn.Sequential, loss: Tensor) -> None:
@@ -286,7 +292,7 @@ class Learner:
 
 
 class Mappo:
-    """A learner with its fleet, taken an iteration at a time.
+    """A learner with its environment, taken an iteration at a time.
 
     Args:
         by: the algorithm's numbers.
@@ -297,29 +303,24 @@ class Mappo:
     """
 
     def __init__(
-        self,
-        by: Hyperparameters,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        weights: Weights,
-        seed: int,
+        self, by: Hyperparameters, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int
     ) -> None:
         self._by = by
         self._rng = np.random.default_rng(seed)
-        self.fleet = Fleet(scenario, sizes, weights, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
-        self.learner = Learner(self.fleet.features, self.fleet.size, by, self._rng)
-        self.agent_steps = by.horizon * self.fleet.rows
+        self.env = TrainingEnv(scenario, sizes, weights, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
+        self.learner = Learner(self.env.features, self.env.size, by, self._rng)
+        self.agent_steps = by.horizon * self.env.rows
         """Of an iteration."""
-        self.take_episodes = self.fleet.take_episodes
+        self.pop_episode_stats = self.env.pop_episode_stats
         self.arrays, self.restore, self.start_from = (
             self.learner.arrays, self.learner.restore, self.learner.start_from
         )  # fmt: skip
-        self.snapshot, self.put_back = self.fleet.snapshot, self.fleet.restore
+        self.snapshot, self.put_back = self.env.snapshot, self.env.restore
 
     def iterate(self, share: float) -> tuple[float, Update]:
         """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
         noise = annealed(self._by.noise, share)
-        batch, reward = self.learner.sample(self.fleet, noise)
+        batch, reward = self.learner.sample(self.env, noise)
         return reward, self.learner.update(batch, noise, annealed(self._by.learning_rate, share))
 
     @property

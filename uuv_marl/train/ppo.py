@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import Layer
+from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.train.crew import Crew
-from uuv_marl.train.fleet import TRAINING_SEEDS, Episodes
-from uuv_marl.train.mappo import Proximal, Update, adam_arrays, annealed, restore_adam
+from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats
+from uuv_marl.train.mappo import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
 from uuv_marl.train.shaping import Weights
+from uuv_marl.train.vec_env import TrainingVecEnv
 
 with extra("train", "training with Stable-Baselines3"):
     import torch
@@ -31,7 +31,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperparameters(Proximal):
+class Hyperparameters(PPOHyperparameters):
     """Of Stable-Baselines3's PPO; ``minibatch`` becomes the largest factor of the batch below it, as SB3 asks for."""
 
     name: str = "ppo"
@@ -40,7 +40,14 @@ class Hyperparameters(Proximal):
     """Standard deviation of actions at the start [full force]; then it is learned."""
 
     def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Ppo":
-        """A training that has not begun."""
+        """A training that has not begun.
+
+        Args:
+            scenario: what to train on.
+            sizes: number of vehicles and of worlds of each swarm.
+            weights: of the reward.
+            seed: of weights, worlds and noise.
+        """
         return Ppo(self, scenario, sizes, weights, seed)
 
 
@@ -59,18 +66,13 @@ class Ppo:
     """
 
     def __init__(
-        self,
-        by: Hyperparameters,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        weights: Weights,
-        seed: int,
+        self, by: Hyperparameters, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int
     ) -> None:
         self._by, self._share = by, 0.0
-        self._crew = Crew(scenario, sizes, weights)
-        self._env = VecNormalize(self._crew, norm_obs=False, gamma=by.gamma)
+        self._vec_env = TrainingVecEnv(scenario, sizes, weights)
+        self._env = VecNormalize(self._vec_env, norm_obs=False, gamma=by.gamma)
         first = int(np.random.default_rng(seed).integers(*TRAINING_SEEDS))
-        self.agent_steps = by.horizon * self._crew.num_envs
+        self.agent_steps = by.horizon * self._vec_env.num_envs
         """Of an iteration."""
         self._random = _global_random()
         with self._own_random():
@@ -97,12 +99,12 @@ class Ppo:
 
     def iterate(self, share: float) -> tuple[float, Update]:
         """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
-        self._share, before = share, self._crew.paid
+        self._share, before = share, self._vec_env.reward_sum
         with self._own_random():
             self.model.learn(self.agent_steps, log_interval=10**9, reset_num_timesteps=False)
         told = self.model.logger.name_to_value
         update = Update(float(told["train/approx_kl"]), float(told["train/explained_variance"]))
-        return (self._crew.paid - before) / self._by.horizon, update
+        return (self._vec_env.reward_sum - before) / self._by.horizon, update
 
     @property
     def layers(self) -> list[Layer]:
@@ -112,9 +114,9 @@ class Ppo:
         weights = [(x.weight.detach().numpy(), x.bias.detach().numpy()) for x in (*linear, policy.action_net)]
         return [Layer(weight.T.copy(), bias.copy()) for weight, bias in weights]
 
-    def take_episodes(self) -> Episodes:
+    def pop_episode_stats(self) -> EpisodeStats:
         """Sums over the episodes that ended since the last call."""
-        return self._crew.fleet.take_episodes()
+        return self._vec_env.env.pop_episode_stats()
 
     def arrays(self) -> Arrays:
         """Weights, optimiser and the scale of returns, for ``restore``."""
@@ -141,15 +143,15 @@ class Ppo:
         """The worlds, for ``put_back``."""
         starts = self.model._last_episode_starts
         assert starts is not None  # noqa: S101
-        return {**self._crew.fleet.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
+        return {**self._vec_env.env.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
 
     def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a ``snapshot``."""
         model: Any = self.model
-        self._crew.fleet.restore(snapshot)
-        self._crew.seed()  # or the next worlds that end would start from the seeds of a new training
+        self._vec_env.env.restore(snapshot)
+        self._vec_env.seed()  # or the next worlds that end would start from the seeds of a new training
         self._env.returns[...] = snapshot["discounted"]
-        model._last_obs, model._last_episode_starts = self._crew.seen.copy(), snapshot["starts"] > 0
+        model._last_obs, model._last_episode_starts = self._vec_env.observation.copy(), snapshot["starts"] > 0
 
     @property
     def random(self) -> Any:

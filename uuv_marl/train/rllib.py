@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from uuv_marl.envs.rllib import SwarmMultiAgentEnv
 from uuv_marl.errors import ClusterError
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.train.fleet import TRAINING_SEEDS
-from uuv_marl.train.folder import Record, Say, opened, quiet
+from uuv_marl.train.env import TRAINING_SEEDS
+from uuv_marl.train.folder import Say, opened, quiet
 from uuv_marl.train.shaping import OVERRIDES
 
 with extra("distributed", "training with RLlib"):
@@ -63,6 +63,20 @@ class Settings:
     def load(self) -> Scenario:
         """The scenario that is trained on."""
         return load_scenario(self.scenario, num_vehicles=self.num_vehicles, overrides=self.overrides)
+
+
+class Record(NamedTuple):
+    """One iteration, a row of ``progress.csv``."""
+
+    iteration: int = 0
+    agent_steps: int = 0
+    """Sampled so far; one is one decision of one vehicle."""
+    episode_return: float | None = None
+    """Mean over the episodes that ended in this iteration, and over vehicles; None where none ended."""
+    episode_length: float | None = None
+    """Decisions, mean over the same episodes."""
+    seconds: float = 0.0
+    """Spent on training so far."""
 
 
 def ppo_config(settings: Settings, num_env_runners: int = 2, world_seed: int = TRAINING_SEEDS[0]) -> PPOConfig:

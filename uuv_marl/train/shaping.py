@@ -8,17 +8,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from uuv_marl.sim.arrays import Float32, Float64
 from uuv_marl.sim.swarm import Swarm
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
 
 OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
 """What training changes in a scenario: a fifth of the decisions, and an inner loop, as our tuned policies have it, so
 that noise on the torque does not spin a vehicle."""
-VIEW_SIZE = 18
+PRIVILEGED_SIZE = 18
 """Entries that the critic sees beyond the actor's features."""
 
 
@@ -41,7 +38,7 @@ class Weights(NamedTuple):
     """Times the squared action."""
 
 
-def shaped(swarm: Swarm, by: Weights) -> Float64:
+def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
     """The reward of the latest decision, shape (world, vehicle)."""
     facts, share = swarm.facts, swarm.scenario.timing.decision_period_s / 0.5
     away = np.hypot(*np.moveaxis(swarm.state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
@@ -69,8 +66,8 @@ def lead(swarm: Swarm) -> Float64:
     return np.sum((swarm.state.eta[:, :, :2] - swarm.facts.centre[:, None]) * way[:, None], axis=-1)
 
 
-def view(swarm: Swarm, out: Float32) -> None:
-    """Fill what the critic sees beyond the actor's features, shape (world, vehicle, ``VIEW_SIZE``), body frame.
+def privileged_observation(swarm: Swarm, out: Float32) -> None:
+    """Fill what the critic sees beyond the actor's features, shape (world, vehicle, ``PRIVILEGED_SIZE``), body frame.
 
     Means and extremes over the world's vehicles, however many: where the centre is and how it moves, how far the
     swarm spreads, its smallest distances, the vehicle's own in all directions, and how much time is left.
@@ -79,7 +76,7 @@ def view(swarm: Swarm, out: Float32) -> None:
     c, s = np.moveaxis(swarm.heading, -1, 0)
     to_reference = facts.reference[:, None, :2] - state.eta[:, :, :2]
     away = np.hypot(*np.moveaxis(to_reference, -1, 0))
-    u, v = state.nu[:, :, 0], state.nu[:, :, 1]
+    u, v = np.moveaxis(swarm.velocity, -1, 0)
     velocity = np.stack([c * u - s * v, s * u + c * v], axis=-1)
     drift = velocity.mean(axis=1) - facts.reference[:, 2:]
     error = facts.centre - facts.reference[:, :2]

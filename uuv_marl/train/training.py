@@ -18,16 +18,17 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines.learned import BARRIER, WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.baselines.features import BARRIER
 from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.train.fleet import Episodes
+from uuv_marl.scenario import Scenario, conditions, load_scenario
+from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Say, opened, quiet, versions
 from uuv_marl.train.mappo import Hyperparameters, Mappo
 from uuv_marl.train.shaping import OVERRIDES, Weights
-from uuv_marl.train.validation import Verdict, validate
+from uuv_marl.train.validation import ValidationResult, validate
 
 with extra("train", "training"):
     import torch
@@ -120,7 +121,7 @@ class Record(NamedTuple):
     min_obstacle_distance_m: float | None = None
 
 
-class Training:
+class Trainer:
     """An algorithm at work, and how it is kept on disk.
 
     Args:
@@ -215,40 +216,41 @@ def train(
         record, stopped = folder.record, False
         if record.agent_steps >= settings.steps:
             return
-        say(f"Training on swarms of {', '.join(f'{n} vehicles ({worlds} worlds)' for n, worlds in settings.sizes)}.")
+        sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in settings.sizes)
+        say(f"Training on swarms of {sizes}; {conditions(scenario)}.")
         torch.set_num_threads(1)  # sums in another order give other bits
-        training = Training(settings)
+        trainer = Trainer(settings)
         if folder.checkpoint:
-            training.restore(folder.checkpoint)
+            trainer.restore(folder.checkpoint)
         folder.begin({"seed": settings.seed}, _LIBRARIES)
         with writing(output), SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps) as board:
             while record.agent_steps < settings.steps and not stopped:
-                record = training.iterate(record)
+                record = trainer.iterate(record)
                 done = record.agent_steps >= settings.steps
                 if done or record.iteration % settings.validate_every == 0:
-                    record = _validated(training, record, output)
+                    record = _validated(trainer, record, output)
                 folder.note(record)
                 stopped = stop()
                 if done or stopped or record.iteration % settings.checkpoint_every == 0:
-                    folder.keep(record, lambda path, record=record: training.save(path, record))
-                _show(board, record, training.algorithm.take_episodes())
+                    folder.keep(record, lambda path, record=record: trainer.save(path, record))
+                _show(board, record, trainer.algorithm.pop_episode_stats())
                 yield record
 
 
-def _validated(training: Training, record: Record, output: Path) -> Record:
-    """The record with a verdict on the policy as it stands, which becomes ``best`` where it is."""
-    started, settings = time.perf_counter(), training.settings
+def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
+    """The record with a validation of the policy as it stands, which becomes ``best`` where it is."""
+    started, settings = time.perf_counter(), trainer.settings
     candidate, best = output / "candidate", output / "best"
-    training.save_policy(candidate, record)
-    verdict: Verdict = validate(candidate, settings.load_for_validation(), settings.validation)
-    better = record.best is None or verdict.score > record.best
+    trainer.save_policy(candidate, record)
+    result: ValidationResult = validate(candidate, settings.load_for_validation(), settings.validation)
+    better = record.best is None or result.score > record.best
     record = record._replace(
         seconds=record.seconds + time.perf_counter() - started,
-        best=verdict.score if better else record.best,
-        **verdict._asdict(),
+        best=result.score if better else record.best,
+        **result._asdict(),
     )
     if better:
-        training.save_policy(candidate, record)
+        trainer.save_policy(candidate, record)
         best.mkdir(exist_ok=True)
         for file in (_LEARNER_FILE, WEIGHTS_FILE):
             (candidate / file).replace(best / file)
@@ -256,10 +258,10 @@ def _validated(training: Training, record: Record, output: Path) -> Record:
     return record
 
 
-def _show(board: SummaryWriter, record: Record, episodes: Episodes) -> None:
+def _show(board: SummaryWriter, record: Record, episodes: EpisodeStats) -> None:
     """Numbers for TensorBoard; of episodes the means."""
     numbers = {f"train/{name}": getattr(record, name) for name in ("reward", "kl", "explained")}
-    numbers |= {f"validation/{name}": getattr(record, name) for name in ("best", *Verdict._fields)}
+    numbers |= {f"validation/{name}": getattr(record, name) for name in ("best", *ValidationResult._fields)}
     if episodes.number:
         names = {"returns": "return", "arrived": "arrived", "collisions": "collisions", "decisions": "decisions"}
         numbers |= {f"episodes/{tag}": getattr(episodes, name) / episodes.number for name, tag in names.items()}

@@ -1,6 +1,6 @@
 """How good a checkpoint is: deterministic episodes on validation seeds, through the benchmark's own ``evaluate``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.train.fleet import TRAINING_SEEDS
+from uuv_marl.train.env import TRAINING_SEEDS
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
 """The first of the validation seeds: up to 999,999, which no training uses."""
@@ -17,7 +17,7 @@ SAFE_SPACING_M = 6.5
 """Distances below these cost: a little more than what we want of the worst seed."""
 
 
-class Verdict(NamedTuple):
+class ValidationResult(NamedTuple):
     """Over all episodes."""
 
     score: float
@@ -34,7 +34,7 @@ class Verdict(NamedTuple):
     """Of the worst episode."""
 
 
-def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]]) -> Verdict:
+def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]]) -> ValidationResult:
     """Run a checkpoint on a scenario's validation seeds.
 
     Args:
@@ -47,19 +47,19 @@ def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]])
         seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + count)
         events = evaluate(granted(str(policy), load_scenario(scenario, num_vehicles=n)), str(policy), seeds)
         metrics += [event.metrics for event in events if isinstance(event, Run)]
-    return judge(metrics)
+    return validation_result(metrics)
 
 
-def judge(metrics: Sequence[Metrics]) -> Verdict:
-    """The verdict on these episodes."""
+def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
+    """The result of these episodes."""
     times = [late for late in map(lateness, metrics) if late is not None]
-    return Verdict(
+    return ValidationResult(
         score=-sum(map(cost, metrics)) / len(metrics),
         arrived=len(times) / len(metrics),
-        collisions=sum(int(_number(m, "collisions") or 0) for m in metrics),
+        collisions=sum(m["collisions"] for m in metrics),
         lateness_s=sum(times) / len(times) if times else None,
-        min_spacing_m=_least(metrics, "min_spacing_m"),
-        min_obstacle_distance_m=_least(metrics, "min_obstacle_distance_m"),
+        min_spacing_m=_least(m["min_spacing_m"] for m in metrics),
+        min_obstacle_distance_m=_least(m["min_obstacle_distance_m"] for m in metrics),
     )
 
 
@@ -67,9 +67,9 @@ def cost(metrics: Metrics) -> float:
     """Of one episode [1]: lateness in minutes (2 where it never arrives), 2 with a collision, and short distances."""
     late = lateness(metrics)
     total = 2.0 if late is None else min(late / 60.0, 2.0)
-    total += 2.0 * min(_number(metrics, "collisions") or 0.0, 1.0)
-    for name, safe in (("min_obstacle_distance_m", SAFE_OBSTACLE_M), ("min_spacing_m", SAFE_SPACING_M)):
-        distance = _number(metrics, name)
+    total += 2.0 * min(metrics["collisions"], 1)
+    distances = metrics["min_obstacle_distance_m"], metrics["min_spacing_m"]
+    for distance, safe in zip(distances, (SAFE_OBSTACLE_M, SAFE_SPACING_M), strict=True):
         if distance is not None:
             total += min(max(1.0 - distance / safe, 0.0), 1.0)
     return total
@@ -77,14 +77,9 @@ def cost(metrics: Metrics) -> float:
 
 def lateness(metrics: Metrics) -> float | None:
     """Task time beyond the time that l(t) takes [s]; None where the swarm never arrived."""
-    time, duration = _number(metrics, "task_time_s"), _number(metrics, "duration_s")
-    return None if time is None or duration is None else time - duration
+    time = metrics["task_time_s"]
+    return None if time is None else time - metrics["duration_s"]
 
 
-def _number(metrics: Metrics, name: str) -> float | None:
-    value = metrics[name]
-    return None if value is None or isinstance(value, dict) else float(value)
-
-
-def _least(metrics: Sequence[Metrics], name: str) -> float | None:
-    return min((value for value in (_number(m, name) for m in metrics) if value is not None), default=None)
+def _least(values: Iterable[float | None]) -> float | None:
+    return min((value for value in values if value is not None), default=None)

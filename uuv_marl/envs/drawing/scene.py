@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.task import Task
+from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.sea.current import FlowField
 
 Float = NDArray[np.floating]
 Bool = NDArray[np.bool_]
@@ -60,21 +61,23 @@ class Scene(NamedTuple):
     centre_error_m: float
     """Distance of the swarm's centre to l(t)."""
     sonar: Sonar | None
+    water: FlowField | None
+    """How it moves; None where the scenario's water is still."""
 
 
 class Memory:
     """What a scene shows of the past: trails and collisions of every world, as far as the steps were noted."""
 
-    def __init__(self, task: Task) -> None:
-        swarm = task.swarm
+    def __init__(self, batch: BatchedEnv) -> None:
+        swarm = batch.swarm
         self._every = max(1, round(1.0 / swarm.scenario.timing.decision_period_s))
         self._trail: deque[Float] = deque(maxlen=round(TRAIL_S))
         self._hits: list[list[tuple[float, float, float]]] = [[] for _ in range(swarm.num_worlds)]
         self._keys, self._time_s, self._steps = swarm.keys.copy(), np.full(swarm.num_worlds, -1.0), 0
 
-    def note(self, task: Task) -> None:
+    def note(self, batch: BatchedEnv) -> None:
         """Look at the worlds after a reset or a step; looking twice at the same moment changes nothing."""
-        swarm, facts = task.swarm, task.swarm.facts
+        swarm, facts = batch.swarm, batch.swarm.facts
         if np.array_equal(facts.time_s, self._time_s) and np.array_equal(swarm.keys, self._keys):
             return
         for w in np.flatnonzero((swarm.keys != self._keys) | (facts.time_s < self._time_s)):
@@ -88,9 +91,9 @@ class Memory:
         self._steps += 1
         self._keys, self._time_s = swarm.keys.copy(), facts.time_s.copy()
 
-    def scene(self, task: Task, world: int, sonar_of: int | None) -> Scene:
+    def scene(self, batch: BatchedEnv, world: int, sonar_of: int | None) -> Scene:
         """A world as it stands, with the sonar of one vehicle where it lives."""
-        swarm, w = task.swarm, world
+        swarm, w = batch.swarm, world
         course, state, facts, constraints = swarm.course, swarm.state, swarm.facts, swarm.scenario.constraints
         alive, position = state.alive[w].copy(), state.eta[w, :, :2].copy()
         arrival_s = float(facts.arrival_s[w, 0])
@@ -109,15 +112,16 @@ class Memory:
             ),
             hits=np.array(self._hits[w]).reshape(-1, 3),
             arrival_s=arrival_s if np.isfinite(arrival_s) else None,
-            collisions=int(task.collisions[w]),
+            collisions=int(batch.collisions[w]),
             min_spacing_m=float(facts.min_spacing[w]),
             clearance_m=float(facts.obstacle_clearance[w].min()),
             centre_error_m=float(np.hypot(*(facts.centre[w] - facts.reference[w, :2]))),
-            sonar=None if sonar_of is None or not alive[sonar_of] else _sonar(task, world, sonar_of),
+            sonar=None if sonar_of is None or not alive[sonar_of] else _sonar(batch, world, sonar_of),
+            water=swarm.flow_field(w) if swarm.scenario.current.flows else None,
         )
 
 
-def _sonar(task: Task, world: int, vehicle: int) -> Sonar:
-    percept, at = task.swarm.percept, (world, vehicle)
+def _sonar(batch: BatchedEnv, world: int, vehicle: int) -> Sonar:
+    percept, at = batch.swarm.percept, (world, vehicle)
     neighbour = percept["neighbour"][at][percept["heard"][at] > 0]
     return Sonar(vehicle, neighbour, percept["echo_range"][at].copy())

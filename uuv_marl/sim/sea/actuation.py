@@ -138,6 +138,12 @@ def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario
     return first, _NEVER if given.duration_s is None else first + math.ceil(given.duration_s / hold - 1e-9)
 
 
+def hit(tick: Int64, hull: Hull) -> Bool:
+    """The vehicles that a fault has hit before this control hold of each world, shape (world, vehicle)."""
+    first, end = hull.broken[..., 0], hull.broken[..., 1]
+    return np.logical_or.reduce((first < end) & (first < tick[:, None, None]), axis=2)
+
+
 @compiled
 def acts(w: int, i: int, fault: int, tick: int, hull: Hull) -> bool:
     """Whether a fault acts on vehicle i of world w in the control hold after this tick."""

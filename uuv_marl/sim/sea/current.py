@@ -9,10 +9,11 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.sea import AROUND_M
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.exponential import decay_mean, exp
@@ -24,7 +25,6 @@ from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields, SeaFields
 
 Float64 = NDArray[np.float64]
-_AROUND_M, _SQUARE_M = 250.0, 500.0
 _PEAK = 0.638172686
 """Largest speed around a Lamb-Oseen vortex, in circulation / (2 pi core): at 1.12091 core radii. [derived]"""
 
@@ -58,6 +58,30 @@ class Flow(NamedTuple):
     flow: Annotated[Float64, "world vehicle 2", "Velocity of the water at each vehicle, north and east [m/s]."]
 
 
+class FlowField(NamedTuple):
+    """How the water of one world moves at one time, everywhere; a copy, which stays as it is."""
+
+    drift: Float64
+    """Velocity of the mean and the process together, north and east [m/s], shape (2,)."""
+    eddies: Float64
+    """Centre north, east [m] and circulation [m2/s], shape (eddy, 3)."""
+    core_m: float
+    """Radius of the eddies' cores."""
+
+    def at(self, points: ArrayLike) -> Float64:
+        """Velocity of the water, north and east [m/s], at points given by north and east [m]; both (..., 2)."""
+        points = np.asarray(points, np.float64)
+        flow = Flow(self.drift[None], np.zeros((1, 2)), self.eddies[None], np.zeros((1, 0, 2)))
+        velocity = [flow_at(0, x, y, self.core_m, flow) for x, y in points.reshape(-1, 2).tolist()]
+        return np.array(velocity, np.float64).reshape(points.shape)
+
+
+def flow_field(w: int, core_m: float, flow: Flow) -> FlowField:
+    """How the water of world w moves now."""
+    eddies = flow.eddies[w]
+    return FlowField(flow.mean[w] + flow.gust[w], eddies[eddies[:, 2] != 0.0], core_m)
+
+
 def water(scenario: Scenario) -> Water:
     """The scenario's current as numbers for the compiled functions."""
     current = scenario.current
@@ -71,23 +95,6 @@ def water(scenario: Scenario) -> Water:
         core=current.eddy_core_m,
         over_ground=current.velocity == "ground",
     )
-
-
-def max_eddies(scenario: Scenario) -> int:
-    """Most eddies of a world."""
-    if scenario.current.eddies == 0 or scenario.current.eddy_speed_mps == 0.0:
-        return 0
-    field = scenario.random_field
-    if field is None:
-        return num_eddies(scenario, np.array(scenario.trajectory.waypoints_m))
-    far = field.legs[1] * field.leg_length_m[1]  # a box's sides add up to the way at most times the root of 2
-    return num_eddies(scenario, np.array([[0.0, 0.0], [far, far]]) / math.sqrt(2.0))
-
-
-def num_eddies(scenario: Scenario, waypoints: Float64) -> int:
-    """Eddies in the box around a course, waypoints (point, 2) [m]: an even number, so that circulations sum to 0."""
-    sides = np.ptp(waypoints, axis=0) + 2.0 * _AROUND_M
-    return 2 * math.ceil(scenario.current.eddies * float(sides[0] * sides[1]) / (2.0 * _SQUARE_M**2) - 1e-9)
 
 
 def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: Water, flow: Flow) -> None:
@@ -108,8 +115,8 @@ def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, wa
     flow.gust[w] = [water.deviation * part for part in normals(key, GUST, 0, 0, 0)]
     flow.eddies[w] = 0.0
     if flow.eddies.shape[1] > 0:
-        low, high = waypoints.min(axis=0) - _AROUND_M, waypoints.max(axis=0) + _AROUND_M
-        count = min(num_eddies(scenario, waypoints), flow.eddies.shape[1])
+        low, high = waypoints.min(axis=0) - AROUND_M, waypoints.max(axis=0) + AROUND_M
+        count = min(scenario.current.num_eddies(*np.ptp(waypoints, axis=0)), flow.eddies.shape[1])
         for k, sign in zip(range(count), itertools.cycle((1.0, -1.0)), strict=False):
             flow.eddies[w, k, :2] = low + np.array(uniforms(key, EDDY_PLACE, 0, 0, k)) * (high - low)
             flow.eddies[w, k, 2] = sign * water.circulation
@@ -126,12 +133,12 @@ def eddy_flow(dx: float, dy: float, circulation: float, core: float) -> tuple[fl
 
 
 @compiled
-def flow_at(w: int, x: float, y: float, water: Water, flow: Flow) -> tuple[float, float]:
-    """Velocity of the water at a point of world w, north and east [m/s]."""
+def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float, float]:
+    """Velocity of the water at a point of world w, north and east [m/s]; ``core`` is the radius of eddies' cores."""
     v_x, v_y = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
     for k in range(flow.eddies.shape[1]):
         if flow.eddies[w, k, 2] != 0.0:
-            e_x, e_y = eddy_flow(x - flow.eddies[w, k, 0], y - flow.eddies[w, k, 1], flow.eddies[w, k, 2], water.core)
+            e_x, e_y = eddy_flow(x - flow.eddies[w, k, 0], y - flow.eddies[w, k, 1], flow.eddies[w, k, 2], core)
             v_x, v_y = v_x + e_x, v_y + e_y
     return v_x, v_y
 
@@ -149,13 +156,13 @@ def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) ->
 def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
     """The water's velocity at every vehicle of world w."""
     for i in range(state.eta.shape[1]):
-        flow.flow[w, i, 0], flow.flow[w, i, 1] = flow_at(w, state.eta[w, i, 0], state.eta[w, i, 1], water, flow)
+        flow.flow[w, i, 0], flow.flow[w, i, 1] = flow_at(w, state.eta[w, i, 0], state.eta[w, i, 1], water.core, flow)
 
 
 @compiled
-def over_ground(w: int, j: int, state: State, heading: Float64, flow: Flow) -> tuple[float, float]:
-    """Velocity of vehicle j over ground, north and east [m/s]; ``heading`` holds cosines and sines."""
-    c, s, u, v = heading[w, j, 0], heading[w, j, 1], state.nu[w, j, 0], state.nu[w, j, 1]
+def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]:
+    """Velocity of vehicle j over ground, north and east [m/s]."""
+    (c, s), u, v = cos_sin(state.eta[w, j, 2]), state.nu[w, j, 0], state.nu[w, j, 1]
     return c * u - s * v + flow.flow[w, j, 0], s * u + c * v + flow.flow[w, j, 1]
 
 
@@ -176,7 +183,7 @@ def know_velocities(w: int, world: World, water: Water, flow: Flow, see: Fields,
         if not state.alive[w, i]:
             continue
         c, s = heading[w, i, 0], heading[w, i, 1]
-        v_x, v_y = over_ground(w, i, state, heading, flow)
+        v_x, v_y = over_ground(w, i, state, flow)
         ahead, abeam = saturate(c * v_x + s * v_y, MAX_SPEED), saturate(c * v_y - s * v_x, MAX_SPEED)
         if more.ground_velocity.shape[2] > 0:
             more.ground_velocity[w, i, 0], more.ground_velocity[w, i, 1] = ahead, abeam
@@ -186,6 +193,6 @@ def know_velocities(w: int, world: World, water: Water, flow: Flow, see: Fields,
         for k in range(see.link_identity.shape[2]):
             j = world.senses.heard[w, i, k]
             if j >= 0:
-                v_x, v_y = over_ground(w, j, state, heading, flow)
+                v_x, v_y = over_ground(w, j, state, flow)
                 see.link_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
                 see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)

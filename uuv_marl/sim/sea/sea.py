@@ -21,10 +21,10 @@ from uuv_marl.sim.sea.current import (
     advance_gust,
     draw_flow,
     know_velocities,
-    max_eddies,
     read_flow,
     water,
 )
+from uuv_marl.sim.sea.modem import Mail, Modem, draw_mail, exchange, know_mail, modem
 from uuv_marl.sim.sea.navigation import Navigation, Track, draw_track, find_oneself, go_astray, navigate, navigation
 from uuv_marl.sim.sea.noise import Ears, Noise, begin_ears, draw_ears, interrupt, noise, spoil, tell_ranged
 from uuv_marl.sim.sea.readings import Hits, Readings, any_due, begin_line, collect, line_sizes, recall, remember, store
@@ -54,6 +54,8 @@ class Sea(NamedTuple):
     ears: Ears
     navigation: Navigation
     track: Track
+    modem: Modem
+    mail: Mail
 
 
 def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea | None:
@@ -66,21 +68,24 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
     """
     if not disturbances(scenario) and not set(SEA_CHANNELS) & set(scenario.sonar.channels):
         return None
-    own = {"eddy": max_eddies(scenario), "plant": PLANT, "fault": len(scenario.faults)}
-    sizes = {**sizes, **own, **line_sizes(scenario)}
+    own = {"eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults)}
+    peers = sizes["vehicle"] if "modem" in scenario.sonar.channels else 0
+    sizes = {**sizes, **own, **line_sizes(scenario), "peer": peers}
     return Sea(
-        keys,
-        water(scenario),
-        allocate(Flow, sizes),
-        actuation(scenario),
-        allocate(Hull, sizes),
-        listening(scenario),
-        allocate(Readings, sizes),
-        allocate(Hits, sizes),
-        noise(scenario),
-        allocate(Ears, sizes),
-        navigation(scenario),
-        allocate(Track, sizes),
+        keys=keys,
+        water=water(scenario),
+        flow=allocate(Flow, sizes),
+        actuation=actuation(scenario),
+        hull=allocate(Hull, sizes),
+        listening=listening(scenario),
+        readings=allocate(Readings, sizes),
+        hits=allocate(Hits, sizes),
+        noise=noise(scenario),
+        ears=allocate(Ears, sizes),
+        navigation=navigation(scenario),
+        track=allocate(Track, sizes),
+        modem=modem(scenario),
+        mail=allocate(Mail, sizes),
     )
 
 
@@ -99,11 +104,12 @@ def draw_sea(w: int, scenario: Scenario, course: Course, duration_s: float, sea:
     draw_hulls(w, key, duration_s, scenario, sea.hull)
     draw_ears(w, key, sea.noise, sea.ears)
     draw_track(w, key, sea.navigation, sea.track)
+    draw_mail(w, sea.mail)
 
 
 def sea_tables(sea: Sea | None) -> tuple[Any, ...]:
     """All that changes, for snapshots."""
-    return () if sea is None else (sea.flow, sea.hull, sea.readings, sea.ears, sea.track)
+    return () if sea is None else (sea.flow, sea.hull, sea.readings, sea.ears, sea.track, sea.mail)
 
 
 @compiled_inner
@@ -128,6 +134,7 @@ def drift(w: int, world: World, sea: Sea) -> None:
     read_flow(w, world.state, sea.water, sea.flow)
     go_astray(w, world.state, sea.navigation, sea.track)
     remember(w, world.state, sea.readings)
+    exchange(w, sea.keys[w], world, sea.modem, sea.mail, sea.flow)
 
 
 @compiled_inner
@@ -166,4 +173,5 @@ def know(w: int, world: World, sea: Sea, see: Fields, more: SeaFields) -> None:
         recall(w, world, sea.listening, sea.track, sea.readings, see, more)
     tell_ranged(w, world.state.alive, sea.listening, sea.noise, more)
     know_velocities(w, world, sea.water, sea.flow, see, more)
+    know_mail(w, world, sea.mail, more)
     navigate(w, world, sea.navigation, sea.track, see)

@@ -4,9 +4,7 @@ Only sections 5.1 and 5.2.1 (with Table 2) are looked at here; section 5.2.2 sta
 """
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +13,7 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.scenario import ScenarioError, load_scenario
+from uuv_marl.studies.data import read_toml
 from uuv_marl.studies.paper.ledger import difference
 from uuv_marl.studies.suite import Case
 
@@ -47,8 +46,7 @@ class Unknown(NamedTuple):
     """Of the scenario; a field of the vehicle is multiplied."""
 
 
-_TABLES = tomllib.loads(resources.files("uuv_marl.studies.dynamics").joinpath("unknowns.toml").read_text("utf-8"))
-UNKNOWNS = {name: Unknown(**table) for name, table in _TABLES.items()}
+UNKNOWNS = {name: Unknown(**table) for name, table in read_toml("dynamics", "unknowns.toml").items()}
 """The space, as ``unknowns.toml`` lists it."""
 DEFAULTS: dict[str, Value] = {name: unknown.default for name, unknown in UNKNOWNS.items()}
 

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pydantic import TypeAdapter
+
 from uuv_marl.benchmark.results import Results
 from uuv_marl.studies.heldout.trainings import Trained
 
@@ -84,11 +86,6 @@ def write_episodes(episodes: Iterable[Episode], path: Path) -> None:
 
 def read_episodes(path: Path) -> list[Episode]:
     """What ``write_episodes`` wrote."""
-    types: dict[str, Any] = dict.fromkeys(("set", "policy"), str)
-    types |= dict.fromkeys(("training_seed", "seed", "collisions", "clamps"), int)
-
-    def parsed(name: str, text: str) -> Any:
-        return types.get(name, float)(text) if text else None
-
     with path.open(newline="", encoding="utf-8") as file:
-        return [Episode(**{name: parsed(name, text) for name, text in row.items()}) for row in csv.DictReader(file)]
+        rows = [{name: text or None for name, text in row.items()} for row in csv.DictReader(file)]
+    return TypeAdapter(list[Episode]).validate_python(rows)

@@ -1,7 +1,6 @@
 """``report.md``: targets, a table for every set, algorithms over training seeds. Written from the episodes alone."""
 
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from uuv_marl.baselines import POLICIES
 from uuv_marl.benchmark.style import house_style
 from uuv_marl.benchmark.tables import estimate, markdown_table
+from uuv_marl.studies.data import read_text
 from uuv_marl.studies.heldout.across import SCORES, runs, tasks
 from uuv_marl.studies.heldout.episodes import Episode, measured, read_episodes, select, write_episodes
 from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
@@ -46,8 +46,7 @@ def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trai
 
 def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     """The page's text."""
-    story = resources.files("uuv_marl.studies.heldout").joinpath("story.md").read_text(encoding="utf-8")
-    return story.format(
+    return read_text("heldout", "story.md").format(
         targets=_targets(episodes),
         sets="\n".join(_set(held, episodes) for held in SETS if any(e.set == held.name for e in episodes)),
         across=_across(episodes),

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
+from uuv_marl.studies.data import read_toml
 from uuv_marl.studies.suite import NOTHING, Case
 
 _BEST = ("bio_inspired_plus", "mappo")
@@ -40,34 +41,8 @@ class HeldOut(NamedTuple):
         ]  # fmt: skip
 
 
-def _sized(scenario: str, n: int, seeds: int, across: int = 0) -> HeldOut:
-    overrides: dict[str, object] = {"swarm.num_vehicles": n}
-    return HeldOut(f"{scenario}_n{n}", scenario, seeds, overrides=overrides, note=f"{n} vehicles", across=across)
-
-
-def _period(period_s: float) -> HeldOut:
-    overrides: dict[str, object] = {"timing.decision_period_s": period_s}
-    note = f"a decision every {period_s:g} s"
-    return HeldOut(f"random_field_every_{period_s:g}_s", "random_field", 100, overrides=overrides, note=note)
-
-
-_SURFACE: dict[str, object] = {"sonar.echo_reports": "surface"}
-
-SETS = (
-    HeldOut("tracking", "tracking", 100, _BEST, _OTHERS, 20),
-    HeldOut("single_obstacle", "single_obstacle", 100, _BEST, _OTHERS, 20, across=10),
-    HeldOut("multi_obstacle", "multi_obstacle", 100, _BEST, _OTHERS, 20),
-    HeldOut("lossy", "lossy", 100, _BEST, _OTHERS, 20),
-    HeldOut("random_field", "random_field", 500, _BEST, _OTHERS, 100, across=20),
-    _sized("random_field", 10, 500, across=40),
-    _sized("random_field", 100, 100),
-    _sized("random_field", 200, 40),
-    _sized("single_obstacle", 10, 100),
-    _sized("single_obstacle", 100, 40),
-    _sized("single_obstacle", 200, 20),
-    HeldOut("single_obstacle_surface", "single_obstacle", 50, overrides=_SURFACE, note="echoes report the surface"),
-    HeldOut("random_field_surface", "random_field", 100, overrides=_SURFACE, note="echoes report the surface"),
-    _period(0.2),
-    _period(0.5),
+SETS = tuple(
+    HeldOut(**({"policies": _BEST, "others": _OTHERS} if "fewer" in table else {}), **table)
+    for table in read_toml("heldout", "sets.toml")["set"]
 )
-"""In the order of the page."""
+"""Those of ``sets.toml``, in the order of the page."""

@@ -1,10 +1,9 @@
 """What the paper leaves open, as ``assumptions.toml`` lists it."""
 
-import tomllib
 from collections.abc import Iterable, Mapping
-from importlib import resources
 from typing import Any, NamedTuple
 
+from uuv_marl.studies.data import read_toml
 from uuv_marl.studies.paper.cases import SCENARIOS
 from uuv_marl.studies.suite import NOTHING, Case
 
@@ -32,8 +31,7 @@ def _cases(
     return {s: Case(f"{name} {label} {s}", s, overrides=overrides, parameters=parameters) for s in scenarios}
 
 
-_TABLES = tomllib.loads(resources.files("uuv_marl.studies.paper").joinpath("assumptions.toml").read_text("utf-8"))
-ASSUMPTIONS = tuple(Assumption(**table) for table in _TABLES["assumption"])
+ASSUMPTIONS = tuple(Assumption(**table) for table in read_toml("paper", "assumptions.toml")["assumption"])
 READINGS = {("as taken", ""): {case.scenario: case for case in SCENARIOS}} | {
     (one.name, other["label"]): _cases(one.name, **other) for one in ASSUMPTIONS for other in one.alternatives
 }

@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,6 +16,9 @@ from uuv_marl.studies.paper.cases import DELTA_LARGE, DELTA_SMALL, MULTI, SINGLE
 from uuv_marl.studies.paper.drawing import against_time, draw_routes, route_table
 from uuv_marl.studies.part import Part, Share, Tables
 from uuv_marl.studies.suite import Case, Suite
+
+Made = tuple[Callable[[Suite, Case], Columns], Case]
+"""How a table is made, and of which case."""
 
 
 def distances(suite: Suite, case: Case) -> Columns:
@@ -45,13 +48,8 @@ def draw_distances(axes: Sequence[Axes], table: Columns, case: Case) -> None:
     axes[1].set_ylim(-2.0, 40.0)
 
 
-def figure_11(suite: Suite, _report: Share) -> Tables:
-    """Routes past one obstacle, and the distance over time."""
-    return {"figure-11a": route_table(suite, SINGLE), "figure-11b": distances(suite, SINGLE)}
-
-
 def draw_11(made: Tables) -> Figure:
-    """Routes, and the distance over time."""
+    """Routes past one obstacle, and the distance over time."""
     figure, axes = panels(3, size=(4.6, 4.6))
     draw_routes(axes[0], made["figure-11a"], SINGLE, "routes")
     draw_distances(axes[1:], made["figure-11b"], SINGLE)
@@ -64,9 +62,6 @@ def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
     def gain(case: Case) -> float:
         return float(getattr(case.parameters.get("gains", Gains()), symbol))
 
-    def tables(suite: Suite, _report: Share) -> Tables:
-        return {f"{name}a": route_table(suite, small), f"{name}b": route_table(suite, large)}
-
     def draw(made: Tables) -> Figure:
         figure, axes = panels(2)
         for ax, key, case, words in zip(axes, "ab", (small, large), ("too small", "too large"), strict=True):
@@ -74,12 +69,17 @@ def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
             draw_routes(ax, made[f"{name}{key}"], case, title)
         return legend(figure, columns=4)
 
-    return Part(name, (small, large, SINGLE), tables, draw)
+    tables = {f"{name}a": (route_table, small), f"{name}b": (route_table, large)}
+    return part(name, (small, large, SINGLE), tables, draw)
 
 
-def figure_14(suite: Suite, _report: Share) -> Tables:
-    """Routes among four obstacles."""
-    return {"figure-14": route_table(suite, MULTI)}
+def part(name: str, cases: tuple[Case, ...], tables: Mapping[str, Made], draw: Callable[[Tables], Figure]) -> Part:
+    """A part whose tables are each a function of one case."""
+
+    def made(suite: Suite, _report: Share) -> Tables:
+        return {key: make(suite, case) for key, (make, case) in tables.items()}
+
+    return Part(name, cases, made, draw)
 
 
 def draw_14(made: Tables) -> Figure:
@@ -89,22 +89,17 @@ def draw_14(made: Tables) -> Figure:
     return legend(figure, columns=4)
 
 
-def figure_15(suite: Suite, _report: Share) -> Tables:
-    """Distance from each of four obstacles over time."""
-    return {"figure-15": distances(suite, MULTI)}
-
-
 def draw_15(made: Tables) -> Figure:
-    """The whole range, and the part below 40 m."""
+    """Distance from each of four obstacles over time: the whole range, and the part below 40 m."""
     figure, axes = panels(2)
     draw_distances(axes, made["figure-15"], MULTI)
     return legend(figure, columns=4)
 
 
 PARTS = (
-    Part("figure-11", (SINGLE,), figure_11, draw_11),
+    part("figure-11", (SINGLE,), {"figure-11a": (route_table, SINGLE), "figure-11b": (distances, SINGLE)}, draw_11),
     figure_12_or_13("figure-12", "zeta_o", ZETA_SMALL, ZETA_LARGE),
     figure_12_or_13("figure-13", "delta_o", DELTA_SMALL, DELTA_LARGE),
-    Part("figure-14", (MULTI,), figure_14, draw_14),
-    Part("figure-15", (MULTI,), figure_15, draw_15),
+    part("figure-14", (MULTI,), {"figure-14": (route_table, MULTI)}, draw_14),
+    part("figure-15", (MULTI,), {"figure-15": (distances, MULTI)}, draw_15),
 )

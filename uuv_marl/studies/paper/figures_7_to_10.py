@@ -9,16 +9,8 @@ from matplotlib.figure import Figure
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, PINK, legend, panels
 from uuv_marl.studies.columns import Columns, where
+from uuv_marl.studies.paper import drawing
 from uuv_marl.studies.paper.cases import TRACKING
-from uuv_marl.studies.paper.drawing import (
-    GROUPS,
-    against_time,
-    draw_routes,
-    mark_corners,
-    plan,
-    route_table,
-    start_groups,
-)  # fmt: skip
 from uuv_marl.studies.paper.measures import SPEED_MPS, corner_times, mean_heading, path_distance
 from uuv_marl.studies.part import Part, Share, Tables
 from uuv_marl.studies.suite import Suite
@@ -32,7 +24,7 @@ def figure_7(suite: Suite, _report: Share) -> Tables:
         position, velocity = trace["route_position"][index], trace["route_velocity"][index]
         return {
             "vehicle": np.arange(len(position)),
-            "group": start_groups(trace),
+            "group": drawing.start_groups(trace),
             "time_s": np.full(len(position), trace["route_time_s"][index]),
             "x_m": position[:, 0],
             "y_m": position[:, 1],
@@ -50,8 +42,8 @@ def draw_7(made: Tables) -> Figure:
     for ax, name, words in zip(axes, ("figure-7a", "figure-7b"), ("start", "end"), strict=True):
         table = made[name]
         fastest = float(f"{np.hypot(table['velocity_x_mps'], table['velocity_y_mps']).max():.1g}")
-        plan(ax, TRACKING, f"({name[-1]}) {words}, t = {float(table['time_s'][0]):g} s")
-        for group, colour, label in GROUPS:
+        drawing.plan(ax, TRACKING, f"({name[-1]}) {words}, t = {float(table['time_s'][0]):g} s")
+        for group, colour, label in drawing.GROUPS:
             own = where(table, group=group)
             x, y, u, v = (own[column] for column in ("x_m", "y_m", "velocity_x_mps", "velocity_y_mps"))
             ax.plot(x, y, "o", color=colour, mfc="none", label=label)
@@ -68,7 +60,7 @@ def figure_8(suite: Suite, _report: Share) -> Tables:
     trace = suite.trace(TRACKING, 0)
     centre = trace["route_position"].mean(axis=1)
     return {
-        "figure-8a": route_table(suite, TRACKING),
+        "figure-8a": drawing.route_table(suite, TRACKING),
         "figure-8b": {"time_s": trace["route_time_s"], "centre_x_m": centre[:, 0], "centre_y_m": centre[:, 1]},
     }
 
@@ -76,8 +68,8 @@ def figure_8(suite: Suite, _report: Share) -> Tables:
 def draw_8(made: Tables) -> Figure:
     """Routes, and the centre's route over the trajectory."""
     figure, (left, right) = panels(2)
-    draw_routes(left, made["figure-8a"], TRACKING, "(a) every vehicle")
-    plan(right, TRACKING, "(b) centre of the swarm")
+    drawing.draw_routes(left, made["figure-8a"], TRACKING, "(a) every vehicle")
+    drawing.plan(right, TRACKING, "(b) centre of the swarm")
     centre = made["figure-8b"]
     right.plot(centre["centre_x_m"], centre["centre_y_m"], color=GREEN, label="route of the swarm's centre")
     return legend(figure, columns=4)
@@ -125,11 +117,11 @@ def draw_9(made: Tables) -> Figure:
     middle.plot(time, deviation["from_path_m"], color=PINK, label="from the path")
     right.plot(time, order, color=BLUE, label="length of the mean heading vector")
     right.set_ylim(0.0, 1.02)
-    against_time(left, "heading psi, clockwise from north [deg]", "(a) headings")
-    against_time(middle, "deviation of the swarm's centre [m]", "(b) centre and given trajectory")
-    against_time(right, "order parameter, 1 where all are aligned [1]", "(c) how far headings agree")
+    drawing.against_time(left, "heading psi, clockwise from north [deg]", "(a) headings")
+    drawing.against_time(middle, "deviation of the swarm's centre [m]", "(b) centre and given trajectory")
+    drawing.against_time(right, "order parameter, 1 where all are aligned [1]", "(c) how far headings agree")
     for ax in (left, middle, right):
-        mark_corners(ax, TRACKING)
+        drawing.mark_corners(ax, TRACKING)
     return legend(figure, columns=7)
 
 
@@ -145,8 +137,8 @@ def draw_10(made: Tables) -> Figure:
     table, scenario, law = made["figure-10"], TRACKING.load(), PAPER["tracking", "bio_inspired"]
     for ax, name, words in zip(axes, ("max_spacing_m", "min_spacing_m"), ("(a) largest", "(b) smallest"), strict=True):
         ax.plot(table["time_s"], table[name], color=BLUE, label="ours")
-        mark_corners(ax, TRACKING)
-        against_time(ax, f"{words[4:]} distance between two vehicles [m]", words)
+        drawing.mark_corners(ax, TRACKING)
+        drawing.against_time(ax, f"{words[4:]} distance between two vehicles [m]", words)
         ax.set_ylim(0.0, 1.05 * float(table[name].max()))
     for value, style, colour, label in (
         (law.mean_min_spacing_m, "--", GREEN, "paper, time mean of the smallest"),

@@ -13,8 +13,8 @@ from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.tables import Estimate, estimate, markdown_table
 from uuv_marl.studies.columns import Float64
 from uuv_marl.studies.paper.assumptions import ASSUMPTIONS
-from uuv_marl.studies.paper.cases import MULTI, SCENARIOS, SDC, SFF, SINGLE, TRACKING
-from uuv_marl.studies.paper.claims import CLAIMS, Claim
+from uuv_marl.studies.paper.cases import BY_NAME, SCENARIOS
+from uuv_marl.studies.paper.claims import CLAIMS, Claim, stated
 from uuv_marl.studies.suite import Case, Suite
 
 CLOSE, NEAR = 0.05, 0.15
@@ -43,30 +43,7 @@ class Number(NamedTuple):
         return PAPER[self.case.scenario, self.case.policy].values(self.metric)
 
 
-SPACING = (
-    "fewer vehicles than 54 (the paper names the number in 5.2.1 only) or half the inertia would give it; sub-sectors "
-    "and start spacing hardly move it (sensitivity)"
-)
-DISTANCE = "the paper's larger value lies within the spread of our seeds; six sub-sectors would give it (sensitivity)"
-COMPARATOR = "the paper only names this method; ours is a reconstruction, tuned on this scenario for time with s_o kept"
-TIME = "the approach to the end differs; speed of l(t), inertia and yaw resistance move it most (sensitivity)"
-MULTI_DISTANCE = (
-    "not explained within what the paper states. Obstacles heard from 190 m, where Table 1 has 100 m, would give both "
-    "numbers (identification, post hoc); more vehicles than 54 lower it too (swarm-size)"
-)
-NUMBERS = (
-    Number("5.1", "smallest distance between vehicles", TRACKING, "min_spacing_m", SPACING),
-    Number("5.1", "time mean of the smallest distance", TRACKING, "mean_min_spacing_m", SPACING),
-    Number("5.2.1", "smallest distance to the obstacle", SINGLE, "min_obstacle_distance_m", DISTANCE),
-    Number("5.2.2", "smallest distance to an obstacle", MULTI, "min_obstacle_distance_m", MULTI_DISTANCE),
-    Number("5.2.2", "task time", MULTI, "task_time_s", TIME),
-    Number("Table 2", "SDC: task time", SDC, "task_time_s", COMPARATOR),
-    Number("Table 2", "SDC: smallest distance to the obstacle", SDC, "min_obstacle_distance_m", COMPARATOR),
-    Number("Table 2", "SFF: task time", SFF, "task_time_s", COMPARATOR),
-    Number("Table 2", "SFF: smallest distance to the obstacle", SFF, "min_obstacle_distance_m", COMPARATOR),
-    Number("Table 2", "proposed: task time", SINGLE, "task_time_s", TIME),
-    Number("Table 2", "proposed: smallest distance to the obstacle", SINGLE, "min_obstacle_distance_m", DISTANCE),
-)
+NUMBERS = tuple(Number(case=BY_NAME[table.pop("case")], **table) for table in stated("number"))
 """The paper's results, in its order."""
 
 
@@ -132,7 +109,7 @@ def claim_entry(claim: Claim, values: Float64) -> Entry:
     held, of = int(claim.holds(values).sum()), len(values)
     words = {of: "holds", 0: "does not hold"}.get(held, f"holds in {held} of {of} seeds")
     row = Entry(
-        claim.section, "claim", f"{claim.says}: {claim.measure}", claim.unit, f"holds {_limits(claim)}",
+        claim.section, "claim", f"{claim.says}: {claim.measured}", claim.unit, f"holds {_limits(claim)}",
         verdict=words, why="" if held == of else claim.why,
     )  # fmt: skip
     found = values[np.isfinite(values)]

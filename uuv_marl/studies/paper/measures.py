@@ -3,7 +3,6 @@
 Below them what is read off routes: distance from the path, turns, groups, sides. Frame north, east [m].
 """
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -109,14 +108,10 @@ def extent_at_first_corner(trace: Trace) -> float:
     return float(after.max() / before.mean())
 
 
-def spread_of(name: str) -> Callable[[Trace], float]:
-    """Range that holds 90 % of the time, over the mean, once settled and until l(t) rests."""
-
-    def value(trace: Trace) -> float:
-        inside = between(trace, name, SETTLED_S, corners(trace)[-1])
-        return float((np.percentile(inside, 95) - np.percentile(inside, 5)) / inside.mean())
-
-    return value
+def spread_of(trace: Trace, name: str) -> float:
+    """Range of a series that holds 90 % of the time, over the mean, once settled and until l(t) rests."""
+    inside = between(trace, name, SETTLED_S, corners(trace)[-1])
+    return float((np.percentile(inside, 95) - np.percentile(inside, 5)) / inside.mean())
 
 
 def spacing_change_at_corners(trace: Trace) -> float:

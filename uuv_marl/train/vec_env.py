@@ -1,4 +1,4 @@
-"""``Crew``: a ``Fleet`` as a Stable-Baselines3 ``VecEnv``, which sees what the actor sees."""
+"""``TrainingVecEnv``: a ``TrainingEnv`` as a Stable-Baselines3 ``VecEnv``, which sees what the actor sees."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,21 +7,20 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import MOST_BARRIER
-from uuv_marl.envs.sb3 import SharedRows
+from uuv_marl.baselines.features import MOST_BARRIER
+from uuv_marl.envs.sb3 import SharedEnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.train.fleet import Fleet
+from uuv_marl.sim.arrays import Float32
+from uuv_marl.train.env import TrainingEnv
 from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with Stable-Baselines3"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
-Float32 = NDArray[np.float32]
 
-
-class Crew(SharedRows, VecEnv):
-    """Rows of a fleet: features of the actor in, what it adds to the barrier [full force] out.
+class TrainingVecEnv(SharedEnvMixin, VecEnv):
+    """Rows of a ``TrainingEnv``: features of the actor in, what it adds to the barrier [full force] out.
 
     Args:
         scenario: what to simulate.
@@ -31,14 +30,12 @@ class Crew(SharedRows, VecEnv):
 
     def __init__(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights) -> None:
         self._next_seed: int | None = None
-        self.fleet = Fleet(scenario, sizes, weights, self._draw)
-        self.paid = 0.0
+        self.env = TrainingEnv(scenario, sizes, weights, self._draw)
+        self.reward_sum = 0.0
         """Mean reward of the rows, summed over the steps so far."""
         self.render_mode = None
-        size = (self.fleet.features,)
-        super().__init__(
-            self.fleet.rows, Box(-np.inf, np.inf, size), Box(-MOST_BARRIER, MOST_BARRIER, (2,), np.float32)
-        )
+        size = (self.env.features,)
+        super().__init__(self.env.rows, Box(-np.inf, np.inf, size), Box(-MOST_BARRIER, MOST_BARRIER, (2,), np.float32))
 
     def _draw(self, num: int) -> Sequence[int] | None:
         """Counted on through all swarms at a reset after ``seed``; later each world goes on with its own stream."""
@@ -48,9 +45,9 @@ class Crew(SharedRows, VecEnv):
         return range(first, first + num)
 
     @property
-    def seen(self) -> Float32:
+    def observation(self) -> Float32:
         """What every row sees now, shape (row, feature)."""
-        return self.fleet.seen[:, : self.fleet.features].copy()
+        return self.env.observation[:, : self.env.features].copy()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """For the next reset: worlds are counted on through all swarms, and world w starts from ``seed + w``."""
@@ -59,10 +56,10 @@ class Crew(SharedRows, VecEnv):
 
     def reset(self) -> Float32:
         """Start all worlds; shape (row, feature)."""
-        self.fleet.reset()
+        self.env.reset()
         self._next_seed = None
         self.reset_infos = [{} for _ in range(self.num_envs)]
-        return self.seen
+        return self.observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions, shape (row, 2), for ``step_wait``."""
@@ -70,12 +67,12 @@ class Crew(SharedRows, VecEnv):
 
     def step_wait(self) -> tuple[Float32, Float32, NDArray[np.bool_], list[dict[str, Any]]]:
         """Features, rewards, dones and infos of every row; cut-off rows tell what they would have seen next."""
-        moment = self.fleet.step(self._actions)
+        transition = self.env.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for row, last in zip(np.flatnonzero(moment.truncated), moment.last, strict=True):
-            infos[row] = {"TimeLimit.truncated": True, "terminal_observation": last[: self.fleet.features]}
-        self.paid += float(moment.reward.mean())
-        return self.seen, moment.reward, moment.terminated | moment.truncated, infos
+        for row, last in zip(np.flatnonzero(transition.truncated), transition.final_obs, strict=True):
+            infos[row] = {"TimeLimit.truncated": True, "terminal_observation": last[: self.env.features]}
+        self.reward_sum += float(transition.reward.mean())
+        return self.observation, transition.reward, transition.terminated | transition.truncated, infos
 
     def close(self) -> None:
         """Nothing is open."""

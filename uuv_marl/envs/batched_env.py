@@ -6,32 +6,30 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from uuv_marl.envs.observation import observe
-from uuv_marl.envs.reward import RewardFunction, compute_reward, reward_weights
+from uuv_marl.envs.reward import RewardFunction, compute_reward, named, reward_weights
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
+from uuv_marl.sim.arrays import Bool, Float32, Float64
 from uuv_marl.sim.engine import EngineName
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 ScenarioLike = str | os.PathLike[str] | Scenario
 Reward = Literal["individual", "team"] | RewardFunction
 
 
-class Outcome(NamedTuple):
+class StepResult(NamedTuple):
     """One step of every world. Arrays of shape (world, vehicle, ...), or (world,) where that is said."""
 
     observation: Float32
     reward: Float64
     """0 for vehicles that were lost before."""
     terminated: Bool
-    """The swarm arrived, or the vehicle was lost in this step."""
+    """The swarm arrived and that ends the episode, or the vehicle was lost in this step."""
     truncated: Bool
     """The time limit, for vehicles that are not lost."""
     acting: Bool
@@ -39,11 +37,16 @@ class Outcome(NamedTuple):
     world_reward: Float64
     """Shape (world,): the mean over all vehicles, before ``team`` adds anybody's own loss."""
     world_terminated: Bool
-    """Shape (world,): the swarm arrived, or all its vehicles are lost."""
+    """Shape (world,): the swarm arrived and that ends the episode, or all its vehicles are lost."""
     world_truncated: Bool
     """Shape (world,): the time limit."""
-    terms: Mapping[str, Float64]
-    """The reward's terms; empty for a user's own reward."""
+    weighted: Float64 | None
+    """The reward's terms, shape (term, world, vehicle); None for a user's own reward."""
+
+    @property
+    def terms(self) -> Mapping[str, Float64]:
+        """The reward's terms by name; empty for a user's own reward."""
+        return {} if self.weighted is None else named(self.weighted)
 
     @property
     def over(self) -> Bool:
@@ -51,7 +54,7 @@ class Outcome(NamedTuple):
         return self.world_terminated | self.world_truncated
 
 
-class Task:
+class BatchedEnv:
     """A swarm with the reward and the endings of the environment's contract.
 
     Args:
@@ -76,7 +79,8 @@ class Task:
         self.swarm = Swarm(scenario, num_worlds, engine)
         self.state_layout = state_layout(scenario)
         self._weights = reward_weights(scenario)
-        self._ready = np.zeros(num_worlds, np.bool_)
+        self._waiting = set(range(num_worlds))
+        """Worlds that were never reset."""
         self._over = np.zeros(num_worlds, np.bool_)
         self.collisions = np.zeros(num_worlds, np.int64)
         """Contact episodes that began since the reset, shape (world,)."""
@@ -111,15 +115,16 @@ class Task:
         """
         chosen = list(range(self.swarm.num_worlds)) if worlds is None else list(worlds)
         self.swarm.reset(seed, chosen)
-        self._ready[chosen], self._over[chosen], self.collisions[chosen] = True, False, 0
+        self._waiting -= set(chosen)
+        self._over[chosen], self.collisions[chosen] = False, 0
         return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
 
     def need_reset(self, what: str) -> None:
         """Raise RuntimeError where a world was never reset."""
-        if not self._ready.all():
+        if self._waiting:
             raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
 
-    def step(self, action: ArrayLike) -> Outcome:
+    def step(self, action: ArrayLike) -> StepResult:
         """One decision of every world; ``action`` has shape (world, vehicle, 2).
 
         A world whose episode is over stays as it is, its flags too, and is paid nothing, until it is reset.
@@ -127,25 +132,25 @@ class Task:
         self.need_reset("step")
         swarm = self.swarm
         before, running = swarm.state.alive.copy(), ~self._over
-        swarm.step(action, running)
+        percept = swarm.step(action, running)
         np.add(self.collisions, swarm.facts.collisions, out=self.collisions, where=running)
         alive = swarm.state.alive
-        reward, world_reward, terms = self._rewards(before & running[:, None])
+        reward, world_reward, weighted = self._rewards(before & running[:, None])
         world_terminated, world_truncated = swarm.endings()
         if self._max_cycles is not None:
             last_tick = self._max_cycles * swarm.scenario.timing.holds_per_decision
             world_truncated |= (swarm.state.tick >= last_tick) & ~world_terminated
         self._over = world_terminated | world_truncated
-        return Outcome(
-            observation=observe(swarm),
+        return StepResult(
+            observation=observe(percept),
             reward=reward,
-            terminated=before & (swarm.arrived[:, None] | ~alive),
+            terminated=before & (world_terminated[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
             acting=alive & ~self._over[:, None],
             world_reward=world_reward,
             world_terminated=world_terminated,
             world_truncated=world_truncated,
-            terms=terms,
+            weighted=weighted,
         )
 
     def state(self) -> Float32:
@@ -153,16 +158,16 @@ class Task:
         self.need_reset("state()")
         return global_state(self.swarm, self.state_layout)
 
-    def _rewards(self, before: Bool) -> tuple[Float64, Float64, Mapping[str, Float64]]:
-        """Reward per vehicle, per world, and the terms, for those that were there ``before`` the step."""
+    def _rewards(self, before: Bool) -> tuple[Float64, Float64, Float64 | None]:
+        """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step."""
         if callable(self._reward):
             own = np.where(before, self._own_reward(self._reward, before), 0.0)
-            return own, own.mean(axis=1), {}
+            return own, own.mean(axis=1), None
         reward, terms = compute_reward(self.swarm, self._weights, ~self._over)
-        mean = reward.mean(axis=1)
+        mean = reward.sum(axis=1) / self.swarm.num_vehicles  # twice as fast as reward.mean(axis=1), and its bits
         if self._reward == "team":
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
-            reward = np.where(before, mean[:, None] + terms["loss"], 0.0)
+            reward = np.where(before, mean[:, None] + named(terms)["loss"], 0.0)
         return reward, mean, terms
 
     def _own_reward(self, function: RewardFunction, before: Bool) -> Float64:
@@ -185,7 +190,7 @@ class Changes(TypedDict, total=False):
     overrides: Mapping[str, object] | None
 
 
-class TaskOptions(Changes, total=False):
+class EnvOptions(Changes, total=False):
     """Arguments of every environment API beyond the scenario, explained by ``uuv_marl.parallel_env``."""
 
     max_cycles: int | None
@@ -199,12 +204,19 @@ def changed(
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> Scenario:
-    """The scenario with the ``Changes``."""
+    """The scenario with what the arguments of an environment change in it.
+
+    Args:
+        scenario: a name, a TOML file or a ``Scenario``.
+        num_vehicles: replaces the scenario's.
+        decision_period: time between decisions [s], replaces ``timing.decision_period_s``.
+        overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
+    """
     period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
     return load_scenario(scenario, num_vehicles=num_vehicles, overrides={**(overrides or {}), **period})
 
 
-def make_task(
+def make_batched_env(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
     *,
@@ -212,16 +224,25 @@ def make_task(
     reward: Reward = "individual",
     engine: EngineName = "numba",
     **changes: Unpack[Changes],
-) -> Task:
-    """A task from the arguments that every environment API takes, explained by ``uuv_marl.parallel_env``."""
-    return Task(changed(scenario, **changes), num_worlds, reward, max_cycles, engine)
+) -> BatchedEnv:
+    """Worlds from the arguments that every environment API takes.
+
+    Args:
+        scenario: a name, a TOML file or a ``Scenario``.
+        num_worlds: worlds stepped together.
+        max_cycles: truncates after so many decisions; None for the scenario's time limit.
+        reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
+        engine: ``numba`` or ``plain``.
+        changes: ``num_vehicles``, ``decision_period`` [s] and ``overrides`` of the scenario, see ``changed``.
+    """
+    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, engine)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:
     """Raise ScenarioError where vehicles can be lost, for an API whose rows must all live to the episode's end."""
-    if scenario.disturbance.loss_times_s or scenario.contact.ends_vehicle:
+    if scenario.loses_vehicles:
         raise ScenarioError(
             f"{api} can't show that a vehicle is lost before the others, which scenario {scenario.name!r} allows; use "
             "uuv_marl.parallel_env, vector_env or the TorchRL or RLlib environment, or override "
-            "disturbance.loss_times_s=[] and contact.ends_vehicle=false"
+            "disturbance.loss_times_s=[], contact.ends_vehicle=false and no faults of kind member"
         )

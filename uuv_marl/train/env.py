@@ -1,4 +1,4 @@
-"""Fleet: several ``Swarm``s of different sizes, stepped as one flat array of vehicles, ended worlds started anew."""
+"""``TrainingEnv``: swarms of several sizes, stepped as one flat array of vehicles; worlds that end start anew."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned import BARRIER, Features
-from uuv_marl.envs.task import refuse_losses
+from uuv_marl.baselines.features import BARRIER, Features
+from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train.shaping import VIEW_SIZE, Weights, shaped, view
+from uuv_marl.train.shaping import PRIVILEGED_SIZE, Weights, privileged_observation, shaped_reward
 
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
 Arrays = Mapping[str, NDArray[Any]]
 Seeds = Callable[[int], Sequence[int] | NDArray[np.integer] | None]
 """Seeds for so many worlds that start, or None for each to go on with its own stream."""
@@ -24,7 +23,7 @@ PATIENCE_S = 40.0
 """An episode is cut off so long after l(t) came to rest: waiting for stragglers teaches little."""
 
 
-class Moment(NamedTuple):
+class Transition(NamedTuple):
     """One decision of every vehicle, a row each."""
 
     reward: Float32
@@ -32,29 +31,23 @@ class Moment(NamedTuple):
     """The swarm arrived."""
     truncated: Bool
     """The episode was cut off."""
-    last: Float32
+    final_obs: Float32
     """What the critic would have seen next, for the truncated rows, in their order."""
 
 
-class Episodes(NamedTuple):
+class EpisodeStats(NamedTuple):
     """Sums over episodes that ended."""
 
-    number: int = 0
-    arrived: int = 0
-    collisions: int = 0
-    returns: float = 0.0
+    number: float
+    arrived: float
+    collisions: float
+    returns: float
     """Of the mean over vehicles."""
-    decisions: int = 0
-
-    @staticmethod
-    def unpacked(array: NDArray[Any]) -> "Episodes":
-        """From an array of all of it."""
-        number, arrived, collisions, returns, decisions = array
-        return Episodes(int(number), int(arrived), int(collisions), float(returns), int(decisions))
+    decisions: float
 
 
-class Fleet:
-    """Vehicles of many worlds as rows; ``seen`` (row, ``size``) is what the critic sees of each now.
+class TrainingEnv:
+    """Vehicles of many worlds as rows; ``observation`` (row, ``size``) is what the critic sees of each now.
 
     The first ``features`` entries are the actor's. Rows run over swarms, their worlds, and vehicles. An episode ends as
     everywhere (``Swarm.ended``), but waits no longer than ``PATIENCE_S`` for stragglers.
@@ -77,13 +70,13 @@ class Fleet:
         self._swarms = [Swarm(load_scenario(scenario, num_vehicles=n), worlds) for n, worlds in sizes]
         self._features = Features(scenario, BARRIER)
         self.features = self._features.size
-        self.size = self.features + VIEW_SIZE
+        self.size = self.features + PRIVILEGED_SIZE
         self._ends = np.cumsum([n * worlds for n, worlds in sizes])
         self.rows = int(self._ends[-1])
-        self.seen = np.zeros((self.rows, self.size), np.float32)
+        self.observation = np.zeros((self.rows, self.size), np.float32)
         self._barrier = np.zeros((self.rows, 2), np.float32)
         self._sums = [np.zeros((worlds, 3)) for _, worlds in sizes]
-        self.episodes = Episodes()
+        self._ended = np.zeros(len(EpisodeStats._fields))
         self.reset()
 
     def reset(self) -> None:
@@ -93,77 +86,59 @@ class Fleet:
             self._look(k)
             self._sums[k][...] = 0.0
 
-    def step(self, action: Float32) -> Moment:
+    def step(self, action: Float32) -> Transition:
         """One decision; ``action`` (row, 2) is what the actor adds to the barrier [full force]."""
-        moment = Moment(
-            reward=np.zeros(self.rows, np.float32),
-            terminated=np.zeros(self.rows, np.bool_),
-            truncated=np.zeros(self.rows, np.bool_),
-            last=np.empty((0, self.size), np.float32),
-        )
-        last = [moment.last]
+        reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
+        final = [np.empty((0, self.size), np.float32)]
         for k, swarm in enumerate(self._swarms):
             rows, shape = self._rows(k), (swarm.num_worlds, swarm.num_vehicles)
             swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
-            reward = shaped(swarm, self._weights)
-            ends, arrived = swarm.endings(), swarm.arrived
-            for flags, values in zip((moment.terminated, moment.truncated), ends, strict=True):
-                flags[rows] = np.repeat(values, shape[1])
-            over = ends[0] | ends[1]
-            moment.reward[rows] = reward.reshape(-1)
-            self._sums[k] += np.stack([reward.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
+            paid, ends = shaped_reward(swarm, self._weights), np.array(swarm.endings())
+            reward[rows], ended[:, rows] = paid.reshape(-1), ends.repeat(shape[1], axis=1)
+            self._sums[k] += np.stack([paid.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
             self._look(k)
+            over = ends.any(axis=0)
             if over.any():
-                last.append(self.seen[rows][moment.truncated[rows]])
-                self._count(k, over, arrived)
-                self._restart(k, [int(w) for w in np.flatnonzero(over)])
+                final.append(self.observation[rows][ended[1, rows]])
+                returns, collisions, decisions = self._sums[k][over].sum(axis=0)
+                self._ended += [over.sum(), (over & swarm.arrived).sum(), collisions, returns, decisions]
+                self._sums[k][over] = 0.0
+                self._restart(k, np.flatnonzero(over).tolist())
                 self._look(k)
-        return moment._replace(last=np.concatenate(last))
+        return Transition(reward, ended[0], ended[1], np.concatenate(final))
 
-    def take_episodes(self) -> Episodes:
+    def pop_episode_stats(self) -> EpisodeStats:
         """Sums over the episodes that ended since the last call."""
-        taken, self.episodes = self.episodes, Episodes()
+        taken, self._ended = EpisodeStats(*self._ended.tolist()), np.zeros_like(self._ended)
         return taken
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All but the generator, for ``restore``."""
-        kept: dict[str, NDArray[Any]] = {"episodes": np.array(self.episodes, np.float64)}
+        kept: dict[str, NDArray[Any]] = {"episodes": self._ended.copy()}
         for k, (swarm, sums) in enumerate(zip(self._swarms, self._sums, strict=True)):
             kept |= {f"{k}.{name}": array for name, array in swarm.snapshot().items()}
             kept[f"{k}.sums"] = sums.copy()
         return kept
 
     def restore(self, snapshot: Arrays) -> None:
-        """Go on from a snapshot of a fleet of the same sizes."""
+        """Go on from a snapshot of an environment of the same sizes."""
         for k, swarm in enumerate(self._swarms):
             swarm.restore({name.split(".")[1]: array for name, array in snapshot.items() if name.startswith(f"{k}.")})
             self._sums[k][...] = snapshot[f"{k}.sums"]
             self._look(k)
-        self.episodes = Episodes.unpacked(snapshot["episodes"])
+        self._ended[...] = snapshot["episodes"]
 
     def _rows(self, k: int) -> slice:
         return slice(int(self._ends[k - 1]) if k else 0, int(self._ends[k]))
 
     def _look(self, k: int) -> None:
         swarm, rows = self._swarms[k], self._rows(k)
-        seen = self.seen[rows].reshape(swarm.num_worlds, swarm.num_vehicles, self.size)
+        observation = self.observation[rows].reshape(swarm.num_worlds, swarm.num_vehicles, self.size)
         barrier = self._barrier[rows].reshape(swarm.num_worlds, swarm.num_vehicles, 2)
         self._features.look(
-            swarm.percept.flat, seen[:, :, : self.features], barrier, np.zeros(swarm.num_worlds, np.int64)
+            swarm.percept.flat, observation[:, :, : self.features], barrier, np.zeros(swarm.num_worlds, np.int64)
         )
-        view(swarm, seen[:, :, self.features :])
+        privileged_observation(swarm, observation[:, :, self.features :])
 
     def _restart(self, k: int, worlds: Sequence[int]) -> None:
         self._swarms[k].reset(self._seeds(len(worlds)), worlds)
-
-    def _count(self, k: int, over: Bool, arrived: Bool) -> None:
-        returns, collisions, decisions = self._sums[k][over].sum(axis=0)
-        before = self.episodes
-        self.episodes = Episodes(
-            before.number + int(over.sum()),
-            before.arrived + int((over & arrived).sum()),
-            before.collisions + int(collisions),
-            before.returns + float(returns),
-            before.decisions + int(decisions),
-        )
-        self._sums[k][over] = 0.0

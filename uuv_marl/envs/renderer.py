@@ -1,4 +1,4 @@
-"""What every API's object shows: the scenario, the swarm, pictures. pygame, an extra, is imported on first use."""
+"""Pictures of an environment's worlds, as frames or in a window. pygame, an extra, is imported on first use."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,18 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.envs.drawing.options import RenderOptions, look
 from uuv_marl.envs.drawing.scene import Memory, Scene
-from uuv_marl.envs.task import Task
-from uuv_marl.scenario import Scenario
-from uuv_marl.sim.swarm import Swarm
 
 
-class View:
-    """Draws a task's worlds for an environment.
+class Renderer:
+    """Draws the worlds of an environment.
 
     Args:
-        task: gives the worlds, and the pictures per second.
+        batch: gives the worlds, and the pictures per second.
         render_mode: one of ``modes``, or None.
         modes: ``rgb_array``, and ``human`` where the environment can show a window.
         options: how to draw.
@@ -26,7 +24,7 @@ class View:
 
     def __init__(
         self,
-        task: Task,
+        batch: BatchedEnv,
         render_mode: str | None,
         modes: Sequence[str],
         options: RenderOptions | None = None,
@@ -35,30 +33,30 @@ class View:
         if render_mode is not None and render_mode not in modes:
             raise ValueError(f"render_mode must be one of {list(modes)} or None, got {render_mode!r}")
         self.mode = render_mode
-        self.fps = round(1.0 / task.swarm.scenario.timing.decision_period_s) or 1
-        self._task = task
-        self._look = look(options, task.swarm.num_vehicles, sonar_of)
-        self._memory = Memory(task)
+        self.fps = round(1.0 / batch.swarm.scenario.timing.decision_period_s) or 1
+        self._batch = batch
+        self._look = look(options, batch.swarm.num_vehicles, sonar_of)
+        self._memory = Memory(batch)
         self._canvas: Any = None
 
     def draw(self, world: int = 0) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
         if self.mode is None:
             raise RuntimeError("render() needs a render_mode: make the environment with render_mode='rgb_array'")
-        self._memory.note(self._task)
+        self._memory.note(self._batch)
         if self.mode == "human":
             return self._window().show(self._scene, wait=False)
         from uuv_marl.envs.drawing.frame import Frame, Panel, pixels  # noqa: PLC0415
 
         self._canvas = self._canvas or Frame(self._look.size)
-        name, worlds = self._task.swarm.scenario.name, self._task.swarm.num_worlds
+        name, worlds = self._batch.swarm.scenario.name, self._batch.swarm.num_worlds
         title = name if worlds == 1 else f"{name}, world {world}"
         return pixels(self._canvas.draw([Panel(title, self._scene(self._look.sonar_of, world))], self._look.camera))
 
     def update(self) -> None:
         """Look at the worlds after a reset or a step; bring a window up to date, if there is one."""
         if self.mode is not None:
-            self._memory.note(self._task)
+            self._memory.note(self._batch)
         if self.mode == "human":
             self._window().show(self._scene, wait=True)
 
@@ -69,55 +67,15 @@ class View:
         self._canvas = None
 
     def _scene(self, sonar_of: int | None, world: int = 0) -> Scene:
-        return self._memory.scene(self._task, world, sonar_of)
+        return self._memory.scene(self._batch, world, sonar_of)
 
     def _window(self) -> Any:
         if self._canvas is None:
             from uuv_marl.envs.drawing.window import Window  # noqa: PLC0415
 
-            self._canvas = Window(self._task.swarm.scenario, self._look, self.fps)
+            self._canvas = Window(self._batch.swarm.scenario, self._look, self.fps)
         return self._canvas
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle and deepcopy: everything but the window."""
         return {**self.__dict__, "_canvas": None}
-
-
-class TaskBased:
-    """What every API's object shows of the task below it, and how it draws."""
-
-    _task: Task
-    _view: View
-    metadata: dict[str, Any]
-
-    def _show(
-        self, task: Task, render_mode: str | None, options: RenderOptions | None = None, sonar_of: int | None = None
-    ) -> None:
-        """Take a task and how ``View`` draws it."""
-        self._task = task
-        self._view = View(task, render_mode, self.metadata["render_modes"], options, sonar_of)
-        self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": self._view.fps}
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._task.swarm.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
-        return self._task.swarm
-
-
-class OneWorld(TaskBased):
-    """What the environments of one world share: pictures and a window."""
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
-        self._task.need_reset("render()")
-        return self._view.draw()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._view.close()

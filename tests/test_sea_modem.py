@@ -1,0 +1,97 @@
+"""Messages: who hears what of whom, when, and what is lost."""
+
+import math
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.sim.swarm import Swarm
+
+MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
+
+
+def swum(overrides, decisions=100, worlds=1, seed=0, **change):
+    """The swarm after each decision."""
+    swarm = Swarm(load_scenario("starter", overrides=MODEM | overrides, **change), worlds)
+    swarm.reset(seed)
+    rng = np.random.default_rng(1)
+    for _ in range(decisions):
+        swarm.step(rng.uniform(-1, 1, (worlds, swarm.num_vehicles, 2)))
+        yield swarm
+
+
+def test_a_round_is_the_formula_s_of_a_named_modem():
+    """N (8 B / 463 bit/s + R / c): a Nanomodem, 54 vehicles, 16 bytes, 500 m of guard are 33 s."""
+    modem = load_scenario("tracking").modem
+    assert modem.round_s(54, 1500.0) == pytest.approx(54 * (8 * 16 / 463 + 500 / 1500)) == pytest.approx(32.9, abs=0.05)
+    assert modem.round_s(10, 1500.0) == pytest.approx(6.1, abs=0.05)
+
+
+def test_a_message_is_the_velocity_when_it_was_sent_and_its_age_follows_the_schedule():
+    past = {}
+    for swarm in swum({}):
+        tick, heading = int(swarm.state.tick[0]), swarm.heading[0]
+        u, v = np.moveaxis(swarm.velocity[0], -1, 0)
+        c, s = heading.T
+        past[tick] = np.stack([c * u - s * v, s * u + c * v], axis=-1)
+        see = swarm.percept
+        for i in range(5):
+            for k in np.flatnonzero(see["heard"][0, i]):
+                j = int(swarm.heard[0, i, k])
+                sent = 4 * j + 20 * math.floor((tick - 4 * (j + 1)) / 20)  # slots of 0.4 s, rounds of 2 s
+                if sent < max(4 * j, 1):
+                    assert see["modem_identity"][0, i, k] == see["modem_age"][0, i, k] == 0
+                    continue
+                assert see["modem_identity"][0, i, k] == see["link_identity"][0, i, k] == j + 1
+                assert see["modem_age"][0, i, k] == pytest.approx(0.1 * (tick - sent), abs=1e-5)
+                x, y = past[sent][j]
+                told = [c[i] * x + s[i] * y, c[i] * y - s[i] * x]
+                np.testing.assert_allclose(see["modem_velocity"][0, i, k], told, rtol=1e-5, atol=1e-5)
+
+
+def test_a_lost_vehicle_says_no_more():
+    swarm = list(swum({"faults": [{"kind": "member", "share": 0.2, "onset_s": 3.0}]}))[-1]
+    gone = np.flatnonzero(~swarm.state.alive[0])
+    assert len(gone) == 1
+    assert (swarm._sea.mail.sent[0, gone, 2] < 3.05).all()
+    assert (np.delete(swarm._sea.mail.sent[0, :, 2], gone) > 7.9).all()
+
+
+def test_messages_are_lost_as_often_as_is_said():
+    """1,000 rounds of 5 vehicles: 20,000 messages; the share within 5 deviations."""
+    arrived, before = 0, None
+    for swarm in swum({"modem.loss_probability": 0.3, "modem.period_s": 0.1}, 500, worlds=2):
+        now = swarm._sea.mail.mail[..., 2].copy()
+        arrived += int((now != before).sum()) if before is not None else 0
+        before = now
+    total = 499 * 2 * 20
+    assert abs(arrived / total - 0.7) < 5 * math.sqrt(0.3 * 0.7 / total)
+
+
+def test_without_messages_the_channel_stays_empty():
+    for swarm in swum({"modem.loss_probability": 1.0}, 50):
+        assert not swarm.percept["modem_identity"].any()
+        assert not swarm.percept["modem_age"].any()
+
+
+@pytest.mark.parametrize("policy", ["sff", "sff_informed", "sdc", "sdc_informed"])
+def test_comparators_run_on_messages_as_on_the_link(policy):
+    """The same law: where messages are as fresh as the link, it does the same."""
+    base = {"modem.period_s": 0.1, "obstacles": []}
+    linked = granted(policy, load_scenario("starter", overrides=base))
+    messaged = granted(policy, load_scenario("starter", overrides={**base, "sonar.channels": ["modem"]}))
+    assert "link" not in messaged.sonar.channels
+    assert "modem" in messaged.sonar.channels
+    paths = []
+    for scenario in (linked, messaged):
+        swarm = Swarm(scenario)
+        swarm.reset(0)
+        actor = make(policy, scenario)
+        actor.reset(0)
+        for _ in range(30):
+            swarm.step(actor.act(swarm.percept))
+        paths.append(swarm.state.eta[0, :, :2].copy())
+    assert np.abs(paths[0] - paths[1]).max() < 3.0  # the first message comes a decision late
+    assert (paths[0] != paths[1]).any()

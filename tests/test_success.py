@@ -1,0 +1,183 @@
+"""Success in disturbed water: who is safe, who is done, who counts; and episodes that arrival does not end."""
+
+import numpy as np
+import pytest
+
+import uuv_marl
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
+from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.reward import reward_terms
+from uuv_marl.sim.swarm import Swarm
+
+SPREAD_M = 80.0
+WORLD = np.ones(1, np.bool_)
+
+
+class Story:
+    """A hand-made episode: what each moment of it says is written, and nothing is simulated."""
+
+    def __init__(self, n, **overrides):
+        self.swarm = Swarm(load_scenario("single_obstacle", num_vehicles=n, overrides=overrides))
+        self.swarm.reset(0)
+        self.recorder = SuccessRecorder(self.swarm)
+        self.recorder.update(WORLD)
+
+    def moment(self, since_s, offsets, touching=(), lost=()):
+        """At ``since_s`` after l(t)'s end: where everybody is from there, who begins a contact, who is lost."""
+        swarm, facts, state = self.swarm, self.swarm.facts, self.swarm.state
+        facts.time_s[0] = swarm.duration_s[0] + since_s
+        state.tick[0] = round(facts.time_s[0] * 10)
+        facts.reference[0, :2] = 600.0
+        state.eta[0, :, :2] = 600.0 + np.asarray(offsets)
+        facts.contacts[0], facts.lost[0] = 0, False
+        facts.contacts[0, list(touching)], facts.lost[0, list(lost)] = 1, True
+        state.alive[0, list(lost)] = False
+        self.recorder.update(WORLD)
+        return self
+
+    @property
+    def end(self):
+        return self.recorder.metrics(0)
+
+
+def ring(n, radius_m=30.0):
+    angle = 2.0 * np.pi * np.arange(n) / n
+    return radius_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def moved(n, vehicle, radius_m):
+    """All on the ring but one."""
+    offsets = ring(n)
+    offsets[vehicle] = radius_m, 0.0
+    return offsets
+
+
+def test_all_there_untouched_is_success():
+    assert Story(4).moment(GRACE_S, ring(4)).end == {
+        "success_share": 1.0,
+        "safe_share": 1.0,
+        "done_share": 1.0,
+        "swarm_success": 1,
+        "vehicles_faulty": 0,
+    }
+
+
+def test_one_contact_at_any_time_makes_both_unsafe():
+    for story in (
+        Story(5).moment(-90.0, ring(5), touching=(1, 3)).moment(GRACE_S, ring(5)),
+        Story(5).moment(GRACE_S, ring(5)).moment(GRACE_S + 1.0, ring(5), touching=(1, 3)),
+    ):
+        end = story.end
+        assert (end["safe_share"], end["done_share"], end["success_share"]) == (0.6, 1.0, 0.6)
+        assert end["swarm_success"] == 0
+
+
+@pytest.mark.parametrize(("away", "done"), [(SPREAD_M - 0.01, 1.0), (SPREAD_M + 0.01, 0.75)])
+def test_done_is_the_place_sixty_seconds_after_the_reference(away, done):
+    offsets = moved(4, 2, away)
+    early = Story(4).moment(GRACE_S - 0.1, ring(4, 500.0)).moment(GRACE_S, offsets).moment(90.0, ring(4, 500.0))
+    assert early.end["done_share"] == done
+    assert early.end["safe_share"] == 1.0
+
+
+def test_the_spread_grows_with_large_swarms():
+    assert Story(216).moment(GRACE_S, ring(216, 2.0 * SPREAD_M - 0.01)).end["done_share"] == 1.0
+    assert Story(216).moment(GRACE_S, ring(216, 2.0 * SPREAD_M + 0.01)).end["done_share"] == 0.0
+
+
+def test_a_swarm_may_miss_one_of_twenty_and_stand_off_a_little():
+    assert Story(20).moment(GRACE_S, moved(20, 0, 100.0)).end["swarm_success"] == 1
+    two = moved(20, 0, 100.0)
+    two[10] = -100.0, 0.0
+    assert Story(20).moment(GRACE_S, two).end["swarm_success"] == 0
+    for aside, succeeds in ((CENTRE_M - 0.01, 1), (CENTRE_M + 0.01, 0)):
+        assert Story(20).moment(GRACE_S, ring(20) + np.array([aside, 0.0])).end["swarm_success"] == succeeds
+
+
+def test_nothing_is_judged_before_its_time():
+    end = Story(3).moment(GRACE_S - 0.1, ring(3)).end
+    assert end == {**dict.fromkeys(end), "vehicles_faulty": 0}
+
+
+def test_faulty_vehicles_count_in_nobodys_done_but_in_what_others_touch():
+    broken = {"kind": "yaw", "share": 0.3, "onset_s": 5.0}
+    story = Story(10, faults=[broken])
+    faulty = np.flatnonzero(story.swarm._sea.hull.broken[0, :, 0, 0] == 50)
+    assert len(faulty) == 3
+    offsets = ring(10)
+    offsets[faulty] = 5000.0
+    healthy = np.setdiff1d(np.arange(10), faulty)
+    end = story.moment(GRACE_S, offsets, touching=(faulty[0], healthy[0])).end
+    assert end["vehicles_faulty"] == 3
+    assert end["done_share"] == 1.0
+    assert end["safe_share"] == end["success_share"] == pytest.approx(6 / 7)
+
+
+def test_a_fault_counts_from_the_hold_in_which_it_acts():
+    scenario = load_scenario(
+        "single_obstacle", overrides={"faults": [{"kind": "array", "array": "bow", "share": 0.1, "onset_s": 0.3}]}
+    )
+    swarm = Swarm(scenario)
+    swarm.reset(0)
+    counts = []
+    for _ in range(6):
+        counts.append(int(swarm.faulty.sum()))
+        swarm.step(np.zeros((1, 54, 2), np.float32))
+    assert counts == [0, 0, 0, 0, 6, 6]
+
+
+def test_lost_vehicles_count_unless_a_contact_lost_them():
+    end = Story(4).moment(10.0, ring(4), lost=(1,)).moment(GRACE_S, ring(4)).end
+    assert (end["vehicles_faulty"], end["success_share"], end["swarm_success"]) == (1, 1.0, 1)
+    end = Story(4).moment(10.0, ring(4), touching=(1,), lost=(1,)).moment(GRACE_S, ring(4)).end
+    assert (end["vehicles_faulty"], end["success_share"], end["swarm_success"]) == (0, 0.75, 0)
+    end = Story(3).moment(10.0, ring(3), touching=(0, 1, 2), lost=(0, 1, 2)).end
+    assert (end["success_share"], end["done_share"]) == (0.0, 0.0)
+    end = Story(3).moment(10.0, ring(3), lost=(0, 1, 2)).end
+    assert (end["success_share"], end["vehicles_faulty"]) == (None, 3)
+
+
+LONG = {"arrival.ends_episode": False, "time_limit.factor": 1.0, "time_limit.extra_s": GRACE_S}
+
+
+def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
+    """The same run to arrival, with the same arrival, and then to the time limit."""
+    short, long = (
+        next(
+            event
+            for event in evaluate(granted("bio_inspired_plus", scenario), "bio_inspired_plus", [3])
+            if isinstance(event, Run)
+        )
+        for scenario in (load_scenario("starter"), load_scenario("starter", overrides=LONG))
+    )
+    assert long.metrics["task_time_s"] == short.metrics["task_time_s"]
+    assert short.metrics["success_share"] is None
+    assert long.metrics["success_share"] == 1.0
+    steps = len(short.series["time_s"])
+    np.testing.assert_array_equal(long.series["centre_error_m"][:steps], short.series["centre_error_m"])
+    assert long.series["time_s"][-1] == pytest.approx(long.metrics["duration_s"] + GRACE_S)
+
+
+def test_arrival_is_paid_once_and_the_last_info_tells_of_it():
+    quick = {**LONG, "trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4}
+    quick |= {"time_limit.extra_s": 6.0, "timing.decision_period_s": 0.5, "arrival.dwell_s": 0.7}
+    batch = BatchedEnv(load_scenario("starter", overrides=quick))
+    batch.reset(0)
+    paid, ended = [], []
+    while not ended or not ended[-1]:
+        result = batch.step(np.zeros((1, 5, 2), np.float32))
+        paid.append(float(reward_terms(batch.swarm)["arrival"][0, 0]))
+        ended.append(bool(result.world_truncated[0]))
+        assert not result.terminated.any()
+    assert np.count_nonzero(paid) == 1
+    assert batch.swarm.arrived[0]
+    env = uuv_marl.parallel_env("starter", overrides=quick)
+    env.reset(seed=0)
+    infos = {}
+    while env.agents:
+        *_, infos = env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+    told = infos["uuv_0"]
+    assert (told["ending"], told["is_success"], told["arrived"]) == ("time_limit", True, True)

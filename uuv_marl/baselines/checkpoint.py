@@ -1,0 +1,166 @@
+"""Checkpoints of learned policies: one safetensors file.
+
+It holds the weights, and in its header a ``Card`` as JSON, which says what they were trained on. Loading it executes
+nothing.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, cast
+
+import numpy as np
+import pydantic
+import safetensors
+import safetensors.numpy
+from numpy.typing import NDArray
+
+from uuv_marl.atomic import replacing
+from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.features import BARRIER, num_features
+from uuv_marl.baselines.policy import PolicyError
+from uuv_marl.percept import PerceptLayout
+from uuv_marl.scenario import Scenario, load_vehicle
+from uuv_marl.sim.arrays import Float32
+
+Row = tuple[str, int, str, float]
+
+WEIGHTS_FILE = "policy.safetensors"
+"""The checkpoint within a folder."""
+_CARD = "uuv_marl"
+_MOST_WEIGHT = 1e6
+"""Larger weights are no result of training, and overflow in single precision."""
+_NOT_THE_VEHICLE = {
+    "vehicle.name",
+    "actuators.yaw_damping_nms",
+    "actuators.thrust_lag_s",
+    "actuators.yaw_lag_s",
+    "actuators.yaw_authority",
+}
+_FIRST_VEHICLE = "literature_185"
+"""The vehicle of version 0.1.0, which wrote checkpoints without saying so."""
+
+
+def vehicle_of(scenario: Scenario) -> dict[str, float]:
+    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare, and disturbances."""
+    return _numbers({"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()})
+
+
+def _numbers(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
+    return {field: every[field] for field in every if field not in _NOT_THE_VEHICLE}
+
+
+def _all_gains(gains: Any) -> Any:
+    if isinstance(gains, list) and len(cast(list[Any], gains)) != len(Gains._fields):
+        raise ValueError(f"must hold {', '.join(Gains._fields)}, got {gains}")
+    return cast(Any, gains)
+
+
+class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """What a checkpoint says of itself."""
+
+    format: Literal[1] = 1
+    kind: Literal["mlp"] = "mlp"
+    """What the tensors are: ``mlp``, tanh layers."""
+    features: Literal["percept"] = "percept"
+    """What the first layer is given: ``percept``, what ``Features`` make of one percept."""
+    percept: tuple[Row, ...]
+    """Name, size, unit and scale of every field of the percept."""
+    decision_period_s: tuple[float, float] = (0.1, 0.5)
+    """Shortest and longest period between decisions that it may be run with [s]."""
+    yaw_damping_nms: float = 600.0
+    """Inner loop that it was trained with [N m s]."""
+    channels: tuple[str, ...] = ()
+    """Channels beyond the percept."""
+    barrier: Annotated[Gains, pydantic.BeforeValidator(_all_gains)] = BARRIER
+    """Of Eq. 20-21; what the actor says is added to their force."""
+    vehicle: dict[str, float] = pydantic.Field(default_factory=lambda: _numbers(load_vehicle(_FIRST_VEHICLE)))
+    """Hull and actuators that it was trained on, by field of the scenario."""
+    training: dict[str, Any] = {}
+    """How it came about: settings, versions, agent-steps, validation."""
+
+
+class Layer(NamedTuple):
+    """Weight (in, out) and bias (out,)."""
+
+    weight: Float32
+    bias: Float32
+
+
+class Checkpoint(NamedTuple):
+    """A file's content."""
+
+    card: Card
+    layers: tuple[Layer, ...]
+    digest: str
+    """Of the whole file."""
+
+
+def rows_of(layout: PerceptLayout) -> tuple[Row, ...]:
+    """A percept's table as a card keeps it."""
+    return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in layout.table)
+
+
+def is_checkpoint(name: str) -> bool:
+    """Whether a policy's name means a file or folder."""
+    return "/" in name or os.sep in name or (":" not in name and Path(name).exists())
+
+
+def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:
+    """Write a checkpoint file, whole or not at all."""
+    tensors = {f"{k}.{name}": array for k, layer in enumerate(layers) for name, array in layer._asdict().items()}
+    contiguous = {name: np.ascontiguousarray(array, np.float32) for name, array in tensors.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as partial:
+        partial.write_bytes(safetensors.numpy.save(contiguous, {_CARD: card.model_dump_json()}))
+
+
+def load_checkpoint(path: Path) -> Checkpoint:
+    """A checkpoint from its file, or from the folder that holds it. Raises PolicyError naming what is wrong."""
+    file = path / WEIGHTS_FILE if path.is_dir() else path
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise PolicyError(
+            f"policy {str(path)!r} can't be read ({error.strerror}: {file}); give a checkpoint, such as the folder "
+            "best of a training"
+        ) from None
+    try:
+        tensors: dict[str, NDArray[Any]] = safetensors.numpy.load(data)
+        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        card = Card.model_validate_json(header.get("__metadata__", {}).get(_CARD, "null"))
+        layers = tuple(Layer(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(max(len(tensors) // 2, 1)))
+        _check(card, layers)
+    except (ValueError, KeyError, safetensors.SafetensorError) as error:
+        raise PolicyError(
+            f"{file} holds no policy of uuv_marl ({_reason(error)}); give a folder that uuv-marl train wrote"
+        ) from None
+    return Checkpoint(card, layers, hashlib.sha256(data).hexdigest()[:16])
+
+
+def _reason(error: Exception) -> str:
+    """What is wrong with a checkpoint, in a line."""
+    if isinstance(error, pydantic.ValidationError):
+        first = error.errors()[0]
+        field = ".".join(map(str, first["loc"]))
+        return f"its card's {field}: {first['msg']}" if field else "it has no card"
+    return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
+
+
+def _check(card: Card, layers: Sequence[Layer]) -> None:
+    """Raises ValueError that names what can't be run."""
+    sizes: Mapping[str, int] = {name: size for name, size, _, _ in card.percept}
+    if not 0.0 < card.decision_period_s[0] <= card.decision_period_s[1]:
+        raise ValueError(f"its card's decision_period_s must be [shortest, longest], got {card.decision_period_s}")
+    width = num_features(sizes["heard"], sizes.get("echo", 0))
+    for k, (weight, bias) in enumerate(layers):
+        outputs = weight.shape[-1] if weight.ndim == 2 and k < len(layers) - 1 else 2
+        for name, array, shape in (("weight", weight, (width, outputs)), ("bias", bias, (outputs,))):
+            if array.dtype != np.float32 or array.shape != shape:
+                raise ValueError(f"{k}.{name} is {array.dtype} {array.shape}, expected float32 {shape}")
+            if not (np.abs(array) <= _MOST_WEIGHT).all():  # NaN is not either
+                raise ValueError(f"{k}.{name} must hold finite numbers of at most {_MOST_WEIGHT:g}")
+        width = outputs

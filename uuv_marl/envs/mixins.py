@@ -1,0 +1,68 @@
+"""What the environments of all APIs have in common: the worlds below, and pictures of them."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.drawing.options import RenderOptions
+from uuv_marl.envs.renderer import Renderer
+from uuv_marl.scenario import Scenario, conditions
+from uuv_marl.sim.swarm import Swarm
+
+
+class EnvMixin:
+    """What the environments of every API share: a ``BatchedEnv`` below, its scenario and swarm, and pictures."""
+
+    _batch: BatchedEnv
+    _renderer: Renderer
+    metadata: dict[str, Any]
+
+    def _wrap(
+        self,
+        batch: BatchedEnv,
+        render_mode: str | None,
+        options: RenderOptions | None = None,
+        sonar_of: int | None = None,
+    ) -> None:
+        """Stand on these worlds.
+
+        Args:
+            batch: the worlds.
+            render_mode: one of the class's ``metadata["render_modes"]``, or None.
+            options: how to draw, see ``uuv_marl.envs.drawing.options``.
+            sonar_of: index of the vehicle whose sonar is drawn where the options name none.
+        """
+        self._batch = batch
+        self._renderer = Renderer(batch, render_mode, self.metadata["render_modes"], options, sonar_of)
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": self._renderer.fps}
+
+    def __repr__(self) -> str:
+        scenario, swarm = self.scenario, self.swarm
+        worlds = "" if swarm.num_worlds == 1 else f"{swarm.num_worlds} worlds, "
+        return f"{type(self).__name__}({scenario.name}: {worlds}{swarm.num_vehicles} vehicles, {conditions(scenario)})"
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is simulated."""
+        return self._batch.swarm.scenario
+
+    @property
+    def swarm(self) -> Swarm:
+        """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
+        return self._batch.swarm
+
+
+class RenderMixin(EnvMixin):
+    """What the environments of one world share: pictures and a window."""
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
+        self._batch.need_reset("render()")
+        return self._renderer.draw()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._renderer.close()

@@ -1,0 +1,113 @@
+"""Acoustic messages: in each round every vehicle sends its velocity once, in its own slot of time (TDMA).
+
+A message arrives at the end of its slot, which leaves time to send it and for sound to cross ``modem.guard_m``; each
+listener loses it with a probability. A vehicle keeps the latest message of each other one. Whose pinger it hears in a
+sub-sector it is taken to know: a message is read where its sender is heard.
+"""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.percept import MAX_SPEED
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import World
+from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.perception import saturate
+from uuv_marl.sim.random import uniform
+from uuv_marl.sim.sea.current import Flow, over_ground
+from uuv_marl.sim.sea.purposes import MESSAGE
+from uuv_marl.sim.tables import described
+from uuv_marl.sim.views import SeaFields
+
+Float64 = NDArray[np.float64]
+_MAX_AGE_S = 4096.0
+
+
+class Modem(NamedTuple):
+    """Numbers of a scenario's messages."""
+
+    round_s: float
+    """Time between two messages of a vehicle."""
+    hold_s: float
+    """A control hold."""
+    loss: float
+    """Probability that a listener loses a message."""
+
+
+@described
+class Mail(NamedTuple):
+    """What was sent and what arrived; times are -1 before the first. The axis peer is empty without the channel."""
+
+    sent: Annotated[Float64, "world peer 3", "Latest message: velocity over ground, north, east [m/s]; when sent [s]."]
+    mail: Annotated[Float64, "world vehicle peer 3", "Latest message that arrived at a vehicle from each other one."]
+
+
+def modem(scenario: Scenario) -> Modem:
+    """The scenario's messages as numbers for the compiled functions."""
+    round_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
+    return Modem(round_s, scenario.timing.control_hold_s, scenario.modem.loss_probability)
+
+
+def draw_mail(w: int, mail: Mail) -> None:
+    """Nobody has sent anything in world w's new episode."""
+    mail.sent[w], mail.mail[w] = -1.0, -1.0
+
+
+@compiled
+def rounds(tick: int, slots: float, numbers: Modem) -> int:
+    """Rounds in which a moment, so many shares of a round after its start, has come by this control hold."""
+    return math.floor(tick * numbers.hold_s / numbers.round_s - slots + 1e-9)
+
+
+@compiled_inner
+def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, flow: Flow) -> None:
+    """Send and receive what is due at the end of a control hold, whose number is already counted.
+
+    Args:
+        w: the world.
+        key: of its episode.
+        world: its arrays.
+        numbers: the scenario's messages.
+        mail: is written.
+        flow: the water, which makes velocities over ground.
+    """
+    state, n, tick = world.state, mail.sent.shape[1], world.state.tick[w]
+    for j in range(n):
+        if not state.alive[w, j]:
+            continue
+        if rounds(tick, j / n, numbers) > rounds(tick - 1, j / n, numbers):
+            mail.sent[w, j, 0], mail.sent[w, j, 1] = over_ground(w, j, state, flow)
+            mail.sent[w, j, 2] = tick * numbers.hold_s
+        arrived = rounds(tick, (j + 1) / n, numbers)
+        if arrived > rounds(tick - 1, (j + 1) / n, numbers) and mail.sent[w, j, 2] >= 0.0:
+            for i in range(n):
+                if i != j and uniform(key, MESSAGE, arrived, i, j) >= numbers.loss:
+                    for part in range(3):
+                        mail.mail[w, i, j, part] = mail.sent[w, j, part]
+
+
+@compiled_inner
+def know_mail(w: int, world: World, mail: Mail, more: SeaFields) -> None:
+    """Write, for each sub-sector, what the vehicle heard in it last said.
+
+    Args:
+        w: the world.
+        world: its arrays, with whom each vehicle hears.
+        mail: what arrived.
+        more: fields of the percepts, which are written.
+    """
+    heading, now_s = world.senses.heading, world.facts.time_s[w]
+    for i in range(world.state.alive.shape[1]):
+        c, s = heading[w, i, 0], heading[w, i, 1]
+        for k in range(more.modem_identity.shape[2]):
+            j = world.senses.heard[w, i, k]
+            if not world.state.alive[w, i] or j < 0 or mail.mail[w, i, j, 2] < 0.0:
+                continue
+            v_x, v_y, sent_s = mail.mail[w, i, j, 0], mail.mail[w, i, j, 1], mail.mail[w, i, j, 2]
+            more.modem_identity[w, i, k] = j + 1
+            more.modem_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
+            more.modem_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+            more.modem_age[w, i, k] = min(now_s - sent_s, _MAX_AGE_S)
