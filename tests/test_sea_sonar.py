@@ -8,7 +8,8 @@ import pytest
 from scipy.stats import kstest, norm
 
 import uuv_marl
-from uuv_marl import ScenarioError, load_scenario
+from uuv_marl import load_scenario
+from uuv_marl.errors import ScenarioError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import hears_ideally
 from uuv_marl.sim.compiled import interpreted
@@ -32,7 +33,19 @@ FALSE = {"noise.false_echo_probability": 0.1}
 DRIFT = {"navigation.drift_share": 0.1}
 COMPASS = {"navigation.compass_bias_deg": 10.0}
 DEAD = {"faults": [{"kind": "array", "array": "bow", "share": 0.5, "onset_s": 1.0, "duration_s": 1.0}]}
-EVERYTHING = CARRIED | PINGS | TRAVEL | BLUR | FACTOR | DETECTION | SILENCE | FALSE | DRIFT | COMPASS | DEAD
+EVERYTHING = (
+    CARRIED
+    | PINGS
+    | {"latency.travel_time": True}
+    | BLUR
+    | FACTOR
+    | DETECTION
+    | SILENCE
+    | FALSE
+    | DRIFT
+    | COMPASS
+    | DEAD
+)
 HOLD = 0.1
 SIGMAS = 5.0  # no seed misses these
 
@@ -52,7 +65,7 @@ def near_obstacles(swarm):
 
 
 def swim(overrides, decisions=40, seed=3, num_vehicles=12, scenario="single_obstacle", idle=False):
-    """A run with actions that are the same whatever disturbs it: per decision, from the start, what is known and true."""
+    """A run whose actions are the same whatever disturbs it; what is known and true at every decision."""
     swarm = Swarm(load_scenario(scenario, num_vehicles=num_vehicles, overrides=CHANNELS | overrides))
     swarm.reset(seed)
     if swarm.course.num_obstacles[0]:
@@ -128,7 +141,7 @@ def test_an_array_reads_at_the_control_holds_nearest_to_its_times(every):
     assert latest(-1, every) == -1
 
 
-@pytest.mark.parametrize(("every", "delay", "holds"), itertools.product([1.0, 2.5, 7.0], [0, 1, 3, 20], [1, 5]))
+@pytest.mark.parametrize(("every", "delay", "holds"), [*itertools.product([1.0, 2.5, 7.0], [0, 1, 3, 20], [1, 5])])
 def test_the_readings_taken_are_those_that_a_decision_sees(every, delay, holds):
     seen = {latest(decision - delay, every) for decision in range(0, 600, holds)} - {-1}
     taken = {due(hold, every, delay, holds) for hold in range(600)} - {-1}
@@ -187,7 +200,7 @@ def test_a_carried_echo_is_where_the_obstacle_is(reports):
         np.testing.assert_allclose(now["echo_position"][seen], points[seen], atol=1e-4)
         moved = np.hypot(*np.moveaxis(points, -1, 0)) - np.hypot(*np.moveaxis(then["echo_position"], -1, 0))
         np.testing.assert_allclose(now["echo_range"][seen], (then["echo_range"] + moved)[seen], atol=1e-3)
-    assert sum((f["echo"] > 0).sum() for f in frames) > 500
+    assert sum((f["echo"] > 0).sum() for f in frames) > 200
 
 
 def test_a_carried_neighbour_is_where_it_was():
@@ -232,14 +245,11 @@ def polar(points):
     return np.hypot(points[..., 0], points[..., 1]), np.arctan2(points[..., 1], points[..., 0])
 
 
-def pairs(overrides, field, flag, where=np.s_[:], decisions=300, num_vehicles=54):
-    """Positions as heard and as they are, where both are heard; drifting vehicles, as many draws as sub-sectors."""
-    _, wrong = swim(overrides, decisions, num_vehicles=num_vehicles, idle=True)
-    _, true = swim({}, decisions, num_vehicles=num_vehicles, idle=True)
-    both = [
-        (a[field][:, where], b[field][:, where], (a[flag] > 0)[:, where] & (b[flag] > 0)[:, where])
-        for a, b in zip(wrong, true, strict=True)
-    ]
+def pairs(overrides, field, flag):
+    """Positions as heard and as they are, where both are heard, of vehicles that come to rest; some 10^5."""
+    decisions = 300 if flag == "heard" else 1700
+    runs = (swim(change, decisions, num_vehicles=54, idle=True)[1] for change in (overrides, {}))
+    both = [(a[field], b[field], (a[flag] > 0) & (b[flag] > 0)) for a, b in zip(*runs, strict=True)]
     return tuple(np.concatenate([pair[part][pair[2]] for pair in both]) for part in range(2))
 
 
@@ -251,19 +261,15 @@ def is_normal(values, num):
     assert kstest(values, "norm").pvalue > 1e-6
 
 
-@pytest.mark.parametrize(("field", "flag", "num"), [("neighbour", "heard", 100_000), ("echo_position", "echo", 20_000)])
+@pytest.mark.parametrize(("field", "flag", "num"), [("neighbour", "heard", 100_000), ("echo_position", "echo", 90_000)])
 def test_bearings_and_ranges_are_off_as_stated(field, flag, num):
-    surface = {"sonar.echo_reports": "surface"}
-    heard, true = pairs(BLUR | surface, field, flag)
-    (away, bearing), (r, psi) = polar(heard), polar(pairs(surface, field, flag)[1])
-    if field == "echo_position":
-        np.testing.assert_array_equal(polar(true)[0].shape, r.shape)
-    is_normal(
-        np.remainder(bearing - psi + math.pi, 2.0 * math.pi)[r > 20.0] / math.radians(5.0)
-        - math.pi / math.radians(5.0),
-        num,
-    )
-    is_normal(((away - r) / (0.5 + 0.05 * r))[r > 20.0], num)
+    heard, true = pairs(BLUR, field, flag)
+    (away, bearing), (r, psi) = polar(heard), polar(true)
+    turn = np.remainder(bearing - psi + math.pi, 2.0 * math.pi) - math.pi
+    reach = r if flag == "heard" else pairs(BLUR, "echo_range", "echo")[1].astype(float)
+    far = reach > 20.0  # where no range falls below 0
+    is_normal(turn[far] / math.radians(5.0), num)
+    is_normal(((away - r) / (0.5 + 0.05 * reach))[far], num)
 
 
 def test_an_echo_s_position_moves_as_far_as_its_range():
@@ -283,7 +289,7 @@ def test_a_passive_range_has_a_factor_that_lasts():
             np.testing.assert_allclose(
                 ours["neighbour"][:, sectors], scale * theirs["neighbour"][:, sectors], rtol=1e-5
             )
-    drawn = Swarm(load_scenario("starter", num_vehicles=200, overrides=FACTOR), 50)
+    drawn = Swarm(load_scenario("single_obstacle", overrides=FACTOR), 200)
     drawn.reset(0)
     is_normal(np.log(drawn._sea.ears.factor.ravel()) / 0.3, 10_000)
 
@@ -453,13 +459,12 @@ def test_a_dead_array_hears_nothing_while_it_is_dead():
     "other", [DETECTION, SILENCE, DRIFT, COMPASS, DEAD, {"current.variation_mps": 0.0, "current.velocity": "water"}]
 )
 def test_one_disturbance_moves_no_draw_of_bearings_and_ranges(other):
-    _, alone = swim(BLUR | FACTOR)
-    _, among = swim(BLUR | FACTOR | other)
-    for ours, theirs in zip(alone, among, strict=True):
-        for flag, field in (("heard", "neighbour"), ("echo", "echo_position")):
-            both = (ours[flag] > 0) & (theirs[flag] > 0)
-            assert both.any()
-            assert ours[field][both].tobytes() == theirs[field][both].tobytes()
+    alone, among = (swim(BLUR | FACTOR | change)[1] for change in ({}, other))
+    for flag, field in (("heard", "neighbour"), ("echo", "echo_position")):
+        both = [((a[flag] > 0) & (b[flag] > 0), a[field], b[field]) for a, b in zip(alone, among, strict=True)]
+        assert sum(mask.sum() for mask, *_ in both) > 20
+        for mask, ours, theirs in both:
+            assert ours[mask].tobytes() == theirs[mask].tobytes()
 
 
 @pytest.mark.parametrize("other", [BLUR, FACTOR, BEARINGS, DRIFT, COMPASS])
@@ -509,7 +514,7 @@ def test_a_compass_is_off_by_the_same_angle_all_the_time():
             np.testing.assert_allclose(ours[name].astype(float) @ [1, 1j], expected, atol=1e-4)
         same(ours, theirs)
     np.testing.assert_allclose(angles, np.broadcast_to(angles[0], np.shape(angles)), atol=1e-6)
-    drawn = Swarm(load_scenario("starter", num_vehicles=200, overrides=COMPASS), 50)
+    drawn = Swarm(load_scenario("single_obstacle", overrides=COMPASS), 200)
     drawn.reset(0)
     is_normal(np.arctan2(*np.moveaxis(drawn._sea.track.bias, -1, 0)[::-1]).ravel() / math.radians(10.0), 10_000)
 
@@ -561,13 +566,15 @@ def test_a_world_depends_on_its_seed_alone():
                 assert array[0].tobytes() == batch.snapshot()[name][w].tobytes(), name
 
 
-@pytest.mark.parametrize("harsh", [
-    EVERYTHING,
-    {"noise.range_share": 1.0, "noise.range_m": 1e6, "noise.passive_range_log_sd": 3.0, "noise.bearing_deg": 180.0,
-     "latency.compensated": True, "latency.processing_s": 2.0, "navigation.drift_share": 1.0, "noise.false_echo_probability": 1.0,
-     "navigation.compass_bias_deg": 180.0},
-    {"noise.silence_probability": 1.0, "noise.nominal_range_m": 4096.0, "noise.passive_ranges": False},
-])  # fmt: skip
+HARSH = {
+    "noise.range_share": 1.0, "noise.range_m": 1e6, "noise.passive_range_log_sd": 3.0, "noise.bearing_deg": 180.0,
+    "noise.false_echo_probability": 1.0, "latency.compensated": True, "latency.processing_s": 2.0,
+    "navigation.drift_share": 1.0, "navigation.compass_bias_deg": 180.0,
+}  # fmt: skip
+FAR = {"noise.silence_probability": 1.0, "noise.nominal_range_m": 4096.0, "noise.passive_ranges": False}
+
+
+@pytest.mark.parametrize("harsh", [EVERYTHING, HARSH, FAR])
 def test_observations_stay_within_their_space(harsh):
     env = uuv_marl.parallel_env(load_scenario("single_obstacle", num_vehicles=5, overrides=CHANNELS | harsh))
     observations, _ = env.reset(seed=0)
@@ -577,13 +584,19 @@ def test_observations_stay_within_their_space(harsh):
         observations, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
 
 
-@pytest.mark.parametrize(("overrides", "message"), [
-    ({"latency.active_period_s": 0.1}, r"active_period_s must be at least 0.1333.*range of 100 m, or 0.*got 0.1"),
-    ({"latency.processing_s": 2.5}, "processing_s must lie within 0 to 2, got 2.5"),
-    ({"latency.processing_s": 1.0, "timing.control_hold_s": 0.01, "timing.integration_step_s": 0.01}, "100 control holds; at most 64"),
-    ({**TRAVEL, "timing.control_hold_s": 0.001, "timing.integration_step_s": 0.001}, r"sound 5,000 control holds.*500 m.*1,024"),
-    ({"noise.silence_probability": 1.5}, "silence_probability must lie within 0 to 1, got 1.5"),
-])  # fmt: skip
+SHORT = {"timing.control_hold_s": 0.001, "timing.integration_step_s": 0.001}
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"latency.active_period_s": 0.1}, r"active_period_s must be at least 0.1333.*of 100 m, or 0.*got 0.1"),
+        ({"latency.processing_s": 2.5}, "processing_s must lie within 0 to 2, got 2.5"),
+        ({"latency.processing_s": 1.0, **SHORT}, "processing_s = 1 is 1,000 control holds; at most 64"),
+        ({**TRAVEL, **SHORT}, r"sound 5,000 control holds.*500 m.*1,024"),
+        ({"noise.silence_probability": 1.5}, "silence_probability must lie within 0 to 1, got 1.5"),
+    ],
+)
 def test_what_can_t_be_meant_is_refused(overrides, message):
     with pytest.raises(ScenarioError, match=message):
         load_scenario("starter", overrides=overrides)
