@@ -1,4 +1,4 @@
-"""A sensor fault of your own: a sonar that is mounted askew. ``uuv-marl benchmark --policy sensor:Askew,degrees=10``."""
+"""A sensor fault of your own: a sonar mounted askew. ``uuv-marl benchmark --policy sensor:Askew,degrees=10`` runs it."""
 
 import dataclasses
 import math
