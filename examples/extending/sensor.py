@@ -1,4 +1,4 @@
-"""A sensor fault of your own: a sonar mounted askew. ``uuv-marl benchmark --policy sensor:Askew,degrees=10`` runs it."""
+"""A sensor fault of your own: a sonar mounted askew, for ``uuv-marl benchmark --policy sensor:Askew,degrees=10``."""
 
 import dataclasses
 import math
