@@ -8,6 +8,12 @@ from uuv_marl.benchmark.results import FILE, read_content, trace_path
 from uuv_marl.extras import extra
 
 
+def need_pandas(who: str) -> Any:
+    """Pandas, which comes with an extra. Raises MissingExtraError, which names who needs it."""
+    with extra("analysis", who):
+        return importlib.import_module("pandas")
+
+
 def load(path: str | Path) -> Any:
     """The runs of a ``results.json`` as a pandas data frame, a row for each, by scenario, policy and seed.
 
@@ -22,8 +28,7 @@ def load(path: str | Path) -> Any:
         MissingExtraError: pandas is not installed.
         ResultsError: it is no results.json of this version.
     """
-    with extra("analysis", "uuv_marl.benchmark.load"):
-        pandas: Any = importlib.import_module("pandas")
+    pandas = need_pandas("uuv_marl.benchmark.load")
     path = Path(path)
     file = path / FILE if path.is_dir() else path
     records: list[dict[str, Any]] = []

@@ -99,13 +99,16 @@ class Results:
             scenarios. A policy that it names is not imported or opened before ``use``.
         scenarios: the scenarios that runs will name.
         route_seeds: seeds whose routes are kept.
+        traces: whether runs leave their time series, about 100 kB each.
 
     Raises:
         ResultsError: the folder can't be written, or holds what can't be continued.
     """
 
-    def __init__(self, folder: Path, scenarios: Iterable[Scenario], route_seeds: Container[int] = (0,)) -> None:
-        self.folder = folder
+    def __init__(
+        self, folder: Path, scenarios: Iterable[Scenario], route_seeds: Container[int] = (0,), traces: bool = True
+    ) -> None:
+        self.folder, self._traces = folder, traces
         self.scenarios = {scenario.name: scenario for scenario in scenarios}
         self.policies: dict[str, Knowledge] = {}
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
@@ -114,7 +117,7 @@ class Results:
         self._runs: dict[tuple[str, str, int], Metrics] = {}
         self._path = folder / FILE
         with writing(folder):
-            (folder / "traces").mkdir(parents=True, exist_ok=True)
+            (folder / "traces" if traces else folder).mkdir(parents=True, exist_ok=True)
         if self._path.exists():
             self._continue(read_content(self._path))
 
@@ -137,7 +140,8 @@ class Results:
                 )
         self.policies = content["policies"]
         self._dumps = {**content["scenarios"], **self._dumps}
-        self._runs = {row[:3]: row.metrics for row in content["runs"] if zipfile.is_zipfile(self.trace_path(*row[:3]))}
+        whole = (row for row in content["runs"] if not self._traces or zipfile.is_zipfile(self.trace_path(*row[:3])))
+        self._runs = {row[:3]: row.metrics for row in whole}
 
     @property
     def rows(self) -> list[Row]:
@@ -160,11 +164,8 @@ class Results:
     def add(self, scenario: str, policy: str, run: Run) -> None:
         """Keep a run, on disk at once; refused where the policy's file has changed, so that no table mixes two."""
         self.use(policy)
-        arrays: dict[str, Any] = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
-        if run.seed in self._route_seeds:
-            arrays |= {f"route_{name}": values for name, values in run.routes._asdict().items()}
-        with replacing(self.trace_path(scenario, policy, run.seed)) as partial:
-            np.savez_compressed(partial, **arrays)
+        if self._traces:
+            self._add_trace(self.trace_path(scenario, policy, run.seed), run)
         self._runs[scenario, policy, run.seed] = run.metrics
         content = Content(
             schema=1,
@@ -177,6 +178,13 @@ class Results:
         )
         runs = [row._asdict() for row in self.rows]
         write_text(self._path, json.dumps({**content, "runs": runs}, allow_nan=False) + "\n")
+
+    def _add_trace(self, path: Path, run: Run) -> None:
+        arrays: dict[str, Any] = {**run.series, "obstacles": run.obstacles, "waypoints": run.waypoints}
+        if run.seed in self._route_seeds:
+            arrays |= {f"route_{name}": values for name, values in run.routes._asdict().items()}
+        with replacing(path) as partial:
+            np.savez_compressed(partial, **arrays)
 
     def select(self, scenario: str, policy: str, seeds: Iterable[int]) -> list[Row]:
         """The runs of a policy on a scenario, by seed."""

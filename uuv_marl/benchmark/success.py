@@ -59,12 +59,11 @@ class SuccessRecorder:
     def metrics(self, world: int) -> Success:
         """A world's shares of healthy vehicles: safe and done, safe, done; and whether the swarm succeeded (1 or 0)."""
         healthy = ~(self._failed | self._swarm.faulty)[world]
-        found = Success(
-            success_share=None, safe_share=None, done_share=None, swarm_success=None,
-            vehicles_faulty=int((~healthy).sum()),
-        )  # fmt: skip
+        faulty = int((~healthy).sum())
         if not healthy.any() or not (self._judged[world] or not self._swarm.state.alive[world].any()):
-            return found
+            return Success(
+                success_share=None, safe_share=None, done_share=None, swarm_success=None, vehicles_faulty=faulty
+            )
         safe, offset = ~self._touched[world, healthy], self._offset[world, healthy]
         done = np.hypot(*offset.T) <= self._spread
         centred = bool(np.hypot(*offset.mean(axis=0)) <= CENTRE_M)
@@ -73,5 +72,5 @@ class SuccessRecorder:
             safe_share=float(safe.mean()),
             done_share=float(done.mean()),
             swarm_success=int(safe.all() and centred and done.mean() >= TOGETHER),
-            vehicles_faulty=found["vehicles_faulty"],
+            vehicles_faulty=faulty,
         )

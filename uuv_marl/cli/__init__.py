@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl import __version__
-from uuv_marl.cli import benchmark, export, lists, replay, studies, train
+from uuv_marl.cli import benchmark, export, lists, replay, robustness, studies, train
 from uuv_marl.cli.console import console
 
 app = typer.Typer(
@@ -17,7 +17,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
-    benchmark.benchmark, replay.replay, studies.heldout, studies.reproduce, lists.scenarios, lists.policies,
+    benchmark.benchmark, replay.replay, robustness.robustness, studies.heldout, studies.reproduce, lists.scenarios, lists.policies,
     benchmark.tune, export.export, studies.identify,
 ):  # fmt: skip
     app.command()(command)

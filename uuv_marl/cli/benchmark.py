@@ -70,7 +70,7 @@ def benchmark(
         find_modules(policies)
         for name, loaded in itertools.product(policies, scenarios):
             make(name, granted(name, loaded))  # refused now, not after hours of others' runs
-        evaluator, cluster = _where(ray, policies)
+        evaluator, cluster = evaluator_at(ray, policies)
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
@@ -92,7 +92,7 @@ def benchmark(
         console.print(_NEXT.format(output=output), markup=False, highlight=False)
 
 
-def _where(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
+def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
     """What runs the seeds, and the connection that it needs: this machine, or the Ray cluster at an address."""
     from uuv_marl.benchmark.evaluate import evaluate
 

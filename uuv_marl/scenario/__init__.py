@@ -5,7 +5,7 @@ every number with its source.
 """
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario.conditions import IDEAL, conditions, disturbances
+from uuv_marl.scenario.conditions import IDEAL, conditions, disturbances, hears_ideally
 from uuv_marl.scenario.files import (
     differences,
     load_scenario,
@@ -21,6 +21,6 @@ from uuv_marl.scenario.sections import MAX_RANGE_M, growth
 
 __all__ = [
     "IDEAL", "MAX_RANGE_M", "Scenario", "ScenarioError", "conditions", "differences", "disturbances",
-    "growth", "load_scenario", "load_vehicle",
+    "growth", "hears_ideally", "load_scenario", "load_vehicle",
     "parse_override", "scenario_names", "show", "to_toml", "vehicle_names",
 ]  # fmt: skip

@@ -17,6 +17,12 @@ def disturbances(scenario: Scenario) -> list[str]:
     return [phrase for part in parts for phrase, on in part.items() if on]
 
 
+def hears_ideally(scenario: Scenario) -> bool:
+    """Whether sonars hear everything at once and as it is."""
+    deaf = any(fault.kind == "array" and fault.share > 0.0 for fault in scenario.faults)
+    return not deaf and not any([*_latency(scenario).values(), *_noise(scenario).values()])
+
+
 def _current(scenario: Scenario) -> dict[str, bool]:
     current = scenario.current
     return {

@@ -45,6 +45,13 @@ def saturate(value: float, limit: float) -> float:
 
 
 @compiled_inline
+def toward(dx: float, dy: float, c: float, s: float) -> tuple[float, float]:
+    """A vector north and east [m] in the body frame of a heading (cosine, sine), a longer one cut to the limit."""
+    far = max(math.sqrt(dx * dx + dy * dy) / MAX_RANGE_M, 1.0)
+    return saturate((c * dx + s * dy) / far, MAX_RANGE_M), saturate((c * dy - s * dx) / far, MAX_RANGE_M)
+
+
+@compiled_inline
 def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspace, see: Fields) -> None:
     """What entry p of the cells knows in world w, into the fields of its percept. Eq. 11, 14-17."""
     cells, listener, course = workspace.cells, workspace.listener, world.course
@@ -55,11 +62,8 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
     see.velocity[w, i, 0] = saturate(nu[w, i, 0], MAX_SPEED)
     see.velocity[w, i, 1] = saturate(nu[w, i, 1], MAX_SPEED)
     see.yaw_rate[w, i, 0] = saturate(nu[w, i, 2], MAX_SPEED)
-    dx, dy = reference[w, 0] - x, reference[w, 1] - y
     v_x, v_y = reference[w, 2], reference[w, 3]
-    far = max(math.sqrt(dx * dx + dy * dy) / MAX_RANGE_M, 1.0)
-    see.reference[w, i, 0] = saturate((c * dx + s * dy) / far, MAX_RANGE_M)
-    see.reference[w, i, 1] = saturate((c * dy - s * dx) / far, MAX_RANGE_M)
+    see.reference[w, i, 0], see.reference[w, i, 1] = toward(reference[w, 0] - x, reference[w, 1] - y, c, s)
     see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
     see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     for k in range(see.heard.shape[2]):

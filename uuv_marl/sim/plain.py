@@ -75,7 +75,7 @@ class PlainEngine:
             if self.sea is not None:
                 interpreted(drift)(w, self.world, self.sea)
             if hold == self.rules.holds - 1 or (
-                self.sea is not None and interpreted(reads)(self.state.tick[w], self.sea)
+                self.sea is not None and interpreted(reads)(w, self.state.tick[w], self.sea)
             ):
                 self.perceive(w)
                 if self.sea is not None:
@@ -93,6 +93,7 @@ class PlainEngine:
         self.perceive(w)
         if self.sea is not None:
             interpreted(begin)(w, self.world, self.sea)
+            interpreted(take_readings)(w, self.world, self.sea, self.fields)
             interpreted(know)(w, self.world, self.sea, self.fields, self.sea_fields)
 
     def clear_facts(self, w: int) -> None:

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,14 +18,13 @@ from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.sea.actuation import hit
 from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
-from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_arrays
+from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_tables
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
 from uuv_marl.sim.trajectory import arrival_times
 
 _log = logging.getLogger("uuv_marl")
-_TABLES = (State, Course, Facts, Senses)
 
 
 class Swarm:
@@ -131,9 +130,8 @@ class Swarm:
             Terminated, by what happened: the swarm arrived (where ``arrival.ends_episode``), or all of it is lost.
             Truncated, that is cut off: by the time limit, or because the world diverged.
         """
-        terminated = ~self.state.alive.any(axis=1)
-        if self.scenario.arrival.ends_episode:
-            terminated |= self.arrived
+        done = self.arrived & self.scenario.arrival.ends_episode
+        terminated = done | ~self.state.alive.any(axis=1)
         late = self.facts.time_s >= self.time_limit_s - 1e-9
         return terminated, (late | (self.facts.diverged >= 0)) & ~terminated
 
@@ -219,15 +217,14 @@ class Swarm:
 
     def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
-        for table in _TABLES:
-            check(table, arrays, self._sizes)
+        for table in (*self._world, *sea_tables(self._sea)):
+            check(cast(type[Any], type(table)), arrays, self._sizes)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {
             "duration_s": self._duration_s,
             "keys": self.keys,
-            **{k: array for table in self._world for k, array in table._asdict().items()},
-            **sea_arrays(self._sea),
+            **{k: array for table in (*self._world, *sea_tables(self._sea)) for k, array in table._asdict().items()},
         }
 
     def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:

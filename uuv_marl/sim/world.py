@@ -20,6 +20,9 @@ from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sea.actuation import Actuation, Hull, is_lost
 from uuv_marl.sim.sea.current import Flow, Water
 from uuv_marl.sim.sea.modem import Mail, Modem
+from uuv_marl.sim.sea.navigation import Navigation, Track
+from uuv_marl.sim.sea.noise import Ears, Noise
+from uuv_marl.sim.sea.readings import Listening, Readings
 from uuv_marl.sim.sea.sea import Sea, begin, drift, integrate_at_sea, know, reads, take_readings
 from uuv_marl.sim.sonar import Suite
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
@@ -179,6 +182,7 @@ def observe_one(w: int, world: World, model: Model, own: Workspace, sea: Sea | N
     perceive(w, world, model, own, grid)
     if sea is not None:
         begin(w, world, sea)
+        take_readings(w, world, sea, fields(world.senses.percept, model.at))
         know(w, world, sea, fields(world.senses.percept, model.at), sea_fields(world.senses.percept, model.at))
 
 
@@ -236,7 +240,7 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
         grid = step_hold(w, hold == 0, world, model, workspace, sea)
         if sea is not None:
             drift(w, world, sea)
-        if hold == holds - 1 or (sea is not None and reads(world.state.tick[w], sea)):
+        if hold == holds - 1 or (sea is not None and reads(w, world.state.tick[w], sea)):
             perceive(w, world, model, workspace, grid)
             if sea is not None:
                 take_readings(w, world, sea, fields(world.senses.percept, model.at))
@@ -281,13 +285,14 @@ def step_worlds(
 def step_worlds_at_sea(
     threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
     plant: Plant, suite: Suite, rules: Rules, at: Starts, room: Scratch, keys: UInt64,
-    water: Water, flow: Flow, actuation: Actuation, hull: Hull, modem: Modem, mail: Mail,
+    water: Water, flow: Flow, actuation: Actuation, hull: Hull, listening: Listening, readings: Readings,
+    noise: Noise, ears: Ears, navigation: Navigation, track: Track, modem: Modem, mail: Mail,
 ) -> bool:  # fmt: skip
     """The same for disturbed worlds."""
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
         own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
-        sea = Sea(keys, water, flow, actuation, hull, modem, mail)
+        sea = Sea(keys, water, flow, actuation, hull, listening, readings, noise, ears, navigation, track, modem, mail)
         for w in range(t * share, min((t + 1) * share, action.shape[0])):
             if active[w]:
                 step_world(w, action, world, model, own, sea)

@@ -11,7 +11,7 @@ import numpy as np
 
 from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.results import Results
-from uuv_marl.benchmark.runner import run_missing
+from uuv_marl.benchmark.runner import Evaluate, run_missing
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.studies.columns import Float32, Float64
 
@@ -59,23 +59,24 @@ class Suite:
     Args:
         folder: one sub-folder for each case, with a benchmark's results.
         seeds: benchmark seeds 0 to ``seeds - 1``, for cases that name none.
+        traces: whether runs leave their time series.
     """
 
-    def __init__(self, folder: Path, seeds: int = 1) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, seeds: int = 1, traces: bool = True) -> None:
+        self.folder, self._traces = folder, traces
         self.seeds = range(seeds)
         self._open: dict[str, Results] = {}
 
-    def run(self, cases: Sequence[Case], report: Report) -> None:
-        """Run what is missing of these cases."""
+    def run(self, cases: Sequence[Case], report: Report, evaluator: Evaluate = evaluate) -> None:
+        """Run what is missing of these cases, here or where the evaluator does."""
         work = [case.load().swarm.num_vehicles * len(self.seeds_of(case)) for case in cases]
         for k, case in enumerate(cases):
 
             def note(_scenario: str, policy: str, share: float, k: int = k, name: str = case.name) -> None:
                 report(f"{name}: {policy}", (sum(work[:k]) + share * work[k]) / sum(work))
 
-            evaluator = partial(evaluate, **case.parameters)
-            run_missing(self.results(case), [case.load()], [case.policy], self.seeds_of(case), note, evaluator)
+            how = partial(evaluator, **case.parameters)
+            run_missing(self.results(case), [case.load()], [case.policy], self.seeds_of(case), note, how)
 
     def seeds_of(self, case: Case) -> Sequence[int]:
         """What a case is run on."""
@@ -98,5 +99,5 @@ class Suite:
         """What its folder holds."""
         if case.name not in self._open:
             routes = self.seeds if case.routes else ()
-            self._open[case.name] = Results(self.folder / case.folder, [case.load()], routes)
+            self._open[case.name] = Results(self.folder / case.folder, [case.load()], routes, self._traces)
         return self._open[case.name]

@@ -141,7 +141,7 @@ def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario
 def hit(tick: Int64, hull: Hull) -> Bool:
     """The vehicles that a fault has hit before this control hold of each world, shape (world, vehicle)."""
     first, end = hull.broken[..., 0], hull.broken[..., 1]
-    return ((first < end) & (first < tick[:, None, None])).any(axis=2)
+    return np.logical_or.reduce((first < end) & (first < tick[:, None, None]), axis=2)
 
 
 @compiled

@@ -25,6 +25,21 @@ from uuv_marl.sim.sea.current import (
     water,
 )
 from uuv_marl.sim.sea.modem import Mail, Modem, draw_mail, exchange, know_mail, modem
+from uuv_marl.sim.sea.navigation import Navigation, Track, draw_track, find_oneself, go_astray, navigate, navigation
+from uuv_marl.sim.sea.noise import Ears, Noise, begin_ears, draw_ears, noise, spoil, tell_ranged
+from uuv_marl.sim.sea.readings import (
+    Listening,
+    Reading,
+    Readings,
+    any_due,
+    begin_line,
+    due,
+    keep,
+    line_sizes,
+    listening,
+    recall,
+    remember,
+)
 from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.views import Fields, SeaFields
 from uuv_marl.sim.workspace import Columns
@@ -43,6 +58,12 @@ class Sea(NamedTuple):
     flow: Flow
     actuation: Actuation
     hull: Hull
+    listening: Listening
+    readings: Readings
+    noise: Noise
+    ears: Ears
+    navigation: Navigation
+    track: Track
     modem: Modem
     mail: Mail
 
@@ -57,14 +78,21 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
     """
     if not disturbances(scenario) and not set(SEA_CHANNELS) & set(scenario.sonar.channels):
         return None
+    own = {"eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults)}
     peers = sizes["vehicle"] if "modem" in scenario.sonar.channels else 0
-    sizes = {**sizes, "eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults), "peer": peers}
+    sizes = {**sizes, **own, **line_sizes(scenario), "peer": peers}
     return Sea(
         keys=keys,
         water=water(scenario),
         flow=allocate(Flow, sizes),
         actuation=actuation(scenario),
         hull=allocate(Hull, sizes),
+        listening=listening(scenario),
+        readings=allocate(Readings, sizes),
+        noise=noise(scenario),
+        ears=allocate(Ears, sizes),
+        navigation=navigation(scenario),
+        track=allocate(Track, sizes),
         modem=modem(scenario),
         mail=allocate(Mail, sizes),
     )
@@ -83,14 +111,14 @@ def draw_sea(w: int, scenario: Scenario, course: Course, duration_s: float, sea:
     key = np.uint64(sea.keys[w])
     draw_flow(w, key, course.waypoints[w, : course.last[w] + 1], scenario, sea.water, sea.flow)
     draw_hulls(w, key, duration_s, scenario, sea.hull)
+    draw_ears(w, key, sea.noise, sea.ears)
+    draw_track(w, key, sea.navigation, sea.track)
     draw_mail(w, sea.mail)
 
 
-def sea_arrays(sea: Sea | None) -> dict[str, NDArray[Any]]:
-    """All that changes, by name, for snapshots."""
-    if sea is None:
-        return {}
-    return {**sea.flow._asdict(), **sea.hull._asdict(), **sea.mail._asdict()}
+def sea_tables(sea: Sea | None) -> tuple[Any, ...]:
+    """All that changes, for snapshots."""
+    return () if sea is None else (sea.flow, sea.hull, sea.readings, sea.ears, sea.track, sea.mail)
 
 
 @compiled_inner
@@ -113,6 +141,8 @@ def drift(w: int, world: World, sea: Sea) -> None:
     """The sea at the end of a control hold, whose number is already counted."""
     advance_gust(w, sea.keys[w], world.state.tick[w], sea.water, sea.flow)
     read_flow(w, world.state, sea.water, sea.flow)
+    go_astray(w, world.state, sea.navigation, sea.track)
+    remember(w, world.state, sea.readings)
     exchange(w, sea.keys[w], world, sea.modem, sea.mail, sea.flow)
 
 
@@ -120,21 +150,35 @@ def drift(w: int, world: World, sea: Sea) -> None:
 def begin(w: int, world: World, sea: Sea) -> None:
     """The sea around vehicles as they stand, after a reset or where their states were written by hand."""
     read_flow(w, world.state, sea.water, sea.flow)
+    find_oneself(w, sea.track)
+    begin_ears(w, sea.keys[w], sea.noise, sea.ears)
+    begin_line(w, world.state, sea.readings)
 
 
 @compiled_inner
-def reads(tick: int, sea: Sea) -> bool:
-    """Whether an array reads at this control hold."""
-    return tick < 0 and sea.keys.shape[0] < 0
+def reads(w: int, tick: int, sea: Sea) -> bool:
+    """Whether an array of world w takes a reading at this control hold that a decision will see."""
+    return any_due(w, tick, sea.listening, sea.readings)
 
 
 @compiled_inner
 def take_readings(w: int, world: World, sea: Sea, see: Fields) -> None:
     """Keep what the arrays hear now, from percepts that hold what is true."""
+    tick, line = world.state.tick[w], sea.listening
+    for a in range(0 if line.ideal else line.every.shape[0]):
+        number = due(tick - sea.readings.began[w], line.every[a], line.delay, line.holds)
+        if number >= 0:
+            at = Reading(w, a, number, tick, number % sea.readings.whom.shape[1])
+            keep(at, world, see, line, sea.track, sea.readings)
+            spoil(at, sea.keys[w], line, sea.noise, sea.ears, sea.actuation, sea.hull, sea.readings)
 
 
 @compiled_inner
 def know(w: int, world: World, sea: Sea, see: Fields, more: SeaFields) -> None:
     """Percepts that hold what is true become what vehicles know."""
+    if not sea.listening.ideal:
+        recall(w, world, sea.listening, sea.track, sea.readings, see, more)
+    tell_ranged(w, world.state.alive, sea.listening, sea.noise, more)
     know_velocities(w, world, sea.water, sea.flow, see, more)
     know_mail(w, world, sea.mail, more)
+    navigate(w, world, sea.navigation, sea.track, see)

@@ -1,0 +1,89 @@
+"""``uuv-marl robustness``: what currents, bad sonar, lags and faults cost each policy."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from uuv_marl.cli.benchmark import evaluator_at
+from uuv_marl.cli.console import console, explained, find_modules, working
+
+
+def robustness(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Eight axes, two scenarios, 5 seeds: about 15 minutes on two cores.")
+    ] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="All levels, three scenarios, 50 seeds: a day on two cores; see --ray.")
+    ] = False,
+    axis: Annotated[
+        list[str] | None, typer.Option(help="Only this axis, such as W1 or S7. Repeat it for several. Default: all.")
+    ] = None,
+    level: Annotated[
+        list[int] | None,
+        typer.Option(min=1, max=5, help="Only this level. Repeat it for several. Default: 1, 3 and 5."),
+    ] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Name, checkpoint or module:Class. Repeat it for several. Default: bio_inspired, bio_inspired_plus "
+            "and mappo."
+        ),
+    ] = None,
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Name or TOML file. Repeat it for several. Default: random_field.")
+    ] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1. Default: 20.")] = None,
+    pilot: Annotated[
+        bool, typer.Option("--pilot", help="Instead confirm or correct the findings of the pilot: pilot.md.")
+    ] = False,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Spread the seeds over this Ray cluster (auto: the one here). Needs: distributed."
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option(help="Folder of results, page and picture.")] = Path("results/robustness"),
+) -> None:
+    """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
+
+    Each axis makes one thing worse in five levels (uuv_marl/studies/robustness/axes.toml, with sources). It writes
+    report.md (scores, critical severities, every cell), figures/severity.png and episodes.csv (a row for each episode;
+    Python: pandas.read_csv). Without --quick or --full it makes the report that ships in docs/robustness, in about an
+    hour on two cores. Needs the extra "analysis". Ctrl-C keeps the finished episodes; the same command goes on.
+
+    Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
+    """
+    with explained():
+        from uuv_marl.benchmark.frame import need_pandas
+        from uuv_marl.errors import ResultsError
+        from uuv_marl.studies.robustness import axes, job, page
+        from uuv_marl.studies.robustness import pilot as findings
+
+        if quick and full:
+            raise ResultsError("--quick and --full exclude each other; give one of them")
+        need_pandas("uuv-marl robustness")
+        plan = job.QUICK if quick else job.FULL if full else job.SHIPPED
+        plan = plan._replace(
+            axes=axes.known(axis) if axis else plan.axes,
+            levels=sorted(set(level)) if level else plan.levels,
+            policies=list(dict.fromkeys(policy)) if policy else plan.policies,
+            scenarios=list(dict.fromkeys(scenario)) if scenario else plan.scenarios,
+            seeds=seeds or plan.seeds,
+        )
+        find_modules(plan.policies)
+        evaluator, cluster = evaluator_at(ray, plan.policies)
+        with working(f"The finished episodes are in {output}", alone=output) as bar, cluster:
+            task = bar.add_task("robustness", total=1.0)
+
+            def report(what: str, share: float) -> None:
+                bar.update(task, completed=share, description=what[-60:])
+
+            if pilot:
+                written = findings.run(output, seeds or job.SHIPPED.seeds, report, evaluator)
+            else:
+                episodes = job.run(output, plan, report, evaluator)
+                written = [*page.write_report(output), episodes]
+            report("robustness", 1.0)
+        for path in written:
+            console.print(f"  {path}", highlight=False)

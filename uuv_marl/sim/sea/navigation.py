@@ -1,0 +1,103 @@
+"""What a vehicle knows of where it is: a position that drifts off, and a compass with a lasting error.
+
+Both turn up where the world meets the body frame: in the vector to l(t), its velocity, and the compass. The sonar needs
+neither. The compass's error doesn't feed the drift: each is an axis of its own.
+"""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.percept import MAX_SPEED
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import State, World
+from uuv_marl.sim.compiled import compiled_inner
+from uuv_marl.sim.perception import saturate, toward
+from uuv_marl.sim.random import normal, uniform
+from uuv_marl.sim.sea.purposes import COMPASS, DRIFT
+from uuv_marl.sim.tables import described
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.sim.views import Fields
+
+Float64 = NDArray[np.float64]
+
+
+class Navigation(NamedTuple):
+    """Numbers of a scenario's navigation."""
+
+    drift_share: float
+    """Of the way made over ground, by which the known position is off."""
+    compass_bias: float
+    """Standard deviation of a compass's error [rad]."""
+
+
+@described
+class Track(NamedTuple):
+    """What each vehicle's navigation gets wrong."""
+
+    astray: Annotated[Float64, "world vehicle 2", "Direction of its drift, a unit vector north and east."]
+    drift: Annotated[Float64, "world vehicle 2", "Known less true position, north and east [m]."]
+    bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's error, clockwise."]
+
+
+def navigation(scenario: Scenario) -> Navigation:
+    """The scenario's navigation as numbers for the compiled functions."""
+    own = scenario.navigation
+    return Navigation(own.drift_share, math.radians(own.compass_bias_deg))
+
+
+def draw_track(w: int, key: np.uint64, navigation: Navigation, track: Track) -> None:
+    """Directions and errors of world w's new episode, from its key."""
+    for i in range(track.drift.shape[1]):
+        track.astray[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
+        track.bias[w, i] = cos_sin(navigation.compass_bias * normal(key, COMPASS, 0, i, 0))
+
+
+@compiled_inner
+def find_oneself(w: int, track: Track) -> None:
+    """The vehicles of world w know where they are."""
+    track.drift[w] = 0.0
+
+
+@compiled_inner
+def go_astray(w: int, state: State, navigation: Navigation, track: Track) -> None:
+    """Known positions after one control hold."""
+    if navigation.drift_share == 0.0:
+        return
+    for i in range(state.eta.shape[1]):
+        dx, dy = state.eta[w, i, 0] - state.before[w, i, 0], state.eta[w, i, 1] - state.before[w, i, 1]
+        off = navigation.drift_share * math.sqrt(dx * dx + dy * dy)
+        track.drift[w, i, 0] += off * track.astray[w, i, 0]
+        track.drift[w, i, 1] += off * track.astray[w, i, 1]
+
+
+@compiled_inner
+def navigate(w: int, world: World, navigation: Navigation, track: Track, see: Fields) -> None:
+    """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them.
+
+    Args:
+        w: the world.
+        world: its arrays.
+        navigation: the scenario's numbers.
+        track: what each vehicle gets wrong.
+        see: fields of the percepts, which are written.
+    """
+    if navigation.drift_share == 0.0 and navigation.compass_bias == 0.0:
+        return
+    eta, heading, reference = world.state.eta, world.senses.heading, world.facts.reference
+    for i in range(eta.shape[1]):
+        if not world.state.alive[w, i]:
+            continue
+        c_bias, s_bias = track.bias[w, i, 0], track.bias[w, i, 1]
+        c = c_bias * heading[w, i, 0] - s_bias * heading[w, i, 1]
+        s = c_bias * heading[w, i, 1] + s_bias * heading[w, i, 0]
+        dx = reference[w, 0] - (eta[w, i, 0] + track.drift[w, i, 0])
+        dy = reference[w, 1] - (eta[w, i, 1] + track.drift[w, i, 1])
+        v_x, v_y = reference[w, 2], reference[w, 3]
+        see.reference[w, i, 0], see.reference[w, i, 1] = toward(dx, dy, c, s)
+        see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
+        see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+        if see.compass.shape[2] > 0:
+            see.compass[w, i, 0], see.compass[w, i, 1] = saturate(c, 1.0), saturate(s, 1.0)

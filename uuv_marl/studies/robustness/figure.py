@@ -1,0 +1,51 @@
+"""The picture: success over severity, a panel for every axis, a line for every policy and scenario."""
+
+# pyright: reportUnknownMemberType=false
+# Matplotlib leaves the types of its keyword arguments open.
+
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from uuv_marl.benchmark.style import BLACK, COLOURS, legend, panels
+from uuv_marl.studies.robustness.axes import AXES, CALM, Axis
+from uuv_marl.studies.robustness.scores import ENOUGH, scored
+
+_LINES = ("-", "--", ":", "-.")
+
+
+def draw(table: Any) -> Figure:
+    """The picture of a table of ``scores.by_seed``."""
+    axes = [axis for name, axis in AXES.items() if name in table]
+    policies, scenarios = (list(table.index.unique(name)) for name in ("policy", "scenario"))
+    colours = dict(zip(policies, COLOURS * len(policies), strict=False))
+    lines = dict(zip(scenarios, _LINES * len(scenarios), strict=False))
+    figure, fields = panels(len(axes) + 1, 5, (4.0, 2.9), sharey=True)
+    for ax, axis in zip(fields, axes, strict=False):
+        for (scenario, policy), own in table.groupby(level=["scenario", "policy"], sort=False):
+            label = policy if len(scenarios) == 1 else f"{policy}, {scenario}"
+            _draw_line(ax, axis, own, color=colours[policy], linestyle=lines[scenario], label=label)
+        ax.axhline(ENOUGH, color=BLACK, linestyle=":", linewidth=0.8, label=f"success of {ENOUGH:g}")
+        ax.set_xticks([0, *axis.levels], axis.labels, fontsize=8, rotation=25 if max(map(len, axis.labels)) > 6 else 0)
+        ax.set_xlabel(axis.unit, fontsize=8)
+        ax.set_title(f"{axis.name}: {axis.title}", fontsize=10)
+        ax.set_ylim(-0.04, 1.04)
+    for ax in fields[len(axes) :]:
+        ax.set_axis_off()
+    figure.supylabel("success: share of the healthy vehicles that are safe and done")
+    where = ", ".join(scenarios)
+    figure.suptitle(f"Success over severity on {where}: mean over seeds and its 95 % bootstrap interval")
+    return legend(figure, fields[len(axes)])
+
+
+def _draw_line(ax: Axes, axis: Axis, own: Any, **style: Any) -> None:
+    """A policy on a scenario: success at every level that was run."""
+    if axis.name not in own or CALM not in own:
+        return
+    cells = own[[CALM, axis.name]].dropna(axis="columns", how="all")
+    scores = {level: scored(cells[name, level].dropna().to_numpy()) for name, level in cells}
+    if len(scores) > 1:
+        values, lows, highs = zip(*scores.values(), strict=True)
+        ax.fill_between(list(scores), lows, highs, color=style["color"], alpha=0.15, lw=0)
+        ax.plot(list(scores), values, marker=".", **style)

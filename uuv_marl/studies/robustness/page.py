@@ -1,0 +1,156 @@
+"""``report.md``: scores, critical severities and all cells, written from the table of episodes alone."""
+
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from uuv_marl.atomic import write_text
+from uuv_marl.baselines import POLICIES
+from uuv_marl.benchmark.style import house_style, save
+from uuv_marl.benchmark.tables import counted, markdown_table
+from uuv_marl.scenario import IDEAL, conditions, load_scenario, scenario_names
+from uuv_marl.studies.robustness.axes import AXES, BASE, CALM, GROUPS
+from uuv_marl.studies.robustness.figure import draw
+from uuv_marl.studies.robustness.job import EPISODES, FULL, read_episodes
+from uuv_marl.studies.robustness.scores import (
+    ENOUGH,
+    EVERY,
+    WORTH_KEEPING,
+    axis_score,
+    by_seed,
+    critical_text,
+    group_score,
+    scored,
+)
+
+_NOTHING = "–"
+
+
+def write_report(folder: Path) -> list[Path]:
+    """``report.md`` and its picture from the folder's ``EPISODES``; the paths, that of the page first."""
+    episodes = read_episodes(folder / EPISODES)
+    page = folder / "report.md"
+    write_text(page, report(episodes))
+    with house_style():
+        return [page, save(draw(by_seed(episodes)), folder / "figures" / "severity.png")]
+
+
+def report(episodes: Any) -> str:
+    """The page's text."""
+    story = Template(resources.files("uuv_marl.studies.robustness").joinpath("story.md").read_text(encoding="utf-8"))
+    table, scenarios = by_seed(episodes), list(episodes["scenario"].unique())
+    seeds, policies = episodes["seed"].nunique(), ", ".join(f"`{name}`" for name in episodes["policy"].unique())
+    return story.substitute(
+        headline=f"{counted(len(episodes), 'episode')} of {policies} on {', '.join(f'`{s}`' for s in scenarios)}, "
+        f"{counted(seeds, 'seed')}.",
+        conditions=f"{_calm(scenarios)}; echoes report the {BASE['sonar.echo_reports']} of obstacles",
+        missing="\n".join(f"- {line}" for line in _missing(episodes)),
+        scenarios="\n".join(_scenario(name, episodes, table.loc[[name]]) for name in scenarios),
+        axes=markdown_table(
+            ("axis", "what", "unit", "level 0", "levels", "source"),
+            [(a.name, a.title, a.unit, a.labels[0], "; ".join(a.labels[1:]), a.source) for a in AXES.values()],
+        ),
+    )
+
+
+def _calm(scenarios: list[str]) -> str:
+    """What is on at level 0."""
+    found = [conditions(load_scenario(name, overrides=BASE)) for name in scenarios if name in scenario_names()]
+    return "; ".join(dict.fromkeys(found)) or f"{IDEAL}, unless the scenario says otherwise"
+
+
+def _missing(episodes: Any) -> Iterator[str]:
+    """What a full run has and these episodes have not."""
+    levels, scenarios = set(episodes["level"]), set(episodes["scenario"])
+    for what, whole, there in (("levels", FULL.levels, levels), ("scenarios", FULL.scenarios, scenarios)):
+        if absent := [str(one) for one in whole if one not in there]:
+            yield f"Not run: {what} {', '.join(absent)} ({there_are(what, whole)})."
+    for policy, own in episodes.groupby("policy", sort=False):
+        idle = [name for name, axis in AXES.items() if policy in POLICIES and not axis.concerns(policy)]
+        absent = [name for name in AXES if name not in set(own["axis"]) and name not in idle]
+        if absent:
+            yield f"Not run for `{policy}`: {', '.join(absent)}."
+        if idle:
+            yield f"Left out for `{policy}`: {', '.join(idle)}, as it uses neither link nor modem."
+    count = episodes.groupby(["scenario", "axis", "level", "policy"]).size()
+    if count.min() < count.max():
+        yield f"{counted(int((count < count.max()).sum()), 'cell')} have fewer than {counted(int(count.max()), 'seed')}."
+
+
+def there_are(what: str, whole: Any) -> str:
+    """``of the levels 1, 2, 3``."""
+    return f"of the {what} {', '.join(map(str, whole))}"
+
+
+def _scenario(name: str, episodes: Any, table: Any) -> str:
+    """A scenario's tables."""
+    policies = {policy: own for policy, own in table.groupby(level="policy", sort=False)}
+    parts = (
+        ("Scores", "Mean success over the levels that were run. `all`: the mean over the groups, without X.",
+         _groups(policies)),
+        ("Axes", f"Mean success over the levels that were run; then what it keeps of level 0's success, where that "
+         f"is at least {WORTH_KEEPING:g}.", _axes(policies)),
+        ("Critical severity", f"Where success falls below {ENOUGH:g} first, linear between the levels that were run, "
+         "in the axis's unit.", _critical(policies)),
+        ("Every cell", "Success; then in how many episodes the whole swarm succeeded.",
+         _cells(episodes[episodes["scenario"] == name], policies)),
+    )  # fmt: skip
+    return f"## {name}\n\n" + "\n".join(f"### {title}\n\n{words}\n\n{rows}" for title, words, rows in parts)
+
+
+def _groups(policies: dict[str, Any]) -> str:
+    groups = ["W", "S", "N", "C", "A", "F", EVERY, "X"]
+    headers = ["policy", "level 0", *(f"{GROUPS[g]} ({g})" if g in GROUPS else g for g in groups)]
+    rows: list[list[str]] = []
+    for policy, own in policies.items():
+        calm = scored(own[CALM].dropna().to_numpy()) if CALM in own else None
+        rows.append([policy, *(f"{s:.2f}" if s else _NOTHING for s in (calm, *(group_score(own, g) for g in groups)))])
+    return markdown_table(headers, rows)
+
+
+def _axes(policies: dict[str, Any]) -> str:
+    def cell(own: Any, axis: str) -> str:
+        score = axis_score(own, axis)
+        if score is None:
+            return _NOTHING
+        return f"{score.success:.2f}" + (f"; {score.retention:.2f}" if score.retention else "")
+
+    return _table(policies, cell)
+
+
+def _critical(policies: dict[str, Any]) -> str:
+    def cell(own: Any, axis: str) -> str:
+        score = axis_score(own, axis)
+        return _NOTHING if score is None else critical_text(axis, score)
+
+    return _table(policies, cell)
+
+
+def _table(policies: dict[str, Any], cell: Any) -> str:
+    """A row for each axis that any policy was run on."""
+    axes = [axis for axis in AXES.values() if any(axis.name in own for own in policies.values())]
+    rows = [(a.name, f"{a.title} [{a.unit}]", *(cell(own, a.name) for own in policies.values())) for a in axes]
+    return markdown_table(("axis", "what [unit]", *policies), rows)
+
+
+def _cells(episodes: Any, policies: dict[str, Any]) -> str:
+    found = {key: own for key, own in episodes.groupby(["axis", "level", "policy"])}
+    rows: list[list[str]] = []
+    places = [
+        (CALM, 0, "–"),
+        *((a.name, k, label) for a in AXES.values() for k, label in zip(a.levels, a.labels[1:], strict=True)),
+    ]
+    for axis, level, label in places:
+        if any((axis, level, policy) in found for policy in policies):
+            cells = [found.get((axis, level, policy)) for policy in policies]
+            rows.append([axis, str(level), label, *(_NOTHING if own is None else _cell(own) for own in cells)])
+    return markdown_table(("axis", "level", "severity", *policies), rows)
+
+
+def _cell(own: Any) -> str:
+    success = own["success_share"].dropna().to_numpy()
+    if not len(success):
+        return _NOTHING
+    return f"{scored(success):.2f}; {own['swarm_success'].sum():.0f}/{len(success)}"
