@@ -17,6 +17,8 @@ MAX_READINGS = 64
 """Most control holds that the processing of a sonar's reading may take."""
 MAX_EDDIES = 4_096
 """Most eddies of a world; every vehicle's water is the sum over all of them."""
+MAX_PAST = 1024
+"""Most control holds that sound may take to cross a sonar's range."""
 MAX_STEPS = 10_000
 """Most integration steps in a decision; compiled code can't be interrupted."""
 

@@ -3,7 +3,7 @@
 A disturbance that draws here moves no other draw, and gives the same numbers whatever the batch, the threads or the
 API. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11): the key is its
 key, the four others are its counter. The logarithm is our own, since a C library's may differ in the last bit between
-machines.
+machines. Loops that do nothing but draw run on vector registers.
 """
 
 import hashlib
@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.compiled import compiled_inline
 from uuv_marl.sim.streams import packed
 from uuv_marl.sim.trigonometry import cos_sin
 
@@ -23,6 +23,8 @@ _MULTIPLIER_0, _MULTIPLIER_1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _WEYL_0, _WEYL_1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
 _HIGH_SHIFT, _LOW_SHIFT, _HIGH_BITS = np.uint64(5), np.uint64(6), np.uint64(26)
 
+_FRACTION, _ONE_HALF = np.int64((1 << 52) - 1), np.int64(1022 << 52)
+"""Bits of a number's fraction, and those of 0.5."""
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 _L1, _L2, _L3 = 6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01
 _L4, _L5, _L6, _L7 = (
@@ -38,7 +40,7 @@ def episode_key(stream: np.random.Generator) -> np.uint64:
     return np.uint64(int.from_bytes(hashlib.blake2b(packed([stream]).tobytes(), digest_size=8).digest(), "little"))
 
 
-@compiled
+@compiled_inline
 def philox(key: np.uint64, c_0: np.uint64, c_1: np.uint64, c_2: np.uint64, c_3: np.uint64) -> Block:
     """Four random words of 32 bits for a key of 64 bits and a counter of four words."""
     k_0, k_1 = key & _LOW, key >> _HALF
@@ -49,7 +51,7 @@ def philox(key: np.uint64, c_0: np.uint64, c_1: np.uint64, c_2: np.uint64, c_3: 
     return c_0, c_1, c_2, c_3
 
 
-@compiled
+@compiled_inline
 def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> tuple[float, float]:
     """Two independent numbers, uniform in [0, 1), multiples of 2^-53."""
     w_0, w_1, w_2, w_3 = philox(
@@ -60,7 +62,7 @@ def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -
     return np.float64(first) * 2.0**-53, np.float64(second) * 2.0**-53
 
 
-@compiled
+@compiled_inline
 def uniform(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> float:
     """A number uniform in [0, 1).
 
@@ -74,7 +76,7 @@ def uniform(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) ->
     return uniforms(key, purpose, time, vehicle, slot)[0]
 
 
-@compiled
+@compiled_inline
 def normals(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> tuple[float, float]:
     """Two independent standard normal numbers (Box and Muller 1958); arguments as for ``uniform``."""
     first, second = uniforms(key, purpose, time, vehicle, slot)
@@ -83,19 +85,19 @@ def normals(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) ->
     return radius * c, radius * s
 
 
-@compiled
+@compiled_inline
 def normal(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> float:
     """A standard normal number; arguments as for ``uniform``."""
     return normals(key, purpose, time, vehicle, slot)[0]
 
 
-@compiled
+@compiled_inline
 def log(x: float) -> float:
-    """Natural logarithm of a positive, finite number, within 1 ulp: the method of Sun's fdlibm (e_log.c)."""
-    share, power = math.frexp(x)
-    if share < math.sqrt(0.5):
-        share, power = 2.0 * share, power - 1
-    f, k = share - 1.0, float(power)
+    """Natural logarithm of a positive, normal number, within 1 ulp: the method of Sun's fdlibm (e_log.c)."""
+    bits = np.float64(x).view(np.int64)
+    share, power = np.int64((bits & _FRACTION) | _ONE_HALF).view(np.float64), (bits >> 52) - 1022
+    small = share < math.sqrt(0.5)
+    f, k = (2.0 * share if small else share) - 1.0, np.float64(power - 1 if small else power)
     s = f / (2.0 + f)
     z = s * s
     w = z * z

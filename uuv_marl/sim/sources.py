@@ -63,10 +63,11 @@ def _bound(statement: ast.stmt) -> Iterator[str]:
 
 @functools.cache
 def _content(module: str, name: str) -> tuple[str, frozenset[str]]:
-    """The code of a statement, without decorators, and the names that it uses; of a class the fields alone."""
+    """The code of a statement and the names that it uses, but for its decorators'; of a class the fields alone."""
     statement = _statements(module)[name]
     parts: list[ast.AST] = [statement]
     annotations: list[ast.AST] = []
+    decorators: list[ast.expr] = []  # they say whether it is copied into its callers
     if isinstance(statement, ast.ClassDef):
         fields = [line for line in statement.body if isinstance(line, ast.AnnAssign)]
         parts = [*statement.bases, *(part for line in fields for part in (line.target, line.value) if part)]
@@ -75,8 +76,9 @@ def _content(module: str, name: str) -> tuple[str, frozenset[str]]:
         ]  # values bring their types along; but what is named there counts
     elif isinstance(statement, ast.FunctionDef):
         parts = [statement.args, *(line for line in statement.body if not _is_text(line))]
+        decorators = statement.decorator_list
     used = {node.id for part in [*parts, *annotations] for node in ast.walk(part) if isinstance(node, ast.Name)}
-    return "; ".join(ast.dump(part) for part in parts), frozenset(used - {name})
+    return "; ".join(ast.dump(part) for part in [*parts, *decorators]), frozenset(used - {name})
 
 
 def _is_text(line: ast.stmt) -> bool:

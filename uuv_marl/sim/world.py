@@ -22,7 +22,8 @@ from uuv_marl.sim.sea.current import Flow, Water
 from uuv_marl.sim.sea.modem import Mail, Modem
 from uuv_marl.sim.sea.navigation import Navigation, Track
 from uuv_marl.sim.sea.noise import Ears, Noise
-from uuv_marl.sim.sea.readings import Listening, Readings
+from uuv_marl.sim.sea.readings import Hits, Readings
+from uuv_marl.sim.sea.schedule import Listening
 from uuv_marl.sim.sea.sea import Sea, begin, drift, integrate_at_sea, know, reads, take_readings
 from uuv_marl.sim.sonar import Suite
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
@@ -286,13 +287,15 @@ def step_worlds_at_sea(
     threads: int, active: Bool, action: Float32, state: State, course: Course, facts: Facts, senses: Senses,
     plant: Plant, suite: Suite, rules: Rules, at: Starts, room: Scratch, keys: UInt64,
     water: Water, flow: Flow, actuation: Actuation, hull: Hull, listening: Listening, readings: Readings,
-    noise: Noise, ears: Ears, navigation: Navigation, track: Track, modem: Modem, mail: Mail,
+    hits: Hits, noise: Noise, ears: Ears, navigation: Navigation, track: Track, modem: Modem, mail: Mail,
 ) -> bool:  # fmt: skip
     """The same for disturbed worlds."""
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
         own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)
-        sea = Sea(keys, water, flow, actuation, hull, listening, readings, noise, ears, navigation, track, modem, mail)
+        sea = Sea(
+            keys, water, flow, actuation, hull, listening, readings, hits, noise, ears, navigation, track, modem, mail
+        )
         for w in range(t * share, min((t + 1) * share, action.shape[0])):
             if active[w]:
                 step_world(w, action, world, model, own, sea)

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.exponential import exp
 from uuv_marl.sim.random import log, normal, normals, uniform, uniforms
 from uuv_marl.sim.sea.actuation import ARRAY, Actuation, Hull, acts
 from uuv_marl.sim.sea.purposes import BEARING_RANGE, DETECTION, FACTOR, FALSE_ECHO, FALSE_PLACE, SILENCE
-from uuv_marl.sim.sea.readings import NOBODY, PHANTOM, Listening, Reading, Readings
+from uuv_marl.sim.sea.readings import NOBODY, OBSTACLE, PHANTOM, PLACE, SHIFT, Hits, Readings, hush
+from uuv_marl.sim.sea.schedule import Listening, Reading
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.trigonometry import cos_sin
@@ -109,22 +110,105 @@ def begin_ears(w: int, key: np.uint64, noise: Noise, ears: Ears) -> None:
             ears.silent[w, i, a] = gap(uniform(key, SILENCE, 0, i, a), noise.silence)
 
 
-@compiled
+@compiled_inline
 def gap(chance: float, probability: float) -> int:
     """How often something of this probability doesn't happen before it does; ``chance`` is uniform in [0, 1)."""
     if 1.0 - probability == 1.0:
         return _NEVER
     if probability >= 1.0:
         return 0
-    return int(min(log(1.0 - chance) / log(1.0 - probability), float(_NEVER)))
+    return np.int64(min(log(1.0 - chance) / log(1.0 - probability), float(_NEVER)))
 
 
 @compiled_inner
-def spoil(
+def spoil(at: Reading, num: int, key: np.uint64, passive: bool, noise: Noise, ears: Ears, hits: Hits) -> None:
+    """What an array of every vehicle misses, and puts elsewhere.
+
+    Args:
+        at: the reading.
+        num: of the hits.
+        key: of the world's episode.
+        passive: whether the array is.
+        noise: the scenario's errors.
+        ears: what lasts.
+        hits: what is heard, true before, and with errors after.
+    """
+    if noise.half_range[at.a] > 0.0:
+        miss(at, num, key, noise, hits)
+    measured = noise.passive_ranges or not passive
+    blurred = noise.bearing > 0.0 or noise.range_m > 0.0 or noise.range_share > 0.0
+    if blurred or not measured or (passive and noise.factor_log_sd > 0.0):
+        draw_blur(at, num, key, noise, hits)
+        blur(at, num, measured, passive, noise, ears, hits)
+
+
+@compiled_inner
+def miss(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -> None:
+    """What is too faint is missed: signal excess 20 log10(r50 / r), or 40 log10 there and back, plus noise <= 0.
+
+    Args:
+        at: the reading.
+        num: of the hits.
+        key: of the world's episode.
+        noise: the scenario's errors.
+        hits: ranges of those missed become negative.
+    """
+    w, decades, half_range = at.w, noise.decades[at.a], noise.half_range[at.a]
+    for q in range(num):
+        excess, _ = normals(key, DETECTION, at.tick, hits.code[w, q] >> SHIFT, hits.code[w, q] & PLACE)
+        hits.first[w, q] = half_range * exp(decades * excess)
+    for q in range(num):
+        if hits.reach[w, q] >= hits.first[w, q]:
+            hits.reach[w, q] = -1.0
+
+
+@compiled_inner
+def draw_blur(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -> None:
+    """Cosine and sine of every bearing's error, and a standard normal number for its range; arguments as for ``miss``.
+
+    The loop holds nothing else, so that it runs on vector registers.
+    """
+    w, bearing = at.w, noise.bearing
+    for q in range(num):
+        side, off = normals(key, BEARING_RANGE, at.tick, hits.code[w, q] >> SHIFT, hits.code[w, q] & PLACE)
+        hits.first[w, q], hits.second[w, q] = cos_sin(bearing * side)
+        hits.third[w, q] = off
+
+
+@compiled_inner
+def blur(at: Reading, num: int, measured: bool, passive: bool, noise: Noise, ears: Ears, hits: Hits) -> None:
+    """Put hits at a wrong bearing and range; an echo's position moves as far as its range does.
+
+    Args:
+        at: the reading.
+        num: of the hits, with draws of ``draw_blur``.
+        measured: whether the array measures ranges.
+        passive: whether it is passive.
+        noise: the scenario's errors.
+        ears: what lasts.
+        hits: is written.
+    """
+    w = at.w
+    for q in range(num):
+        away = hits.reach[w, q]
+        if away < 0.0:
+            continue
+        factor = ears.factor[w, hits.code[w, q] >> SHIFT] if passive else 1.0
+        heard = max(factor * away + (noise.range_m + noise.range_share * away) * hits.third[w, q], 0.0)
+        if not measured:
+            heard = noise.nominal_range
+        x, y, c, s = hits.x[w, q], hits.y[w, q], hits.first[w, q], hits.second[w, q]
+        far = math.sqrt(x * x + y * y)
+        share = max(far + (heard - away), 0.0) / far if far > 0.0 else 1.0
+        hits.x[w, q], hits.y[w, q], hits.reach[w, q] = share * (c * x - s * y), share * (s * x + c * y), heard
+
+
+@compiled_inner
+def interrupt(
     at: Reading, key: np.uint64, listening: Listening, noise: Noise, ears: Ears, actuation: Actuation, hull: Hull,
-    readings: Readings,
+    hits: Hits, readings: Readings,
 ) -> None:  # fmt: skip
-    """What an array of every vehicle gets wrong in a reading.
+    """Echoes of nothing; arrays that are silent for a while; dead arrays.
 
     Args:
         at: the reading.
@@ -134,14 +218,11 @@ def spoil(
         ears: what lasts; is written.
         actuation: the scenario's faults.
         hull: when they act.
-        readings: the line, in which the reading is true, and becomes what is heard.
+        hits: room to work in.
+        readings: is written.
     """
-    if noise.half_range[at.a] > 0.0:
-        miss(at, key, listening, noise, readings)
-    blur_vehicles(at, key, listening, noise, ears, readings)
-    blur_echoes(at, key, listening, noise, readings)
     if noise.false_echo > 0.0:
-        imagine(at, key, listening, noise, readings)
+        imagine(at, key, listening, noise, hits, readings)
     if noise.silence > 0.0:
         for i in range(ears.silent.shape[1]):
             if is_silent(at, i, key, noise, ears):
@@ -154,110 +235,7 @@ def spoil(
 
 
 @compiled_inner
-def miss(at: Reading, key: np.uint64, listening: Listening, noise: Noise, readings: Readings) -> None:
-    """What is too faint is not heard: signal excess 20 log10(r50 / r), or 40 log10 there and back, plus noise <= 0.
-
-    Args:
-        at: the reading.
-        key: of the world's episode.
-        listening: the scenario's arrays.
-        noise: the scenario's errors.
-        readings: is written.
-    """
-    w, a, slot = at.w, at.a, at.slot
-    first, e_first, echoes = listening.first[a], listening.active[a], listening.active[a + 1] > listening.active[a]
-    for i in range(readings.whom.shape[2]):
-        for k in range(first, listening.first[a + 1]):
-            e = e_first + k - first
-            loud = echoes and readings.surface[w, slot, i, e] >= 0.0
-            if readings.whom[w, slot, i, k] == NOBODY and not loud:
-                continue
-            vehicle, obstacle = normals(key, DETECTION, at.tick, i, k)
-            if length(readings.where, w, slot, i, k) >= noise.half_range[a] * exp(noise.decades[a] * vehicle):
-                readings.whom[w, slot, i, k] = NOBODY
-            if loud and readings.surface[w, slot, i, e] >= noise.half_range[a] * exp(noise.decades[a] * obstacle):
-                readings.surface[w, slot, i, e] = -1.0
-
-
-@compiled_inner
-def blur_vehicles(
-    at: Reading, key: np.uint64, listening: Listening, noise: Noise, ears: Ears, readings: Readings
-) -> None:
-    """Vehicles are heard at a wrong bearing and range, or by their bearing alone; arguments as for ``spoil``."""
-    w, a, slot = at.w, at.a, at.slot
-    passive = listening.active[a] == listening.active[a + 1]
-    blurred = noise.bearing > 0.0 or noise.range_m > 0.0 or noise.range_share > 0.0
-    measured = noise.passive_ranges or not passive
-    if not blurred and measured and (noise.factor_log_sd == 0.0 or not passive):
-        return
-    for i in range(readings.whom.shape[2]):
-        factor = ears.factor[w, i] if passive else 1.0
-        for k in range(listening.first[a], listening.first[a + 1]):
-            if readings.whom[w, slot, i, k] == NOBODY:
-                continue
-            side, off = normals(key, BEARING_RANGE, at.tick, i, k) if blurred else (0.0, 0.0)
-            away = length(readings.where, w, slot, i, k)
-            heard = max(factor * away + (noise.range_m + noise.range_share * away) * off, 0.0)
-            if not measured:
-                heard = noise.nominal_range
-            put(readings.where, w, slot, i, k, noise.bearing * side, heard / away if away > 0.0 else 1.0)
-
-
-@compiled_inner
-def blur_echoes(at: Reading, key: np.uint64, listening: Listening, noise: Noise, readings: Readings) -> None:
-    """Echoes are heard at a wrong bearing and range; their position moves as far as the range does.
-
-    Args:
-        at: the reading.
-        key: of the world's episode.
-        listening: the scenario's arrays.
-        noise: the scenario's errors.
-        readings: is written.
-    """
-    w, a, slot = at.w, at.a, at.slot
-    if noise.bearing == 0.0 and noise.range_m == 0.0 and noise.range_share == 0.0:
-        return
-    for i in range(readings.whom.shape[2]):
-        for e in range(listening.active[a], listening.active[a + 1]):
-            if readings.surface[w, slot, i, e] < 0.0:
-                continue
-            side, off = normals(key, BEARING_RANGE, at.tick, i, readings.whom.shape[3] + e)
-            away = np.float64(readings.surface[w, slot, i, e])
-            heard = max(away + (noise.range_m + noise.range_share * away) * off, 0.0)
-            far = length(readings.point, w, slot, i, e)
-            share = max(far + heard - away, 0.0) / far if far > 0.0 else 1.0
-            readings.surface[w, slot, i, e] = heard
-            put(readings.point, w, slot, i, e, noise.bearing * side, share)
-
-
-@compiled_inner
-def length(points: NDArray[np.float32], w: int, slot: int, i: int, k: int) -> float:
-    """Distance of a point of a reading [m].
-
-    Args:
-        points: shape (world, slot, vehicle, sub-sector, 2).
-        w: the world.
-        slot: where the reading is kept.
-        i: the vehicle.
-        k: the sub-sector.
-    """
-    x, y = np.float64(points[w, slot, i, k, 0]), np.float64(points[w, slot, i, k, 1])
-    return math.sqrt(x * x + y * y)
-
-
-@compiled_inner
-def put(points: NDArray[np.float32], w: int, slot: int, i: int, k: int, turn: float, share: float) -> None:
-    """Turn a point of a reading about the vehicle, clockwise [rad], and change its distance to this share of it.
-
-    The other arguments are those of ``length``.
-    """
-    x, y = np.float64(points[w, slot, i, k, 0]), np.float64(points[w, slot, i, k, 1])
-    c, s = cos_sin(turn)
-    points[w, slot, i, k, 0], points[w, slot, i, k, 1] = share * (c * x - s * y), share * (s * x + c * y)
-
-
-@compiled_inner
-def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, readings: Readings) -> None:
+def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, hits: Hits, readings: Readings) -> None:
     """Echoes of nothing, anywhere in a sub-sector within the array's range, unless something nearer is heard there.
 
     An active array takes one for an obstacle's surface, a passive one for a vehicle.
@@ -267,27 +245,27 @@ def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, rea
         key: of the world's episode.
         listening: the scenario's arrays.
         noise: the scenario's errors.
+        hits: room to work in.
         readings: is written.
     """
     w, a, slot = at.w, at.a, at.slot
     first, end = listening.first[a], listening.first[a + 1]
     passive = listening.active[a] == listening.active[a + 1]
+    # Where an active array's echoes lie, beyond its own sub-sectors.
+    beyond = 0 if passive else readings.whom.shape[3] - listening.active[-1] + listening.active[a] - first
     for i in range(readings.whom.shape[2]):
-        # From one to the next, so that those who hear nothing false cost one draw.
-        k = first + gap(uniform(key, FALSE_ECHO, at.tick, i, first), noise.false_echo)
-        while k < end:
+        hits.code[w, i] = first + gap(uniform(key, FALSE_ECHO, at.tick, i, first), noise.false_echo)
+    for i in range(readings.whom.shape[2]):
+        k = hits.code[w, i]
+        while k < end:  # from one to the next, so that those who hear nothing false cost one draw
             far, side = uniforms(key, FALSE_PLACE, at.tick, i, k)
             away = noise.range[a] * far if noise.passive_ranges or not passive else noise.nominal_range
-            c, s = cos_sin(noise.width[a] * (1.0 - side))
-            x = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
-            y = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])
-            e = listening.active[a] + k - first
-            if passive and (readings.whom[w, slot, i, k] == NOBODY or length(readings.where, w, slot, i, k) > away):
-                readings.whom[w, slot, i, k] = PHANTOM
-                readings.where[w, slot, i, k, 0], readings.where[w, slot, i, k, 1] = x, y
-            elif not passive and not 0.0 <= readings.surface[w, slot, i, e] <= away:
-                readings.surface[w, slot, i, e] = away
-                readings.point[w, slot, i, e, 0], readings.point[w, slot, i, e, 1] = x, y
+            if readings.whom[w, slot, i, k + beyond] == NOBODY or readings.reach[w, slot, i, k + beyond] > away:
+                c, s = cos_sin(noise.width[a] * (1.0 - side))
+                readings.whom[w, slot, i, k + beyond] = PHANTOM if passive else OBSTACLE
+                readings.reach[w, slot, i, k + beyond] = away
+                readings.where[w, slot, i, k + beyond, 0] = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
+                readings.where[w, slot, i, k + beyond, 1] = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])
             k += 1 + gap(uniform(key, FALSE_ECHO, at.tick, i, k + 1), noise.false_echo)
 
 
@@ -306,15 +284,6 @@ def is_silent(at: Reading, i: int, key: np.uint64, noise: Noise, ears: Ears) -> 
         end = ears.silent[at.w, i, at.a] + noise.silent_readings
         ears.silent[at.w, i, at.a] = end + gap(uniform(key, SILENCE, end, i, at.a), noise.silence)
     return at.number >= ears.silent[at.w, i, at.a]
-
-
-@compiled_inner
-def hush(at: Reading, i: int, listening: Listening, readings: Readings) -> None:
-    """An array of vehicle i has heard nothing."""
-    for k in range(listening.first[at.a], listening.first[at.a + 1]):
-        readings.whom[at.w, at.slot, i, k] = NOBODY
-    for e in range(listening.active[at.a], listening.active[at.a + 1]):
-        readings.surface[at.w, at.slot, i, e] = -1.0
 
 
 @compiled_inner

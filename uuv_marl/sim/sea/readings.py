@@ -1,7 +1,4 @@
-"""How late the sonar is: when each array reads, and the delay line from what is true to what vehicles know.
-
-A reading is what one array hears at the end of one control hold: whom and where, and echoes. It stands from
-``latency.processing_s`` after its reception until the array's next one does.
+"""How late the sonar is: the delay line from what is true to what vehicles know.
 
 With travel time, a vehicle is heard where it was R / c before reception, R being its distance at reception; between
 control holds it is put on the line between them, and before the reset where it stood. Who is heard, and in which
@@ -18,11 +15,12 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.scenario import MAX_RANGE_M, Scenario, hears_ideally
+from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.sea.navigation import Track
+from uuv_marl.sim.sea.schedule import Listening, Reading, due, hold_of, latest, listening
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.views import Fields, SeaFields
 
@@ -33,36 +31,16 @@ Int64 = NDArray[np.int64]
 Move = tuple[float, float, float, float]
 """Cosine and sine of a turn, then how far a vehicle went, ahead and abeam as it is headed now [m]."""
 
-NOBODY, PHANTOM = -1, -2
-"""Whom a sub-sector hears where it hears no vehicle: nobody, or one that isn't there."""
-
-
-class Listening(NamedTuple):
-    """Numbers of a scenario's arrays and of how late they are. Times in control holds."""
-
-    ideal: bool
-    """Whether all is heard at once and as it is, so that percepts stay as they are."""
-    hold_s: float
-    """Length of a control hold [s]."""
-    holds: int
-    """Of a decision."""
-    delay: int
-    """From the reception of a reading until a policy has it."""
-    holds_per_metre: float
-    """That sound takes; 0: none."""
-    compensated: bool
-    """Whether readings are carried to the present pose."""
-    every: Float64
-    """Between two readings of each array, at least 1, shape (array,)."""
-    first: Int64
-    """First sub-sector of each array, and their number, shape (array + 1,)."""
-    active: Int64
-    """First of its sub-sectors among the active ones, and their number, shape (array + 1,)."""
+NOBODY, PHANTOM, OBSTACLE = -1, -2, -3
+"""What is heard where it is no vehicle: nothing, a vehicle that isn't there, an obstacle."""
 
 
 @described
 class Readings(NamedTuple):
-    """The delay line: reading number m of an array lies in slot m modulo the number of slots."""
+    """The delay line: reading number m of an array lies in slot m modulo the number of slots.
+
+    A place of what can be heard is a sub-sector, for a vehicle, or beyond all of them an active one, for an obstacle.
+    """
 
     began: Annotated[Int64, "world", "Control hold at which the arrays read first."]
     past: Annotated[Float64, "world past vehicle 2", "Positions at the latest control holds, by their number [m]."]
@@ -70,95 +48,43 @@ class Readings(NamedTuple):
         Float64, "world slot vehicle array 4", "Own position as known at reception [m], cosine and sine of the heading."
     ]
     whom: Annotated[
-        Int32, "world slot vehicle sector", "Index of the vehicle heard, ``NOBODY`` or ``PHANTOM``.",
-        Bounds(PHANTOM, "vehicle"),
+        Int32, "world slot vehicle place", "Index of the vehicle heard, or ``NOBODY``, ``PHANTOM``, ``OBSTACLE``.",
+        Bounds(OBSTACLE, "vehicle"),
     ]  # fmt: skip
-    where: Annotated[Float32, "world slot vehicle sector 2", "Where it is heard, in the body frame at reception [m]."]
-    surface: Annotated[Float32, "world slot vehicle active", "Range of the echo [m], -1 for none."]
-    point: Annotated[Float32, "world slot vehicle active 2", "Its position in the body frame at reception [m]."]
+    reach: Annotated[Float32, "world slot vehicle place", "Range at which it is heard [m]."]
+    where: Annotated[Float32, "world slot vehicle place 2", "Its position in the body frame at reception [m]."]
 
 
-class Reading(NamedTuple):
-    """One reading of an array, by all vehicles of a world."""
+@described
+class Hits(NamedTuple):
+    """All that an array of all vehicles hears in a reading, one after the other: room to work in."""
 
-    w: int
-    """The world."""
-    a: int
-    """The array."""
-    number: int
-    """Of those that the array took."""
-    tick: int
-    """Control hold of its reception."""
-    slot: int
-    """Where it is kept."""
+    code: Annotated[Int64, "world hit", "Index of the listener, shifted left by ``SHIFT``, plus the place."]
+    whom: Annotated[Int64, "world hit", "As in ``Readings``."]
+    reach: Annotated[Float64, "world hit", "Range [m], negative for what is missed."]
+    x: Annotated[Float64, "world hit", "How far ahead its position is [m]."]
+    y: Annotated[Float64, "world hit", "How far to starboard [m]."]
+    first: Annotated[Float64, "world hit", "Room for draws."]
+    second: Annotated[Float64, "world hit", "Room for draws."]
+    third: Annotated[Float64, "world hit", "Room for draws."]
 
 
-def listening(scenario: Scenario) -> Listening:
-    """The scenario's arrays and delays as numbers for the compiled functions."""
-    latency, arrays, hold_s = scenario.latency, scenario.sonar.arrays, scenario.timing.control_hold_s
-    period_s = {"active": latency.active_period_s, "passive": latency.passive_period_s}
-    sub_sectors = [array.sub_sectors for array in arrays]
-    active = [array.sub_sectors if array.kind == "active" else 0 for array in arrays]
-    return Listening(
-        ideal=hears_ideally(scenario),
-        hold_s=hold_s,
-        holds=scenario.timing.holds_per_decision,
-        delay=math.ceil(latency.processing_s / hold_s - 1e-9),
-        holds_per_metre=1.0 / (latency.sound_speed_mps * hold_s) if latency.travel_time else 0.0,
-        compensated=latency.compensated,
-        every=np.array([max(period_s[array.kind] / hold_s, 1.0) for array in arrays]),
-        first=np.cumsum([0, *sub_sectors]),
-        active=np.cumsum([0, *active]),
-    )
+SHIFT, PLACE = 32, (1 << 32) - 1
+"""Where a hit's code holds the listener, and the bits of the place."""
 
 
 def line_sizes(scenario: Scenario) -> dict[str, int]:
-    """Lengths of the axes of ``Readings``: all readings on their way and the one that stands; the past in earshot."""
-    numbers = listening(scenario)
-    far = max(array.range_m for array in scenario.sonar.arrays) * numbers.holds_per_metre
+    """Lengths of the axes: all readings on their way and the one that stands; the past within earshot."""
+    numbers, arrays = listening(scenario), scenario.sonar.arrays
+    far = max(array.range_m for array in arrays) * numbers.holds_per_metre
     return {
-        "array": len(scenario.sonar.arrays),
-        "active": int(numbers.active[-1]),
+        "array": len(arrays),
+        "place": scenario.sonar.num_sectors + scenario.sonar.num_active_sectors,
+        "hit": scenario.swarm.num_vehicles
+        * max(array.sub_sectors * (1 + (array.kind == "active")) for array in arrays),
         "slot": 2 + math.floor(numbers.delay / float(numbers.every.min())),
         "past": math.floor(far) + 2 if far > 0.0 else 0,
     }
-
-
-# --- When arrays read ---
-
-
-@compiled
-def hold_of(number: int, every: float) -> int:
-    """Control hold, from the first reading on, at which an array takes a reading: the nearest to its time."""
-    return math.floor(number * every + 0.5)
-
-
-@compiled
-def latest(hold: int, every: float) -> int:
-    """Number of the latest reading up to a control hold, -1 for none."""
-    if hold < 0:
-        return -1
-    number = int((hold + 0.5) / every) + 1
-    while hold_of(number, every) > hold:
-        number -= 1
-    return number
-
-
-@compiled
-def due(hold: int, every: float, delay: int, holds: int) -> int:
-    """Number of the reading that an array takes at this control hold; -1 for none, or one that no decision will see.
-
-    Args:
-        hold: since the array began.
-        every: control holds between readings.
-        delay: control holds until a policy has a reading.
-        holds: of a decision.
-    """
-    number = latest(hold, every)
-    if hold_of(number, every) != hold:
-        return -1
-    decision = (hold + delay + holds - 1) // holds * holds
-    return number if latest(decision - delay, every) == number else -1
 
 
 @compiled_inner
@@ -192,16 +118,19 @@ def remember(w: int, state: State, readings: Readings) -> None:
 @compiled_inner
 def was_at(w: int, j: int, tick: int, ago: float, readings: Readings) -> tuple[float, float]:
     """North and east [m] of vehicle j some control holds before a tick; before the beginning it stood still."""
-    whole = int(ago)
-    share, began, past = ago - whole, readings.began[w], readings.past
-    later, earlier = max(tick - whole, began) % past.shape[1], max(tick - whole - 1, began) % past.shape[1]
+    past, whole = readings.past, min(int(ago), tick - readings.began[w])
+    share = min(ago - whole, 1.0) if tick - whole > readings.began[w] else 0.0
+    later = (tick - whole) % past.shape[1]
+    earlier = later - 1 if later > 0 else past.shape[1] - 1
     x, y = past[w, later, j, 0], past[w, later, j, 1]
     return x + share * (past[w, earlier, j, 0] - x), y + share * (past[w, earlier, j, 1] - y)
 
 
 @compiled_inner
-def keep(at: Reading, world: World, see: Fields, listening: Listening, track: Track, readings: Readings) -> None:
-    """Put what an array of every living vehicle hears now into the line.
+def collect(
+    at: Reading, world: World, see: Fields, listening: Listening, track: Track, readings: Readings, hits: Hits
+) -> int:
+    """All that an array of every living vehicle hears now, into ``hits``; how many they are.
 
     Args:
         at: the reading.
@@ -209,33 +138,69 @@ def keep(at: Reading, world: World, see: Fields, listening: Listening, track: Tr
         see: fields of the percepts.
         listening: the scenario's numbers.
         track: how far vehicles believe to be from where they are.
-        readings: is written.
+        readings: the poses at reception are written.
+        hits: is written.
     """
-    w, a, slot = at.w, at.a, at.slot
-    eta, heading, heard = world.state.eta, world.senses.heading, world.senses.heard
+    w, a, num = at.w, at.a, 0
+    eta, heading, heard, sectors = world.state.eta, world.senses.heading, world.senses.heard, see.heard.shape[2]
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:
             continue
         x, y, c, s = eta[w, i, 0], eta[w, i, 1], heading[w, i, 0], heading[w, i, 1]
-        readings.pose[w, slot, i, a, 0] = x + track.drift[w, i, 0]
-        readings.pose[w, slot, i, a, 1] = y + track.drift[w, i, 1]
-        readings.pose[w, slot, i, a, 2], readings.pose[w, slot, i, a, 3] = c, s
+        readings.pose[w, at.slot, i, a, 0] = x + track.drift[w, i, 0]
+        readings.pose[w, at.slot, i, a, 1] = y + track.drift[w, i, 1]
+        readings.pose[w, at.slot, i, a, 2], readings.pose[w, at.slot, i, a, 3] = c, s
         for k in range(listening.first[a], listening.first[a + 1]):
             j = heard[w, i, k]
-            readings.whom[w, slot, i, k] = j
-            readings.where[w, slot, i, k, 0] = see.neighbour[w, i, k, 0]
-            readings.where[w, slot, i, k, 1] = see.neighbour[w, i, k, 1]
-            if j >= 0 and listening.holds_per_metre > 0.0:
-                dx, dy = eta[w, j, 0] - x, eta[w, j, 1] - y
-                ago = math.sqrt(dx * dx + dy * dy) * listening.holds_per_metre
+            if j < 0:
+                continue
+            ahead, abeam = np.float64(see.neighbour[w, i, k, 0]), np.float64(see.neighbour[w, i, k, 1])
+            if listening.holds_per_metre > 0.0:
+                ago = math.sqrt(ahead * ahead + abeam * abeam) * listening.holds_per_metre
                 north, east = was_at(w, j, at.tick, ago, readings)
-                dx, dy = north - x, east - y
-                readings.where[w, slot, i, k, 0] = c * dx + s * dy
-                readings.where[w, slot, i, k, 1] = c * dy - s * dx
+                ahead, abeam = c * (north - x) + s * (east - y), c * (east - y) - s * (north - x)
+            hits.code[w, num], hits.whom[w, num] = (i << SHIFT) + k, j
+            hits.x[w, num], hits.y[w, num] = ahead, abeam
+            hits.reach[w, num] = math.sqrt(ahead * ahead + abeam * abeam)
+            num += 1
         for e in range(listening.active[a], listening.active[a + 1]):
-            readings.surface[w, slot, i, e] = see.echo_range[w, i, e] if see.echo[w, i, e] > 0.0 else -1.0
-            readings.point[w, slot, i, e, 0] = see.echo_position[w, i, e, 0]
-            readings.point[w, slot, i, e, 1] = see.echo_position[w, i, e, 1]
+            if see.echo[w, i, e] > 0.0:
+                hits.code[w, num], hits.whom[w, num] = (i << SHIFT) + sectors + e, OBSTACLE
+                hits.x[w, num], hits.y[w, num] = see.echo_position[w, i, e, 0], see.echo_position[w, i, e, 1]
+                hits.reach[w, num] = see.echo_range[w, i, e]
+                num += 1
+    return num
+
+
+@compiled_inner
+def store(at: Reading, num: int, listening: Listening, hits: Hits, readings: Readings) -> None:
+    """Put the first ``num`` hits that are not missed into the line; in all other places nothing is heard.
+
+    Args:
+        at: the reading.
+        num: of the hits.
+        listening: the scenario's numbers.
+        hits: what is heard.
+        readings: is written.
+    """
+    for i in range(readings.whom.shape[2]):
+        hush(at, i, listening, readings)
+    w, slot = at.w, at.slot
+    for q in range(num):
+        if hits.reach[w, q] >= 0.0:
+            i, k = hits.code[w, q] >> SHIFT, hits.code[w, q] & PLACE
+            readings.whom[w, slot, i, k], readings.reach[w, slot, i, k] = hits.whom[w, q], hits.reach[w, q]
+            readings.where[w, slot, i, k, 0], readings.where[w, slot, i, k, 1] = hits.x[w, q], hits.y[w, q]
+
+
+@compiled_inner
+def hush(at: Reading, i: int, listening: Listening, readings: Readings) -> None:
+    """An array of vehicle i has heard nothing."""
+    sectors = readings.whom.shape[3] - listening.active[-1]
+    for k in range(listening.first[at.a], listening.first[at.a + 1]):
+        readings.whom[at.w, at.slot, i, k] = NOBODY
+    for e in range(listening.active[at.a], listening.active[at.a + 1]):
+        readings.whom[at.w, at.slot, i, sectors + e] = NOBODY
 
 
 # --- From the line into percepts ---
@@ -317,11 +282,10 @@ def tell_echoes(at: Reading, world: World, listening: Listening, track: Track, r
         moved = listening.compensated and at.number >= 0 and at.tick != world.state.tick[w]
         move = own_move(at, i, world, track, readings) if moved else (1.0, 0.0, 0.0, 0.0)
         for e in range(listening.active[a], listening.active[a + 1]):
-            reach, x, y = -1.0, 0.0, 0.0
-            if at.number >= 0:
-                reach = np.float64(readings.surface[w, slot, i, e])
-            if reach >= 0.0:
-                x, y = np.float64(readings.point[w, slot, i, e, 0]), np.float64(readings.point[w, slot, i, e, 1])
+            k, reach, x, y = see.heard.shape[2] + e, -1.0, 0.0, 0.0
+            if at.number >= 0 and readings.whom[w, slot, i, k] != NOBODY:
+                reach = np.float64(readings.reach[w, slot, i, k])
+                x, y = np.float64(readings.where[w, slot, i, k, 0]), np.float64(readings.where[w, slot, i, k, 1])
                 if moved:
                     far = math.sqrt(x * x + y * y)
                     x, y = carried(x, y, move)

@@ -26,20 +26,9 @@ from uuv_marl.sim.sea.current import (
 )
 from uuv_marl.sim.sea.modem import Mail, Modem, draw_mail, exchange, know_mail, modem
 from uuv_marl.sim.sea.navigation import Navigation, Track, draw_track, find_oneself, go_astray, navigate, navigation
-from uuv_marl.sim.sea.noise import Ears, Noise, begin_ears, draw_ears, noise, spoil, tell_ranged
-from uuv_marl.sim.sea.readings import (
-    Listening,
-    Reading,
-    Readings,
-    any_due,
-    begin_line,
-    due,
-    keep,
-    line_sizes,
-    listening,
-    recall,
-    remember,
-)
+from uuv_marl.sim.sea.noise import Ears, Noise, begin_ears, draw_ears, interrupt, noise, spoil, tell_ranged
+from uuv_marl.sim.sea.readings import Hits, Readings, any_due, begin_line, collect, line_sizes, recall, remember, store
+from uuv_marl.sim.sea.schedule import Listening, Reading, due, listening
 from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.views import Fields, SeaFields
 from uuv_marl.sim.workspace import Columns
@@ -60,6 +49,7 @@ class Sea(NamedTuple):
     hull: Hull
     listening: Listening
     readings: Readings
+    hits: Hits
     noise: Noise
     ears: Ears
     navigation: Navigation
@@ -89,6 +79,7 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
         hull=allocate(Hull, sizes),
         listening=listening(scenario),
         readings=allocate(Readings, sizes),
+        hits=allocate(Hits, sizes),
         noise=noise(scenario),
         ears=allocate(Ears, sizes),
         navigation=navigation(scenario),
@@ -169,8 +160,10 @@ def take_readings(w: int, world: World, sea: Sea, see: Fields) -> None:
         number = due(tick - sea.readings.began[w], line.every[a], line.delay, line.holds)
         if number >= 0:
             at = Reading(w, a, number, tick, number % sea.readings.whom.shape[1])
-            keep(at, world, see, line, sea.track, sea.readings)
-            spoil(at, sea.keys[w], line, sea.noise, sea.ears, sea.actuation, sea.hull, sea.readings)
+            num = collect(at, world, see, line, sea.track, sea.readings, sea.hits)
+            spoil(at, num, sea.keys[w], line.active[a] == line.active[a + 1], sea.noise, sea.ears, sea.hits)
+            store(at, num, line, sea.hits, sea.readings)
+            interrupt(at, sea.keys[w], line, sea.noise, sea.ears, sea.actuation, sea.hull, sea.hits, sea.readings)
 
 
 @compiled_inner

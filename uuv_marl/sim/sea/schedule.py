@@ -1,0 +1,108 @@
+"""When each array reads, and when a policy has what it heard.
+
+A reading is what one array hears at the end of one control hold. It stands from ``latency.processing_s`` after its
+reception until the array's next one does.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.scenario import Scenario, hears_ideally
+from uuv_marl.sim.compiled import compiled
+
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+
+class Listening(NamedTuple):
+    """Numbers of a scenario's arrays and of how late they are. Times in control holds."""
+
+    ideal: bool
+    """Whether all is heard at once and as it is, so that percepts stay as they are."""
+    hold_s: float
+    """Length of a control hold [s]."""
+    holds: int
+    """Of a decision."""
+    delay: int
+    """From the reception of a reading until a policy has it."""
+    holds_per_metre: float
+    """That sound takes; 0: none."""
+    compensated: bool
+    """Whether readings are carried to the present pose."""
+    every: Float64
+    """Between two readings of each array, at least 1, shape (array,)."""
+    first: Int64
+    """First sub-sector of each array, and their number, shape (array + 1,)."""
+    active: Int64
+    """First of its sub-sectors among the active ones, and their number, shape (array + 1,); none for passive arrays."""
+
+
+class Reading(NamedTuple):
+    """One reading of an array, by all vehicles of a world."""
+
+    w: int
+    """The world."""
+    a: int
+    """The array."""
+    number: int
+    """Of those that the array took."""
+    tick: int
+    """Control hold of its reception."""
+    slot: int
+    """Where it is kept."""
+
+
+def listening(scenario: Scenario) -> Listening:
+    """The scenario's arrays and delays as numbers for the compiled functions."""
+    latency, arrays, hold_s = scenario.latency, scenario.sonar.arrays, scenario.timing.control_hold_s
+    period_s = {"active": latency.active_period_s, "passive": latency.passive_period_s}
+    sub_sectors = [array.sub_sectors for array in arrays]
+    active = [array.sub_sectors if array.kind == "active" else 0 for array in arrays]
+    return Listening(
+        ideal=hears_ideally(scenario),
+        hold_s=hold_s,
+        holds=scenario.timing.holds_per_decision,
+        delay=math.ceil(latency.processing_s / hold_s - 1e-9),
+        holds_per_metre=1.0 / (latency.sound_speed_mps * hold_s) if latency.travel_time else 0.0,
+        compensated=latency.compensated,
+        every=np.array([max(period_s[array.kind] / hold_s, 1.0) for array in arrays]),
+        first=np.cumsum([0, *sub_sectors]),
+        active=np.cumsum([0, *active]),
+    )
+
+
+@compiled
+def hold_of(number: int, every: float) -> int:
+    """Control hold, from the first reading on, at which an array takes a reading: the nearest to its time."""
+    return math.floor(number * every + 0.5)
+
+
+@compiled
+def latest(hold: int, every: float) -> int:
+    """Number of the latest reading up to a control hold, -1 for none."""
+    if hold < 0:
+        return -1
+    number = int((hold + 0.5) / every) + 1
+    while hold_of(number, every) > hold:
+        number -= 1
+    return number
+
+
+@compiled
+def due(hold: int, every: float, delay: int, holds: int) -> int:
+    """Number of the reading that an array takes at this control hold; -1 for none, or one that no decision will see.
+
+    Args:
+        hold: since the array began.
+        every: control holds between readings.
+        delay: control holds until a policy has a reading.
+        holds: of a decision.
+    """
+    number = latest(hold, every)
+    if hold_of(number, every) != hold:
+        return -1
+    decision = (hold + delay + holds - 1) // holds * holds
+    return number if latest(decision - delay, every) == number else -1
