@@ -5,6 +5,7 @@ along, so that its start and field do not blur the difference between them. Inte
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,9 +89,13 @@ def axis_score(table: Any, axis: str) -> AxisScore | None:
     return AxisScore(
         success=scored(rest.mean(axis=1)),
         retention=scored(np.column_stack([rest.mean(axis=1), calm]), _ratio) if worth else None,
-        critical=scored(shares, lambda *columns, axis: critical_level(np.stack([c.mean(axis) for c in columns]), levels)),
+        critical=scored(shares, partial(_critical, levels)),
         levels=levels,
-    )  # fmt: skip
+    )
+
+
+def _critical(levels: tuple[int, ...], *shares: Float64, axis: int) -> Float64:
+    return critical_level(np.stack([share.mean(axis) for share in shares]), levels)
 
 
 def _ratio(part: Float64, whole: Float64, axis: int) -> Float64:
@@ -110,11 +115,15 @@ def critical_level(shares: Float64, levels: tuple[int, ...]) -> Float64:
     below = shares < ENOUGH
     k = np.where(below.any(axis=0), below.argmax(axis=0), len(levels))
     high = np.clip(k, 1, len(levels) - 1)[None]
-    s_low, s_high = (np.take_along_axis(shares, j, 0)[0] for j in (high - 1, high))
+    s_low, s_high = _taken(shares, high - 1), _taken(shares, high)
     at = np.array(levels, np.float64)
     step = np.clip((s_low - ENOUGH) / np.where(s_low > s_high, s_low - s_high, 1.0), 0.0, 1.0)
     between = at[high - 1][0] + step * (at[high] - at[high - 1])[0]
     return np.where(k == 0, -1.0, np.where(k == len(levels), at[-1] + 1.0, between))
+
+
+def _taken(values: Float64, index: NDArray[np.int64]) -> Float64:
+    return np.take_along_axis(values, index, 0)[0]
 
 
 def critical_text(axis: str, score: AxisScore) -> str:
