@@ -23,6 +23,7 @@ EVERY = "all"
 """The mean over the groups, without the combined axis."""
 _SEEDS = 5
 _RESAMPLES = 2000
+_ROUNDING = 1e-9
 
 
 class Score(NamedTuple):
@@ -112,18 +113,16 @@ def critical_level(shares: Float64, levels: tuple[int, ...]) -> Float64:
     Returns:
         Shape (...): -1 where level 0 is below already, and one more than the last level where none is.
     """
-    below = shares < ENOUGH
-    k = np.where(below.any(axis=0), below.argmax(axis=0), len(levels))
+    below = shares < ENOUGH - _ROUNDING
+    k: NDArray[np.int64] = np.where(below.any(axis=0), np.argmax(below, axis=0), len(levels))
     high = np.clip(k, 1, len(levels) - 1)[None]
-    s_low, s_high = _taken(shares, high - 1), _taken(shares, high)
+    s_low, s_high = (np.take_along_axis(shares, j, 0)[0] for j in (high - 1, high))
     at = np.array(levels, np.float64)
     step = np.clip((s_low - ENOUGH) / np.where(s_low > s_high, s_low - s_high, 1.0), 0.0, 1.0)
-    between = at[high - 1][0] + step * (at[high] - at[high - 1])[0]
-    return np.where(k == 0, -1.0, np.where(k == len(levels), at[-1] + 1.0, between))
-
-
-def _taken(values: Float64, index: NDArray[np.int64]) -> Float64:
-    return np.take_along_axis(values, index, 0)[0]
+    between: Float64 = at[high - 1][0] + step * (at[high] - at[high - 1])[0]
+    return np.select(
+        [k == 0, k == len(levels)], [np.full_like(between, -1.0), np.full_like(between, at[-1] + 1.0)], between
+    )
 
 
 def critical_text(axis: str, score: AxisScore) -> str:
@@ -140,7 +139,7 @@ def critical_text(axis: str, score: AxisScore) -> str:
         k = max(int(np.searchsorted(levels, level)), 1)
         if np.isfinite(severity[k - 1 : k + 1]).all():
             return f"{np.interp(level, levels[k - 1 : k + 1], severity[k - 1 : k + 1]):.3g}"
-        return labels[k - 1] if level == levels[k - 1] else f"between {labels[k - 1]} and {labels[k]}"
+        return labels[levels.index(int(level))] if level in levels else f"between {labels[k - 1]} and {labels[k]}"
 
     low, high = (text(level) for level in score.critical[1:]) if not np.isnan(score.critical.low) else ("", "")
     value = text(score.critical.value)
