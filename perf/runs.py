@@ -32,6 +32,12 @@ SETS = importlib.import_module(_SETS).SETS
 SEED, MOST_AGENT_STEPS = 10_000, 30_000
 """The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
+METRICS = (
+    "task_time_s", "time_within_1_m_s", "time_within_5_m_s", "time_within_10_m_s", "duration_s",
+    "min_obstacle_distance_m", "min_spacing_m", "mean_min_spacing_m", "max_spacing_m", "centre_error_m",
+    "order_parameter", "collisions", "constraint_share", "effort", "clamps", "saturation_share", "vehicles_lost",
+)  # fmt: skip
+"""Those of 0.1.0."""
 STATE = ("eta", "nu", "before", "alive", "tick", "dwell")
 FACTS = (
     "time_s", "reference", "centre", "spacing", "min_spacing", "max_spacing", "clearance", "obstacle_clearance",
@@ -92,7 +98,8 @@ def reported(policy: str) -> str:
     """What the benchmark reports of two short episodes: metrics, series, routes."""
     scenario = granted(policy, load_scenario("single_obstacle", num_vehicles=10))
     runs = [run for run in evaluate(scenario, policy, [SEED, SEED + 1]) if isinstance(run, Run)]
-    return digest([run.metrics for run in runs], *(a for run in runs for a in (*run.series.values(), *run.routes)))
+    metrics = [{key: value for key, value in run.metrics.items() if key in METRICS} for run in runs]
+    return digest(metrics, *(a for run in runs for a in (*run.series.values(), *run.routes)))
 
 
 def trained(algorithm: str) -> str:

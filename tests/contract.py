@@ -23,7 +23,7 @@ SINKS = {
     "start.spacing_m": 45.0,
     "start.gap_m": 45.0,
 }
-SEA = {
+MEDIUM = {
     "current.speed_mps": 0.5, "current.variation_mps": 0.2, "current.eddies": 4, "current.eddy_speed_mps": 0.5,
     "latency.travel_time": True, "latency.processing_s": 0.3, "latency.compensated": True,
     "latency.active_period_s": 0.5, "latency.passive_period_s": 0.3,
@@ -33,10 +33,14 @@ SEA = {
     "navigation.drift_share": 0.02, "navigation.compass_bias_deg": 2.0,
     "actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2, "mismatch.drag": 0.2, "mismatch.mass": 0.1,
     "faults": [{"kind": "array", "share": 0.2, "array": "bow"}, {"kind": "thruster", "share": 0.2}],
-    "sonar.channels": ["compass", "current", "age", "ranged", "modem"], "modem.loss_probability": 0.1,
     "sonar.echo_reports": "surface", "arrival.ends_episode": False,
 }  # fmt: skip
 """Everything that can disturb a world, in the middle of its range."""
+SEA = MEDIUM | {
+    "sonar.channels": ["compass", "current", "age", "ranged", "modem"],
+    "modem.loss_probability": 0.1,
+}
+"""The same, and all that vehicles can be told of it."""
 SINKING = {"faults": [{"kind": "member", "share": 0.4, "onset_s": 2.0}]}
 BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
 

@@ -12,6 +12,7 @@ from uuv_marl.benchmark import style
 from uuv_marl.envs.batched_env import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim, nice
+from uuv_marl.envs.drawing.current import ARROW, paint_current
 from uuv_marl.envs.drawing.frame import Frame, Panel, _numbers, pixels
 from uuv_marl.envs.drawing.legend import _flow, rows
 from uuv_marl.envs.drawing.painter import Painter
@@ -38,6 +39,48 @@ def played(scenario="starter", policy="bio_inspired", seconds=10.0, sonar_of=Non
 
 def colour(picture, at):
     return tuple(int(part) for part in picture[round(at[1]), round(at[0])])
+
+
+CURRENT = {"current.speed_mps": 1.0, "current.direction_deg": 90.0}
+
+
+def arrow_px(**changes):
+    """What a current paints in the middle of a picture, where an arrow is: pixels to the right and down of it."""
+    scene, _, _ = played(seconds=0.0, overrides={**CURRENT, **changes})
+    surface = pygame.Surface((200, 200), depth=32)
+    surface.fill(ink.WATER)
+    paint_current(surface, scene, Camera(np.array([100.0, 100.0]), 1.0, (200, 200)), 400.0, 1.0)
+    down, right = np.nonzero((pixels(surface) != ink.WATER).any(axis=-1))
+    return right - 100, down - 100
+
+
+def test_the_current_is_an_arrow_along_the_water_as_long_as_it_is_fast():
+    for degrees, (right, down) in ((90.0, (1, 0)), (0.0, (0, -1)), (-90.0, (-1, 0)), (180.0, (0, 1))):
+        x, y = arrow_px(**{"current.direction_deg": degrees})
+        along, across = right * x + down * y, down * x - right * y
+        assert abs(along.min() + ARROW / 2) <= 1
+        assert abs(along.max() - ARROW / 2) <= 1
+        assert np.abs(across[along < 0]).max() <= 1  # the tip is ahead
+        assert np.abs(across[along > 0]).max() >= 2
+    half = arrow_px(**{"current.speed_mps": 0.7})
+    assert half[0].max() - half[0].min() == pytest.approx(0.7 * ARROW, abs=1.5)
+
+
+def test_still_water_is_drawn_as_before_and_a_sea_is_named_in_the_legend():
+    calm, moved = (played(seconds=0.0, overrides=change)[0] for change in ({"obstacles": []}, CURRENT))
+    assert calm.water is None
+    words = [[entry[2] for entry in _flow(800, scene, 12)] for scene in (calm, moved)]
+    assert "current, 1 m/s" in words[1]
+    assert words[1][-1] == "sea: current 1 m/s"
+    assert not [word for word in words[0] if "current" in word or "sea" in word]
+    long = played(seconds=0.0, overrides={**CURRENT, "mismatch.mass": 0.1, "noise.bearing_deg": 2.0})[0]
+    (*_, (row, x, cut, _)) = _flow(200, long, 12)
+    assert cut.endswith("…")
+    assert x + ink.text(cut, 12).get_width() <= 200
+    assert row == rows(200, long, 12) - 1
+    painter, camera = Painter(SIZE), aim("follow", [moved], SIZE)
+    with_arrows = pixels(painter.paint(moved, camera))
+    assert (with_arrows != pixels(painter.paint(moved._replace(water=None), camera))).any()
 
 
 @pytest.mark.parametrize("kind", ["follow", "map"])

@@ -8,6 +8,7 @@ from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
+from tests import contract
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.scenario import ScenarioError
 
@@ -39,6 +40,10 @@ def test_ppo_learns_and_a_seed_fixes_it():
     assert first.num_timesteps == 3 * 32 * 8
     mean, _ = evaluate_policy(first, VecMonitor(swarm()), n_eval_episodes=8)
     assert np.isfinite(mean)
+
+
+def test_ppo_learns_in_a_disturbed_sea():
+    learn(VecCheckNan(swarm(overrides=contract.SEA | SHORT), raise_exception=True))
 
 
 def test_ppo_knows_episodes_without_any_wrapper():

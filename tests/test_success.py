@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from uuv_marl.envs.task import Task
 
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
+from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.envs.reward import reward_terms
 from uuv_marl.sim.swarm import Swarm
 
@@ -164,16 +164,16 @@ def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
 def test_arrival_is_paid_once_and_the_last_info_tells_of_it():
     quick = {**LONG, "trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4}
     quick |= {"time_limit.extra_s": 6.0, "timing.decision_period_s": 0.5, "arrival.dwell_s": 0.7}
-    task = Task(load_scenario("starter", overrides=quick))
-    task.reset(0)
+    batch = BatchedEnv(load_scenario("starter", overrides=quick))
+    batch.reset(0)
     paid, ended = [], []
     while not ended or not ended[-1]:
-        outcome = task.step(np.zeros((1, 5, 2), np.float32))
-        paid.append(float(reward_terms(task.swarm)["arrival"][0, 0]))
-        ended.append(bool(outcome.world_truncated[0]))
-        assert not outcome.terminated.any()
+        result = batch.step(np.zeros((1, 5, 2), np.float32))
+        paid.append(float(reward_terms(batch.swarm)["arrival"][0, 0]))
+        ended.append(bool(result.world_truncated[0]))
+        assert not result.terminated.any()
     assert np.count_nonzero(paid) == 1
-    assert task.swarm.arrived[0]
+    assert batch.swarm.arrived[0]
     env = uuv_marl.parallel_env("starter", overrides=quick)
     env.reset(seed=0)
     infos = {}

@@ -25,6 +25,7 @@ with warnings.catch_warnings():
     from torchrl.objectives import ClipPPOLoss, ValueEstimators
 
 import uuv_marl
+from tests import contract
 from uuv_marl.envs.torchrl import SwarmEnv
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
@@ -126,10 +127,12 @@ def test_resets_hand_out_flags_of_their_own():
     assert not data["uuv", "truncated"].any()
 
 
-@pytest.mark.parametrize("scenario", ["random_field", "lossy"])
-def test_ppo_loss_trains_with_the_collector(actor, scenario):
+@pytest.mark.parametrize(
+    ("scenario", "overrides"), [("random_field", SHORT), ("lossy", LOSSES), ("starter", contract.MEDIUM | SHORT)]
+)
+def test_ppo_loss_trains_with_the_collector(actor, scenario, overrides):
     env = TransformedEnv(
-        swarm(scenario=scenario, overrides=LOSSES if scenario == "lossy" else SHORT),
+        swarm(scenario=scenario, overrides=overrides),
         Compose(InitTracker(), RewardSum(in_keys=[("uuv", "reward")], reset_keys=["_reset"])),
     )
     critic = TensorDictModule(network(1, centralised=True), [("uuv", "observation")], [("uuv", "state_value")])

@@ -53,9 +53,12 @@ def weights(running):
     return torch.nn.utils.parameters_to_vector(running.policy.parameters()).detach().clone()
 
 
-@pytest.mark.parametrize("algorithm", [MappoConfig, IppoConfig])
-def test_it_trains(tmp_path, algorithm):
-    running = experiment(tmp_path, SwarmTask.RANDOM_FIELD.get_task(SMALL), algorithm)
+AT_SEA = {**SMALL, "overrides": {**SMALL["overrides"], **contract.SEA}}
+
+
+@pytest.mark.parametrize(("algorithm", "how"), [(MappoConfig, SMALL), (IppoConfig, SMALL), (MappoConfig, AT_SEA)])
+def test_it_trains(tmp_path, algorithm, how):
+    running = experiment(tmp_path, SwarmTask.RANDOM_FIELD.get_task(how), algorithm)
     before = weights(running)
     running.run()
     assert running.total_frames == 320

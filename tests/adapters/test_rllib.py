@@ -187,8 +187,10 @@ def same(one, other):
     return all(np.array_equal(one[name], other[name]) for name in one)
 
 
-def test_ppo_trains_by_the_registered_name_on_remote_runners(joined):
-    config = ppo_config(SMALL, num_env_runners=2).environment(register(), env_config={"num_vehicles": 5})
+@pytest.mark.parametrize("overrides", [{}, contract.MEDIUM])
+def test_ppo_trains_by_the_registered_name_on_remote_runners(joined, overrides):
+    how = {"num_vehicles": 5, "overrides": overrides}
+    config = ppo_config(SMALL, num_env_runners=2).environment(register(), env_config=how)
     assert config.env == ENV_NAME
     algorithm = config.build_algo()
     try:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, draw_course, house_style, legend, panels, save
+from uuv_marl.scenario import Scenario, conditions, disturbances
 
 Float32 = NDArray[np.float32]
 Trace = dict[str, Float32]
@@ -37,7 +38,7 @@ def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Se
         return []
     constraints, hull_m = results.scenarios[scenario].constraints, results.scenarios[scenario].contact.hull_radius_m
     curves = {p: [results.trace(scenario, p, row.seed) for row in results.select(scenario, p, seeds)] for p in present}
-    where = f"{scenario}, {results.scenarios[scenario].swarm.num_vehicles} vehicles, {len(seeds)} seeds"
+    where = _where(results.scenarios[scenario], f"{len(seeds)} seeds")
     made: dict[str, Figure] = {}
     with house_style():
         if shown := [p for p in present if results.has(scenario, p, 0)]:
@@ -61,6 +62,12 @@ def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Se
         for figure in (figure for name, figure in made.items() if name != "routes"):
             legend(figure, figure.axes[-1])
         return [save(figure, results.folder / "figures" / f"{scenario}_{name}.png") for name, figure in made.items()]
+
+
+def _where(scenario: Scenario, seeds: str) -> str:
+    """What a picture is of; in a second line what disturbs it, if anything does."""
+    sea = f"\n{conditions(scenario)}" if disturbances(scenario) else ""
+    return f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles, {seeds}{sea}"
 
 
 def _grid(num: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
@@ -97,8 +104,7 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
         ax.set_title(f"{policy[-28:]}\n{_outcome(results.select(scenario, policy, [0])[0].metrics)}")
     figure.supxlabel("east [m]")
     figure.supylabel("north [m]")
-    loaded = results.scenarios[scenario]
-    figure.suptitle(f"Routes of each policy: {scenario}, {loaded.swarm.num_vehicles} vehicles, seed 0")
+    figure.suptitle(f"Routes of each policy: {_where(results.scenarios[scenario], 'seed 0')}")
     if lines is not None:
         bar = axes[-1].inset_axes((0.1, 0.12, 0.8, 0.05))
         figure.colorbar(lines, cax=bar, orientation="horizontal", label="colour of routes: time [s]")

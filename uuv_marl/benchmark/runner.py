@@ -11,7 +11,7 @@ from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import Results, Row
 from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
-from uuv_marl.scenario import Scenario, differences, scenario_names
+from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "bio_inspired_plus", "sff_informed", "sdc_informed", "mappo")
 """The paper's Table 2, then the stronger variants, then the learned policy."""
@@ -84,7 +84,7 @@ def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     note = f"; CHANGED: {', '.join(changed)}" if changed else ""
     return (
         f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
-        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}{note}"
+        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}, {conditions(scenario)}{note}"
     )
 
 

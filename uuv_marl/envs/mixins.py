@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.renderer import Renderer
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario import Scenario, conditions
 from uuv_marl.sim.swarm import Swarm
 
 
@@ -38,6 +38,11 @@ class EnvMixin:
         self._renderer = Renderer(batch, render_mode, self.metadata["render_modes"], options, sonar_of)
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": self._renderer.fps}
+
+    def __repr__(self) -> str:
+        scenario, swarm = self.scenario, self.swarm
+        worlds = "" if swarm.num_worlds == 1 else f"{swarm.num_worlds} worlds, "
+        return f"{type(self).__name__}({scenario.name}: {worlds}{swarm.num_vehicles} vehicles, {conditions(scenario)})"
 
     @property
     def scenario(self) -> Scenario:

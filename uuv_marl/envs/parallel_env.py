@@ -113,7 +113,8 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         acted, rows = self.agents, self._rows
         observations = dict(zip(acted, result.observation[0, rows], strict=True))
         rewards = dict(zip(acted, result.reward[0, rows].tolist(), strict=True))
-        terminated, truncated = dict.fromkeys(acted, False), dict.fromkeys(acted, False)
+        terminated = dict.fromkeys(acted, False)
+        truncated = terminated.copy()
         infos = self._infos(result, acted, rows)
         going = result.acting[0, rows].tolist()
         if not all(going):
@@ -141,7 +142,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
             given = None
         if given is None or not math.isfinite(np.vdot(given, given)):  # quick; finite numbers may overflow in it
             given = self._one_by_one(actions)
-        if not actions.keys() <= self._index.keys():
+        if len(actions) > len(given) and not actions.keys() <= self._index.keys():
             unknown = min(actions.keys() - self._index.keys(), key=str)
             raise ValueError(f"there is no agent {unknown!r}; agents are uuv_0 to {self.possible_agents[-1]}")
         if len(given) == len(self.possible_agents):

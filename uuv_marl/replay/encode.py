@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl import __version__
+from uuv_marl.envs.drawing.camera import shown_speed
 from uuv_marl.replay.recording import Float32, Recording
-from uuv_marl.scenario import Scenario, growth
+from uuv_marl.scenario import Scenario, conditions, growth
 
 Int32 = NDArray[np.int32]
 
@@ -55,6 +56,7 @@ CODINGS = {
     "echo_range": Coding(0.25, stride=1, order=1),
     "echo_position": Coding(0.25, stride=1, order=1),
     "action": Coding(0.02, stride=1, order=1),
+    "drift": Coding(0.01),
 }
 """In m, rad, m/s and shares of full force. A hull is 2 m wide, and a pixel of a whole map about 1 m; the sonar of
 inspected vehicles is drawn by their own, finer heading."""
@@ -83,11 +85,18 @@ def _episode(recording: Recording) -> dict[str, Any]:
             "spread_m": arrival.spread_m * growth(scenario.swarm.num_vehicles),
             "dwell_s": arrival.dwell_s,
         },
+        "conditions": conditions(scenario),
+        "current": None if recording.water is None else _current(scenario),
         "sonar": _sonar(scenario),
         "events": [event._asdict() for event in recording.events],
         "inspected": list(recording.inspections),
         "arrays": _arrays(recording),
     }
+
+
+def _current(scenario: Scenario) -> dict[str, float]:
+    """What the page needs beside the arrays ``drift`` and ``eddies`` to draw the current."""
+    return {"core_m": scenario.current.eddy_core_m, "shown_mps": shown_speed(scenario)}
 
 
 def _sonar(scenario: Scenario) -> list[dict[str, Any]]:
@@ -119,6 +128,8 @@ def _arrays(recording: Recording) -> dict[str, Any]:
         "spacing": recording.spacing,
     }
     exact = {**recording.series, "waypoints": recording.waypoints, "obstacles": recording.obstacles}
+    if recording.water is not None:
+        smooth["drift"], exact["eddies"] = recording.water
     arrays = {"time_s": _coded(recording.time_s, Coding(tick_s, stride=1))}
     arrays |= {name: _bits(np.asarray(values, np.float32)) for name, values in exact.items()}
     if recording.inspections:

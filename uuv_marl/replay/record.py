@@ -10,7 +10,7 @@ from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.events import arrival, contacts, losses, near_misses
-from uuv_marl.replay.recording import Event, Float32, Inspection, Recording
+from uuv_marl.replay.recording import Event, Float32, Inspection, Recording, Water
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 
@@ -69,6 +69,7 @@ class _Tape:
 
     def __init__(self, inspect: Sequence[int]) -> None:
         self._inspect = inspect
+        self._eddies = np.zeros((0, 3))
         self._samples: dict[str, list[NDArray[Any]]] = {}
         self._actions: list[Float32] = []
 
@@ -79,6 +80,8 @@ class _Tape:
         percept = swarm.percept
         self._add("time_s", facts.time_s[0])
         self._add("reference", facts.reference[0, :2])
+        self._add("drift", swarm.flow_field().drift)
+        self._eddies = swarm.flow_field().eddies
         self._add("position", eta[:, :2])
         self._add("heading", eta[:, 2])
         self._add("speed", np.hypot(velocity[:, 0], velocity[:, 1]))
@@ -124,6 +127,7 @@ class _Tape:
             force=_where(alive, tape["force"]),
             spacing=finite(tape["spacing"]),
             inspections=self._inspections(tape),
+            water=Water(tape["drift"], self._eddies) if scenario.current.flows else None,
         )
 
     def _inspections(self, tape: dict[str, NDArray[Any]]) -> dict[int, Inspection]:

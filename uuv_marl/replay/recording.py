@@ -42,6 +42,15 @@ class Inspection(NamedTuple):
     at the end and once the vehicle is lost."""
 
 
+class Water(NamedTuple):
+    """How the water moved: everywhere by its drift, and around eddies that stand still."""
+
+    drift: Float32
+    """Velocity of mean and process together, north and east [m/s], shape (time, 2)."""
+    eddies: NDArray[np.float64]
+    """Centre north, east [m] and circulation [m2/s], clockwise positive, shape (eddy, 3)."""
+
+
 class Recording(NamedTuple):
     """One episode: what was simulated, and where everybody was at each sample.
 
@@ -77,3 +86,5 @@ class Recording(NamedTuple):
     """Smallest distance to another vehicle since the sample before [m], NaN for none, shape (time, vehicle)."""
     inspections: dict[int, Inspection]
     """By index of the vehicle."""
+    water: Water | None
+    """None in still water."""

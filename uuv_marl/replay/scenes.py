@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, Sonar
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.recording import Event, Inspection, Recording
+from uuv_marl.sim.sea.current import FlowField
 
 
 class Scenes:
@@ -58,6 +59,7 @@ class Scenes:
             clearance_m=_distance(series["obstacle_clearance_m"]),
             centre_error_m=series["centre_error_m"],
             sonar=self._sonar(k),
+            water=self._water(k),
         )
 
     def _near(self, k: int) -> NDArray[np.bool_]:
@@ -66,6 +68,13 @@ class Scenes:
         offset = position[:, None] - discs[None, :, :2]
         near = (np.hypot(offset[..., 0], offset[..., 1]) - discs[:, 2] < limits.s_o_m).any(axis=1)
         return near if recording.spacing is None else near | (recording.spacing[k] < limits.s_u_m)
+
+    def _water(self, k: int) -> FlowField | None:
+        recording = self.recording
+        if recording.water is None:
+            return None
+        core_m = recording.scenario.current.eddy_core_m
+        return FlowField(recording.water.drift[k].astype(np.float64), recording.water.eddies, core_m)
 
     def _place(self, event: Event) -> list[float]:
         """North, east and time of a collision."""

@@ -14,8 +14,11 @@ from uuv_marl.errors import ReplayError
 from uuv_marl.replay.command import command
 from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
-from uuv_marl.replay.recording import Event, Float32, Recording
+from uuv_marl.replay.recording import Event, Float32, Recording, Water
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.sim.compiled import interpreted
+from uuv_marl.sim.sea.current import advance_gust, water
+from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import arrival_times, reference
 
 _ELSE = "give the folder of a benchmark or a file of its folder traces, or simulate with --scenario and --policy"
@@ -146,6 +149,7 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
         force=None,
         spacing=None,
         inspections={},
+        water=_water(scenario, seed, trace["route_time_s"]),
     )
 
 
@@ -177,6 +181,21 @@ def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:
             raise ReplayError(f"{path} is no trace of this version of uuv_marl: {name} {got}; run the benchmark again")
     if not len(trace["route_time_s"]) or not np.isin(trace["route_time_s"], trace["time_s"]).all():
         raise ReplayError(f"{path}: route_time_s must be times of time_s; run the benchmark again")
+
+
+def _water(scenario: Scenario, seed: int, time_s: Float32) -> Water | None:
+    """How the water moved, which the seed decides alone."""
+    if not scenario.current.flows:
+        return None
+    swarm, numbers, step, tick = Swarm(scenario), water(scenario), interpreted(advance_gust), 0
+    swarm.reset(seed)
+    drift = np.zeros((len(time_s), 2), np.float32)
+    for k, until in enumerate(np.rint(time_s / scenario.timing.control_hold_s).astype(int).tolist()):
+        while tick < until:
+            tick += 1
+            step(0, swarm.keys[0], tick, numbers, swarm.currents)
+        drift[k] = swarm.flow_field().drift
+    return Water(drift, swarm.flow_field().eddies)
 
 
 def _reference(waypoints: Float32, speed_mps: float, time_s: Float32) -> Float32:

@@ -23,7 +23,7 @@ from uuv_marl.baselines.features import BARRIER
 from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario import Scenario, conditions, load_scenario
 from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Say, opened, quiet, versions
 from uuv_marl.train.mappo import Hyperparameters, Mappo
@@ -216,7 +216,8 @@ def train(
         record, stopped = folder.record, False
         if record.agent_steps >= settings.steps:
             return
-        say(f"Training on swarms of {', '.join(f'{n} vehicles ({worlds} worlds)' for n, worlds in settings.sizes)}.")
+        sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in settings.sizes)
+        say(f"Training on swarms of {sizes}; {conditions(scenario)}.")
         torch.set_num_threads(1)  # sums in another order give other bits
         trainer = Trainer(settings)
         if folder.checkpoint:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uuv_marl.envs.drawing.scene import Float, Scene
+from uuv_marl.scenario import Scenario
 
 CAMERAS = ("follow", "map")
 """``follow`` keeps the swarm and l(t) in view, ``map`` the whole course."""
@@ -54,6 +55,12 @@ def nice(length: float) -> float:
     """The smallest of 1, 2, 5, 10, 20, ... that is no shorter."""
     power = 10.0 ** math.floor(math.log10(length))
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length * (1.0 - 1e-9))
+
+
+def shown_speed(scenario: Scenario) -> float:
+    """A round speed [m/s] of which a picture tells how long an arrow of the current is."""
+    current = scenario.current
+    return nice(max(current.speed_mps, current.variation_mps, current.eddy_speed_mps if current.eddies else 0.0))
 
 
 def _around(points: Float, size: tuple[int, int], least_m: float = 1.0) -> Camera:

@@ -19,6 +19,8 @@ BLUE, ORANGE, GREEN, PINK, AMBER = (0, 114, 178), (213, 94, 0), (0, 158, 115), (
 WHITE, WATER, GRID = (255, 255, 255), (246, 250, 252), (222, 231, 236)
 PASSIVE, ACTIVE, EDGE = (250, 243, 248), (246, 226, 238), (232, 210, 224)
 TEXT, QUIET, TRACK = (33, 41, 48), (96, 108, 118), (70, 80, 88)
+CURRENT = (146, 155, 163)
+"""QUIET, a third of the way to WATER, as ``palette`` has it."""
 DISC, KEEP_OUT, LOST = (115, 115, 115), (165, 165, 165), (140, 140, 140)
 TRAILS: tuple[Colour, ...] = ((222, 234, 243), (200, 221, 236), (174, 207, 228), (145, 190, 219))
 """From the oldest to the newest part."""

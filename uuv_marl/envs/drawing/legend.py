@@ -5,9 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from uuv_marl.envs.drawing import ink
+from uuv_marl.envs.drawing.camera import shown_speed
+from uuv_marl.envs.drawing.current import ARROW, arrow
 from uuv_marl.envs.drawing.painter import DART, FINE, cross
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene
 from uuv_marl.extras import extra
+from uuv_marl.scenario import conditions, disturbances
 
 with extra("render", "rendering"):
     import pygame
@@ -29,6 +32,8 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
     found += [(near, _dart(ink.AMBER)), ("collision", _hit)]
     if scene.scenario.loses_vehicles:
         found.append(("lost", _lost))
+    if scene.water is not None:
+        found.append((f"current, {shown_speed(scene.scenario):g} m/s", _current))
     return found
 
 
@@ -49,22 +54,38 @@ def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height
     unit = height / 12.0
     for row, x, words, sign in _flow(area.width, scene, height):
         y = area.top + (3 + 20 * row) * unit
-        surface.blit(_drawn(sign, unit), (area.left + round(x), round(y)))
-        ink.write(surface, words, (area.left + x + (WIDE + 4) * unit, y), height)
+        if sign is not None:
+            surface.blit(_drawn(sign, unit), (area.left + round(x), round(y)))
+        after = (WIDE + 4) * unit if sign is not None else 0.0
+        ink.write(surface, words, (area.left + x + after, y), height)
 
 
-def _flow(width: int, scene: Scene, height: int) -> list[tuple[int, float, str, Sign]]:
-    """Row, left end, word and sign; where one row is not enough, the sonar has its own."""
+def _flow(width: int, scene: Scene, height: int) -> list[tuple[int, float, str, Sign | None]]:
+    """Row, left end, word and sign.
+
+    Where one row is not enough, the sonar has its own. What disturbs the vehicles stands below, in words alone.
+    """
     unit, signs = height / 12.0, [*_water(scene), *_sonar(scene)]
     wide = [(WIDE + 18) * unit + ink.text(words, height).get_width() for words, _ in signs]
     breaks = {len(_water(scene))} if sum(wide) > width - 8 * unit else set[int]()
-    row, x, flown = 0, 8 * unit, list[tuple[int, float, str, Sign]]()
+    row, x, flown = 0, 8 * unit, list[tuple[int, float, str, Sign | None]]()
     for k, (words, sign) in enumerate(signs):
         if x > 8 * unit and (k in breaks or x + wide[k] > width):
             row, x = row + 1, 8 * unit
         flown.append((row, x, words, sign))
         x += wide[k]
+    if disturbances(scene.scenario):
+        flown.append((row + 1, 8 * unit, _cut(f"sea: {conditions(scene.scenario)}", width - 16 * unit, height), None))
     return flown
+
+
+def _cut(words: str, width: float, height: int) -> str:
+    """As much of a text as fits into a width [px]."""
+    if ink.text(words, height).get_width() <= width:
+        return words
+    while words and ink.text(f"{words}…", height).get_width() > width:
+        words = words[:-1]
+    return f"{words}…"
 
 
 def _drawn(sign: Sign, unit: float) -> pygame.Surface:
@@ -100,6 +121,10 @@ def _hit(fine: pygame.Surface, unit: float) -> None:
 
 def _lost(fine: pygame.Surface, unit: float) -> None:
     cross(fine, np.array([12.0, 8.0]) * unit, 3.5 * unit, ink.LOST, round(0.8 * unit) * 2)
+
+
+def _current(fine: pygame.Surface, unit: float) -> None:
+    arrow(fine, np.array([2.0, 8.0]) * unit, np.array([ARROW, 0.0]) * unit, unit)
 
 
 def _heard(fine: pygame.Surface, unit: float) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, nice
+from uuv_marl.envs.drawing.current import paint_current
 from uuv_marl.envs.drawing.scene import Float, Scene
 from uuv_marl.envs.drawing.sonar import paint_arrays, paint_heard
 from uuv_marl.extras import extra
@@ -45,6 +46,7 @@ class Painter:
         cell = nice(_GRID_PX / camera.scale * self._unit / FINE)
         if self._lines:
             self._grid(view, cell)
+        paint_current(self._fine, scene, view, cell, self._unit)
         self._course(scene, view)
         self._trails(scene, view)
         if scene.sonar:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.sea.current import FlowField
 
 Float = NDArray[np.floating]
 Bool = NDArray[np.bool_]
@@ -60,6 +61,8 @@ class Scene(NamedTuple):
     centre_error_m: float
     """Distance of the swarm's centre to l(t)."""
     sonar: Sonar | None
+    water: FlowField | None
+    """How it moves; None where the scenario's water is still."""
 
 
 class Memory:
@@ -114,6 +117,7 @@ class Memory:
             clearance_m=float(facts.obstacle_clearance[w].min()),
             centre_error_m=float(np.hypot(*(facts.centre[w] - facts.reference[w, :2]))),
             sonar=None if sonar_of is None or not alive[sonar_of] else _sonar(batch, world, sonar_of),
+            water=swarm.flow_field(w) if swarm.scenario.current.flows else None,
         )
 
 

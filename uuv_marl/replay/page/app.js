@@ -12,7 +12,7 @@ import { showVehicle } from "./vehicle.js";
 
 const PALETTE = [
   "water", "grid", "track", "obstacle", "keepout", "goal", "trail", "reference", "hit", "near", "lost", "active",
-  "passive", "heard", "echo", "force", "ink", "muted", "line", "panel", "series-0", "series-1", "series-2", "series-3",
+  "passive", "current", "heard", "echo", "force", "ink", "muted", "line", "panel", "series-0", "series-1", "series-2", "series-3",
 ];
 /** How often the numbers are written while the replay plays [ms]. */
 const WRITE_MS = 100;
@@ -179,7 +179,7 @@ class App {
     const names = this.episodes.map((episode) => episode.policy);
     at("title").textContent = `${first.scenario}: ${names.join(", ")}`;
     at("subtitle").textContent =
-      `${first.vehicles} vehicles, seed ${first.seed}, scenario version ${first.version}`;
+      `${first.vehicles} vehicles, seed ${first.seed}, scenario version ${first.version}, ${first.conditions}`;
     at("waters").dataset.episodes = this.episodes.length;
     at("waters").append(...this.panels.map((panel) => panel.element));
     at("colour").append(...this.quantities.map((name) => new Option(QUANTITIES[name].label, name)));

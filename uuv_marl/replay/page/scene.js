@@ -1,5 +1,6 @@
 /** The water: course, obstacles, trails, vehicles, and what happens to them. */
 import { drawCourse, drawGrid, drawMap, drawScaleBar } from "./course.js";
+import { drawCurrent, drawCurrentKey } from "./current.js";
 import { circle, cross, dart, label } from "./shapes.js";
 import { drawSonar } from "./sonar.js";
 
@@ -21,6 +22,7 @@ export function drawScene(context, episode, time, poses, view, look) {
   context.fillStyle = look.palette.water;
   context.fillRect(0, 0, view.width, view.height);
   drawGrid(context, view, look.palette);
+  if (episode.current) drawCurrent(context, episode, sample, view, look.palette);
   drawCourse(context, episode, view, look.palette, 1);
   if (look.trails) drawTrails(context, episode, sample, poses, view, look.palette);
   const shown = look.selected !== null && episode.inspected.indexOf(look.selected);
@@ -30,6 +32,7 @@ export function drawScene(context, episode, time, poses, view, look) {
   drawReference(context, episode.reference(time), view, look.palette);
   drawFlashes(context, episode, time, poses, view, size, look.palette);
   drawScaleBar(context, view, look.palette);
+  if (episode.current) drawCurrentKey(context, episode, view, look.palette);
   if (look.map) drawMap(context, episode, time, poses, view, look);
 }
 
@@ -59,8 +62,8 @@ function drawTrails(context, episode, sample, poses, view, palette) {
       if (band === 0) context.moveTo(view.x(poses[3 * i + 1]), view.y(poses[3 * i]));
       part.forEach((k, step) => {
         const at = 2 * (k * n + i);
-        if (band || step) context.lineTo(view.x(position[at + 1]), view.y(position[at]));
-        if (band && !step) context.moveTo(view.x(position[at + 1]), view.y(position[at]));
+        if (step) context.lineTo(view.x(position[at + 1]), view.y(position[at]));
+        else if (band) context.moveTo(view.x(position[at + 1]), view.y(position[at]));
       });
     }
     context.globalAlpha = 0.7 * (1 - band / bands);
