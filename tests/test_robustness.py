@@ -278,8 +278,8 @@ def test_verdicts_are_within_one_seed_of_the_pilot_s():
 
 def test_the_pilot_s_table(tmp_path, monkeypatch):
     rows = [
-        {"what": "nothing", "scenario": "starter", "claims": {"bio_inspired_plus": 5}},
-        {"what": "lag", "scenario": "starter", "claims": {"bio_inspired_plus": 5}, "set": {"actuators.yaw_lag_s": 5.0}},
+        {"what": "nothing", "scenario": "starter", "claims": [5, "-", "-"]},
+        {"what": "lag", "scenario": "starter", "claims": [5, "-", "-"], "set": {"actuators.yaw_lag_s": 5.0}},
     ]
     monkeypatch.setitem(pilot._TOLD, "rows", rows)
     text, table = (path.read_text() for path in pilot.run(tmp_path, 2, silent))

@@ -52,7 +52,8 @@ def claims(seeds: int) -> list[Claim]:
             shared=True,
         ))
         for row in _TOLD["rows"]
-        for policy, claimed in row["claims"].items()
+        for policy, claimed in zip(_TOLD["policies"], row["claims"], strict=True)
+        if claimed != "-"
     ]  # fmt: skip
 
 
