@@ -221,8 +221,8 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     result = CliRunner().invoke(app, [*args.split(), str(tmp_path)])
     assert result.exit_code == 0, result.output
     text = (tmp_path / "report.md").read_text()
-    assert "C1 is left out for policies that use neither link nor modem: `bio_inspired`" in text
-    assert "level 2, 3, 4 of 1, 2, 3, 4, 5 was not run" in text
+    assert "Left out, since they use neither link nor modem, for `bio_inspired`: C1." in text
+    assert "Not run: levels 2, 3, 4 (of 1, 2, 3, 4, 5)." in text
     assert "still water, no noise, no delay" in text
     rows = job.read_episodes(tmp_path / "episodes.csv")
     assert rows[["axis", "level"]].to_numpy().tolist() == [["0", 0], ["A1", 1], ["A1", 5]]

@@ -66,23 +66,23 @@ def _missing(episodes: Any) -> Iterator[str]:
     """What a full run has and these episodes have not."""
     for column, whole in (("level", FULL.levels), ("scenario", FULL.scenarios)):
         if absent := [str(one) for one in whole if one not in set(episodes[column])]:
-            yield f"{column} {', '.join(absent)} of {', '.join(map(str, whole))} was not run"
+            yield f"Not run: {column}s {', '.join(absent)} (of {', '.join(map(str, whole))})"
     absent, idle = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
     for policy, own in episodes.groupby("policy", sort=False):
         for name in AXES.keys() - set(own["axis"]):
             unused = policy in POLICIES and not AXES[name].concerns(policy)
             (idle if unused else absent)[name].append(f"`{policy}`")
     for found, words in (
-        (absent, "was not run for"),
-        (idle, "is left out for policies that use neither link nor modem:"),
+        (absent, "Not run for"),
+        (idle, "Left out, since they use neither link nor modem, for"),
     ):
         for policies in dict.fromkeys(tuple(found[name]) for name in AXES if name in found):
             names = [name for name in AXES if tuple(found.get(name, ())) == policies]
-            yield f"{', '.join(names)} {words} {', '.join(policies)}"
+            yield f"{words} {', '.join(policies)}: {', '.join(names)}"
     count = episodes.groupby(["scenario", "axis", "level", "policy"]).size()
     if count.min() < count.max():
         few = counted(int((count < count.max()).sum()), "cell")
-        yield f"{few} less than {counted(int(count.max()), 'seed')}"
+        yield f"Not complete: {few} with fewer than {counted(int(count.max()), 'seed')}"
 
 
 def _scenario(name: str, episodes: Any, table: Any) -> str:
@@ -95,7 +95,8 @@ def _scenario(name: str, episodes: Any, table: Any) -> str:
          f"is at least {WORTH_KEEPING:g}.", _axes(policies)),
         ("Critical severity", f"Where success falls below {ENOUGH:g} first, linear between the levels that were run, "
          "in the axis's unit.", _critical(policies)),
-        ("Every cell", "Success; then in how many episodes the whole swarm succeeded.",
+        ("Every cell", "Success; in how many episodes the whole swarm succeeded; contacts per episode, those of "
+         "faulty vehicles too.",
          _cells(episodes[episodes["scenario"] == name], policies)),
     )  # fmt: skip
     return f"## {name}\n\n" + "\n".join(f"### {title}\n\n{words}\n\n{rows}" for title, words, rows in parts)
@@ -116,7 +117,7 @@ def _axes(policies: dict[str, Any]) -> str:
         score = axis_score(own, axis)
         if score is None:
             return _NOTHING
-        return f"{score.success:.2f}" + (f"; {score.retention:.2f}" if score.retention else "")
+        return f"{score.success:.2f}" + (f"; {score.retention.value:.0%}" if score.retention else "")
 
     return _table(policies, cell)
 
@@ -154,4 +155,5 @@ def _cell(own: Any) -> str:
     success = own["success_share"].dropna().to_numpy()
     if not len(success):
         return _NOTHING
-    return f"{scored(success):.2f}; {own['swarm_success'].sum():.0f}/{len(success)}"
+    swarms, contacts = own["swarm_success"].sum(), own["collisions"].mean()
+    return f"{scored(success):.2f}; {swarms:.0f}/{len(success)}; {contacts:.3g}"

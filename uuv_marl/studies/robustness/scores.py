@@ -34,9 +34,9 @@ class Score(NamedTuple):
     high: float
 
     def __format__(self, spec: str) -> str:
-        """``value [low, high]``, or the value alone where there is no interval."""
-        interval = "" if np.isnan(self.low) else f" [{self.low:{spec}}, {self.high:{spec}}]"
-        return f"{self.value:{spec}}{interval}"
+        """``value [low, high]``, or the value alone where the interval is unknown, or nothing at these digits."""
+        value, low, high = (f"{number:{spec}}" for number in self)
+        return value if np.isnan(self.low) or low == high else f"{value} [{low}, {high}]"
 
 
 class AxisScore(NamedTuple):
