@@ -225,6 +225,8 @@ def test_the_water_at_a_vehicle_is_the_field_there():
         assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._sea.water.core, swarm._sea.flow)
     np.testing.assert_array_equal(swarm.flow_field().at(swarm.state.eta[0, :, :2]), swarm.flow[0])
     assert not Swarm(load_scenario("starter")).flow_field().at([[[1.0, 2.0]]]).any()
+    with pytest.raises(ValueError, match=r"north and east \[m\], shape \(..., 2\), got shape \(3,\)"):
+        swarm.flow_field().at([1.0, 2.0, 3.0])
 
 
 # --- Forces ---

@@ -181,3 +181,21 @@ def test_a_uniform_flow_carries_a_vehicle_along_and_changes_nothing_else(north, 
         moved = vehicle.advance(moved, (900.0, -250.0), (north, east), 0.1, FULL)
     assert moved[2:] == still[2:]
     assert moved[:2] == pytest.approx((still[0] + 4.0 * north, still[1] + 4.0 * east), abs=1e-12)
+
+
+@pytest.mark.parametrize(("damping", "limit_mps"), [(0.0, 0.682), (600.0, 2.459)])
+def test_the_hull_is_directionally_unstable_above_the_speed_that_the_docs_state(damping, limit_mps):
+    """The Munk moment: det < 0 of the sway-yaw equations, linearised at a speed u. docs/paper/report.md."""
+    assert sway_yaw(0.99 * limit_mps, damping).max() < 0.0 < sway_yaw(1.01 * limit_mps, damping).max()
+
+
+def test_deviations_grow_as_fast_as_the_docs_state():
+    assert sway_yaw(4.0).max() == pytest.approx(2.35, abs=0.01)
+
+
+def sway_yaw(u, damping=0.0, h=1e-6):
+    """Real parts of the eigenvalues of sway and yaw at speed u [1/s]."""
+    p = plant(load_scenario("single_obstacle"))
+    rate = lambda v, r: np.array(vehicle.acceleration((u, v, r), (0.0, -damping * r), p)[1:])  # noqa: E731
+    columns = [(rate(*(h * e)) - rate(*(-h * e))) / (2 * h) for e in np.eye(2)]
+    return np.linalg.eigvals(np.stack(columns, axis=1)).real

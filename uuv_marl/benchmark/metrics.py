@@ -22,8 +22,8 @@ class Shares(TypedDict):
     s_u: float
 
 
-class Metrics(Success):
-    """What one run is summed up to; docs/results-format.md defines every key. None where there is nothing to measure.
+class Measures(TypedDict):
+    """What is measured of the swarm as a whole. None where there is nothing to measure.
 
     Distances are in m and taken from the start to the episode's end; times are in s.
     """
@@ -45,6 +45,10 @@ class Metrics(Success):
     clamps: int
     saturation_share: float
     vehicles_lost: int
+
+
+class Metrics(Measures, Success):
+    """What one run is summed up to; docs/results-format.md defines every key."""
 
 
 class Sample(NamedTuple):

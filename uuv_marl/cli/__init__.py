@@ -17,8 +17,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
-    benchmark.benchmark, replay.replay, robustness.robustness, studies.heldout, studies.reproduce, lists.scenarios, lists.policies,
-    benchmark.tune, export.export, studies.identify,
+    benchmark.benchmark, robustness.robustness, replay.replay, studies.heldout, studies.reproduce, lists.scenarios,
+    lists.policies, benchmark.tune, export.export, studies.identify,
 ):  # fmt: skip
     app.command()(command)
 app.add_typer(train.app, name="train")

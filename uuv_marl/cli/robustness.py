@@ -11,10 +11,10 @@ from uuv_marl.cli.console import console, explained, find_modules, working
 
 def robustness(
     quick: Annotated[
-        bool, typer.Option("--quick", help="Eight axes, two scenarios, 5 seeds: about 15 minutes on two cores.")
+        bool, typer.Option("--quick", help="Eight axes, two scenarios, 5 seeds: about ten minutes.")
     ] = False,
     full: Annotated[
-        bool, typer.Option("--full", help="All levels, three scenarios, 50 seeds: a day on two cores; see --ray.")
+        bool, typer.Option("--full", help="All levels, three scenarios, 50 seeds: several hours; see --ray.")
     ] = False,
     axis: Annotated[
         list[str] | None, typer.Option(help="Only this axis, such as W1 or S7. Repeat it for several. Default: all.")
@@ -35,7 +35,12 @@ def robustness(
     ] = None,
     seeds: Annotated[int | None, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1. Default: 20.")] = None,
     pilot: Annotated[
-        bool, typer.Option("--pilot", help="Instead confirm or correct the findings of the pilot: pilot.md.")
+        bool,
+        typer.Option(
+            "--pilot",
+            help="Instead confirm or correct the findings of a pilot, in pilot.md; of the options, "
+            "--seeds, --ray and --output count.",
+        ),
     ] = False,
     ray: Annotated[
         str | None,

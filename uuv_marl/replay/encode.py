@@ -129,7 +129,7 @@ def _arrays(recording: Recording) -> dict[str, Any]:
     }
     exact = {**recording.series, "waypoints": recording.waypoints, "obstacles": recording.obstacles}
     if recording.water is not None:
-        smooth["drift"], exact["eddies"] = recording.water
+        smooth["drift"], exact["eddies"] = recording.water.drift, recording.water.eddies.astype(np.float32)
     arrays = {"time_s": _coded(recording.time_s, Coding(tick_s, stride=1))}
     arrays |= {name: _bits(np.asarray(values, np.float32)) for name, values in exact.items()}
     if recording.inspections:

@@ -71,6 +71,8 @@ class FlowField(NamedTuple):
     def at(self, points: ArrayLike) -> Float64:
         """Velocity of the water, north and east [m/s], at points given by north and east [m]; both (..., 2)."""
         points = np.asarray(points, np.float64)
+        if points.shape[-1:] != (2,):
+            raise ValueError(f"points must be north and east [m], shape (..., 2), got shape {points.shape}")
         flow = Flow(self.drift[None], np.zeros((1, 2)), self.eddies[None], np.zeros((1, 0, 2)))
         velocity = [flow_at(0, x, y, self.core_m, flow) for x, y in points.reshape(-1, 2).tolist()]
         return np.array(velocity, np.float64).reshape(points.shape)

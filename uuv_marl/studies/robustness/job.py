@@ -37,9 +37,9 @@ SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), ("bio_inspired", "bio_
 QUICK = SHIPPED._replace(
     axes=("W1", "S4", "S7", "S9", "N1", "A1", "F3", "X"), scenarios=("single_obstacle", "random_field"), seeds=5
 )
-"""A first look, in a quarter of an hour on two cores."""
+"""A first look, in about ten minutes."""
 FULL = SHIPPED._replace(levels=(1, 2, 3, 4, 5), scenarios=("single_obstacle", "random_field", "tracking"), seeds=50)
-"""All of it: days on one core, so give it a cluster."""
+"""All of it, for hours."""
 
 
 class Cell(NamedTuple):

@@ -1,5 +1,6 @@
 """``report.md``: scores, critical severities and all cells, written from the table of episodes alone."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
@@ -46,7 +47,7 @@ def report(episodes: Any) -> str:
         headline=f"{counted(len(episodes), 'episode')} of {policies} on {', '.join(f'`{s}`' for s in scenarios)}, "
         f"{counted(seeds, 'seed')}.",
         conditions=f"{_calm(scenarios)}; echoes report the {BASE['sonar.echo_reports']} of obstacles",
-        missing="\n".join(f"- {line}" for line in _missing(episodes)),
+        missing="\n".join(f"- {line}." for line in _missing(episodes)) or "- Nothing: every cell was run.",
         scenarios="\n".join(_scenario(name, episodes, table.loc[[name]]) for name in scenarios),
         axes=markdown_table(
             ("axis", "what", "unit", "level 0", "levels", "source"),
@@ -63,30 +64,30 @@ def _calm(scenarios: list[str]) -> str:
 
 def _missing(episodes: Any) -> Iterator[str]:
     """What a full run has and these episodes have not."""
-    levels, scenarios = set(episodes["level"]), set(episodes["scenario"])
-    for what, whole, there in (("levels", FULL.levels, levels), ("scenarios", FULL.scenarios, scenarios)):
-        if absent := [str(one) for one in whole if one not in there]:
-            yield f"Not run: {what} {', '.join(absent)} ({there_are(what, whole)})."
+    for column, whole in (("level", FULL.levels), ("scenario", FULL.scenarios)):
+        if absent := [str(one) for one in whole if one not in set(episodes[column])]:
+            yield f"Not run: {column}s {', '.join(absent)} (of {', '.join(map(str, whole))})"
+    absent, idle = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
     for policy, own in episodes.groupby("policy", sort=False):
-        idle = [name for name, axis in AXES.items() if policy in POLICIES and not axis.concerns(policy)]
-        absent = [name for name in AXES if name not in set(own["axis"]) and name not in idle]
-        if absent:
-            yield f"Not run for `{policy}`: {', '.join(absent)}."
-        if idle:
-            yield f"Left out for `{policy}`: {', '.join(idle)}, as it uses neither link nor modem."
+        for name in AXES.keys() - set(own["axis"]):
+            unused = policy in POLICIES and not AXES[name].concerns(policy)
+            (idle if unused else absent)[name].append(f"`{policy}`")
+    for found, words in (
+        (absent, "Not run for"),
+        (idle, "Left out, since they use neither link nor modem, for"),
+    ):
+        for policies in dict.fromkeys(tuple(found[name]) for name in AXES if name in found):
+            names = [name for name in AXES if tuple(found.get(name, ())) == policies]
+            yield f"{words} {', '.join(policies)}: {', '.join(names)}"
     count = episodes.groupby(["scenario", "axis", "level", "policy"]).size()
     if count.min() < count.max():
-        yield f"{counted(int((count < count.max()).sum()), 'cell')} have fewer than {counted(int(count.max()), 'seed')}."
-
-
-def there_are(what: str, whole: Any) -> str:
-    """``of the levels 1, 2, 3``."""
-    return f"of the {what} {', '.join(map(str, whole))}"
+        few = counted(int((count < count.max()).sum()), "cell")
+        yield f"Not complete: {few} with fewer than {counted(int(count.max()), 'seed')}"
 
 
 def _scenario(name: str, episodes: Any, table: Any) -> str:
     """A scenario's tables."""
-    policies = {policy: own for policy, own in table.groupby(level="policy", sort=False)}
+    policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
     parts = (
         ("Scores", "Mean success over the levels that were run. `all`: the mean over the groups, without X.",
          _groups(policies)),
@@ -94,7 +95,8 @@ def _scenario(name: str, episodes: Any, table: Any) -> str:
          f"is at least {WORTH_KEEPING:g}.", _axes(policies)),
         ("Critical severity", f"Where success falls below {ENOUGH:g} first, linear between the levels that were run, "
          "in the axis's unit.", _critical(policies)),
-        ("Every cell", "Success; then in how many episodes the whole swarm succeeded.",
+        ("Every cell", "Success; in how many episodes the whole swarm succeeded; contacts per episode, those of "
+         "faulty vehicles too.",
          _cells(episodes[episodes["scenario"] == name], policies)),
     )  # fmt: skip
     return f"## {name}\n\n" + "\n".join(f"### {title}\n\n{words}\n\n{rows}" for title, words, rows in parts)
@@ -115,7 +117,7 @@ def _axes(policies: dict[str, Any]) -> str:
         score = axis_score(own, axis)
         if score is None:
             return _NOTHING
-        return f"{score.success:.2f}" + (f"; {score.retention:.2f}" if score.retention else "")
+        return f"{score.success:.2f}" + (f"; {score.retention.value:.0%}" if score.retention else "")
 
     return _table(policies, cell)
 
@@ -136,7 +138,7 @@ def _table(policies: dict[str, Any], cell: Any) -> str:
 
 
 def _cells(episodes: Any, policies: dict[str, Any]) -> str:
-    found = {key: own for key, own in episodes.groupby(["axis", "level", "policy"])}
+    found = dict[Any, Any](iter(episodes.groupby(["axis", "level", "policy"])))
     rows: list[list[str]] = []
     places = [
         (CALM, 0, "–"),
@@ -153,4 +155,5 @@ def _cell(own: Any) -> str:
     success = own["success_share"].dropna().to_numpy()
     if not len(success):
         return _NOTHING
-    return f"{scored(success):.2f}; {own['swarm_success'].sum():.0f}/{len(success)}"
+    swarms, contacts = own["swarm_success"].sum(), own["collisions"].mean()
+    return f"{scored(success):.2f}; {swarms:.0f}/{len(success)}; {contacts:.3g}"

@@ -25,10 +25,11 @@ _HEAD = """# The pilot's findings, confirmed or corrected
 
 <!-- Written by uuv-marl robustness --pilot. -->
 
-Before the package had currents, late sonar or faults, a pilot corrupted percepts and actions from outside, on 5 seeds. Here
-the simulation itself does it, on {seeds}. **Success** in this table is the pilot's: the swarm arrives and nobody touches
-anything. A claim is confirmed where the two shares differ by at most {near:.0%}, one seed of the pilot's; else it is corrected.
-Scenario: `single_obstacle` as it is, unless the row says otherwise. {confirmed} of {claims} claims are confirmed.
+Before the package had currents, late sonar or faults, a pilot corrupted percepts and actions from outside, on 5 seeds.
+Here the simulation itself does it, on {seeds}. **Success** in this table is the pilot's: the swarm arrives and nobody
+touches anything. A claim is confirmed where the two shares differ by at most {near:.0%}, one seed of the pilot's; else
+it is corrected. Scenario: `single_obstacle` as it is, unless the row says otherwise. {confirmed} of {claims} claims are
+confirmed.
 
 """
 
@@ -51,7 +52,8 @@ def claims(seeds: int) -> list[Claim]:
             shared=True,
         ))
         for row in _TOLD["rows"]
-        for policy, claimed in row["claims"].items()
+        for policy, claimed in zip(_TOLD["policies"], row["claims"], strict=True)
+        if claimed != "-"
     ]  # fmt: skip
 
 

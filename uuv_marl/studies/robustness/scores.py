@@ -5,6 +5,7 @@ along, so that its start and field do not blur the difference between them. Inte
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ EVERY = "all"
 """The mean over the groups, without the combined axis."""
 _SEEDS = 5
 _RESAMPLES = 2000
+_ROUNDING = 1e-9
 
 
 class Score(NamedTuple):
@@ -32,9 +34,9 @@ class Score(NamedTuple):
     high: float
 
     def __format__(self, spec: str) -> str:
-        """``value [low, high]``, or the value alone where there is no interval."""
-        interval = "" if np.isnan(self.low) else f" [{self.low:{spec}}, {self.high:{spec}}]"
-        return f"{self.value:{spec}}{interval}"
+        """``value [low, high]``, or the value alone where the interval is unknown, or nothing at these digits."""
+        value, low, high = (f"{number:{spec}}" for number in self)
+        return value if np.isnan(self.low) or low == high else f"{value} [{low}, {high}]"
 
 
 class AxisScore(NamedTuple):
@@ -88,9 +90,13 @@ def axis_score(table: Any, axis: str) -> AxisScore | None:
     return AxisScore(
         success=scored(rest.mean(axis=1)),
         retention=scored(np.column_stack([rest.mean(axis=1), calm]), _ratio) if worth else None,
-        critical=scored(shares, lambda *columns, axis: critical_level(np.stack([c.mean(axis) for c in columns]), levels)),
+        critical=scored(shares, partial(_critical, levels)),
         levels=levels,
-    )  # fmt: skip
+    )
+
+
+def _critical(levels: tuple[int, ...], *shares: Float64, axis: int) -> Float64:
+    return critical_level(np.stack([share.mean(axis) for share in shares]), levels)
 
 
 def _ratio(part: Float64, whole: Float64, axis: int) -> Float64:
@@ -107,14 +113,16 @@ def critical_level(shares: Float64, levels: tuple[int, ...]) -> Float64:
     Returns:
         Shape (...): -1 where level 0 is below already, and one more than the last level where none is.
     """
-    below = shares < ENOUGH
-    k = np.where(below.any(axis=0), below.argmax(axis=0), len(levels))
+    below = shares < ENOUGH - _ROUNDING
+    k: NDArray[np.int64] = np.where(below.any(axis=0), np.argmax(below, axis=0), len(levels))
     high = np.clip(k, 1, len(levels) - 1)[None]
     s_low, s_high = (np.take_along_axis(shares, j, 0)[0] for j in (high - 1, high))
     at = np.array(levels, np.float64)
     step = np.clip((s_low - ENOUGH) / np.where(s_low > s_high, s_low - s_high, 1.0), 0.0, 1.0)
-    between = at[high - 1][0] + step * (at[high] - at[high - 1])[0]
-    return np.where(k == 0, -1.0, np.where(k == len(levels), at[-1] + 1.0, between))
+    between: Float64 = at[high - 1][0] + step * (at[high] - at[high - 1])[0]
+    return np.select(
+        [k == 0, k == len(levels)], [np.full_like(between, -1.0), np.full_like(between, at[-1] + 1.0)], between
+    )
 
 
 def critical_text(axis: str, score: AxisScore) -> str:
@@ -131,7 +139,7 @@ def critical_text(axis: str, score: AxisScore) -> str:
         k = max(int(np.searchsorted(levels, level)), 1)
         if np.isfinite(severity[k - 1 : k + 1]).all():
             return f"{np.interp(level, levels[k - 1 : k + 1], severity[k - 1 : k + 1]):.3g}"
-        return labels[k - 1] if level == levels[k - 1] else f"between {labels[k - 1]} and {labels[k]}"
+        return labels[levels.index(int(level))] if level in levels else f"between {labels[k - 1]} and {labels[k]}"
 
     low, high = (text(level) for level in score.critical[1:]) if not np.isnan(score.critical.low) else ("", "")
     value = text(score.critical.value)

@@ -1,0 +1,289 @@
+"""The robustness suite: axes as data, one start at every level, scores by hand, resuming, the command, the pilot."""
+
+import itertools
+import json
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from uuv_marl import load_scenario
+from uuv_marl.benchmark.evaluate import evaluate
+from uuv_marl.benchmark.success import GRACE_S
+from uuv_marl.cli import app
+from uuv_marl.scenario import disturbances
+from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.sea.actuation import victims
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.studies.robustness import job, page, pilot, scores
+from uuv_marl.studies.robustness.axes import AXES, BASE, CALM, GROUPS, overrides
+
+DOCS = Path(__file__).resolve().parent.parent / "docs" / "robustness"
+PLACES = [(axis.name, level) for axis in AXES.values() for level in axis.levels]
+pytestmark = pytest.mark.needs("pandas")
+
+
+def silent(what, share):
+    pass
+
+
+# Axes
+
+
+def test_every_axis_is_whole():
+    assert {axis.group for axis in AXES.values()} == set(GROUPS)
+    for axis in AXES.values():
+        assert len(axis.labels) == len(axis.severity) == 1 + len(axis.levels) == 1 + len(axis.changes), axis.name
+        assert len(set(axis.labels)) == len(axis.labels), axis.name
+        assert axis.name.startswith(axis.group)
+        assert axis.source
+        assert all(changes.keys() == axis.changes[0].keys() for changes in axis.changes)
+        steps = np.diff(axis.severity)
+        assert np.isnan(steps).all() or (steps >= 0).all() or (steps <= 0).all(), axis.name
+
+
+@pytest.mark.parametrize("scenario", job.FULL.scenarios)
+def test_every_level_is_a_scenario_of_its_own(scenario):
+    seen = [load_scenario(scenario, overrides=BASE)]
+    assert disturbances(seen[0]) == []
+    limit = seen[0].time_limit
+    assert (limit.factor, limit.extra_s, seen[0].arrival.ends_episode) == (1.0, GRACE_S, False)
+    for axis, level in PLACES:
+        loaded = load_scenario(scenario, overrides=overrides(axis, level, scenario))
+        assert loaded not in seen, (axis, level)
+        assert disturbances(loaded) or AXES[axis].channels, (axis, level)
+        seen.append(loaded)
+
+
+def test_speeds_are_shares_of_the_references():
+    assert overrides("W1", 5, "random_field")["current.speed_mps"] == 2.0
+    slow = AXES["W2"].overrides(3, 1.5)
+    assert (slow["current.speed_mps"], slow["current.variation_mps"]) == (0.375, 0.1875)
+
+
+UNLIKE = ("S2", "S3", "S4", "S5", "S7", "S8", "F1", "X", "C1")
+"""Axes whose severity isn't one number that is set, or whose first or last level has none."""
+
+
+@pytest.mark.parametrize("name", [name for name in AXES if name not in UNLIKE])
+def test_numbers_in_tables_are_those_that_are_set(name):
+    """In percent, or as they are."""
+    axis = AXES[name]
+    field = next(f for f in axis.changes[0] if len({str(changes[f]) for changes in axis.changes}) > 1)
+    values = [c[field][0]["share"] if field == "faults" else c[field] for c in axis.changes]
+    factor = 100.0 if axis.unit.startswith("%") else 1.0
+    np.testing.assert_allclose(axis.severity[1:], factor * np.array(values))
+
+
+@pytest.mark.parametrize("axis", ["F2", "F3", "F4"])
+def test_who_is_hit_at_a_level_is_hit_at_the_next(axis):
+    key = episode_key(np.random.default_rng(5))
+    hit = [
+        set(victims(key, 0, load_scenario("random_field", overrides=overrides(axis, k, "random_field"))))
+        for k in range(1, 6)
+    ]
+    assert all(less < more for less, more in itertools.pairwise(hit))
+
+
+def test_a_seed_has_the_same_start_and_field_at_every_level():
+    def drawn(axis, level):
+        swarm = Swarm(load_scenario("random_field", num_vehicles=7, overrides=overrides(axis, level, "random_field")))
+        swarm.reset(3)
+        return (
+            swarm.state.eta.copy(),
+            swarm.state.nu.copy(),
+            swarm.course.obstacles.copy(),
+            swarm.course.waypoints.copy(),
+        )
+
+    calm = drawn(CALM, 0)
+    for axis, level in PLACES:
+        for ours, theirs in zip(drawn(axis, level), calm, strict=True):
+            np.testing.assert_array_equal(ours, theirs, err_msg=f"{axis} {level}")
+
+
+def test_messages_are_left_out_for_who_has_none():
+    plan = job.SHIPPED._replace(policies=("mappo", "sdc"), axes=("C1", "W1"))
+    found = {(cell.axis, cell.case.policy) for cell in job.cells(plan)}
+    assert found == {(CALM, "mappo"), (CALM, "sdc"), ("W1", "mappo"), ("W1", "sdc"), ("C1", "sdc")}
+
+
+def test_plans():
+    assert len(job.QUICK.axes) == 8
+    assert len(job.cells(job.QUICK)) * job.QUICK.seeds == 2 * 3 * 25 * 5
+    # 21 axes have three levels, and the shipped policies use neither link nor modem.
+    assert len(job.cells(job.SHIPPED)) == 3 * (1 + 3 * (len(AXES) - 1))
+
+
+# Scores
+
+
+def table(**cells):
+    """Success by seed of one policy: ``W1_3=[...]`` is axis W1 at level 3, ``calm=[...]`` level 0."""
+    import pandas
+
+    rows = [
+        {"scenario": "s", "policy": "p", "seed": seed, "success_share": value, "axis": axis, "level": level}
+        for name, values in cells.items()
+        for axis, level in [(CALM, 0) if name == "calm" else (name[:2].rstrip("_"), int(name[-1]))]
+        for seed, value in enumerate(values)
+    ]
+    return scores.by_seed(pandas.DataFrame(rows))
+
+
+def test_an_axis_is_the_mean_over_its_levels_and_keeps_a_share_of_level_0():
+    found = scores.axis_score(table(calm=[1.0, 0.8] * 3, W1_1=[1.0, 0.7] * 3, W1_3=[0.5, 0.0] * 3), "W1")
+    assert found.success.value == pytest.approx(0.55)
+    assert found.retention.value == pytest.approx(0.55 / 0.9)
+    assert found.success.low < 0.55 < found.success.high
+    assert found.levels == (0, 1, 3)
+    assert scores.axis_score(table(calm=[0.75] * 6, W1_1=[0.7] * 6), "W1").retention is None
+    assert scores.axis_score(table(calm=[1.0] * 6), "W1") is None
+
+
+def test_what_is_the_same_share_of_level_0_in_each_seed_has_no_doubt():
+    """The bootstrap draws seeds, not cells: how good a seed is cancels in the ratio."""
+    calm = np.array([1.0, 0.9, 0.95, 0.85, 0.8, 0.99])
+    found = scores.axis_score(table(calm=calm, W1_1=calm / 2), "W1")
+    assert found.retention.high - found.retention.low < 1e-12
+    assert found.success.high - found.success.low > 0.01
+
+
+def test_few_seeds_have_no_interval():
+    found = scores.axis_score(table(calm=[1.0, 1.0], W1_1=[0.5, 0.7]), "W1")
+    assert math.isnan(found.success.low)
+    assert f"{found.success:.2f}" == "0.60"
+
+
+@pytest.mark.parametrize(
+    ("cells", "text"),
+    [
+        ({"calm": 1.0, "W1_1": 1.0, "W1_3": 0.8}, "0.155"),  # half way from 0.06 to 0.25
+        ({"calm": 1.0, "W1_1": 0.8, "W1_3": 1.0}, "0.03"),  # the first loss counts
+        ({"calm": 1.0, "W1_1": 0.9, "W1_3": 0.5}, "0.06"),
+        ({"calm": 0.89, "W1_1": 1.0}, "fails undisturbed"),
+        ({"calm": 1.0, "W1_1": 0.9, "W1_3": 0.95}, "beyond 0.25"),
+        ({"calm": 1.0, "A2_1": 1.0, "A2_2": 0.8}, "0.415"),  # half way from 0.5 to 0.33 of the torque
+        ({"calm": 1.0, "S4_1": 0.5}, "between all and 200/500 m"),
+        ({"calm": 1.0, "F1_1": 1.0, "F1_3": 0.5}, "between 10 % x 0.75 and 30 % x 0.5"),
+        ({"calm": 1.0, "X_1": 1.0, "X_3": 0.9, "X_5": 0.0}, "medium"),
+    ],
+)
+def test_critical_severity_in_the_axis_s_unit(cells, text):
+    axis = list(cells)[-1].partition("_")[0]
+    found = scores.axis_score(table(**{name: [value] * 6 for name, value in cells.items()}), axis)
+    assert scores.critical_text(axis, found) == text
+
+
+def test_critical_severity_has_an_interval():
+    found = scores.axis_score(table(calm=[1.0] * 8, W1_1=[1.0] * 8, W1_3=[0.6, 0.9] * 4), "W1")
+    low, high = (float(part) for part in scores.critical_text("W1", found).partition("[")[2][:-1].split(", "))
+    assert 0.06 < low < 0.06 + 0.19 * 0.4 < high <= 0.25
+
+
+def test_groups_are_means_over_axes_and_all_over_groups():
+    own = table(calm=[1.0] * 6, W1_1=[0.8] * 6, W2_1=[0.4] * 6, S1_1=[1.0] * 6, X_1=[0.0] * 6)
+    assert scores.group_score(own, "W").value == pytest.approx(0.6)
+    assert scores.group_score(own, scores.EVERY).value == pytest.approx(0.8)
+    assert scores.group_score(own, "X").value == 0.0
+    assert scores.group_score(own, "N") is None
+
+
+# Job, page, command
+
+
+TINY = job.Plan(("A1", "C1"), (1, 5), ("starter",), ("bio_inspired",), 1)
+
+
+def test_a_cell_that_is_done_is_not_run_again(tmp_path):
+    asked = []
+
+    def counted(scenario, policy, seeds, **parameters):
+        asked.extend(seeds)
+        yield from evaluate(scenario, policy, seeds, **parameters)
+
+    first = job.run(tmp_path, TINY, silent, counted).read_bytes()
+    assert asked == [0, 0, 0]
+    assert job.run(tmp_path, TINY, silent, counted).read_bytes() == first
+    assert asked == [0, 0, 0]
+    job.run(tmp_path, TINY._replace(seeds=2), silent, counted)
+    assert asked == [0, 0, 0, 1, 1, 1]
+    assert not list(tmp_path.rglob("*.npz"))
+
+
+def test_the_command_writes_results_page_and_picture(tmp_path):
+    args = (
+        "robustness --scenario starter --axis A1 --axis C1 --level 1 --level 5 --policy bio_inspired --seeds 1 --output"
+    )
+    result = CliRunner().invoke(app, [*args.split(), str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    text = (tmp_path / "report.md").read_text()
+    assert "Left out, since they use neither link nor modem, for `bio_inspired`: C1." in text
+    assert "Not run: levels 2, 3, 4 (of 1, 2, 3, 4, 5)." in text
+    assert "still water, no noise, no delay" in text
+    rows = job.read_episodes(tmp_path / "episodes.csv")
+    assert rows[["axis", "level"]].to_numpy().tolist() == [["0", 0], ["A1", 1], ["A1", 5]]
+    assert rows["success_share"][0] == 1.0
+    assert rows["success_share"][2] < 1.0, "a lag of 2 s costs something"
+    kept = json.loads((tmp_path / "cells" / "starter.A1.5" / "results.json").read_text())
+    assert kept["runs"][0]["metrics"]["success_share"] == pytest.approx(rows["success_share"][2])
+    before = [path.read_bytes() for path in page.write_report(tmp_path)]
+    assert before == [path.read_bytes() for path in page.write_report(tmp_path)]
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        ("--quick --full", "exclude each other"),
+        ("--axis W9", "there is no axis 'W9'; there are W1, "),
+        ("--policy mapo", "did you mean 'mappo'"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_with_the_remedy(tmp_path, args, message):
+    result = CliRunner().invoke(app, ["robustness", *args.split(), "--output", str(tmp_path)])
+    assert result.exit_code == 2
+    assert message in " ".join(result.output.split())
+
+
+@pytest.mark.docs
+@pytest.mark.skipif(not DOCS.exists(), reason="no report is shipped yet")
+def test_the_shipped_page_is_made_of_the_shipped_episodes(tmp_path):
+    shutil.copy(DOCS / job.EPISODES, tmp_path)
+    page.write_report(tmp_path)
+    assert (tmp_path / "report.md").read_text() == (DOCS / "report.md").read_text()
+
+
+# The pilot
+
+
+def test_the_pilot_s_claims_are_scenarios():
+    every = pilot.claims(20)
+    assert len({(claim.case.name, claim.case.policy) for claim in every}) == len(every) > 100
+    for claim in every:
+        loaded = claim.case.load()
+        assert bool(disturbances(loaded)) == (claim.what != "nothing"), claim.what
+        assert loaded.arrival.ends_episode
+        assert 0 <= claim.claimed <= pilot.CLAIMED_SEEDS
+
+
+def test_verdicts_are_within_one_seed_of_the_pilot_s():
+    assert pilot.verdict(5, 16, 20) == "confirmed"
+    assert pilot.verdict(5, 15, 20) == "corrected"
+    assert pilot.verdict(0, 4, 20) == "confirmed"
+    assert pilot.verdict(0, 5, 20) == "corrected"
+
+
+def test_the_pilot_s_table(tmp_path, monkeypatch):
+    rows = [
+        {"what": "nothing", "scenario": "starter", "claims": [5, "-", "-"]},
+        {"what": "lag", "scenario": "starter", "claims": [5, "-", "-"], "set": {"actuators.yaw_lag_s": 5.0}},
+    ]
+    monkeypatch.setitem(pilot._TOLD, "rows", rows)
+    text, table = (path.read_text() for path in pilot.run(tmp_path, 2, silent))
+    assert "| nothing | bio_inspired_plus | 5/5 | 2/2 | confirmed |" in text
+    assert "| lag | bio_inspired_plus | 5/5 | 0/2 | **corrected** |" in text
+    assert "1 of 2 claims are confirmed" in " ".join(text.split())
+    assert table.count("\n") == 3
