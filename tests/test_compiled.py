@@ -84,6 +84,7 @@ def test_an_edit_compiles_what_uses_it_and_nothing_else(copy, tmp_path):
     assert functions == {
         "motion.integrate",
         "vehicle.advance",
+        "vehicle.advance_lagging",
         "vehicle.derivative",
         "vehicle.acceleration",
         "vehicle.damping",
@@ -92,6 +93,10 @@ def test_an_edit_compiles_what_uses_it_and_nothing_else(copy, tmp_path):
     bounds = run(copy, cache, NUMBA_BOUNDSCHECK="1")
     assert bounds.stdout == edited.stdout
     assert "Compiling" in bounds.stderr, "code without bounds checks was served where they were asked for"
+
+    edit(package / "sim" / "vehicle.py", "import compiled_inline\n", "import compiled, compiled_inline\n")
+    edit(package / "sim" / "vehicle.py", "@compiled_inline\ndef wrap", "@compiled\ndef wrap")
+    assert "Compiling" in run(copy, cache).stderr, "a function that is no longer copied into its callers"
 
 
 def test_broken_files_of_the_cache_are_compiled_anew(copy, tmp_path):

@@ -61,6 +61,20 @@ SEA = {
         {"kind": "member", "share": 0.2, "onset_s": 1.5},
     ],
 }  # fmt: skip
+SONAR = {
+    "latency.travel_time": True, "latency.processing_s": 0.3, "latency.compensated": True,
+    "latency.active_period_s": 0.25, "latency.passive_period_s": 0.5,
+    "noise.bearing_deg": 4.0, "noise.range_m": 0.5, "noise.range_share": 0.03, "noise.passive_range_log_sd": 0.2,
+    "noise.active_r50_m": 80.0, "noise.passive_r50_m": 200.0, "noise.silence_probability": 0.1,
+    "noise.silence_readings": 3, "noise.false_echo_probability": 0.05,
+    "navigation.drift_share": 0.05, "navigation.compass_bias_deg": 5.0,
+    "sonar.channels": ["compass", "link", "age", "ranged"],
+    "faults": [{"kind": "array", "array": "bow", "share": 0.3, "onset_s": 1.0, "duration_s": 1.0}],
+}  # fmt: skip
+RAW = {
+    "latency.travel_time": True, "latency.sound_speed_mps": 150.0, "latency.processing_s": 0.1,
+    "noise.passive_ranges": False, "noise.false_echo_probability": 0.2, "sonar.echo_reports": "surface",
+}  # fmt: skip
 EPISODES = {
     **{name: (name, {"num_vehicles": n}, "") for n, name in enumerate(scenario_names(), 7)},
     "starter": ("starter", {}, "arrival"),
@@ -77,6 +91,9 @@ EPISODES = {
     "overlapping arrays": ("single_obstacle", {"num_vehicles": 7, "overrides": {"sonar.arrays": OVERLAPPING}}, ""),
     "the sea": ("random_field", {"overrides": SEA}, "lost"),
     "the sea, five holds": ("starter", {"overrides": {**SEA, **FINE}}, "lost arrival"),
+    "late and wrong sonar": ("random_field", {"overrides": {**SEA, **SONAR}}, ""),
+    "late and wrong sonar, five holds": ("starter", {"overrides": {**SONAR, **FINE}}, "arrival"),
+    "raw readings at each hold": ("multi_obstacle", {"num_vehicles": 9, "overrides": RAW}, ""),
     "five holds, coupled, damped": ("starter", {"overrides": {**FINE, **COUPLED, **DAMPED}}, "arrival"),
 }  # fmt: skip
 """Scenario, changes, and what must happen beside echoes and contacts."""

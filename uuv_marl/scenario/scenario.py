@@ -186,6 +186,14 @@ def _check_sonar(scenario: Scenario) -> None:
             f"latency.processing_s = {latency.processing_s:g} is {readings:,.0f} control holds; at most {MAX_READINGS} "
             "readings are kept: lower it or raise timing.control_hold_s"
         )
+    longest = max(array.range_m for array in scenario.sonar.arrays)
+    past = longest / latency.sound_speed_mps / scenario.timing.control_hold_s
+    if latency.travel_time and past > MAX_PAST:
+        raise ValueError(
+            f"latency.sound_speed_mps = {latency.sound_speed_mps:g} takes sound {past:,.0f} control holds across the "
+            f"longest range of {longest:g} m; positions of at most {MAX_PAST:,} are kept: raise it or "
+            "timing.control_hold_s, or set latency.travel_time = false"
+        )
 
 
 def _check_faults(scenario: Scenario) -> None:

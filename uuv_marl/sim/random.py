@@ -93,9 +93,10 @@ def normal(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> 
 
 @compiled_inline
 def log(x: float) -> float:
-    """Natural logarithm of a positive, normal number, within 1 ulp: the method of Sun's fdlibm (e_log.c)."""
-    bits = np.float64(x).view(np.int64)
-    share, power = np.int64((bits & _FRACTION) | _ONE_HALF).view(np.float64), (bits >> 52) - 1022
+    """Natural logarithm of a positive, finite number, within 1 ulp: the method of Sun's fdlibm (e_log.c)."""
+    tiny = x < 2.0**-1022
+    bits = np.float64(x * 2.0**54 if tiny else x).view(np.int64)
+    share, power = np.int64((bits & _FRACTION) | _ONE_HALF).view(np.float64), (bits >> 52) - (1076 if tiny else 1022)
     small = share < math.sqrt(0.5)
     f, k = (2.0 * share if small else share) - 1.0, np.float64(power - 1 if small else power)
     s = f / (2.0 + f)

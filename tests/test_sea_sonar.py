@@ -1,0 +1,617 @@
+"""Sonar that is late and wrong, and navigation that drifts: laws, and distributions over 10^5 draws."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, norm
+
+import uuv_marl
+from uuv_marl import load_scenario
+from uuv_marl.errors import ScenarioError
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import hears_ideally
+from uuv_marl.sim.compiled import interpreted
+from uuv_marl.sim.random import log, uniform
+from uuv_marl.sim.sea.noise import gap, is_silent
+from uuv_marl.sim.sea.schedule import Reading, due, hold_of, latest
+from uuv_marl.sim.swarm import Swarm
+
+CHANNELS = {"sonar.channels": ["compass", "link", "age", "ranged"]}
+SONAR = ("heard", "neighbour", "echo", "echo_range", "echo_position", "link_identity")
+LATE = {"latency.processing_s": 0.3}
+CARRIED = {"latency.processing_s": 0.5, "latency.compensated": True}
+PINGS = {"latency.active_period_s": 0.25, "latency.passive_period_s": 0.7}
+TRAVEL = {"latency.travel_time": True, "latency.sound_speed_mps": 100.0}
+BLUR = {"noise.bearing_deg": 5.0, "noise.range_m": 0.5, "noise.range_share": 0.05}
+FACTOR = {"noise.passive_range_log_sd": 0.3}
+BEARINGS = {"noise.passive_ranges": False}
+DETECTION = {"noise.active_r50_m": 40.0, "noise.passive_r50_m": 60.0}
+SILENCE = {"noise.silence_probability": 0.1, "noise.silence_readings": 5}
+FALSE = {"noise.false_echo_probability": 0.1}
+DRIFT = {"navigation.drift_share": 0.1}
+COMPASS = {"navigation.compass_bias_deg": 10.0}
+DEAD = {"faults": [{"kind": "array", "array": "bow", "share": 0.5, "onset_s": 1.0, "duration_s": 1.0}]}
+EVERYTHING = (
+    CARRIED
+    | PINGS
+    | {"latency.travel_time": True}
+    | BLUR
+    | FACTOR
+    | DETECTION
+    | SILENCE
+    | FALSE
+    | DRIFT
+    | COMPASS
+    | DEAD
+)
+HOLD = 0.1
+SIGMAS = 5.0  # no seed misses these
+
+
+def near_obstacles(swarm):
+    """Vehicles on a grid around the first obstacle, at every heading."""
+    n = swarm.num_vehicles
+    for w in range(swarm.num_worlds):
+        rng, (x, y, radius) = np.random.default_rng(w), swarm.course.obstacles[w, 0]
+        angle, away = rng.uniform(-math.pi, math.pi, n), radius + rng.uniform(20.0, 90.0, n)
+        swarm.state.eta[w] = np.stack(
+            [x + away * np.cos(angle), y + away * np.sin(angle), angle + rng.normal(0, 3, n)], 1
+        )
+        swarm.state.eta[w, :, 2] = (swarm.state.eta[w, :, 2] + math.pi) % (2.0 * math.pi) - math.pi
+    swarm.state.before[...] = swarm.state.eta[..., :2]
+    swarm.observe()
+
+
+def swim(overrides, decisions=40, seed=3, num_vehicles=12, scenario="single_obstacle", idle=False):
+    """A run whose actions are the same whatever disturbs it; what is known and true at every decision."""
+    swarm = Swarm(load_scenario(scenario, num_vehicles=num_vehicles, overrides=CHANNELS | overrides))
+    swarm.reset(seed)
+    if swarm.course.num_obstacles[0]:
+        near_obstacles(swarm)
+    rng, frames = np.random.default_rng(7), []
+    for _ in range(decisions + 1):
+        frames.append(frame(swarm))
+        action = rng.uniform(-1.0, 1.0, (1, num_vehicles, 2))
+        swarm.step(0.0 * action if idle else action)
+    return swarm, frames
+
+
+def frame(swarm):
+    percept = swarm.percept
+    known = {name: percept[name][0].copy() for name in percept.names}
+    return known | {
+        "who": swarm.heard[0].copy(),
+        "eta": swarm.state.eta[0].copy(),
+        "l": swarm.facts.reference[0].copy(),
+    }
+
+
+def arrays_of(swarm):
+    """Sub-sectors of each array, and its own among the active ones."""
+    first, active = 0, 0
+    for array in swarm.scenario.sonar.arrays:
+        own = array.sub_sectors if array.kind == "active" else 0
+        yield array, slice(first, first + array.sub_sectors), slice(active, active + own)
+        first, active = first + array.sub_sectors, active + own
+
+
+def in_body(frame, north, east):
+    """Points of the world (vehicle, ...) in each vehicle's body frame."""
+    x, y, psi = (column.reshape(-1, *[1] * (np.ndim(north) - 1)) for column in frame["eta"].T)
+    dx, dy = north - x, east - y
+    return np.stack([np.cos(psi) * dx + np.sin(psi) * dy, np.cos(psi) * dy - np.sin(psi) * dx], -1)
+
+
+def same(ours, theirs, names=SONAR, where=np.s_[:]):
+    for name in names:
+        assert ours[name][where].tobytes() == theirs[name][where].tobytes(), name
+
+
+# --- Off ---
+
+
+def test_readings_that_are_neither_late_nor_wrong_move_no_bit():
+    """A line that carries the truth: a period of one control hold, and silence that never comes."""
+    _, calm = swim({})
+    for overrides in ({"noise.silence_probability": 1e-300}, {"latency.passive_period_s": HOLD}):
+        assert not hears_ideally(load_scenario("starter", overrides=overrides))
+        for ours, theirs in zip(swim(overrides)[1], calm, strict=True):
+            same(ours, theirs, names=ours)
+
+
+def test_what_is_not_the_sonar_s_leaves_the_sonar_ideal():
+    for overrides in ({"current.speed_mps": 1.0}, DRIFT, COMPASS, {"latency.compensated": True}):
+        assert hears_ideally(load_scenario("starter", overrides=overrides))
+    for overrides in (LATE, TRAVEL, PINGS, BLUR, FACTOR, BEARINGS, DETECTION, SILENCE, FALSE, DEAD):
+        assert not hears_ideally(load_scenario("starter", overrides=overrides))
+
+
+# --- Late ---
+
+
+@pytest.mark.parametrize("every", [1.0, 1.5, 2.5, 1.4999999999999998, 1.0 / 0.7, 7.0, 13.37])
+def test_an_array_reads_at_the_control_holds_nearest_to_its_times(every):
+    holds = [math.floor(m * every + 0.5) for m in range(400)]
+    assert [hold_of(m, every) for m in range(400)] == holds
+    for hold in range(int(300 * every)):
+        assert latest(hold, every) == max(m for m in range(400) if holds[m] <= hold)
+        assert due(hold, every, 0, 1) == (holds.index(hold) if hold in holds else -1)
+    assert latest(-1, every) == -1
+
+
+@pytest.mark.parametrize(("every", "delay", "holds"), [*itertools.product([1.0, 2.5, 7.0], [0, 1, 3, 20], [1, 5])])
+def test_the_readings_taken_are_those_that_a_decision_sees(every, delay, holds):
+    seen = {latest(decision - delay, every) for decision in range(0, 600, holds)} - {-1}
+    taken = {due(hold, every, delay, holds) for hold in range(600)} - {-1}
+    assert {m for m in seen if hold_of(m, every) < 500} == {m for m in taken if hold_of(m, every) < 500}
+
+
+@pytest.mark.parametrize(
+    "overrides", [LATE, {"latency.processing_s": 0.25}, PINGS, LATE | PINGS, {"latency.processing_s": 2.0}]
+)
+def test_a_late_reading_is_the_past_and_knows_its_age(overrides):
+    swarm, late = swim(overrides)
+    _, ideal = swim({})
+    latency = swarm.scenario.latency
+    delay, heard = math.ceil(latency.processing_s / HOLD - 1e-9), 0
+    for t, known in enumerate(late):
+        for array, sectors, active in arrays_of(swarm):
+            period = latency.active_period_s if array.kind == "active" else latency.passive_period_s
+            every = max(period / HOLD, 1.0)
+            readings = [hold for hold in (math.floor(m * every + 0.5) for m in range(t + 2)) if hold <= t - delay]
+            np.testing.assert_allclose(known["age"][:, sectors], HOLD * (t - max(readings, default=0)), rtol=1e-6)
+            for names, where in ((("heard", "neighbour", "link_identity", "who"), sectors), (SONAR[2:5], active)):
+                if readings:
+                    same(known, ideal[max(readings)], names, np.s_[:, where])
+                    heard += int((known[names[0]][:, where] > 0).sum())
+                else:
+                    assert not any((known[name][:, where] > 0).any() for name in names)
+    assert heard > 1000
+
+
+def test_a_delay_of_one_long_decision_shows_the_decision_before():
+    long = {"timing.decision_period_s": 0.5}
+    _, late = swim(long | {"latency.processing_s": 0.5})
+    for before, after in itertools.pairwise(zip(late, swim(long)[1], strict=True)):
+        same(after[0], before[1])
+        np.testing.assert_array_equal(after[0]["age"], np.float32(0.5))
+
+
+@pytest.mark.parametrize("reports", ["centre", "surface"])
+def test_a_carried_echo_is_where_the_obstacle_is(reports):
+    """Obstacles stand still, and own motion is known, so that only rounding is left."""
+    swarm, frames = swim(CARRIED | {"sonar.echo_reports": reports})
+    _, ideal = swim({"sonar.echo_reports": reports})
+    x, y, _ = swarm.course.obstacles[0, 0]
+    for t in range(5, len(frames)):
+        now, then, seen = frames[t], ideal[t - 5], frames[t]["echo"] > 0
+        np.testing.assert_array_equal(now["echo"], then["echo"])
+        if reports == "centre":
+            points = np.broadcast_to(in_body(now, x, y)[:, None], now["echo_position"].shape)
+        else:
+            c, s = np.cos(then["eta"][:, 2, None]), np.sin(then["eta"][:, 2, None])
+            ahead, abeam = np.moveaxis(then["echo_position"].astype(float), -1, 0)
+            north, east = (
+                then["eta"][:, k, None] + part for k, part in enumerate((c * ahead - s * abeam, s * ahead + c * abeam))
+            )
+            points = in_body(now, north, east)
+        np.testing.assert_allclose(now["echo_position"][seen], points[seen], atol=1e-4)
+        moved = np.hypot(*np.moveaxis(points, -1, 0)) - np.hypot(*np.moveaxis(then["echo_position"], -1, 0))
+        np.testing.assert_allclose(now["echo_range"][seen], (then["echo_range"] + moved)[seen], atol=1e-3)
+    assert sum((f["echo"] > 0).sum() for f in frames) > 200
+
+
+def test_a_carried_neighbour_is_where_it_was():
+    """Its own motion since is unknown: its place in the world at reception, from the present pose."""
+    _, frames = swim(CARRIED)
+    for t in range(5, len(frames)):
+        now, then = frames[t], frames[t - 5]
+        i, k = np.nonzero(now["heard"])
+        j = now["who"][i, k]
+        np.testing.assert_allclose(
+            now["neighbour"][i, k], in_body(now, then["eta"][None, :, 0], then["eta"][None, :, 1])[i, j], atol=1e-4
+        )
+
+
+def test_sound_shows_vehicles_where_they_were():
+    """R / c before, between control holds on the line between them, and before the reset where they stood."""
+    _, frames = swim(TRAVEL)
+    for t, now in enumerate(frames):
+        i, k = np.nonzero(now["heard"])
+        j = now["who"][i, k]
+        ago = np.hypot(*(now["eta"][i, :2] - now["eta"][j, :2]).T) / (100.0 * HOLD)
+        whole = ago.astype(int)
+        places = [
+            np.stack([frames[max(t - m, 0)]["eta"][n, :2] for m, n in zip(whole + later, j, strict=True)])
+            for later in (0, 1)
+        ]
+        was = places[0] + (ago - whole)[:, None] * (places[1] - places[0])
+        x, y, psi = now["eta"][i].T
+        dx, dy = was[:, 0] - x, was[:, 1] - y
+        expected = np.stack([np.cos(psi) * dx + np.sin(psi) * dy, np.cos(psi) * dy - np.sin(psi) * dx], 1)
+        np.testing.assert_allclose(now["neighbour"][i, k], expected, atol=1e-3)
+    _, ideal = swim({})
+    same(frames[-1], ideal[-1], ("heard", "echo", "echo_range", "echo_position", "who"))
+    assert np.abs(frames[-1]["neighbour"] - ideal[-1]["neighbour"]).max() > 0.5
+
+
+# --- Wrong ---
+
+
+def polar(points):
+    points = points.astype(np.float64)
+    return np.hypot(points[..., 0], points[..., 1]), np.arctan2(points[..., 1], points[..., 0])
+
+
+def pairs(overrides, field, flag):
+    """Positions as heard and as they are, where both are heard, of vehicles that come to rest; some 10^5."""
+    decisions = 300 if flag == "heard" else 1700
+    runs = (swim(change, decisions, num_vehicles=54, idle=True)[1] for change in (overrides, {}))
+    both = [(a[field], b[field], (a[flag] > 0) & (b[flag] > 0)) for a, b in zip(*runs, strict=True)]
+    return tuple(np.concatenate([pair[part][pair[2]] for pair in both]) for part in range(2))
+
+
+def is_normal(values, num):
+    """Mean, deviation and shape of a standard normal sample of at least this size."""
+    assert len(values) >= num
+    assert abs(values.mean()) < SIGMAS / math.sqrt(len(values))
+    assert abs(values.std() - 1.0) < SIGMAS / math.sqrt(2.0 * len(values))
+    assert kstest(values, "norm").pvalue > 1e-6
+
+
+@pytest.mark.parametrize(("field", "flag", "num"), [("neighbour", "heard", 100_000), ("echo_position", "echo", 90_000)])
+def test_bearings_and_ranges_are_off_as_stated(field, flag, num):
+    heard, true = pairs(BLUR, field, flag)
+    (away, bearing), (r, psi) = polar(heard), polar(true)
+    turn = np.remainder(bearing - psi + math.pi, 2.0 * math.pi) - math.pi
+    reach = r if flag == "heard" else pairs(BLUR, "echo_range", "echo")[1].astype(float)
+    far = reach > 20.0  # where no range falls below 0
+    is_normal(turn[far] / math.radians(5.0), num)
+    is_normal(((away - r) / (0.5 + 0.05 * reach))[far], num)
+
+
+def test_an_echo_s_position_moves_as_far_as_its_range():
+    heard, true = pairs(BLUR, "echo_position", "echo")
+    reach, truth = pairs(BLUR, "echo_range", "echo")
+    np.testing.assert_allclose(polar(heard)[0] - polar(true)[0], reach.astype(float) - truth, atol=1e-3)
+
+
+def test_a_passive_range_has_a_factor_that_lasts():
+    swarm, wrong = swim(FACTOR)
+    _, true = swim({})
+    factor = swarm._sea.ears.factor[0]
+    for ours, theirs in zip(wrong, true, strict=True):
+        same(ours, theirs, ("heard", "echo", "echo_range", "echo_position", "who"))
+        for array, sectors, _ in arrays_of(swarm):
+            scale = factor[:, None, None] if array.kind == "passive" else 1.0
+            np.testing.assert_allclose(
+                ours["neighbour"][:, sectors], scale * theirs["neighbour"][:, sectors], rtol=1e-5
+            )
+    drawn = Swarm(load_scenario("single_obstacle", overrides=FACTOR), 200)
+    drawn.reset(0)
+    is_normal(np.log(drawn._sea.ears.factor.ravel()) / 0.3, 10_000)
+
+
+def test_bearings_alone():
+    swarm, frames = swim(BEARINGS | {"noise.nominal_range_m": 30.0})
+    _, ideal = swim({})
+    for ours, theirs in zip(frames, ideal, strict=True):
+        for array, sectors, _ in arrays_of(swarm):
+            passive, heard = array.kind == "passive", ours["heard"][:, sectors] > 0
+            np.testing.assert_array_equal(ours["ranged"][:, sectors], 0.0 if passive else 1.0)
+            (away, bearing), (r, psi) = (polar(f["neighbour"][:, sectors][heard]) for f in (ours, theirs))
+            np.testing.assert_allclose(bearing, psi, atol=1e-6)
+            np.testing.assert_allclose(away, 30.0 if passive else r, rtol=1e-6)
+        assert (theirs["ranged"] == 1.0).all()
+
+
+def test_detection_falls_with_range_as_stated():
+    swarm, heard = swim(DETECTION, 300, num_vehicles=54, idle=True)
+    _, there = swim({}, 300, num_vehicles=54, idle=True)
+    counted = 0
+    for array, sectors, active in arrays_of(swarm):
+        spreading, half = (40.0, 40.0) if array.kind == "active" else (20.0, 60.0)
+        for flag, where in (("heard", sectors), ("echo", active)):
+            present = np.concatenate([f[flag][:, where] > 0 for f in there])
+            r = np.concatenate(
+                [f["echo_range"][:, where] if flag == "echo" else polar(f["neighbour"][:, where])[0] for f in there]
+            )
+            chance, found = (
+                norm.cdf(spreading * np.log10(half / r[present]) / 6.0),
+                np.concatenate([f[flag][:, where] for f in heard]),
+            )
+            assert not (found[~present] > 0).any()
+            for low, high in itertools.pairwise(np.quantile(r[present], np.linspace(0, 1, 6)) if present.any() else []):
+                inside = (r[present] >= low) & (r[present] <= high)
+                spread = math.sqrt((chance * (1.0 - chance))[inside].sum()) + 1.0
+                assert abs((found[present] - chance)[inside].sum()) < SIGMAS * spread
+            counted += present.sum()
+    assert counted > 100_000
+
+
+@pytest.mark.parametrize(("probability", "length"), [(0.3, 20), (0.05, 5), (0.1, 1), (1.0, 3)])
+def test_silence_begins_as_often_and_lasts_as_long_as_stated(probability, length):
+    swarm = Swarm(
+        load_scenario(
+            "starter",
+            num_vehicles=1,
+            overrides={"noise.silence_probability": probability, "noise.silence_readings": length},
+        )
+    )
+    swarm.reset(0)
+    sea, num = swarm._sea, 100_000
+    silent = np.array([
+        interpreted(is_silent)(Reading(0, 1, m, m, 0), 0, sea.keys[0], sea.noise, sea.ears) for m in range(num)
+    ])  # fmt: skip
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], silent, [0]])))
+    assert ((edges[1::2] - edges[::2])[:-1] % length == 0).all()
+    bursts = silent.sum() / length
+    chances = num - silent.sum() + bursts  # readings at which a silence could begin
+    assert abs(bursts - probability * chances) <= SIGMAS * math.sqrt(probability * (1.0 - probability) * chances) + 1.0
+
+
+def test_a_silent_array_hears_nothing_and_others_hear_all():
+    swarm, frames = swim(SILENCE, 200)
+    _, ideal = swim({}, 200)
+    quiet = []
+    for ours, theirs in zip(frames, ideal, strict=True):
+        for _, sectors, active in arrays_of(swarm):
+            for i in range(12):
+                mine = np.concatenate([ours["heard"][i, sectors], ours["echo"][i, active]])
+                full = np.concatenate([theirs["heard"][i, sectors], theirs["echo"][i, active]])
+                assert not mine.any() or (mine == full).all()
+                quiet += [not mine.any()] if full.any() else []
+    assert (
+        abs(np.mean(quiet) - 0.5 / 1.4) < 0.06
+    )  # p L / (p L + 1 - p); the readings of a burst are no draws of their own
+
+
+@pytest.mark.parametrize("probability", [0.02, 0.2])
+def test_false_echoes_have_their_rate_and_fill_their_sub_sectors(probability):
+    swarm = Swarm(
+        load_scenario(
+            "starter",
+            num_vehicles=1,
+            overrides=CHANNELS | {"obstacles": [], "noise.false_echo_probability": probability},
+        )
+    )
+    swarm.reset(0)
+    frames = []
+    for _ in range(5000):
+        swarm.step(np.zeros((1, 1, 2)))
+        frames.append(frame(swarm))
+    for array, sectors, active in arrays_of(swarm):
+        echoes = array.kind == "active"
+        flag, field, where = ("echo", "echo_position", active) if echoes else ("heard", "neighbour", sectors)
+        found = np.concatenate([f[flag][:, where] for f in frames]) > 0
+        spread = math.sqrt(probability * (1.0 - probability) * found.size)
+        assert abs(found.sum() - probability * found.size) < SIGMAS * spread
+        assert (np.abs(found.sum(0) - found.sum() / 7) < SIGMAS * spread / math.sqrt(7)).all()
+        away, bearing = polar(np.concatenate([f[field][:, where] for f in frames]))
+        assert kstest(away[found] / array.range_m, "uniform").pvalue > 1e-6
+        edge = math.radians(array.mounting_deg - array.aperture_deg / 2)
+        share = np.remainder(bearing - edge, 2.0 * math.pi) / math.radians(array.aperture_deg) * 7 - np.arange(7)
+        assert kstest(share[found], "uniform").pvalue > 1e-6
+        if echoes:
+            np.testing.assert_allclose(np.concatenate([f["echo_range"] for f in frames])[found], away[found], rtol=1e-5)
+            assert not any(f["heard"][:, sectors].any() for f in frames)
+    assert all((f["who"] == -1).all() and not f["link_identity"].any() for f in frames)
+
+
+def test_a_false_echo_is_heard_only_where_nothing_is_nearer():
+    _, ours = swim(FALSE)
+    _, theirs = swim({})
+    phantoms = 0
+    for false, true in zip(ours, theirs, strict=True):
+        for flag, reach in (
+            ("heard", polar(true["neighbour"])[0] - polar(false["neighbour"])[0]),
+            ("echo", true["echo_range"] - false["echo_range"]),
+        ):
+            there, changed = true[flag] > 0, reach != 0.0
+            assert (false[flag][there] > 0).all()
+            assert (reach[there] >= 0.0).all()
+            phantoms += (there & changed).sum()
+        stays = (true["heard"] > 0) & (false["who"] >= 0)
+        np.testing.assert_array_equal(false["neighbour"][stays], true["neighbour"][stays])
+    assert phantoms > 20
+
+
+@pytest.mark.parametrize("probability", [0.0, 1e-300, 1e-17, 1e-9, 0.5, 1.0])
+@pytest.mark.parametrize("chance", [0.0, 0.5, 1.0 - 2.0**-53])
+def test_waiting_for_what_may_never_come(probability, chance):
+    wait = gap(chance, probability)
+    assert 0 <= wait <= 2**40
+    assert wait == (0 if probability == 1.0 else wait)
+    if probability < 1e-16:
+        assert wait == 2**40
+
+
+def test_waiting_times_are_geometric():
+    waits = np.array([gap(uniform(np.uint64(5), 1, t, 0, 0), 0.2) for t in range(100_000)])
+    for k in range(10):
+        share = 0.8**k * 0.2
+        assert abs((waits == k).mean() - share) < SIGMAS * math.sqrt(share * (1.0 - share) / len(waits))
+    assert log(math.e) == pytest.approx(1.0)
+
+
+def test_a_dead_array_hears_nothing_while_it_is_dead():
+    swarm, frames = swim(DEAD | FALSE)
+    _, others = swim(FALSE)
+    hit = {i for i in range(12) if swarm._sea.hull.broken[0, i, 0, 0] < 2**62}
+    assert len(hit) == 6
+    for t, (ours, theirs) in enumerate(zip(frames, others, strict=True)):
+        for i in range(12):
+            dead = i in hit and 10 <= t < 20
+            same(ours, theirs, ("heard", "neighbour", "who"), np.s_[i, 7:])
+            if dead:
+                assert not any(ours[name][i].any() for name in SONAR[2:5])
+                assert not ours["heard"][i, :7].any()
+            else:
+                same(ours, theirs, where=np.s_[i])
+
+
+# --- Draws ---
+
+
+@pytest.mark.parametrize(
+    "other", [DETECTION, SILENCE, DRIFT, COMPASS, DEAD, {"current.variation_mps": 0.0, "current.velocity": "water"}]
+)
+def test_one_disturbance_moves_no_draw_of_bearings_and_ranges(other):
+    alone, among = (swim(BLUR | FACTOR | change)[1] for change in ({}, other))
+    for flag, field in (("heard", "neighbour"), ("echo", "echo_position")):
+        both = [((a[flag] > 0) & (b[flag] > 0), a[field], b[field]) for a, b in zip(alone, among, strict=True)]
+        assert sum(mask.sum() for mask, *_ in both) > 20
+        for mask, ours, theirs in both:
+            assert ours[mask].tobytes() == theirs[mask].tobytes()
+
+
+@pytest.mark.parametrize("other", [BLUR, FACTOR, BEARINGS, DRIFT, COMPASS])
+@pytest.mark.parametrize("own", [DETECTION, SILENCE, DEAD])
+def test_one_disturbance_moves_no_draw_of_what_is_missed(own, other):
+    for ours, theirs in zip(swim(own)[1], swim(own | other)[1], strict=True):
+        same(ours, theirs, ("heard", "echo", "who"))
+
+
+def test_false_echoes_stay_where_they_are_beside_others():
+    _, alone = swim(FALSE)
+    _, among = swim(FALSE | DETECTION | FACTOR)
+    for ours, theirs in zip(alone, among, strict=True):
+        phantom = (ours["heard"] > 0) & (ours["who"] < 0) & (theirs["heard"] > 0) & (theirs["who"] < 0)
+        assert ours["neighbour"][phantom].tobytes() == theirs["neighbour"][phantom].tobytes()
+
+
+# --- Navigation ---
+
+
+def test_position_drifts_by_a_share_of_the_way():
+    _, frames = swim(DRIFT, 100, scenario="tracking")
+    way = np.zeros(12)
+    for before, now in itertools.pairwise(frames):
+        way += np.hypot(*(now["eta"][:, :2] - before["eta"][:, :2]).T)
+        c, s = np.cos(now["eta"][:, 2]), np.sin(now["eta"][:, 2])
+        ahead, abeam = now["reference"].astype(float).T
+        off = now["l"][:2] - np.stack([c * ahead - s * abeam, s * ahead + c * abeam], 1) - now["eta"][:, :2]
+        np.testing.assert_allclose(np.hypot(*off.T), 0.1 * way, atol=1e-3)
+        direction = off / np.hypot(*off.T)[:, None]
+        np.testing.assert_allclose(now["compass"], np.stack([c, s], 1), atol=1e-6)
+    _, calm = swim({}, 100, scenario="tracking")
+    same(frames[-1], calm[-1], [name for name in calm[-1] if name != "reference"])
+    assert np.ptp(direction, axis=0).min() > 0.5
+
+
+def test_a_compass_is_off_by_the_same_angle_all_the_time():
+    _, frames = swim(COMPASS, 50)
+    _, calm = swim({}, 50)
+    angles = []
+    for ours, theirs in zip(frames, calm, strict=True):
+        true, known = (f["compass"].astype(float) @ [1, 1j] for f in (theirs, ours))
+        bias = known / true
+        angles.append(np.angle(bias))
+        for name in ("reference", "reference_velocity"):
+            expected = theirs[name].astype(float) @ [1, 1j] / bias
+            np.testing.assert_allclose(ours[name].astype(float) @ [1, 1j], expected, atol=1e-4)
+        same(ours, theirs)
+    np.testing.assert_allclose(angles, np.broadcast_to(angles[0], np.shape(angles)), atol=1e-6)
+    drawn = Swarm(load_scenario("single_obstacle", overrides=COMPASS), 200)
+    drawn.reset(0)
+    is_normal(np.arctan2(*np.moveaxis(drawn._sea.track.bias, -1, 0)[::-1]).ravel() / math.radians(10.0), 10_000)
+
+
+def test_drift_carries_late_readings_along():
+    """Own way is known as navigation has it: readings are carried too far or not far enough, by what drifted since."""
+    _, frames = swim(CARRIED | DRIFT, 60)
+    _, true = swim(CARRIED, 60)
+    way = [np.zeros(12)]
+    for before, now in itertools.pairwise(true):
+        way.append(way[-1] + np.hypot(*(now["eta"][:, :2] - before["eta"][:, :2]).T))
+    for t in range(5, 61):
+        i, k = np.nonzero(frames[t]["heard"])
+        moved = np.hypot(*(frames[t]["neighbour"].astype(float) - true[t]["neighbour"])[i, k].T)
+        np.testing.assert_allclose(moved, 0.1 * (way[t] - way[t - 5])[i], atol=1e-4)
+
+
+# --- Everything ---
+
+
+def test_a_snapshot_resumes_bit_for_bit():
+    swarm, _ = swim(EVERYTHING)
+    kept, other = swarm.snapshot(), Swarm(swarm.scenario)
+    other.reset(99)
+    other.restore(kept)
+    for each in (swarm, other):
+        for _ in range(30):
+            each.step(np.full((1, 12, 2), 0.4))
+    for name, array in swarm.snapshot().items():
+        assert array.tobytes() == other.snapshot()[name].tobytes(), name
+
+
+def test_a_world_depends_on_its_seed_alone():
+    scenario, rng = (
+        load_scenario("random_field", num_vehicles=5, overrides=CHANNELS | EVERYTHING),
+        np.random.default_rng(0),
+    )
+    batch, actions = Swarm(scenario, 3), rng.uniform(-1, 1, (40, 3, 5, 2))
+    batch.reset([4, 5, 6])
+    for action in actions:
+        batch.step(action)
+    for w, seed in enumerate((4, 5, 6)):
+        alone = Swarm(scenario)
+        alone.reset(seed)
+        for action in actions:
+            alone.step(action[w : w + 1])
+        for name, array in alone.snapshot().items():
+            if name != "streams":
+                assert array[0].tobytes() == batch.snapshot()[name][w].tobytes(), name
+
+
+HARSH = {
+    "noise.range_share": 1.0, "noise.range_m": 1e6, "noise.passive_range_log_sd": 3.0, "noise.bearing_deg": 180.0,
+    "noise.false_echo_probability": 1.0, "latency.compensated": True, "latency.processing_s": 2.0,
+    "navigation.drift_share": 1.0, "navigation.compass_bias_deg": 180.0,
+}  # fmt: skip
+FAR = {"noise.silence_probability": 1.0, "noise.nominal_range_m": 4096.0, "noise.passive_ranges": False}
+
+
+@pytest.mark.parametrize("harsh", [EVERYTHING, HARSH, FAR])
+def test_observations_stay_within_their_space(harsh):
+    env = uuv_marl.parallel_env(load_scenario("single_obstacle", num_vehicles=5, overrides=CHANNELS | harsh))
+    observations, _ = env.reset(seed=0)
+    space = env.observation_space("uuv_0")
+    for _ in range(200):
+        assert all(space.contains(observation) for observation in observations.values())
+        observations, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+
+
+SHORT = {"timing.control_hold_s": 0.001, "timing.integration_step_s": 0.001}
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"latency.active_period_s": 0.1}, r"active_period_s must be at least 0.1333.*of 100 m, or 0.*got 0.1"),
+        ({"latency.processing_s": 2.5}, "processing_s must lie within 0 to 2, got 2.5"),
+        ({"latency.processing_s": 1.0, **SHORT}, "processing_s = 1 is 1,000 control holds; at most 64"),
+        ({**TRAVEL, **SHORT}, r"sound 5,000 control holds.*500 m.*1,024"),
+        ({"noise.silence_probability": 1.5}, "silence_probability must lie within 0 to 1, got 1.5"),
+    ],
+)
+def test_what_can_t_be_meant_is_refused(overrides, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("starter", overrides=overrides)
+
+
+def test_a_forged_line_is_refused():
+    swarm, _ = swim(EVERYTHING, 3)
+    kept = swarm.snapshot()
+    kept["whom"][:] = 12
+    with pytest.raises(ValueError, match="whom must lie within -3 and 11"):
+        swarm.restore(kept)
+
+
+def test_percepts_from_observations_hold_the_channels():
+    swarm, frames = swim(EVERYTHING, 30)
+    back = Percept.from_observation(swarm.percept.to_observation(), swarm.layout)
+    np.testing.assert_array_equal(back["age"], swarm.percept["age"])
+    assert len(np.unique(frames[-1]["age"])) == 2
