@@ -28,8 +28,8 @@ _HEAD = """# The pilot's findings, confirmed or corrected
 Before the package had currents, late sonar or faults, a pilot corrupted percepts and actions from outside, on 5 seeds.
 Here the simulation itself does it, on {seeds}. **Success** in this table is the pilot's: the swarm arrives and nobody
 touches anything. A cell shows the pilot's seeds that succeed, then ours. Where the two shares differ by at most
-{near:.0%}, one seed of the pilot's, a claim is confirmed; else it is corrected, and bold. {confirmed} of {claims} claims
-are confirmed. Scenario: `single_obstacle` as it is, unless the row says otherwise.
+{near:.0%}, one seed of the pilot's, a claim is confirmed; else it is corrected, and bold. {confirmed} of {claims} are
+confirmed. Scenario: `single_obstacle` as it is, unless the row says otherwise.
 
 """
 
