@@ -67,7 +67,7 @@ def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, f
     """Send and receive what is due at the end of a control hold, whose number is already counted.
 
     Args:
-        w: the world.
+        w: index of the world.
         key: of its episode.
         world: its arrays.
         numbers: the scenario's messages.
@@ -94,7 +94,7 @@ def know_mail(w: int, world: World, mail: Mail, more: SeaFields) -> None:
     """Write, for each sub-sector, what the vehicle heard in it last said.
 
     Args:
-        w: the world.
+        w: index of the world.
         world: its arrays, with whom each vehicle hears.
         mail: what arrived.
         more: fields of the percepts, which are written.
