@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from uuv_marl.sim.compiled import compiled, compiled_inline
+from uuv_marl.sim.compiled import compiled_inline
 
 _LN2_HIGH, _LN2_LOW, _ONE_OVER_LN2 = 6.93147180369123816490e-01, 1.90821492927058770002e-10, 1.44269504088896338700
 _P1, _P2, _P3 = 1.66666666666666019037e-01, -2.77777777770155933842e-03, 6.61375632143793436117e-05
@@ -27,9 +27,9 @@ def exp(x: float) -> float:
     return (1.0 - ((low - (rest * c) / (2.0 - c)) - high)) * two_to_power if x >= -700.0 else 0.0
 
 
-@compiled
+@compiled_inline
 def decay_mean(x: float) -> float:
     """(1 - e^-x) / x for x >= 0: the mean of e^-t over t from 0 to x; 1 at 0."""
-    if x < 1e-3:  # where the difference would cancel; the next term is below 1e-17
-        return 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
-    return (1.0 - exp(-x)) / x
+    series = 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))  # the next term is below 1e-17
+    small = x < 1e-3  # where the difference would cancel
+    return series if small else (1.0 - exp(-x)) / (1.0 if small else x)

@@ -157,6 +157,14 @@ def gather(box: Box, cells: Cells, grid: Grid, ear: Listener) -> int:
 
 
 @compiled_inline
+def hear_nobody(ear: Listener) -> None:
+    """Fill the listener with silence."""
+    ear.heard[:] = -1
+    ear.kept_ahead[:] = 0.0
+    ear.kept_abeam[:] = 0.0
+
+
+@compiled_inline
 def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
     """Whom one vehicle hears: those around it, then farther out where a sub-sector is empty.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled, compiled_inner, compiled_parallel
-from uuv_marl.sim.hearing import hear
+from uuv_marl.sim.hearing import hear, hear_nobody
 from uuv_marl.sim.model import Model, Rules
 from uuv_marl.sim.motion import apply_actuators, integrate, load, load_action, load_one
 from uuv_marl.sim.perception import write_percept
@@ -169,7 +169,7 @@ def check_arrival(w: int, world: World, rules: Rules) -> None:
 
 
 @compiled_inner
-def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> None:
+def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Grid, listens: bool) -> None:
     """What the living hear, and everybody's percept.
 
     Args:
@@ -178,6 +178,7 @@ def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Gri
         model: the scenario's numbers.
         workspace: with the living sorted into its cells.
         grid: where the cells lie.
+        listens: False where earlier readings stand, so that nobody need listen now.
     """
     state, senses, now = world.state, world.senses, workspace.now
     see = fields(senses.percept, model.at)
@@ -188,7 +189,10 @@ def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Gri
             senses.heard[w, i] = -1
             senses.percept[w, i] = 0.0
     for p in range(grid.living):
-        hear(p, w, world.course, model.suite, workspace, grid)
+        if listens:
+            hear(p, w, world.course, model.suite, workspace, grid)
+        else:
+            hear_nobody(workspace.listener)
         i = workspace.cells.vehicle[p]
         for k in range(model.suite.lower.shape[0]):
             senses.heard[w, i, k] = workspace.listener.heard[k]
@@ -228,7 +232,7 @@ def observe_one(w: int, world: World, model: Model, own: Workspace, sea: Sea | N
     grid = sort_into_cells(w, world, model, own)
     measure(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
-    perceive(w, world, model, own, grid)
+    perceive(w, world, model, own, grid, True)
     if sea is not None:
         begin(w, world, sea)
         take_readings(w, world, sea, fields(world.senses.percept, model.at))
@@ -313,8 +317,9 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
         grid = step_hold(w, hold == 0, world, model, workspace, sea)
         if sea is not None:
             drift(w, world, sea)
-        if hold == holds - 1 or (sea is not None and reads(w, world.state.tick[w], sea)):
-            perceive(w, world, model, workspace, grid)
+        due = sea is not None and reads(w, world.state.tick[w], sea)
+        if due or hold == holds - 1:
+            perceive(w, world, model, workspace, grid, due or sea is None or sea.listening.ideal)
             if sea is not None:
                 take_readings(w, world, sea, fields(world.senses.percept, model.at))
     facts.saturated[w] /= max(num_alive * holds, 1)

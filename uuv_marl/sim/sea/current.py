@@ -15,7 +15,7 @@ from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sea import AROUND_M
 from uuv_marl.sim.arrays import State, World
-from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.random import normals, uniform, uniforms
@@ -124,7 +124,7 @@ def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, wa
             flow.eddies[w, k, 2] = sign * water.circulation
 
 
-@compiled
+@compiled_inline
 def eddy_flow(dx: float, dy: float, circulation: float, core: float) -> tuple[float, float]:
     """Velocity, north and east [m/s], around a Lamb-Oseen vortex.
 
@@ -186,8 +186,15 @@ def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
         water: the scenario's numbers.
         flow: the current of all worlds; ``flow`` is written.
     """
+    everywhere = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
     for i in range(state.eta.shape[1]):
-        flow.flow[w, i, 0], flow.flow[w, i, 1] = flow_at(w, state.eta[w, i, 0], state.eta[w, i, 1], water.core, flow)
+        flow.flow[w, i, 0], flow.flow[w, i, 1] = everywhere
+    for k in range(flow.eddies.shape[1]):  # as flow_at, but eddy by eddy, on vector registers
+        x, y, circulation = flow.eddies[w, k, 0], flow.eddies[w, k, 1], flow.eddies[w, k, 2]
+        for i in range(state.eta.shape[1] if circulation != 0.0 else 0):
+            north, east = eddy_flow(state.eta[w, i, 0] - x, state.eta[w, i, 1] - y, circulation, water.core)
+            flow.flow[w, i, 0] += north
+            flow.flow[w, i, 1] += east
 
 
 @compiled
