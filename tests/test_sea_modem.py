@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import Policy, granted, make
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
+from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -110,3 +112,20 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
         paths.append(swarm.state.eta[0, :, :2].copy())
     assert np.abs(paths[0] - paths[1]).max() < 3.0  # the first message comes a decision late
     assert (paths[0] != paths[1]).any()
+
+
+def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
+    """Not for one that asks for both, nor for an actor that was trained on the link."""
+    sea = load_scenario("starter", overrides={"sonar.channels": ["link", "modem"]})
+    assert granted("sff", sea).sonar.channels == ("modem",)
+    assert granted("tests.test_sea_modem:Both", sea).sonar.channels == ("link", "modem")
+    linked = load_scenario("starter", overrides={"sonar.channels": ["link"]})
+    card = Card(percept=rows_of(PerceptLayout.of(linked)), channels=("link",))
+    save_checkpoint(tmp_path / WEIGHTS_FILE, card, [Layer(np.zeros((123, 2), np.float32), np.zeros(2, np.float32))])
+    assert granted(str(tmp_path), sea).sonar.channels == ("link",)
+
+
+class Both(Policy):
+    """Compares what it is told with what is true."""
+
+    channels = ("link", "modem")
