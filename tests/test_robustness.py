@@ -283,7 +283,7 @@ def test_the_pilot_s_table(tmp_path, monkeypatch):
     ]
     monkeypatch.setitem(pilot._TOLD, "rows", rows)
     text, table = (path.read_text() for path in pilot.run(tmp_path, 2, silent))
-    assert "| nothing | bio_inspired_plus | 5/5 | 2/2 | confirmed |" in text
-    assert "| lag | bio_inspired_plus | 5/5 | 0/2 | **corrected** |" in text
+    assert "| nothing | 5/5; 2/2 |" in text
+    assert "| lag | **5/5; 0/2** |" in text
     assert "1 of 2 claims are confirmed" in " ".join(text.split())
     assert table.count("\n") == 3

@@ -64,7 +64,14 @@ def contacts(time_s: Float32, began: Int32, clearance: Float32, position: Float3
 
 
 def _partner(i: int, left: Int32, position: Float32, touch_m: float) -> int | None:
-    """Whom vehicle i hit between two samples: of those with contacts ``left`` who were apart from it, the nearest."""
+    """Whom a vehicle hit between two samples: the nearest of those with contacts left, first of those apart before.
+
+    Args:
+        i: index of the vehicle.
+        left: contacts of each vehicle that have no event yet, shape (vehicle,).
+        position: at the two samples, north and east [m], shape (2, vehicle, 2).
+        touch_m: distance of two centres below which they are in contact [m].
+    """
     before, now = np.hypot(*np.moveaxis(position - position[:, i : i + 1], -1, 0))
     others = np.flatnonzero((left > 0) & (np.arange(len(left)) != i)).tolist()
     return min(others, key=lambda j: (before[j] < touch_m, now[j]), default=None)

@@ -99,7 +99,14 @@ def from_folder(folder: str | Path, scenario: str | None, policy: str | None, se
 
 
 def _chosen(folder: str | Path, option: str, wanted: str | None, held: set[str]) -> str:
-    """What is wanted, or the only one that is held."""
+    """What is wanted, or the only one that is held.
+
+    Args:
+        folder: the benchmark's, for the message.
+        option: with which one chooses, for the message.
+        wanted: the name; None for the only one.
+        held: the names that there are.
+    """
     if wanted in held:
         return wanted
     if wanted is None and len(held) == 1:
@@ -115,6 +122,15 @@ def _listed(held: Iterable[Any]) -> str:
 
 
 def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics) -> Recording:
+    """The recording of one run.
+
+    Args:
+        saved: the benchmark's folder and results.
+        name: of the scenario.
+        policy: its name.
+        seed: of the run.
+        metrics: of the run.
+    """
     path, scenario = trace_path(saved.folder, name, policy, seed), _scenario(saved, name, policy)
     trace = load_trace(path)
     if not any(array.startswith("route_") for array in trace):

@@ -89,7 +89,19 @@ def _check_damping(p: Vehicle) -> None:
 
 
 def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float) -> None:
-    """Runge-Kutta follows the fastest motion, by its damping rate and in a trial."""
+    """Refuse an integration step with which Runge-Kutta can't follow the fastest motion.
+
+    That is judged by the motion's damping rate, and in a trial.
+
+    Args:
+        p: inertia and damping.
+        limits: of thrust and torque.
+        timing: the control hold and the integration step.
+        speed_mps: the highest surge speed at the start [m/s].
+
+    Raises:
+        ValueError: names the field, the value and the remedy.
+    """
     rate = _damping_rate(p, limits, speed_mps)
 
     def fails(step_s: float) -> bool:
@@ -117,7 +129,14 @@ def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
 
 @lru_cache(maxsize=1024)
 def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -> bool:
-    """Whether Runge-Kutta at this step runs away somewhere: a trial of Eq. 2 at full action, held and switched."""
+    """Whether Runge-Kutta runs away somewhere: a trial of Eq. 2 at full action, held and switched.
+
+    Args:
+        p: inertia and damping.
+        limits: of thrust and torque.
+        speed_mps: the highest surge speed at the start [m/s].
+        step_s: the integration step that is tried [s].
+    """
     inverse = np.linalg.inv(_inertia(p))
     motion = inverse @ _resistance(p)
     push = inverse[:, ::2] @ _pushes(limits)

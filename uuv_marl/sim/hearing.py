@@ -27,7 +27,16 @@ _REACH_CELLS = 5.0
 
 @compiled_inner
 def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> bool:
-    """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy)."""
+    """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy).
+
+    Args:
+        x: start of the segment, north [m].
+        y: start of the segment, east [m].
+        dx: how far north of it the segment ends [m].
+        dy: how far east of it the segment ends [m].
+        w: index of the world.
+        course: holds the obstacles of all worlds.
+    """
     obstacles, length2 = course.obstacles, dx * dx + dy * dy
     for k in range(course.num_obstacles[w]):
         o_x, o_y = obstacles[w, k, 0] - x, obstacles[w, k, 1] - y
@@ -39,7 +48,15 @@ def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> 
 
 @compiled_inline
 def locate(num: int, points: Points, pose: Pose, bins: int, ear: Listener) -> None:
-    """Where the first ``num`` of the points are for a listener with this pose; itself nowhere."""
+    """Where points are for a listener; itself nowhere.
+
+    Args:
+        num: how many of the points count, from the first on.
+        points: north and east [m] and index of the vehicles to listen to, shape (vehicle,) each.
+        pose: of the listener: north and east [m], cosine and sine of the heading.
+        bins: parts of the full circle of directions, a power of two.
+        ear: squared distances, places ahead and abeam, and bins are written.
+    """
     (xs, ys, _), (x, y, c, s) = points, pose
     per_unit, last = 0.25 * bins, np.int32(bins - 1)
     for q in range(num):
@@ -56,6 +73,12 @@ def choose_sectors(num: int, layer: int, suite: Suite, ear: Listener) -> None:
     """The sub-sector of a layer for each of those located. Eq. 12-13.
 
     No branch depends on the positions: a wrongly guessed branch costs more than all the arithmetic here.
+
+    Args:
+        num: how many were located.
+        layer: row of ``suite.codes``, which holds sub-sectors that do not overlap.
+        suite: finds a direction's sub-sector.
+        ear: places and bins are read, sub-sectors are written; the number of all sub-sectors stands for none.
     """
     none, num_edges = suite.lower.shape[0], 0
     for q in range(num):
@@ -90,7 +113,17 @@ def keep_nearest(num: int, vehicles: Int64, ear: Listener) -> None:
 
 @compiled_inline
 def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: Suite, ear: Listener) -> None:
-    """A listener with this pose hears the first ``num`` of the points, unless an obstacle is between."""
+    """A listener hears those of some vehicles that are nearest in a sub-sector, unless an obstacle is between.
+
+    Args:
+        num: how many of the points count, from the first on.
+        points: north and east [m] and index of the vehicles to listen to, shape (vehicle,) each.
+        pose: of the listener: north and east [m], cosine and sine of the heading.
+        w: index of the world.
+        course: holds the obstacles of all worlds.
+        suite: the sonar's sub-sectors.
+        ear: whom it has heard so far in each sub-sector; a nearer one replaces that.
+    """
     locate(num, points, pose, suite.codes.shape[1], ear)
     xs, ys, vehicles = points
     if suite.obstacles_hide and course.num_obstacles[w] > 0:
@@ -104,7 +137,14 @@ def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: 
 
 @compiled_inner
 def gather(box: Box, cells: Cells, grid: Grid, ear: Listener) -> int:
-    """Collect the entries of the cells that meet a rectangle of the world; how many."""
+    """Collect the entries of the cells that meet a rectangle of the world; how many.
+
+    Args:
+        box: the rectangle's northern, southern, eastern and western side [m].
+        cells: the living, sorted by cell.
+        grid: where the cells lie.
+        ear: positions and indices of those in these cells are written.
+    """
     north, south, east, west = box
     left, right = place(west, grid.y_min, grid.side, grid.columns), place(east, grid.y_min, grid.side, grid.columns)
     top, bottom = place(north, grid.x_min, grid.side, grid.rows), place(south, grid.x_min, grid.side, grid.rows)
@@ -118,7 +158,16 @@ def gather(box: Box, cells: Cells, grid: Grid, ear: Listener) -> int:
 
 @compiled_inline
 def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
-    """Fill the listener for entry p of the cells: those around it, then farther out where a sub-sector is empty."""
+    """Whom one vehicle hears: those around it, then farther out where a sub-sector is empty.
+
+    Args:
+        p: its entry in ``workspace.cells``.
+        w: index of the world.
+        course: holds the obstacles of all worlds.
+        suite: the sonar's sub-sectors.
+        workspace: the sorted cells are read, the listener is written.
+        grid: where the cells lie.
+    """
     cells, ear, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]
     pose = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(sectors + 1):
@@ -143,7 +192,15 @@ def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, gri
 
 @compiled_inner
 def reached(k: int, near: float, far: float, pose: Pose, suite: Suite) -> Box:
-    """Rectangle around what sub-sector k of a listener with this pose hears between two distances [m]."""
+    """Rectangle around what a sub-sector hears between two distances.
+
+    Args:
+        k: index of the sub-sector.
+        near: the smaller distance [m].
+        far: the larger distance [m].
+        pose: of the listener: north and east [m], cosine and sine of the heading.
+        suite: the sonar's sub-sectors.
+    """
     x, y, c, s = pose
     l_x, l_y, u_x, u_y = suite.lower[k, 0], suite.lower[k, 1], suite.upper[k, 0], suite.upper[k, 1]
     # The far edges are lengthened so that their chord clears the arc: by 1 / cos of half the width.

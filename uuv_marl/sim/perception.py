@@ -17,9 +17,18 @@ from uuv_marl.sim.workspace import Workspace
 def echo(
     c_x: float, c_y: float, radius: float, l_x: float, l_y: float, u_x: float, u_y: float
 ) -> tuple[float, float, float]:
-    """Range and nearest point, in the body frame, of a disc's surface within a beam; range infinite for none.
+    """Range [m] and nearest point, in the body frame [m], of a disc's surface within a beam; range infinite for none.
 
-    The disc is centred on c, the beam lies between the unit vectors l and u. Inside the disc the range is 0.
+    Inside the disc the range is 0.
+
+    Args:
+        c_x: the disc's centre, how far ahead [m].
+        c_y: the disc's centre, how far to starboard [m].
+        radius: of the disc [m].
+        l_x: lower edge of the beam, a unit vector: forward part.
+        l_y: lower edge: starboard part.
+        u_x: upper edge of the beam, a unit vector: forward part.
+        u_y: upper edge: starboard part.
     """
     distance = math.hypot(c_x, c_y)
     if distance <= radius:
@@ -46,14 +55,30 @@ def saturate(value: float, limit: float) -> float:
 
 @compiled_inline
 def toward(dx: float, dy: float, c: float, s: float) -> tuple[float, float]:
-    """A vector north and east [m] in the body frame of a heading (cosine, sine), a longer one cut to the limit."""
+    """A vector in the body frame, ahead and to starboard [m]; one longer than ``MAX_RANGE_M`` is cut to that.
+
+    Args:
+        dx: its northern part [m].
+        dy: its eastern part [m].
+        c: cosine of the heading.
+        s: sine of the heading.
+    """
     far = max(math.sqrt(dx * dx + dy * dy) / MAX_RANGE_M, 1.0)
     return saturate((c * dx + s * dy) / far, MAX_RANGE_M), saturate((c * dy - s * dx) / far, MAX_RANGE_M)
 
 
 @compiled_inline
 def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspace, see: Fields) -> None:
-    """What entry p of the cells knows in world w, into the fields of its percept. Eq. 11, 14-17."""
+    """What one vehicle knows, into the fields of its percept. Eq. 11, 14-17.
+
+    Args:
+        p: its entry in ``workspace.cells``.
+        w: index of the world.
+        world: the arrays; the vehicle's percept is cleared and written.
+        model: the scenario's numbers.
+        workspace: the sorted cells, and the listener, which ``hear`` has filled for this vehicle.
+        see: fields of the percepts, views of ``world.senses.percept``.
+    """
     cells, listener, course = workspace.cells, workspace.listener, world.course
     nu, reference, i = world.state.nu, world.facts.reference, cells.vehicle[p]
     x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
@@ -87,7 +112,16 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 
 @compiled_inner
 def write_echoes(i: int, w: int, pose: Pose, course: Course, suite: Suite, see: Fields) -> None:
-    """What vehicle i hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17."""
+    """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
+
+    Args:
+        i: index of the vehicle.
+        w: index of the world.
+        pose: of the vehicle: north and east [m], cosine and sine of the heading.
+        course: holds the obstacles of all worlds.
+        suite: the sonar's sub-sectors.
+        see: fields of the percepts; echoes are written, and stay as they are where nothing is heard.
+    """
     x, y, c, s = pose
     for a in range(suite.active.shape[0]):
         k = suite.active[a]

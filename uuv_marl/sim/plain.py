@@ -141,8 +141,8 @@ class PlainEngine:
         """The same of vehicle i with numbers, lags and faults of its own, which the water carries along.
 
         Args:
-            w: the world.
-            i: the vehicle.
+            w: index of the world.
+            i: index of the vehicle.
             now: pose, and velocity through the water.
             tau: thrust [N] and torque [N m] as asked of it.
             sea: the forces that reach the water are written.
@@ -238,7 +238,14 @@ class PlainEngine:
                 self.know_obstacles(a, k, eta[i], heading[i], discs, see)
 
     def know_oneself(self, w: int, i: int, heading: Row, see: dict[str, Any]) -> None:
-        """Write one's own velocity, where l(t) is and how it moves."""
+        """Write one's own velocity, where l(t) is and how it moves.
+
+        Args:
+            w: index of the world.
+            i: index of the vehicle.
+            heading: cosine and sine of its heading.
+            see: its percept by name, which is written.
+        """
         x, y, _ = self.state.eta[w, i].tolist()
         u, v, r = self.state.nu[w, i].tolist()
         l_x, l_y, v_x, v_y = self.facts.reference[w].tolist()
@@ -251,7 +258,16 @@ class PlainEngine:
             see["compass"][:] = heading
 
     def know_obstacles(self, a: int, k: int, eta: Row, heading: Row, discs: Rows, see: dict[str, Any]) -> None:
-        """Write the nearest surface in sub-sector k, the active one number a. Eq. 11, 16-17."""
+        """Write the nearest surface in one sub-sector. Eq. 11, 16-17.
+
+        Args:
+            a: index of the sub-sector among the active ones.
+            k: its index among all.
+            eta: the vehicle's pose: north and east [m], heading [rad].
+            heading: cosine and sine of its heading.
+            discs: the obstacles: centre north and east, radius [m], a row each.
+            see: its percept by name, which is written.
+        """
         nearest = self.sectors.range_m[k]
         for x, y, radius in discs:
             centre = to_body(x - eta[0], y - eta[1], heading)
@@ -263,7 +279,17 @@ class PlainEngine:
 
 
 def know_neighbour(k: int, i: int, j: int, eta: Rows, nu: Rows, heading: Rows, see: dict[str, Any]) -> None:
-    """Write where vehicle j is, whom vehicle i hears in sub-sector k; by the link also who it is and its velocity."""
+    """Write where vehicle j is, whom vehicle i hears in sub-sector k; by the link also who it is and its velocity.
+
+    Args:
+        k: index of the sub-sector.
+        i: index of the vehicle that hears.
+        j: index of the vehicle that is heard.
+        eta: poses: north and east [m], heading [rad], a row for each vehicle.
+        nu: velocities in the body frame: surge, sway [m/s], yaw rate [rad/s], a row for each vehicle.
+        heading: cosine and sine of the heading, a row for each vehicle.
+        see: percept of vehicle i by name, which is written.
+    """
     see["heard"][k] = 1.0
     see["neighbour"][k] = to_body(eta[j][0] - eta[i][0], eta[j][1] - eta[i][1], heading[i])
     if "link_identity" in see:
@@ -330,14 +356,28 @@ def actuators(a: Row, r: float, p: Plant) -> Pair:
 
 
 def lagging(asked: float, given: float, half: float, whole: float) -> tuple[float, float, float]:
-    """A force now, half a step and a step later: asked + (given - asked) e^(-t / lag), whose shares are given."""
+    """A force now, half a step and a step later: asked + (given - asked) e^(-t / lag), whose shares are given.
+
+    Args:
+        asked: thrust [N] or torque [N m] that is asked for.
+        given: what reaches the water now, in the same unit.
+        half: e^(-t / lag) after half a step.
+        whole: e^(-t / lag) after a step; 0 without a lag.
+    """
     if whole == 0.0:
         return asked, asked, asked
     return given, asked + (given - asked) * half, asked + (given - asked) * whole
 
 
 def derivative(now: Row, tau: Row, flow: Row, p: Plant) -> Row:
-    """Rates of (x, y, psi, u, v, r): eta' = R(psi) nu + flow, nu' = M^-1 (tau - C(nu) nu - D(nu) nu). Eq. 1-2, 4."""
+    """Rates of (x, y, psi, u, v, r): eta' = R(psi) nu + flow, nu' = M^-1 (tau - C(nu) nu - D(nu) nu). Eq. 1-2, 4.
+
+    Args:
+        now: (x, y, psi, u, v, r), velocities relative to the water.
+        tau: thrust [N] and torque [N m].
+        flow: velocity of the water, north and east [m/s].
+        p: the vehicle.
+    """
     _, _, psi, u, v, r = now
     a = p.m * (p.x_G * r + v) - p.Y_vdot * v - p.Y_rdot * r
     b = p.m * u - p.X_udot * u
@@ -404,9 +444,15 @@ def squared_distance(a: Row, b: Row) -> float:
 def between_vehicles(
     now: Rows, before: Rows, alive: Sequence[bool], hull: float
 ) -> tuple[list[float], float, list[int]]:
-    """Each vehicle's distance to the nearest other, the largest distance, and each one's contacts that begin.
+    """Each vehicle's distance to the nearest other [m], the largest distance [m], and each one's contacts that begin.
 
-    A contact begins where two hulls of this radius overlap and did not one control hold ``before``.
+    A contact begins where two hulls overlap and did not one control hold before.
+
+    Args:
+        now: positions, north and east [m], a row for each vehicle.
+        before: the same one control hold ago.
+        alive: False for lost vehicles.
+        hull: radius of a hull [m].
     """
     n, touch, largest = len(now), 2.0 * hull, -math.inf
     spacing, contacts = [math.inf] * n, [0] * n
@@ -427,7 +473,14 @@ def to_obstacles(
 ) -> tuple[list[float], list[float], list[int]]:
     """Each vehicle's distance to the nearest surface, each obstacle's to the nearest vehicle, and contacts that begin.
 
-    A contact begins where a hull of this radius meets an obstacle and did not one control hold ``before``.
+    Distances are in m. A contact begins where a hull meets an obstacle and did not one control hold before.
+
+    Args:
+        now: positions, north and east [m], a row for each vehicle.
+        before: the same one control hold ago.
+        alive: False for lost vehicles.
+        hull: radius of a hull [m].
+        discs: the obstacles: centre north and east, radius [m], a row each.
     """
     clearance, reached, contacts = [math.inf] * len(now), [math.inf] * len(discs), [0] * len(now)
     for i in range(len(now)):
@@ -476,9 +529,15 @@ def sub_sectors(arrays: Sequence[SonarArray]) -> Sectors:
 
 
 def hear(i: int, eta: Rows, heading: Rows, alive: Sequence[bool], sectors: Sectors, discs: Rows) -> list[int]:
-    """Whom vehicle i hears in each sub-sector: the nearest, -1 for nobody. Eq. 8-9, 13-15.
+    """Whom a vehicle hears in each sub-sector: the nearest, the lower index of equals, -1 for nobody. Eq. 8-9, 13-15.
 
-    Of two equally near it is the lower index; ``discs`` silence whom they hide.
+    Args:
+        i: index of the vehicle.
+        eta: poses: north and east [m], heading [rad], a row for each vehicle.
+        heading: cosine and sine of the heading, a row for each vehicle.
+        alive: False for lost vehicles.
+        sectors: the sonar's sub-sectors.
+        discs: obstacles that silence whom they hide: centre north and east, radius [m], a row each.
     """
     nearest = [range_m * range_m for range_m in sectors.range_m]
     heard = [-1] * len(nearest)
@@ -495,7 +554,15 @@ def hear(i: int, eta: Rows, heading: Rows, alive: Sequence[bool], sectors: Secto
 
 
 def hidden(x: float, y: float, dx: float, dy: float, discs: Rows) -> bool:
-    """Whether a disc meets the segment from (x, y) to (x + dx, y + dy)."""
+    """Whether a disc meets the segment from (x, y) to (x + dx, y + dy).
+
+    Args:
+        x: start of the segment, north [m].
+        y: start of the segment, east [m].
+        dx: how far north of it the segment ends [m].
+        dy: how far east of it the segment ends [m].
+        discs: the obstacles: centre north and east, radius [m], a row each.
+    """
     length2 = dx * dx + dy * dy
     for k in range(len(discs)):
         o_x, o_y = discs[k][0] - x, discs[k][1] - y
@@ -509,6 +576,12 @@ def echo(centre: Pair, radius: float, lower: Row, upper: Row) -> tuple[float, Pa
     """Range [m] and place, body frame, of the point of a disc within a sub-sector that is nearest. Eq. 11, 16-17.
 
     That lies towards the centre, or on an edge where the centre is outside; at range 0 for a vehicle inside the disc.
+
+    Args:
+        centre: of the disc, ahead and to starboard [m].
+        radius: of the disc [m].
+        lower: lower edge of the sub-sector, a unit vector in the body frame.
+        upper: upper edge, likewise.
     """
     distance = hypot(*centre)
     if distance <= radius:

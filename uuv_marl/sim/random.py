@@ -42,7 +42,15 @@ def episode_key(stream: np.random.Generator) -> np.uint64:
 
 @compiled_inline
 def philox(key: np.uint64, c_0: np.uint64, c_1: np.uint64, c_2: np.uint64, c_3: np.uint64) -> Block:
-    """Four random words of 32 bits for a key of 64 bits and a counter of four words."""
+    """Four random words of 32 bits.
+
+    Args:
+        key: the generator's key, 64 bits.
+        c_0: first word of its counter, below 2^32, as the other three.
+        c_1: second word.
+        c_2: third word.
+        c_3: fourth word.
+    """
     k_0, k_1 = key & _LOW, key >> _HALF
     for _ in range(10):
         p_0, p_1 = _MULTIPLIER_0 * c_0, _MULTIPLIER_1 * c_2
@@ -53,7 +61,15 @@ def philox(key: np.uint64, c_0: np.uint64, c_1: np.uint64, c_2: np.uint64, c_3: 
 
 @compiled_inline
 def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> tuple[float, float]:
-    """Two independent numbers, uniform in [0, 1), multiples of 2^-53."""
+    """Two independent numbers, uniform in [0, 1), multiples of 2^-53.
+
+    Args:
+        key: of the episode (``Swarm.keys``).
+        purpose: what they are for, one number for each disturbance.
+        time: control hold, ping or decision at which they are used, below 2^32.
+        vehicle: whose they are.
+        slot: which of the vehicle's pairs at this time.
+    """
     w_0, w_1, w_2, w_3 = philox(
         key, np.uint64(purpose) & _LOW, np.uint64(time) & _LOW, np.uint64(vehicle) & _LOW, np.uint64(slot) & _LOW
     )

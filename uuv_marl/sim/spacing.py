@@ -28,7 +28,15 @@ def find_nearest(cells: Cells, grid: Grid) -> None:
 
 @compiled_inline
 def lower_all(first: int, end: int, x: float, y: float, cells: Cells) -> None:
-    """Let the entries ``first`` to ``end`` know of somebody at (x, y)."""
+    """Let entries of the cells know of somebody.
+
+    Args:
+        first: the first of these entries.
+        end: the first entry beyond them.
+        x: where that somebody is, north [m].
+        y: where that somebody is, east [m].
+        cells: the living, sorted by cell; ``nearest`` is lowered.
+    """
     for q in range(first, end):
         dx, dy = cells.x[q] - x, cells.y[q] - y
         squared = dx * dx + dy * dy
@@ -61,7 +69,16 @@ def search(p: int, cells: Cells, grid: Grid) -> float:
 
 @compiled_inner
 def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, grid: Grid) -> int:
-    """Contact episodes of entry p that begin: vehicles nearer than ``touch`` [m] now that were not ``before``."""
+    """Contact episodes of one vehicle that begin: others that are near now and were not one control hold ago.
+
+    Args:
+        w: index of the world.
+        p: the vehicle's entry in ``cells``.
+        touch: distance of two centres below which they are in contact [m].
+        before: positions one control hold ago, north and east [m], shape (world, vehicle, 2).
+        cells: the living, sorted by cell.
+        grid: where the cells lie.
+    """
     i, count = cells.vehicle[p], 0
     rings = 0.0 if grid.rows * grid.columns == 1 else touch
     top, bottom = (
@@ -87,7 +104,14 @@ def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, gr
 def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
     """Lower the spacing of the living and raise their contacts; how many episodes between vehicles began.
 
-    A contact episode begins where two hulls of this radius [m] overlap now and did not one control hold ago.
+    A contact episode begins where two hulls overlap now and did not one control hold ago.
+
+    Args:
+        w: index of the world.
+        hull: radius of a hull [m].
+        world: the arrays; facts are written.
+        cells: the living, sorted by cell; ``nearest`` is written.
+        grid: where the cells lie.
     """
     before, facts = world.state.before, world.facts
     touch, began = 2.0 * hull, 0
@@ -104,7 +128,15 @@ def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid
 
 @compiled_inner
 def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
-    """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began."""
+    """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began.
+
+    Args:
+        w: index of the world.
+        hull: radius of a hull [m].
+        world: the arrays; facts are written.
+        cells: the living, sorted by cell.
+        grid: where the cells lie.
+    """
     obstacles, before, facts = world.course.obstacles, world.state.before, world.facts
     began = 0
     for p in range(grid.living):
@@ -124,7 +156,14 @@ def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Gri
 
 @compiled_inner
 def farthest(x: float, y: float, cells: Cells, grid: Grid) -> int:
-    """The entry of ``cells`` farthest from (x, y), -1 for none."""
+    """The entry of ``cells`` that is farthest from a point, -1 for none.
+
+    Args:
+        x: the point's north [m].
+        y: the point's east [m].
+        cells: the living, sorted by cell.
+        grid: where the cells lie.
+    """
     best, most = -1, -1.0
     for p in range(grid.living):
         dx, dy = cells.x[p] - x, cells.y[p] - y

@@ -16,7 +16,14 @@ def arrival_times(waypoints: Float64, speed: float) -> Float64:
 
 @compiled
 def reference(t: float, waypoints: Float64, times: Float64, last: int) -> tuple[float, float, float, float]:
-    """Position [m] and velocity [m/s] of l(t), north and east; points beyond index ``last`` are padding."""
+    """Position [m] and velocity [m/s] of l(t), north and east.
+
+    Args:
+        t: time since the reset [s].
+        waypoints: corners of the trajectory, north and east [m], shape (point, 2).
+        times: when l(t) passes them [s], shape (point,).
+        last: index of the last corner; those beyond it are padding.
+    """
     if t >= times[last]:
         return waypoints[last, 0], waypoints[last, 1], 0.0, 0.0
     k = 0

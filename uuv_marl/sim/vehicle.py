@@ -173,7 +173,15 @@ def advance_lagging(
 
 @compiled_inline
 def advance(state: State6, tau: Vector2, flow: Vector2, h: float, p: Plant) -> State6:
-    """The joint state h [s] later, tau and flow held. See ``advance_lagging``."""
+    """The joint state one step later, forces and water held: the classical fourth-order Runge-Kutta method (Eq. 23-24).
+
+    Args:
+        state: pose and velocity relative to the water.
+        tau: thrust [N] and torque [N m].
+        flow: velocity of the water, north and east [m/s].
+        h: the step [s].
+        p: the vehicle.
+    """
     return advance_lagging(state, tau, tau, tau, flow, h, p)
 
 
@@ -194,7 +202,14 @@ def project(a_x: float, a_y: float) -> tuple[float, float]:
 
 @compiled_inline
 def turned(a_x: float, a_y: float, angle: float, p: Plant) -> tuple[float, float]:
-    """The action that keeps the same horizontal force in the world after the vehicle has turned by an angle [rad]."""
+    """The action that keeps the same horizontal force in the world after the vehicle has turned.
+
+    Args:
+        a_x: share of full thrust.
+        a_y: share of full torque.
+        angle: by which it has turned, clockwise [rad].
+        p: the vehicle.
+    """
     f_x, f_y = a_x * p.max_force, a_y * p.max_torque / p.lever_arm
     c, s = cos_sin(angle)
     return (c * f_x + s * f_y) / p.max_force, (c * f_y - s * f_x) * p.lever_arm / p.max_torque
@@ -202,6 +217,13 @@ def turned(a_x: float, a_y: float, angle: float, p: Plant) -> tuple[float, float
 
 @compiled_inline
 def actuators(a_x: float, a_y: float, r: float, p: Plant) -> tuple[float, float]:
-    """Thrust [N] and torque [N m] of a body-frame action on the unit disc, with the inner yaw-damping loop. Eq. 22."""
+    """Thrust [N] and torque [N m] of a body-frame action, with the inner yaw-damping loop. Eq. 22.
+
+    Args:
+        a_x: share of full thrust; the action lies on the unit disc.
+        a_y: share of full torque.
+        r: yaw rate [rad/s].
+        p: the vehicle.
+    """
     torque = p.max_torque * a_y - p.yaw_damping * r
     return p.max_force * a_x, min(max(torque, -p.max_torque), p.max_torque)

@@ -92,7 +92,14 @@ class Scratch(NamedTuple):
 
 
 def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -> Scratch:
-    """A column for each array of a workspace, and a cache line between one thread's and the next's."""
+    """A column for each array of a workspace, and a cache line between one thread's and the next's.
+
+    Args:
+        threads: how many work at once.
+        num_vehicles: vehicles of a world.
+        num_sectors: sub-sectors of a vehicle's sonar.
+        num_cells: the most cells that a world is sorted into.
+    """
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
     kinds = [(row.axes, row.dtype) for table in (Columns, Cells, Listener) for row in rows(table).values()]
 

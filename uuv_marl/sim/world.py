@@ -44,7 +44,17 @@ under water is a hundredth as fast."""
 
 @compiled_inner
 def control_hold(w: int, first: bool, world: World, model: Model, now: Columns, sea: Sea | None) -> None:
-    """Actions become forces, forces become motion. Eq. 1-4, 22-24."""
+    """Actions become forces, forces become motion. Eq. 1-4, 22-24.
+
+    Args:
+        w: index of the world.
+        first: whether the decision was made at the start of this hold; later ones keep its force's direction in the
+            world.
+        world: the arrays; states and facts are written.
+        model: the scenario's numbers.
+        now: columns of the world's vehicles, with the decided actions.
+        sea: what disturbs it, None for nothing.
+    """
     state, facts, rules = world.state, world.facts, model.rules
     apply_actuators(first, now, model.plant)
     if sea is None:
@@ -69,7 +79,14 @@ def control_hold(w: int, first: bool, world: World, model: Model, now: Columns, 
 
 @compiled_inner
 def apply_losses(w: int, world: World, rules: Rules, sea: Sea | None) -> None:
-    """Vehicles whose scheduled time has come fall silent and stop."""
+    """Vehicles whose scheduled time has come fall silent and stop.
+
+    Args:
+        w: index of the world.
+        world: the arrays; states and facts of those vehicles are written.
+        rules: the scenario's schedule of losses.
+        sea: what disturbs it, None for nothing; its faults may lose vehicles, too.
+    """
     if sea is not None:
         for i in range(world.state.alive.shape[1]):
             if is_lost(w, i, world.state.tick[w], sea.actuation, sea.hull):
@@ -90,13 +107,28 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 @compiled_inner
 def sort_into_cells(w: int, world: World, model: Model, workspace: Workspace) -> Grid:
-    """Sort the living into cells."""
+    """Sort the living into cells; where these lie.
+
+    Args:
+        w: index of the world.
+        world: the arrays.
+        model: the scenario's numbers.
+        workspace: positions are read from its columns, its cells are written.
+    """
     return sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
 
 
 @compiled_inner
 def measure(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> int:
-    """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
+    """Distances of the living, folded into the facts of the step; how many contact episodes began now.
+
+    Args:
+        w: index of the world.
+        world: the arrays; facts are written.
+        model: the scenario's numbers.
+        workspace: with the living sorted into its cells.
+        grid: where the cells lie.
+    """
     facts, hull = world.facts, model.rules.hull
     began = measure_vehicles(w, hull, world, workspace.cells, grid)
     began += measure_obstacles(w, hull, world, workspace.cells, grid)
@@ -138,7 +170,15 @@ def check_arrival(w: int, world: World, rules: Rules) -> None:
 
 @compiled_inner
 def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> None:
-    """What the living hear, and everybody's percept."""
+    """What the living hear, and everybody's percept.
+
+    Args:
+        w: index of the world.
+        world: the arrays; senses are written.
+        model: the scenario's numbers.
+        workspace: with the living sorted into its cells.
+        grid: where the cells lie.
+    """
     state, senses, now = world.state, world.senses, workspace.now
     see = fields(senses.percept, model.at)
     for i in range(state.alive.shape[1]):
@@ -171,7 +211,15 @@ def clear_facts(w: int, facts: Facts) -> None:
 
 @compiled_inner
 def observe_one(w: int, world: World, model: Model, own: Workspace, sea: Sea | None) -> None:
-    """Facts and percepts of a world that has just been reset."""
+    """Facts and percepts of a world that has just been reset.
+
+    Args:
+        w: index of the world.
+        world: the arrays; facts, senses and ``state.dwell`` are written.
+        model: the scenario's numbers.
+        own: room to work in.
+        sea: what disturbs it, None for nothing.
+    """
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.facts.arrival_s[w] = math.nan
@@ -189,19 +237,43 @@ def observe_one(w: int, world: World, model: Model, own: Workspace, sea: Sea | N
 
 @compiled
 def observe_world(w: int, world: World, model: Model, room: Scratch) -> None:
-    """Facts and percepts of a world that has just been reset."""
+    """Facts and percepts of a world that has just been reset.
+
+    Args:
+        w: index of the world.
+        world: the arrays; facts, senses and ``state.dwell`` are written.
+        model: the scenario's numbers.
+        room: to work in; the first thread's is used.
+    """
     observe_one(w, world, model, workspace(room, 0), None)
 
 
 @compiled
 def observe_world_at_sea(w: int, world: World, model: Model, room: Scratch, sea: Sea) -> None:
-    """Facts and percepts of a disturbed world that has just been reset."""
+    """Facts and percepts of a disturbed world that has just been reset.
+
+    Args:
+        w: index of the world.
+        world: the arrays; facts, senses and ``state.dwell`` are written.
+        model: the scenario's numbers.
+        room: to work in; the first thread's is used.
+        sea: what disturbs it.
+    """
     observe_one(w, world, model, workspace(room, 0), sea)
 
 
 @compiled_inner
 def step_hold(w: int, first: bool, world: World, model: Model, workspace: Workspace, sea: Sea | None) -> Grid:
-    """One control hold of world w and what becomes true by it; the cells of the living afterwards."""
+    """One control hold of a world and what becomes true by it; where the cells of the living lie afterwards.
+
+    Args:
+        w: index of the world.
+        first: whether the decision was made at the start of this hold.
+        world: the arrays; states and facts are written.
+        model: the scenario's numbers.
+        workspace: room to work in, loaded with the vehicles and their actions.
+        sea: what disturbs it, None for nothing.
+    """
     control_hold(w, first, world, model, workspace.now, sea)
     world.state.tick[w] += 1
     apply_losses(w, world, model.rules, sea)
@@ -221,7 +293,7 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
     """One decision period of a world. A world that has diverged stays as it is.
 
     Args:
-        w: the world.
+        w: index of the world.
         action: shares of full force, body frame, shape (world, vehicle, 2).
         world: the arrays.
         model: the scenario's numbers.
@@ -252,14 +324,29 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
 
 @compiled
 def step_alone(action: Float32, world: World, model: Model, room: Scratch) -> bool:
-    """One decision period of the only world; whether it has diverged."""
+    """One decision period of the only world; whether it has diverged.
+
+    Args:
+        action: shares of full force, body frame, shape (1, vehicle, 2).
+        world: the arrays.
+        model: the scenario's numbers.
+        room: to work in; the first thread's is used.
+    """
     step_world(0, action, world, model, workspace(room, 0), None)
     return world.facts.diverged[0] >= 0
 
 
 @compiled
 def step_alone_at_sea(action: Float32, world: World, model: Model, room: Scratch, sea: Sea) -> bool:
-    """One decision period of the only world, disturbed; whether it has diverged."""
+    """One decision period of the only world, disturbed; whether it has diverged.
+
+    Args:
+        action: shares of full force, body frame, shape (1, vehicle, 2).
+        world: the arrays.
+        model: the scenario's numbers.
+        room: to work in; the first thread's is used.
+        sea: what disturbs it.
+    """
     step_world(0, action, world, model, workspace(room, 0), sea)
     return world.facts.diverged[0] >= 0
 
@@ -272,6 +359,20 @@ def step_worlds(
     """One decision period of every active world, a run of worlds for each thread; whether any has diverged.
 
     World and model come in parts, since Numba hands no tuples of tuples to threads.
+
+    Args:
+        threads: how many work at once.
+        active: worlds to step, shape (world,); the others stay as they are.
+        action: shares of full force, body frame, shape (world, vehicle, 2).
+        state: what a step changes.
+        course: trajectories, obstacles and losses.
+        facts: what is true of the step, which is written.
+        senses: what is heard and known, which is written.
+        plant: the scenario's vehicle.
+        suite: the scenario's sonar.
+        rules: the scenario's clocks and thresholds.
+        at: where each field starts in a flat percept.
+        room: to work in, a part for each thread.
     """
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
@@ -289,7 +390,38 @@ def step_worlds_at_sea(
     water: Water, flow: Flow, actuation: Actuation, hull: Hull, listening: Listening, readings: Readings,
     hits: Hits, noise: Noise, ears: Ears, navigation: Navigation, track: Track, modem: Modem, mail: Mail,
 ) -> bool:  # fmt: skip
-    """The same for disturbed worlds."""
+    """One decision period of every active disturbed world, a run of worlds for each thread; whether any has diverged.
+
+    World, model and sea come in parts, since Numba hands no tuples of tuples to threads.
+
+    Args:
+        threads: how many work at once.
+        active: worlds to step, shape (world,); the others stay as they are.
+        action: shares of full force, body frame, shape (world, vehicle, 2).
+        state: what a step changes.
+        course: trajectories, obstacles and losses.
+        facts: what is true of the step, which is written.
+        senses: what is heard and known, which is written.
+        plant: the scenario's vehicle.
+        suite: the scenario's sonar.
+        rules: the scenario's clocks and thresholds.
+        at: where each field starts in a flat percept.
+        room: to work in, a part for each thread.
+        keys: of the worlds' episodes, shape (world,).
+        water: numbers of the current.
+        flow: the current of each world.
+        actuation: numbers of lags, authority and faults.
+        hull: what each vehicle is like.
+        listening: numbers of the sonar's readings.
+        readings: those on their way, and the latest.
+        hits: room for what one reading hears.
+        noise: numbers of the sonar's errors.
+        ears: what each sonar gets wrong.
+        navigation: numbers of what is known of one's own position and heading.
+        track: what each vehicle's navigation gets wrong.
+        modem: numbers of the messages.
+        mail: what was sent and what arrived.
+    """
     share = (action.shape[0] + threads - 1) // threads
     for t in numba.prange(threads):
         own, world, model = workspace(room, t), World(state, course, facts, senses), Model(plant, suite, rules, at)

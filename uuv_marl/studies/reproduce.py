@@ -40,6 +40,12 @@ _COMPUTED = 20
 def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> list[Path]:
     """Make these parts (default all, the ledger and the page); what is done already is kept.
 
+    Args:
+        folder: for runs, data, figures, ledger and page.
+        seeds: benchmark seeds 0 to ``seeds - 1``, for cases that name none.
+        only: names of parts, or ``ledger``; nothing for all.
+        report: is called with what is being done, and the share of the work that is done.
+
     Returns:
         What was made for people to read: pictures, and the ledger and the page.
 
@@ -66,7 +72,14 @@ def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> 
 
 
 def make(part: Part, suite: Suite, folder: Path, report: Share) -> Path:
-    """A part's data and picture; the picture is drawn from the data as they are on disk."""
+    """A part's data and picture; the picture is drawn from the data as they are on disk.
+
+    Args:
+        part: what to make.
+        suite: holds its runs, and makes those that are missing.
+        folder: of the reproduction; the data and the picture go below it.
+        report: is called with the share of the work that is done.
+    """
     stamp, code = folder / "runs" / f"{part.name}.json", _code()
     kept: dict[str, Any] = json.loads(stamp.read_text(encoding="utf-8")) if stamp.exists() else {}
     paths = [folder / "data" / f"{name}.csv" for name in kept.get("tables", ())]

@@ -42,7 +42,14 @@ def paint_current(surface: pygame.Surface, scene: Scene, view: Camera, cell: flo
 
 
 def arrow(surface: pygame.Surface, start: Float, vector: Float, unit: float) -> None:
-    """An arrow from a point along a vector, everything in pixels."""
+    """An arrow from a point along a vector.
+
+    Args:
+        surface: to paint on.
+        start: where it begins, right and down [px], shape (2,).
+        vector: from there to its tip, right and down [px], shape (2,); longer than 0.
+        unit: pixels of the surface in one of a picture of the usual size.
+    """
     tip, length = start + vector, float(np.hypot(*vector))
     ahead = vector / length
     aside, wing = np.array([-ahead[1], ahead[0]]), min(5.0 * unit, 0.5 * length)

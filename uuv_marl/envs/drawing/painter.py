@@ -184,7 +184,15 @@ class Painter:
 
 
 def cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:
-    """A diagonal cross that reaches so far from its middle, everything in pixels."""
+    """A diagonal cross.
+
+    Args:
+        surface: to paint on.
+        at: its middle, right and down [px], shape (2,).
+        size: half its width, which is half its height [px].
+        colour: of its lines.
+        width: of its lines [px].
+    """
     for slope in (1.0, -1.0):
         start, end = (at + size * np.array([[-1.0, -slope], [1.0, slope]])).tolist()
         pygame.draw.line(surface, colour, start, end, width)

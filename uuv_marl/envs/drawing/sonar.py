@@ -16,7 +16,14 @@ with extra("render", "rendering"):
 
 
 def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: Sonar, view: Camera) -> None:
-    """Every array as a fan with the edges of its sub-sectors, the active ones on top."""
+    """Every array as a fan with the edges of its sub-sectors, the active ones on top.
+
+    Args:
+        surface: to paint on.
+        scene: gives the arrays and the vehicle's pose.
+        sonar: gives the vehicle.
+        view: the camera.
+    """
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     middle, far = view.pixels(pose).tolist(), 3.0 * math.hypot(*view.reach)
     for array in sorted(scene.scenario.sonar.arrays, key=lambda array: array.kind == "active"):
@@ -29,7 +36,15 @@ def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: Sonar, view: Came
 
 
 def paint_heard(surface: pygame.Surface, scene: Scene, sonar: Sonar, view: Camera, line_px: float) -> None:
-    """Lines to the vehicles that are heard, and echoes as arcs across their sub-sectors."""
+    """Lines to the vehicles that are heard, and echoes as arcs across their sub-sectors.
+
+    Args:
+        surface: to paint on.
+        scene: gives the arrays and the vehicle's pose.
+        sonar: what the vehicle hears.
+        view: the camera.
+        line_px: pixels of the surface in one of a picture of the usual size.
+    """
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     ahead, aside = unit(heading), unit(heading + math.pi / 2)
     middle = view.pixels(pose).tolist()

@@ -87,7 +87,7 @@ def draw_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hu
     """The vehicles of world w's new episode.
 
     Args:
-        w: the world.
+        w: index of the world.
         key: of its episode.
         duration_s: time that l(t) takes to its end, in which faults begin [s].
         scenario: gives the shares.
@@ -115,7 +115,14 @@ def draw_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hu
 
 
 def varied(vehicle: Vehicle, mass: float, added: float, drag: float) -> Vehicle:
-    """A vehicle whose mass (and moment of inertia), added masses and resistances are times these factors."""
+    """A vehicle with other inertia and resistances.
+
+    Args:
+        vehicle: the scenario's.
+        mass: factor of its mass and moment of inertia.
+        added: factor of its added masses.
+        drag: factor of its resistances.
+    """
     factors = dict.fromkeys(("m_kg", "I_z_kgm2"), mass)
     factors |= dict.fromkeys(("X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"), added)
     factors |= dict.fromkeys(("X_u", "Y_v", "Y_r", "N_v", "N_r", "X_uu", "Y_vv", "Y_rr", "N_rv", "N_rr"), drag)
@@ -130,7 +137,15 @@ def victims(key: np.uint64, fault: int, scenario: Scenario) -> list[int]:
 
 
 def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario: Scenario) -> tuple[int, int]:
-    """Control holds from which and up to which a fault acts on a vehicle; l(t) takes ``duration_s`` to its end."""
+    """Control holds from which and up to which a fault acts on a vehicle.
+
+    Args:
+        key: of the episode.
+        fault: index of the fault in the scenario.
+        vehicle: index of the vehicle.
+        duration_s: time that l(t) takes to its end, in which an onset is drawn [s].
+        scenario: gives the fault's onset and duration, where it states them.
+    """
     given = scenario.faults[fault]
     drawn = duration_s * uniform(key, ONSET, 0, vehicle, fault)
     hold, onset = scenario.timing.control_hold_s, drawn if given.onset_s is None else given.onset_s
@@ -146,13 +161,29 @@ def hit(tick: Int64, hull: Hull) -> Bool:
 
 @compiled
 def acts(w: int, i: int, fault: int, tick: int, hull: Hull) -> bool:
-    """Whether a fault acts on vehicle i of world w in the control hold after this tick."""
+    """Whether a fault acts on a vehicle in a control hold.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        fault: index of the fault in the scenario.
+        tick: control holds since the reset, at the start of this one.
+        hull: holds when each fault acts.
+    """
     return hull.broken[w, i, fault, 0] <= tick < hull.broken[w, i, fault, 1]
 
 
 @compiled_inner
 def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> None:
-    """Thrust and torque asked of the vehicles, lessened by mismatch, authority and faults."""
+    """Thrust and torque asked of the vehicles, lessened by mismatch, authority and faults.
+
+    Args:
+        w: index of the world.
+        tick: control holds since the reset, at the start of this one.
+        now: columns of the world's vehicles; thrust and torque are written.
+        numbers: the scenario's authority and faults.
+        hull: what each vehicle is like.
+    """
     for i in range(hull.thrust.shape[1]):
         now.tau_u[i] *= hull.thrust[w, i]
         now.tau_r[i] *= numbers.yaw_authority
@@ -167,7 +198,14 @@ def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> N
 
 @compiled_inline
 def followed(asked: float, given: float, half: float, whole: float) -> tuple[float, float, float]:
-    """A lagging force at the start, in the middle and at the end of a step: asked + (given - asked) e^(-t / lag)."""
+    """A lagging force at the start, in the middle and at the end of a step: asked + (given - asked) e^(-t / lag).
+
+    Args:
+        asked: thrust [N] or torque [N m] that is asked for.
+        given: what reaches the water at the start, in the same unit.
+        half: e^(-t / lag) after half a step.
+        whole: e^(-t / lag) after a step; 0 without a lag.
+    """
     if whole == 0.0:
         return asked, asked, asked
     return given, asked + (given - asked) * half, asked + (given - asked) * whole
@@ -180,7 +218,7 @@ def integrate_each(
     """One control hold of vehicles that differ, lag and are carried along. Eq. 1-4, 23-24.
 
     Args:
-        w: the world.
+        w: index of the world.
         alive: the vehicles that move, shape (world, vehicle).
         rules: the scenario's clocks.
         now: columns of the vehicles; thrust and torque as asked of them.
@@ -216,7 +254,15 @@ def own_plant(w: int, i: int, hull: Hull) -> Plant:
 
 @compiled_inner
 def is_lost(w: int, i: int, tick: int, numbers: Actuation, hull: Hull) -> bool:
-    """Whether a fault has lost vehicle i of world w by the end of a control hold."""
+    """Whether a fault has lost a vehicle by the end of a control hold.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        tick: control holds since the reset, this one included.
+        numbers: the scenario's faults.
+        hull: holds when each fault acts.
+    """
     lost = False
     for f in range(numbers.kind.shape[0]):
         lost = lost or (numbers.kind[f] == MEMBER and hull.broken[w, i, f, 0] <= tick)

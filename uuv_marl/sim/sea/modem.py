@@ -69,7 +69,7 @@ def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, f
     """Send and receive what is due at the start of an episode, or the end of a control hold, its number counted.
 
     Args:
-        w: the world.
+        w: index of the world.
         key: of its episode.
         world: its arrays.
         numbers: the scenario's messages.
@@ -98,7 +98,7 @@ def know_mail(w: int, world: World, mail: Mail, track: Track, more: SeaFields) -
     """Write, for each sub-sector, what the vehicle heard in it last said.
 
     Args:
-        w: the world.
+        w: index of the world.
         world: its arrays, with whom each vehicle hears.
         mail: what arrived.
         track: the errors of compasses.

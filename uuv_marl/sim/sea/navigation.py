@@ -75,7 +75,15 @@ def go_astray(w: int, state: State, navigation: Navigation, track: Track) -> Non
 
 @compiled
 def by_compass(w: int, i: int, north: float, east: float, track: Track) -> tuple[float, float]:
-    """A vector north and east, or the cosine and sine of a heading, as the compass of vehicle i has it."""
+    """A vector north and east as a vehicle's compass has it: turned clockwise by the compass's error.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        north: the vector's northern part, or the cosine of a heading.
+        east: its eastern part, or the sine of a heading.
+        track: the errors of compasses.
+    """
     c, s = track.bias[w, i, 0], track.bias[w, i, 1]
     return c * north - s * east, c * east + s * north
 

@@ -117,7 +117,7 @@ def gap(chance: float, probability: float) -> int:
         return _NEVER
     if probability >= 1.0:
         return 0
-    return np.int64(min(log(1.0 - chance) / log(1.0 - probability), float(_NEVER)))
+    return int(min(log(1.0 - chance) / log(1.0 - probability), float(_NEVER)))
 
 
 @compiled_inner

@@ -93,7 +93,7 @@ def draw_sea(w: int, scenario: Scenario, course: Course, duration_s: float, sea:
     """The sea of world w's new episode, from its key alone.
 
     Args:
-        w: the world.
+        w: index of the world.
         scenario: what to draw from.
         course: as drawn for the episode.
         duration_s: time that l(t) takes to its end [s].
@@ -117,7 +117,7 @@ def integrate_at_sea(w: int, state: State, rules: Rules, now: Columns, sea: Sea)
     """One control hold of world w.
 
     Args:
-        w: the world.
+        w: index of the world.
         state: of the vehicles, at the start.
         rules: the scenario's clocks.
         now: columns of the vehicles; thrust and torque as asked of them.
@@ -155,7 +155,14 @@ def reads(w: int, tick: int, sea: Sea) -> bool:
 
 @compiled_inner
 def take_readings(w: int, world: World, sea: Sea, see: Fields) -> None:
-    """Keep what the arrays hear now, from percepts that hold what is true."""
+    """Keep what the arrays hear now, from percepts that hold what is true.
+
+    Args:
+        w: index of the world.
+        world: its arrays; percepts hold what is true.
+        sea: the readings are written, and what the noise remembers.
+        see: fields of the percepts, which are read.
+    """
     tick, line = world.state.tick[w], sea.listening
     for a in range(0 if line.ideal else line.every.shape[0]):
         number = due(tick - sea.readings.began[w], line.every[a], line.delay, line.holds)
@@ -169,7 +176,15 @@ def take_readings(w: int, world: World, sea: Sea, see: Fields) -> None:
 
 @compiled_inner
 def know(w: int, world: World, sea: Sea, see: Fields, more: SeaFields) -> None:
-    """Percepts that hold what is true become what vehicles know."""
+    """Percepts that hold what is true become what vehicles know.
+
+    Args:
+        w: index of the world.
+        world: its arrays; percepts hold what is true, and ``heard`` is written.
+        sea: what lies between the truth and what is known.
+        see: fields of the percepts, which are written.
+        more: fields of the sea's channels, which are written.
+    """
     if not sea.listening.ideal:
         recall(w, world, sea.listening, sea.track, sea.readings, see, more)
     tell_ranged(w, world.state.alive, sea.listening, sea.noise, more)

@@ -41,7 +41,14 @@ class Formation(NamedTuple):
 def straight_leg(
     num_vehicles: int = 54, yaw_damping_nms: float = 0.0, hold_s: float = 0.1, leg_m: float = 4000.0
 ) -> Scenario:
-    """Open water and one leg to the north that starts at the origin; all clocks tick with the control hold."""
+    """Open water and one leg to the north that starts at the origin; all clocks tick with the control hold.
+
+    Args:
+        num_vehicles: size of the swarm.
+        yaw_damping_nms: torque against the yaw rate [N m s]; 0 for none, as in the paper.
+        hold_s: control hold, integration step and decision period [s].
+        leg_m: length of the leg [m].
+    """
     clocks = ("control_hold_s", "integration_step_s", "decision_period_s")
     overrides = {f"timing.{clock}": hold_s for clock in clocks} | {
         "trajectory.waypoints_m": [[0.0, 0.0], [leg_m, 0.0]],
@@ -91,6 +98,12 @@ def formations(scenario: Scenario, gains: Gains, seeds: Sequence[int], rounds: i
     """A formation from each seed's start: relaxed with fresh neighbour sets, then solved with frozen ones.
 
     Where no balance is found, the relaxed state with the smallest residual of the second half stands for it.
+
+    Args:
+        scenario: one straight leg to the north, see ``straight_leg``.
+        gains: of the law.
+        seeds: of the starts; one formation each.
+        rounds: relaxation steps towards a formation.
     """
     swarm = Swarm(scenario, len(seeds))
     swarm.reset(list(seeds))
@@ -132,7 +145,14 @@ def _rms(force: Float64) -> Float64:
 
 
 def _solve(places: Float64, heard: Int32, push: Float64, gains: Gains) -> Float64:
-    """Places of balance with these sets by Newton's method; where it leaves for elsewhere, the last within reach."""
+    """Places of balance with these sets by Newton's method; where it leaves for elsewhere, the last within reach.
+
+    Args:
+        places: where to begin, relative to l(t) [m], shape (vehicle, 2).
+        heard: index of the vehicle heard, -1 for none, shape (vehicle, sector); held.
+        push: force that every vehicle needs against the drag, ahead and to starboard [N], shape (2,).
+        gains: of the law.
+    """
     now = places
     for _ in range(_NEWTON_ROUNDS):
         missing = forces(now, heard, gains) - push

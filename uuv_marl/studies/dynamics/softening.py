@@ -31,7 +31,14 @@ PAPER = Softening()
 
 
 class Softened(BioInspired):
-    """The paper's law with a ``Softening``, in NumPy; without one it is ``BioInspired`` with an echo per beam."""
+    """The paper's law with a ``Softening``, in NumPy; without one it is ``BioInspired`` with an echo per beam.
+
+    Args:
+        scenario: gives the vehicle's limits and the percept's layout.
+        num_worlds: first axis of the percepts.
+        gains: Table 1 by default.
+        softening: the changes; none by default.
+    """
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, softening: Softening = PAPER

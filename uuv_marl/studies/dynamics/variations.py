@@ -48,7 +48,14 @@ LOSSES = (
 def variation(
     name: str, axis: str, variants: Mapping[str, Mapping[str, object]], quantities: Sequence[Quantity]
 ) -> Part:
-    """A part that runs the paper's controller on every variant, by its label on the axis, and shows every seed."""
+    """A part that runs the paper's controller on every variant, and shows every seed.
+
+    Args:
+        name: of the part, and of its table.
+        axis: what the variants differ in, as the picture's axis is labelled.
+        variants: the fields of the scenario that each one changes, by its label on the axis.
+        quantities: what is shown, a panel each.
+    """
     cases = {
         (label, quantity.scenario): Case(
             f"{name} {label} {quantity.scenario}", quantity.scenario, overrides=overrides, seeds=SEEDS
@@ -77,6 +84,14 @@ def variation(
 
 
 def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) -> None:
+    """Draw every seed's value by variant, their mean and the paper's number.
+
+    Args:
+        ax: where to draw.
+        table: rows with variant, scenario, metric, seed and value.
+        quantity: which of them to show.
+        labels: the variants in the order of the axis.
+    """
     ax.set_title(quantity.words)
     ax.set_xticks(range(len(labels)), labels)
     ax.margins(x=0.1, y=0.15)

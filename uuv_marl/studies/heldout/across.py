@@ -29,7 +29,14 @@ def tasks(episodes: Sequence[Episode]) -> list[HeldOut]:
 
 
 def runs(episodes: Sequence[Episode], held: HeldOut, policy: str, trained: bool) -> list[list[Episode]]:
-    """A policy's episodes of a task, a list for each training; a policy that ships counts as one."""
+    """A policy's episodes of a task, a list for each training; a policy that ships counts as one.
+
+    Args:
+        episodes: of all sets and policies.
+        held: the task; seeds from ``held.across`` on are left out.
+        policy: its name.
+        trained: whether its trainings are meant, not the policy of that name that ships.
+    """
     found: dict[int | None, list[Episode]] = {}
     for e in episodes:
         if (e.set, e.policy, e.training_seed is not None) == (held.name, policy, trained) and e.seed < held.across:

@@ -52,7 +52,14 @@ class Episode(NamedTuple):
 
 
 def select(episodes: Sequence[Episode], name: str, policy: str, training_seed: int | None = None) -> list[Episode]:
-    """A policy's episodes of a set, by seed; of one that ships, or of a training."""
+    """A policy's episodes of a set, by seed.
+
+    Args:
+        episodes: of all sets and policies.
+        name: of the set.
+        policy: its name.
+        training_seed: which of its trainings; None for the policy of that name that ships.
+    """
     mine = [e for e in episodes if (e.set, e.policy, e.training_seed) == (name, policy, training_seed)]
     return sorted(mine, key=lambda e: e.seed)
 

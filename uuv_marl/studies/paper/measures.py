@@ -23,7 +23,14 @@ LINK_M = 20.0
 
 
 def between(trace: Trace, name: str, start: float, end: float) -> Float32:
-    """A series, or routes, in a window of time [s]."""
+    """A series, or routes, in a window of time, both ends included; the first axis is time.
+
+    Args:
+        trace: of a run.
+        name: of the array.
+        start: of the window [s].
+        end: of the window [s].
+    """
     time = trace["route_time_s" if name.startswith("route_") else "time_s"]
     return trace[name][(time >= start) & (time <= end)]
 

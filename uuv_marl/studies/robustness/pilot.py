@@ -27,9 +27,9 @@ _HEAD = """# The pilot's findings, confirmed or corrected
 
 Before the package had currents, late sonar or faults, a pilot corrupted percepts and actions from outside, on 5 seeds.
 Here the simulation itself does it, on {seeds}. **Success** in this table is the pilot's: the swarm arrives and nobody
-touches anything. A claim is confirmed where the two shares differ by at most {near:.0%}, one seed of the pilot's; else
-it is corrected. Scenario: `single_obstacle` as it is, unless the row says otherwise. {confirmed} of {claims} claims are
-confirmed.
+touches anything. A cell shows the pilot's seeds that succeed, then ours. Where the two shares differ by at most
+{near:.0%}, one seed of the pilot's, a claim is confirmed; else it is corrected, and bold. {confirmed} of {claims} are
+confirmed. Scenario: `single_obstacle` as it is, unless the row says otherwise.
 
 """
 
@@ -104,12 +104,15 @@ def verdict(claimed: int, ours: int, seeds: int) -> str:
 
 
 def text(rows: list[dict[str, Any]], seeds: int) -> str:
-    """The page."""
+    """The page: a row for what is wrong, a cell for each policy."""
     confirmed = sum(row["verdict"] == "confirmed" for row in rows)
     head = _HEAD.format(seeds=counted(seeds, "seed"), near=NEAR, confirmed=confirmed, claims=len(rows))
-    cells = [
-        (row["what"], row["policy"], f"{row['claimed']}/{CLAIMED_SEEDS}", f"{row['ours']}/{row['seeds']}",
-         row["verdict"] if row["verdict"] == "confirmed" else "**corrected**", row["note"])
-        for row in rows
-    ]  # fmt: skip
-    return head + markdown_table(("what is wrong", "policy", "pilot", "here", "", "note"), cells)
+    cells = {(row["what"], row["policy"]): _cell(row) for row in rows}
+    notes, policies = {row["what"]: row["note"] for row in rows}, list(dict.fromkeys(row["policy"] for row in rows))
+    table = [(what, *(cells.get((what, policy), "–") for policy in policies), note) for what, note in notes.items()]
+    return head + markdown_table(("what is wrong", *policies, "note"), table)
+
+
+def _cell(row: dict[str, Any]) -> str:
+    shares = f"{row['claimed']}/{CLAIMED_SEEDS}; {row['ours']}/{row['seeds']}"
+    return shares if row["verdict"] == "confirmed" else f"**{shares}**"
