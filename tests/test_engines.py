@@ -191,6 +191,15 @@ def test_engines_give_the_same_bits(name):
     assert seen == {"heard", "contact", *happens.split(), *(["echo"] if scenario.max_obstacles else [])}
 
 
+def test_engines_agree_on_a_phantom_as_far_off_as_the_vehicle_beside_it():
+    """Heard by bearings alone, all are put at one range, which float32 rounds up; who is there stays."""
+    bearings = {"noise.passive_ranges": False, "noise.nominal_range_m": 12.3}
+    false = {"noise.false_echo_probability": 1.0}
+    true, _ = both(load_scenario("starter", overrides=bearings), 1)
+    ours, _ = both(load_scenario("starter", overrides=bearings | false), 1)
+    np.testing.assert_array_equal(ours.heard, true.heard)
+
+
 @pytest.mark.parametrize("fine", [{}, FINE])
 def test_engines_lose_the_same_vehicle_to_its_speed(fine, monkeypatch):
     monkeypatch.setattr(model_module, "plant", lambda scenario: plant(scenario)._replace(X_u=-2000.0, X_uu=0.0))

@@ -110,6 +110,29 @@ def test_a_snapshot_resumes_bit_for_bit():
         np.testing.assert_array_equal(array, other.snapshot()[name], name)
 
 
+def test_a_reset_leaves_nothing_of_the_episode_before():
+    """Readings on their way, messages, lags, drift, faults: a world that is reset is one that is new."""
+    overrides = EVERYTHING | {
+        "latency.processing_s": 0.5, "latency.travel_time": True, "latency.compensated": True, "noise.bearing_deg": 5.0,
+        "navigation.drift_share": 0.1, "modem.period_s": 0.5, "sonar.channels": ["modem", "link", "age"],
+    }  # fmt: skip
+    used, new = swim(overrides, 30, 2), swim(overrides, 0, 2, seed=[8, 9])
+    used.reset([9], worlds=[1])
+    for name, array in used.snapshot().items():
+        if name != "streams":
+            np.testing.assert_array_equal(array[1], new.snapshot()[name][1], name)
+
+
+def test_headers_tell_every_fault():
+    dead = [{"kind": "array", "share": 0.1, "array": name} for name in ("bow", "port")]
+    weak = [{"kind": "thruster", "share": 0.1, "efficiency": left} for left in (0.0, 0.5)]
+    told = conditions(load_scenario("starter", overrides={"faults": [*dead, *weak, {"kind": "member", "share": 0.1}]}))
+    assert told == (
+        "bow array fault on 0.1 of vehicles, port array fault on 0.1 of vehicles, thruster fault on 0.1 of vehicles, "
+        "thruster fault to 0.5 on 0.1 of vehicles, member fault on 0.1 of vehicles"
+    )
+
+
 # --- Currents ---
 
 
@@ -157,6 +180,18 @@ def test_without_thrust_a_vehicle_ends_up_with_the_water():
     speed = np.hypot(*np.moveaxis(swarm.velocity, -1, 0))
     np.testing.assert_allclose(speed, 0.7, atol=1e-3)
     np.testing.assert_allclose(swarm.percept["velocity"], swarm.velocity, rtol=1e-6)
+
+
+def test_a_lost_vehicle_that_is_still_heard_stands_still():
+    """It stays where it was lost, and the current doesn't carry it along, though a late reading shows it."""
+    overrides = CURRENT | {"latency.processing_s": 1.0, "sonar.channels": ["link"]}
+    faults = {"faults": [{"kind": "member", "share": 0.2, "onset_s": 2.0}]}
+    swarm = swim(overrides | faults, 25)
+    gone = int(np.flatnonzero(~swarm.state.alive[0])[0])
+    i, k = np.nonzero(swarm.percept["link_identity"][0] == gone + 1)
+    assert len(i) > 0
+    assert not swarm.percept["link_velocity"][0, i, k].any()
+    assert not swarm.velocity[0, gone].any()
 
 
 @pytest.mark.parametrize("hold_s", [0.1, 0.5, 2.0])

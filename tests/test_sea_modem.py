@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import Policy, granted, make
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
+from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
 
 
 def swum(overrides, decisions=100, worlds=1, seed=0, **change):
-    """The swarm after each decision."""
+    """The swarm after the reset and after each decision."""
     swarm = Swarm(load_scenario("starter", overrides=MODEM | overrides, **change), worlds)
     swarm.reset(seed)
+    yield swarm
     rng = np.random.default_rng(1)
     for _ in range(decisions):
         swarm.step(rng.uniform(-1, 1, (worlds, swarm.num_vehicles, 2)))
@@ -41,7 +44,7 @@ def test_a_message_is_the_velocity_when_it_was_sent_and_its_age_follows_the_sche
             for k in np.flatnonzero(see["heard"][0, i]):
                 j = int(swarm.heard[0, i, k])
                 sent = 4 * j + 20 * math.floor((tick - 4 * (j + 1)) / 20)  # slots of 0.4 s, rounds of 2 s
-                if sent < max(4 * j, 1):
+                if sent < 4 * j:
                     assert see["modem_identity"][0, i, k] == see["modem_age"][0, i, k] == 0
                     continue
                 assert see["modem_identity"][0, i, k] == see["link_identity"][0, i, k] == j + 1
@@ -66,8 +69,22 @@ def test_messages_are_lost_as_often_as_is_said():
         now = swarm._sea.mail.mail[..., 2].copy()
         arrived += int((now != before).sum()) if before is not None else 0
         before = now
-    total = 499 * 2 * 20
+    total = 500 * 2 * 20
     assert abs(arrived / total - 0.7) < 5 * math.sqrt(0.3 * 0.7 / total)
+
+
+def test_compasses_turn_what_is_said_and_what_is_read():
+    """A velocity over ground is north and east by the sender's compass, ahead and abeam by the listener's."""
+    turns = 0
+    for swarm in swum({"navigation.compass_bias_deg": 30.0, "modem.period_s": 0.1}, 20):
+        bias = swarm._sea.track.bias[0] @ [1.0, 1.0j]
+        told, true = (swarm.percept[f"{name}_velocity"][0].astype(float) @ [1.0, 1.0j] for name in ("modem", "link"))
+        for i, k in np.argwhere(swarm.percept["modem_identity"][0]):
+            j = swarm.heard[0, i, k]
+            fresh = swarm.percept["modem_age"][0, i, k] == 0.0
+            assert abs(told[i, k] - true[i, k] * bias[j] / bias[i]) < 1e-5 or not fresh
+            turns += fresh and abs(true[i, k]) > 0.1
+    assert turns > 100
 
 
 def test_without_messages_the_channel_stays_empty():
@@ -95,3 +112,20 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
         paths.append(swarm.state.eta[0, :, :2].copy())
     assert np.abs(paths[0] - paths[1]).max() < 3.0  # the first message comes a decision late
     assert (paths[0] != paths[1]).any()
+
+
+def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
+    """Not for one that asks for both, nor for an actor that was trained on the link."""
+    sea = load_scenario("starter", overrides={"sonar.channels": ["link", "modem"]})
+    assert granted("sff", sea).sonar.channels == ("modem",)
+    assert granted("tests.test_sea_modem:Both", sea).sonar.channels == ("link", "modem")
+    linked = load_scenario("starter", overrides={"sonar.channels": ["link"]})
+    card = Card(percept=rows_of(PerceptLayout.of(linked)), channels=("link",))
+    save_checkpoint(tmp_path / WEIGHTS_FILE, card, [Layer(np.zeros((123, 2), np.float32), np.zeros(2, np.float32))])
+    assert granted(str(tmp_path), sea).sonar.channels == ("link",)
+
+
+class Both(Policy):
+    """Compares what it is told with what is true."""
+
+    channels = ("link", "modem")

@@ -58,7 +58,8 @@ class Policy:
     """Table of what is remembered (``uuv_marl.sim.tables``): a NamedTuple of arrays over world, vehicle, sector and
     active sub-sector. Zero is nothing: so it starts, and so it is forgotten."""
     channels: ClassVar[tuple[str, ...]] = ()
-    """Channels needed beyond the percept: ``compass``, ``link``, for which ``modem`` can stand in."""
+    """Channels needed beyond the percept, of ``uuv_marl.percept.CHANNELS``. ``modem`` can stand in for ``link``: then
+    the link's fields lie where ``at`` says, and ``percept["link_velocity"]`` is not there."""
     yaw_damping_nms: ClassVar[float] = 0.0
     """Inner loop that the policy was designed with [N m s]."""
 

@@ -135,10 +135,12 @@ def _kind(name: str) -> Kind:
 def granted(name: str, scenario: Scenario) -> Scenario:
     """The scenario with the channels and the inner loop that a policy declares, and no others.
 
-    A scenario that grants ``modem`` grants it in place of ``link``, which is an oracle.
+    A scenario that grants ``modem`` grants it in place of ``link``, which is an oracle; but not to a policy that
+    declares both, nor to a trained one, which knows what it was trained on alone.
     """
     policy = policy_class(name)
-    told = "modem" if "modem" in scenario.sonar.channels else "link"
+    either = "modem" not in policy.channels and not isinstance(policy, Trained)
+    told = "modem" if either and "modem" in scenario.sonar.channels else "link"
     return load_scenario(
         scenario,
         overrides={

@@ -1,6 +1,7 @@
 """What a scenario's sea does, in a few words, for headers of tables, pages and pictures."""
 
 from uuv_marl.scenario.scenario import Scenario
+from uuv_marl.scenario.sea import Fault
 
 IDEAL = "still water, no noise, no delay"
 """The conditions of a scenario in which nothing is on."""
@@ -61,7 +62,7 @@ def _noise(scenario: Scenario) -> dict[str, bool]:
 def _rest(scenario: Scenario) -> dict[str, bool]:
     navigation, actuators, mismatch = scenario.navigation, scenario.actuators, scenario.mismatch
     shares = (mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
-    broken = {f"{fault.kind} fault on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults}
+    broken = {f"{_told(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults}
     return {
         f"position drifts by {navigation.drift_share:.3g} of the way": navigation.drift_share > 0.0,
         f"compass bias {navigation.compass_bias_deg:g} deg": navigation.compass_bias_deg > 0.0,
@@ -71,3 +72,9 @@ def _rest(scenario: Scenario) -> dict[str, bool]:
         f"vehicles differ by up to {max(shares):.3g}": max(shares) > 0.0,
         **broken,
     }
+
+
+def _told(fault: Fault) -> str:
+    """A fault, and what it leaves."""
+    left = f" to {fault.efficiency:.3g}" if fault.efficiency > 0.0 else ""
+    return f"{fault.kind if fault.array is None else f'{fault.array} array'} fault{left}"

@@ -186,7 +186,11 @@ class Swarm:
         self._engine.observe(w)
 
     def observe(self) -> Percept:
-        """Facts and percepts anew, as after a reset, where ``state`` or ``course`` was changed by hand."""
+        """Facts and percepts anew, as after a reset, where ``state`` or ``course`` was changed by hand.
+
+        At sea, vehicles then know where they are, and their arrays begin to read: drift and readings on their way are
+        forgotten. Current, forces, faults and messages go on.
+        """
         self._check_indices(self._arrays())
         for w in range(self.num_worlds):
             self._engine.observe(w)

@@ -199,7 +199,7 @@ def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
 
 @compiled
 def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]:
-    """Velocity of a vehicle over ground, north and east [m/s].
+    """Velocity of a vehicle over ground, north and east [m/s]; a lost one stands still.
 
     Args:
         w: index of the world.
@@ -207,6 +207,8 @@ def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]
         state: holds its heading, and its velocity through the water.
         flow: holds the velocity of the water at it.
     """
+    if not state.alive[w, j]:
+        return 0.0, 0.0
     (c, s), u, v = cos_sin(state.eta[w, j, 2]), state.nu[w, j, 0], state.nu[w, j, 1]
     return c * u - s * v + flow.flow[w, j, 0], s * u + c * v + flow.flow[w, j, 1]
 

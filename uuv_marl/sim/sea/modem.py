@@ -2,7 +2,8 @@
 
 A message arrives at the end of its slot, which leaves time to send it and for sound to cross ``modem.guard_m``; each
 listener loses it with a probability. A vehicle keeps the latest message of each other one. Whose pinger it hears in a
-sub-sector it is taken to know: a message is read where its sender is heard.
+sub-sector it is taken to know: a message is read where its sender is heard. A velocity is sent north and east by the
+sender's compass, and read by the listener's.
 """
 
 import math
@@ -18,6 +19,7 @@ from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.random import uniform
 from uuv_marl.sim.sea.current import Flow, over_ground
+from uuv_marl.sim.sea.navigation import Track, by_compass
 from uuv_marl.sim.sea.purposes import MESSAGE
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import SeaFields
@@ -58,13 +60,13 @@ def draw_mail(w: int, mail: Mail) -> None:
 
 @compiled
 def rounds(tick: int, slots: float, numbers: Modem) -> int:
-    """Rounds in which a moment, so many shares of a round after its start, has come by this control hold."""
-    return math.floor(tick * numbers.hold_s / numbers.round_s - slots + 1e-9)
+    """Latest round whose moment, so many shares of a round after its start, has come by this control hold; or -1."""
+    return max(math.floor(tick * numbers.hold_s / numbers.round_s - slots + 1e-9), -1)
 
 
 @compiled_inner
-def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, flow: Flow) -> None:
-    """Send and receive what is due at the end of a control hold, whose number is already counted.
+def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, flow: Flow, track: Track) -> None:
+    """Send and receive what is due at the start of an episode, or the end of a control hold, its number counted.
 
     Args:
         w: index of the world.
@@ -73,13 +75,15 @@ def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, f
         numbers: the scenario's messages.
         mail: is written.
         flow: the water, which makes velocities over ground.
+        track: the errors of compasses.
     """
     state, n, tick = world.state, mail.sent.shape[1], world.state.tick[w]
     for j in range(n):
         if not state.alive[w, j]:
             continue
         if rounds(tick, j / n, numbers) > rounds(tick - 1, j / n, numbers):
-            mail.sent[w, j, 0], mail.sent[w, j, 1] = over_ground(w, j, state, flow)
+            v_x, v_y = over_ground(w, j, state, flow)
+            mail.sent[w, j, 0], mail.sent[w, j, 1] = by_compass(w, j, v_x, v_y, track)
             mail.sent[w, j, 2] = tick * numbers.hold_s
         arrived = rounds(tick, (j + 1) / n, numbers)
         if arrived > rounds(tick - 1, (j + 1) / n, numbers) and mail.sent[w, j, 2] >= 0.0:
@@ -90,18 +94,19 @@ def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, f
 
 
 @compiled_inner
-def know_mail(w: int, world: World, mail: Mail, more: SeaFields) -> None:
+def know_mail(w: int, world: World, mail: Mail, track: Track, more: SeaFields) -> None:
     """Write, for each sub-sector, what the vehicle heard in it last said.
 
     Args:
         w: index of the world.
         world: its arrays, with whom each vehicle hears.
         mail: what arrived.
+        track: the errors of compasses.
         more: fields of the percepts, which are written.
     """
     heading, now_s = world.senses.heading, world.facts.time_s[w]
     for i in range(world.state.alive.shape[1]):
-        c, s = heading[w, i, 0], heading[w, i, 1]
+        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], track)
         for k in range(more.modem_identity.shape[2]):
             j = world.senses.heard[w, i, k]
             if not world.state.alive[w, i] or j < 0 or mail.mail[w, i, j, 2] < 0.0:

@@ -1,7 +1,7 @@
 """What a vehicle knows of where it is: a position that drifts off, and a compass with a lasting error.
 
-Both turn up where the world meets the body frame: in the vector to l(t), its velocity, and the compass. The sonar needs
-neither. The compass's error doesn't feed the drift: each is an axis of its own.
+Both turn up where the world meets the body frame: in the vector to l(t), its velocity, and the compass; the compass's
+error also in messages. The sonar needs neither. The compass's error doesn't feed the drift: each is an axis of its own.
 """
 
 import math
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import State, World
-from uuv_marl.sim.compiled import compiled_inner
+from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.perception import saturate, toward
 from uuv_marl.sim.random import normal, uniform
 from uuv_marl.sim.sea.purposes import COMPASS, DRIFT
@@ -73,6 +73,21 @@ def go_astray(w: int, state: State, navigation: Navigation, track: Track) -> Non
         track.drift[w, i, 1] += off * track.astray[w, i, 1]
 
 
+@compiled
+def by_compass(w: int, i: int, north: float, east: float, track: Track) -> tuple[float, float]:
+    """A vector north and east as a vehicle's compass has it: turned clockwise by the compass's error.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        north: the vector's northern part, or the cosine of a heading.
+        east: its eastern part, or the sine of a heading.
+        track: the errors of compasses.
+    """
+    c, s = track.bias[w, i, 0], track.bias[w, i, 1]
+    return c * north - s * east, c * east + s * north
+
+
 @compiled_inner
 def navigate(w: int, world: World, navigation: Navigation, track: Track, see: Fields) -> None:
     """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them.
@@ -90,9 +105,7 @@ def navigate(w: int, world: World, navigation: Navigation, track: Track, see: Fi
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:
             continue
-        c_bias, s_bias = track.bias[w, i, 0], track.bias[w, i, 1]
-        c = c_bias * heading[w, i, 0] - s_bias * heading[w, i, 1]
-        s = c_bias * heading[w, i, 1] + s_bias * heading[w, i, 0]
+        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], track)
         dx = reference[w, 0] - (eta[w, i, 0] + track.drift[w, i, 0])
         dy = reference[w, 1] - (eta[w, i, 1] + track.drift[w, i, 1])
         v_x, v_y = reference[w, 2], reference[w, 3]

@@ -260,12 +260,13 @@ def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, hit
         while k < end:  # from one to the next, so that those who hear nothing false cost one draw
             far, side = uniforms(key, FALSE_PLACE, at.tick, i, k)
             away = noise.range[a] * far if noise.passive_ranges or not passive else noise.nominal_range
-            if readings.whom[w, slot, i, k + beyond] == NOBODY or readings.reach[w, slot, i, k + beyond] > away:
+            place = k + beyond
+            if readings.whom[w, slot, i, place] == NOBODY or np.float32(away) < readings.reach[w, slot, i, place]:
                 c, s = cos_sin(noise.width[a] * (1.0 - side))
-                readings.whom[w, slot, i, k + beyond] = PHANTOM if passive else OBSTACLE
-                readings.reach[w, slot, i, k + beyond] = away
-                readings.where[w, slot, i, k + beyond, 0] = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
-                readings.where[w, slot, i, k + beyond, 1] = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])
+                readings.whom[w, slot, i, place] = PHANTOM if passive else OBSTACLE
+                readings.reach[w, slot, i, place] = away
+                readings.where[w, slot, i, place, 0] = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
+                readings.where[w, slot, i, place, 1] = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])
             k += 1 + gap(uniform(key, FALSE_ECHO, at.tick, i, k + 1), noise.false_echo)
 
 

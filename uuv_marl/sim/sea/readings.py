@@ -101,8 +101,10 @@ def any_due(w: int, tick: int, listening: Listening, readings: Readings) -> bool
 
 @compiled_inner
 def begin_line(w: int, state: State, readings: Readings) -> None:
-    """The arrays of world w begin now; whoever is there has stood there before."""
+    """The arrays of world w begin now, the line empty; whoever is there has stood there before."""
     readings.began[w] = state.tick[w]
+    readings.past[w], readings.pose[w], readings.reach[w], readings.where[w] = 0.0, 0.0, 0.0, 0.0
+    readings.whom[w] = NOBODY
     remember(w, state, readings)
 
 

@@ -134,7 +134,7 @@ def drift(w: int, world: World, sea: Sea) -> None:
     read_flow(w, world.state, sea.water, sea.flow)
     go_astray(w, world.state, sea.navigation, sea.track)
     remember(w, world.state, sea.readings)
-    exchange(w, sea.keys[w], world, sea.modem, sea.mail, sea.flow)
+    exchange(w, sea.keys[w], world, sea.modem, sea.mail, sea.flow, sea.track)
 
 
 @compiled_inner
@@ -144,6 +144,7 @@ def begin(w: int, world: World, sea: Sea) -> None:
     find_oneself(w, sea.track)
     begin_ears(w, sea.keys[w], sea.noise, sea.ears)
     begin_line(w, world.state, sea.readings)
+    exchange(w, sea.keys[w], world, sea.modem, sea.mail, sea.flow, sea.track)
 
 
 @compiled_inner
@@ -188,5 +189,5 @@ def know(w: int, world: World, sea: Sea, see: Fields, more: SeaFields) -> None:
         recall(w, world, sea.listening, sea.track, sea.readings, see, more)
     tell_ranged(w, world.state.alive, sea.listening, sea.noise, more)
     know_velocities(w, world, sea.water, sea.flow, see, more)
-    know_mail(w, world, sea.mail, more)
+    know_mail(w, world, sea.mail, sea.track, more)
     navigate(w, world, sea.navigation, sea.track, see)
