@@ -199,6 +199,11 @@ BAD_SEA = [
     ({"modem.loss_probability": 2}, "modem.loss_probability must lie within 0 to 1, got 2"),
     ({"modem.period_s": 0.0}, "modem.period_s must lie within 0.001 to 36,000, got 0.0"),
     ({"mismatch.mass": 0.95}, "mismatch.mass must lie within 0 to 0.9, got 0.95"),
+    (
+        {"mismatch.mass": 0.5, "mismatch.added_mass": 0.5, "mismatch.drag": 0.5},
+        r"mismatch.mass = 0.5, added_mass = 0.5, drag = 0.5 and thrust = 0 may draw .*; lower them, or for this one: "
+        r"timing.integration_step_s = 0.1 is too long .*; use at most 0.05, or lower",
+    ),
     ({"actuators.yaw_authority": 1.5}, "actuators.yaw_authority must lie within 0 to 1, got 1.5"),
     ({"actuators.thrust_lag_s": -1.0}, "actuators.thrust_lag_s must lie within 0 to 3,600, got -1.0"),
     ({"sonar.channels": ["modm"]}, "sonar.channels.0 must be 'compass', .* or 'modem', got 'modm'"),

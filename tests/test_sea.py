@@ -14,7 +14,7 @@ from uuv_marl.scenario import IDEAL, conditions
 from uuv_marl.sim.compiled import interpreted
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
-from uuv_marl.sim.sea.actuation import followed, own_plant, varied, victims
+from uuv_marl.sim.sea.actuation import followed, own_plant, victims
 from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.sea.sea import SEA_CHANNELS
 from uuv_marl.sim.swarm import Swarm
@@ -318,7 +318,7 @@ def test_a_vehicle_that_differs_swims_as_a_scenario_with_its_numbers():
         assert abs(mass - 1) <= 0.2
         assert abs(drag - 1) <= 0.3
         assert abs(added - 1) <= 0.3
-        theirs = plant(swarm.scenario.model_copy(update={"vehicle": varied(swarm.scenario.vehicle, mass, added, drag)}))
+        theirs = plant(swarm.scenario.model_copy(update={"vehicle": swarm.scenario.vehicle.times(mass, added, drag)}))
         np.testing.assert_allclose(own, theirs, rtol=1e-12)
     assert len({tuple(row) for row in swarm._sea.hull.plants[0]}) == 5
 

@@ -91,6 +91,7 @@ class Scenario(sections.Section):
                 f"{MAX_EDDIES:,} are possible: lower it or shorten the course"
             )
         check_vehicle(self.vehicle, self.actuators, self.timing, self.start.speed_max_mps)
+        _check_mismatch(self)
         if self.trajectory.speed_mps > top_speed(self.vehicle, self.actuators):
             warn_of_speed(self.trajectory.speed_mps)
 
@@ -202,6 +203,20 @@ def _check_faults(scenario: Scenario) -> None:
     for k, fault in enumerate(scenario.faults):
         if fault.array is not None and fault.array not in names:
             raise ValueError(f"faults.{k}.array must be one of {', '.join(names)}, got {fault.array!r}")
+
+
+def _check_mismatch(scenario: Scenario) -> None:
+    """The simulation can follow whatever is drawn: what is lightest, braked hardest and pushed most moves fastest."""
+    most, limits = scenario.mismatch, scenario.actuators
+    quickest = scenario.vehicle.times(1.0 - most.mass, 1.0 - most.added_mass, 1.0 + most.drag)
+    pushed = limits.model_copy(update={"max_force_n": (1.0 + most.thrust) * limits.max_force_n})
+    try:
+        check_vehicle(quickest, pushed, scenario.timing, scenario.start.speed_max_mps)
+    except ValueError as error:
+        raise ValueError(
+            f"mismatch.mass = {most.mass:g}, added_mass = {most.added_mass:g}, drag = {most.drag:g} and thrust = "
+            f"{most.thrust:g} may draw a vehicle that the simulation can't follow; lower them, or for this one: {error}"
+        ) from None
 
 
 @cache

@@ -215,6 +215,13 @@ class Vehicle(Section):
             self.I_z_kgm2 - self.N_rdot_kgm2,
         )
 
+    def times(self, mass: float, added_mass: float, drag: float) -> "Vehicle":
+        """A vehicle whose mass (and moment of inertia), added masses and resistances are times these factors."""
+        factors = dict.fromkeys(("m_kg", "I_z_kgm2"), mass)
+        factors |= dict.fromkeys(("X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"), added_mass)
+        factors |= dict.fromkeys(("X_u", "Y_v", "Y_r", "N_v", "N_r", "X_uu", "Y_vv", "Y_rr", "N_rv", "N_rr"), drag)
+        return self.model_copy(update={name: factor * getattr(self, name) for name, factor in factors.items()})
+
 
 class Actuators(Section):
     """Limits of thrust and torque, the same for every policy."""

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario.sections import Vehicle
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.exponential import exp
 from uuv_marl.sim.model import Rules
@@ -100,8 +99,7 @@ def draw_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hu
         for i in range(scenario.swarm.num_vehicles):
             mass, added = uniforms(key, MISMATCH, 0, i, 0)
             drag, thrust = uniforms(key, MISMATCH, 0, i, 1)
-            own = varied(
-                scenario.vehicle,
+            own = scenario.vehicle.times(
                 1.0 + mismatch.mass * (2.0 * mass - 1.0),
                 1.0 + mismatch.added_mass * (2.0 * added - 1.0),
                 1.0 + mismatch.drag * (2.0 * drag - 1.0),
@@ -112,21 +110,6 @@ def draw_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hu
     for f in range(len(scenario.faults)):
         for i in victims(key, f, scenario):
             hull.broken[w, i, f] = window(key, f, i, duration_s, scenario)
-
-
-def varied(vehicle: Vehicle, mass: float, added: float, drag: float) -> Vehicle:
-    """A vehicle with other inertia and resistances.
-
-    Args:
-        vehicle: the scenario's.
-        mass: factor of its mass and moment of inertia.
-        added: factor of its added masses.
-        drag: factor of its resistances.
-    """
-    factors = dict.fromkeys(("m_kg", "I_z_kgm2"), mass)
-    factors |= dict.fromkeys(("X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"), added)
-    factors |= dict.fromkeys(("X_u", "Y_v", "Y_r", "N_v", "N_r", "X_uu", "Y_vv", "Y_rr", "N_rv", "N_rr"), drag)
-    return vehicle.model_copy(update={name: factor * getattr(vehicle, name) for name, factor in factors.items()})
 
 
 def victims(key: np.uint64, fault: int, scenario: Scenario) -> list[int]:
