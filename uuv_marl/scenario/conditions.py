@@ -63,7 +63,10 @@ def _rest(scenario: Scenario) -> dict[str, bool]:
     navigation, actuators, mismatch = scenario.navigation, scenario.actuators, scenario.mismatch
     shares = (mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
     broken = {f"{_told(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults}
+    every_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
+    lost = scenario.modem.loss_probability
     return {
+        f"messages every {every_s:.3g} s, {lost:.3g} of them lost": "modem" in scenario.sonar.channels,
         f"position drifts by {navigation.drift_share:.3g} of the way": navigation.drift_share > 0.0,
         f"compass bias {navigation.compass_bias_deg:g} deg": navigation.compass_bias_deg > 0.0,
         f"thrust lags {actuators.thrust_lag_s:g} s": actuators.thrust_lag_s > 0.0,
