@@ -208,6 +208,8 @@ def _check_faults(scenario: Scenario) -> None:
 def _check_mismatch(scenario: Scenario) -> None:
     """The simulation can follow whatever is drawn: what is lightest, braked hardest and pushed most moves fastest."""
     most, limits = scenario.mismatch, scenario.actuators
+    if not any((most.mass, most.added_mass, most.drag, most.thrust)):
+        return
     quickest = scenario.vehicle.times(1.0 - most.mass, 1.0 - most.added_mass, 1.0 + most.drag)
     pushed = limits.model_copy(update={"max_force_n": (1.0 + most.thrust) * limits.max_force_n})
     try:
