@@ -249,7 +249,6 @@ def test_what_cannot_be_run_is_refused_with_the_remedy(tmp_path, args, message):
 
 
 @pytest.mark.docs
-@pytest.mark.skipif(not DOCS.exists(), reason="no report is shipped yet")
 def test_the_shipped_page_is_made_of_the_shipped_episodes(tmp_path):
     shutil.copy(DOCS / job.EPISODES, tmp_path)
     page.write_report(tmp_path)
