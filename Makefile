@@ -45,7 +45,7 @@ docs-check: .venv/dev.stamp
 	$(BIN)/python $(PYTEST) $(HALVES) -m docs $(ARGS)
 
 # On one thread, because an error on a thread that Numba starts is lost; what is compiled so stays out of the user's cache.
-BOUNDED := baselines bounds engines env reward sonar swarm trajectory vector_env vehicle
+BOUNDED := baselines bounds engines env reward sea sea_modem sea_sonar sonar swarm trajectory vector_env vehicle
 test-bounds: .venv/dev.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
 	$(BIN)/python $(PYTEST) $(HALVES) $(BOUNDED:%=tests/test_%.py) $(ARGS)
