@@ -1,6 +1,7 @@
 """Both engines compute the same, bit for bit: speed never changes physics, and the plain Python says what it is."""
 
 import functools
+import json
 import math
 import os
 import subprocess
@@ -14,10 +15,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import uuv_marl
+from tests import contract
 from uuv_marl import load_scenario, scenario_names
 from uuv_marl.baselines import make
+from uuv_marl.sim import formulas
 from uuv_marl.sim import model as model_module
-from uuv_marl.sim import plain
 from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
@@ -236,23 +238,28 @@ def test_an_engine_that_there_is_not_is_refused():
         Swarm(BASE, engine="jax")
 
 
-def test_the_plain_engine_needs_no_compiler():
+@pytest.mark.parametrize("overrides", [{}, contract.SEA])
+def test_the_plain_engine_needs_no_compiler(overrides):
     run = """
+import json, sys
 import numpy as np
 from uuv_marl import load_scenario
 from uuv_marl.sim.swarm import Swarm
-swarm = Swarm(load_scenario("starter"), engine="plain")
+swarm = Swarm(load_scenario("starter", overrides=json.loads(sys.argv[1])), engine="plain")
 swarm.reset(0)
-print(swarm.step(np.full((1, 5, 2), 0.5)).flat.sum())
+for _ in range(8):
+    percept = swarm.step(np.full((1, 5, 2), 0.5))
+print(percept.flat.tobytes().hex())
 """
-    sums = {
+    flat = {
         subprocess.run(
-            [sys.executable, "-c", run], env={**os.environ, "NUMBA_DISABLE_JIT": disable}, check=True,
+            [sys.executable, "-W", "error", "-c", run, json.dumps(overrides)], check=True,
+            env={**os.environ, "NUMBA_DISABLE_JIT": disable},
             capture_output=True, text=True,
         ).stdout
         for disable in "01"
     }  # fmt: skip
-    assert len(sums) == 1
+    assert len(flat) == 1
 
 
 # --- Motion ---
@@ -347,7 +354,7 @@ def compiled_copy(module):
     return types.SimpleNamespace(**space)
 
 
-PLAIN = compiled_copy(plain)
+PLAIN = compiled_copy(formulas)
 
 
 SUITES = {
@@ -487,7 +494,7 @@ def fill(swarm, layout, seed):
 
 
 def sectors(swarm):
-    return plain.Sectors(*(np.array(part) for part in plain.sub_sectors(swarm.scenario.sonar.arrays)))
+    return formulas.Sectors(*(np.array(part) for part in formulas.sub_sectors(swarm.scenario.sonar.arrays)))
 
 
 def check(swarm):
@@ -495,7 +502,7 @@ def check(swarm):
     facts, alive, hull = swarm.facts, swarm.state.alive[0], swarm.scenario.contact.hull_radius_m
     eta, before = swarm.state.eta[0], swarm.state.before[0]
     discs = swarm.course.obstacles[0, : swarm.course.num_obstacles[0]]
-    heading = np.array([plain.cos_sin(psi) for psi in eta[:, 2].tolist()])
+    heading = np.array([formulas.cos_sin(psi) for psi in eta[:, 2].tolist()])
     np.testing.assert_array_equal(swarm.heading[0], heading)
 
     suite, hiding = sectors(swarm), discs if swarm.scenario.sonar.obstacles_hide_vehicles else discs[:0]

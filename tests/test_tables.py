@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.sim import world
+from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Course, Facts, Senses, State
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, check, rows
@@ -81,6 +81,7 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
             swarm = Swarm(scenario, worlds)
             swarm.reset(0)
             swarm.step(np.zeros((worlds, swarm.num_vehicles, 2)))
-    calm = (world.observe_world, world.step_alone, world.step_worlds)
-    for entry in (*calm, world.observe_world_at_sea, world.step_alone_at_sea, world.step_worlds_at_sea):
+    calm = (entry_points.observe, entry_points.step_alone, entry_points.step_worlds)
+    at_sea = (entry_points.observe_at_sea, entry_points.step_alone_at_sea, entry_points.step_worlds_at_sea)
+    for entry in (*calm, *at_sea):
         assert len(entry.signatures) == 1, entry

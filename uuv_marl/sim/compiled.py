@@ -170,7 +170,9 @@ def compiled_inner(function: F) -> F:
 @functools.cache
 def interpreted(function: F) -> F:
     """The Python of a ``compiled_inner`` function and of those that it calls; functions with a door stay compiled."""
-    plain = cast(Any, function).py_func
+    plain = getattr(function, "py_func", None)
+    if plain is None:  # Numba is switched off: it is Python already
+        return function
     used = {name: plain.__globals__[name] for name in plain.__code__.co_names if name in plain.__globals__}
     inner = {name: interpreted(value) for name, value in used.items() if getattr(value, "is_inner", False)}
     space = {**plain.__globals__, **inner}

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import max_cells
-from uuv_marl.sim.model import model
-from uuv_marl.sim.plain import PlainEngine
-from uuv_marl.sim.sea.sea import Sea
-from uuv_marl.sim.workspace import scratch
-from uuv_marl.sim.world import (
-    observe_world,
-    observe_world_at_sea,
+from uuv_marl.sim.entry_points import (
+    observe,
+    observe_at_sea,
     step_alone,
     step_alone_at_sea,
     step_worlds,
     step_worlds_at_sea,
 )
+from uuv_marl.sim.model import model
+from uuv_marl.sim.plain import PlainEngine
+from uuv_marl.sim.sea.sea import Sea
+from uuv_marl.sim.workspace import scratch
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -71,9 +71,9 @@ class NumbaEngine:
     def observe(self, w: int) -> None:
         """See ``Engine``."""
         if self._sea is None:
-            observe_world(w, self._world, self._model, self._scratch)
+            observe(w, self._world, self._model, self._scratch)
         else:
-            observe_world_at_sea(w, self._world, self._model, self._scratch, self._sea)
+            observe_at_sea(w, self._world, self._model, self._scratch, self._sea)
 
     def step(self, action: Float32, active: Bool | None) -> bool:
         """See ``Engine``."""

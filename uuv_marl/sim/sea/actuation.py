@@ -227,7 +227,7 @@ def integrate_each(
 
 @compiled_inline
 def own_plant(w: int, i: int, hull: Hull) -> Plant:
-    """Vehicle i's numbers. Every field has a column of its own: tests/test_tables.py."""
+    """Vehicle i's numbers. Every field has a column of its own: tests/test_sea.py."""
     p = hull.plants[w, i]
     return Plant(
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16],

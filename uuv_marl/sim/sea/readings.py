@@ -29,7 +29,8 @@ Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Move = tuple[float, float, float, float]
-"""Cosine and sine of a turn, then how far a vehicle went, ahead and abeam as it is headed now [m]."""
+"""Cosine and sine of a vehicle's turn, then how far it went, ahead and abeam as it is headed now [m]; (1, 0, 0, 0) for
+none."""
 
 NOBODY, PHANTOM, OBSTACLE = -1, -2, -3
 """What is heard where it is no vehicle: nothing, a vehicle that isn't there, an obstacle."""
@@ -228,74 +229,72 @@ def recall(
         number = latest(since - listening.delay, listening.every[a])
         taken = readings.began[w] + hold_of(max(number, 0), listening.every[a])  # before the first: since they began
         at = Reading(w, a, number, taken, number % readings.whom.shape[1])
-        for k in range(listening.first[a], listening.first[a + 1] if more.age.shape[2] > 0 else 0):
-            for i in range(world.state.alive.shape[1]):
-                if world.state.alive[w, i]:
-                    more.age[w, i, k] = (tick - taken) * listening.hold_s
-        tell_vehicles(at, world, listening, track, readings, see)
-        tell_echoes(at, world, listening, track, readings, see)
+        carries = listening.compensated and number >= 0 and taken != tick
+        for i in range(world.state.alive.shape[1]):
+            if not world.state.alive[w, i]:
+                continue
+            for k in range(listening.first[a], listening.first[a + 1] if more.age.shape[2] > 0 else 0):
+                more.age[w, i, k] = (tick - taken) * listening.hold_s
+            move = own_move(at, i, world, track, readings) if carries else (1.0, 0.0, 0.0, 0.0)
+            tell_vehicles(at, i, move, listening, readings, world.senses.heard, see)
+            tell_echoes(at, i, move, listening, readings, see)
 
 
 @compiled_inner
 def tell_vehicles(
-    at: Reading, world: World, listening: Listening, track: Track, readings: Readings, see: Fields
+    at: Reading, i: int, move: Move, listening: Listening, readings: Readings, heard: Int32, see: Fields
 ) -> None:
-    """The vehicles that a reading heard, into every living vehicle's percept; by the link also who they are.
+    """The vehicles that vehicle i heard in a reading, into its percept; by the link also who they are.
 
     Args:
         at: the reading; a number below 0 for silence.
-        world: its arrays.
+        i: index of the vehicle.
+        move: its own since the reading.
         listening: the scenario's numbers.
-        track: how far vehicles believe to be from where they are.
         readings: the line.
+        heard: index of the vehicle heard, shape (world, vehicle, sector); is written.
         see: fields of the percepts, which are written.
     """
-    w, a, slot, linked = at.w, at.a, at.slot, see.link_identity.shape[2] > 0
-    for i in range(world.state.alive.shape[1]):
-        if not world.state.alive[w, i]:
-            continue
-        moved = listening.compensated and at.number >= 0 and at.tick != world.state.tick[w]
-        move = own_move(at, i, world, track, readings) if moved else (1.0, 0.0, 0.0, 0.0)
-        for k in range(listening.first[a], listening.first[a + 1]):
-            j, x, y = NOBODY, 0.0, 0.0
-            if at.number >= 0:
-                j = readings.whom[w, slot, i, k]
-            if j != NOBODY:
-                x, y = np.float64(readings.where[w, slot, i, k, 0]), np.float64(readings.where[w, slot, i, k, 1])
-                if moved:
-                    x, y = carried(x, y, move)
-            world.senses.heard[w, i, k] = max(j, NOBODY)
-            see.heard[w, i, k] = 0.0 if j == NOBODY else 1.0
-            see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = saturate(x, MAX_RANGE_M), saturate(y, MAX_RANGE_M)
-            if linked:  # a velocity is written where the current is known
-                see.link_identity[w, i, k] = max(j, NOBODY) + 1
-                see.link_velocity[w, i, k, 0] = see.link_velocity[w, i, k, 1] = 0.0
+    w, slot, linked = at.w, at.slot, see.link_identity.shape[2] > 0
+    for k in range(listening.first[at.a], listening.first[at.a + 1]):
+        j, x, y = NOBODY, 0.0, 0.0
+        if at.number >= 0:
+            j = readings.whom[w, slot, i, k]
+        if j != NOBODY:
+            x, y = np.float64(readings.where[w, slot, i, k, 0]), np.float64(readings.where[w, slot, i, k, 1])
+            x, y = carried(x, y, move)
+        heard[w, i, k] = max(j, NOBODY)
+        see.heard[w, i, k] = 0.0 if j == NOBODY else 1.0
+        see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = saturate(x, MAX_RANGE_M), saturate(y, MAX_RANGE_M)
+        if linked:  # a velocity is written where the current is known
+            see.link_identity[w, i, k] = max(j, NOBODY) + 1
+            see.link_velocity[w, i, k, 0] = see.link_velocity[w, i, k, 1] = 0.0
 
 
 @compiled_inner
-def tell_echoes(at: Reading, world: World, listening: Listening, track: Track, readings: Readings, see: Fields) -> None:
-    """The echoes that a reading heard, into every living vehicle's percept; arguments as for ``tell_vehicles``."""
-    w, a, slot = at.w, at.a, at.slot
-    if listening.active[a] == listening.active[a + 1]:
-        return
-    for i in range(world.state.alive.shape[1]):
-        if not world.state.alive[w, i]:
-            continue
-        moved = listening.compensated and at.number >= 0 and at.tick != world.state.tick[w]
-        move = own_move(at, i, world, track, readings) if moved else (1.0, 0.0, 0.0, 0.0)
-        for e in range(listening.active[a], listening.active[a + 1]):
-            k, reach, x, y = see.heard.shape[2] + e, -1.0, 0.0, 0.0
-            if at.number >= 0 and readings.whom[w, slot, i, k] != NOBODY:
-                reach = np.float64(readings.reach[w, slot, i, k])
-                x, y = np.float64(readings.where[w, slot, i, k, 0]), np.float64(readings.where[w, slot, i, k, 1])
-                if moved:
-                    far = math.sqrt(x * x + y * y)
-                    x, y = carried(x, y, move)
-                    reach = max(reach + math.sqrt(x * x + y * y) - far, 0.0)
-            see.echo[w, i, e] = 1.0 if reach >= 0.0 else 0.0
-            see.echo_range[w, i, e] = min(max(reach, 0.0), MAX_RANGE_M)
-            see.echo_position[w, i, e, 0] = saturate(x, MAX_RANGE_M)
-            see.echo_position[w, i, e, 1] = saturate(y, MAX_RANGE_M)
+def tell_echoes(at: Reading, i: int, move: Move, listening: Listening, readings: Readings, see: Fields) -> None:
+    """The echoes that vehicle i heard in a reading, into its percept.
+
+    Args:
+        at: the reading; a number below 0 for silence.
+        i: index of the vehicle.
+        move: its own since the reading.
+        listening: the scenario's numbers.
+        readings: the line.
+        see: fields of the percepts, which are written.
+    """
+    w, slot = at.w, at.slot
+    for e in range(listening.active[at.a], listening.active[at.a + 1]):
+        k, reach, x, y = see.heard.shape[2] + e, -1.0, 0.0, 0.0
+        if at.number >= 0 and readings.whom[w, slot, i, k] != NOBODY:
+            x, y = np.float64(readings.where[w, slot, i, k, 0]), np.float64(readings.where[w, slot, i, k, 1])
+            far = math.sqrt(x * x + y * y)
+            x, y = carried(x, y, move)
+            reach = max(np.float64(readings.reach[w, slot, i, k]) + math.sqrt(x * x + y * y) - far, 0.0)
+        see.echo[w, i, e] = 1.0 if reach >= 0.0 else 0.0
+        see.echo_range[w, i, e] = min(max(reach, 0.0), MAX_RANGE_M)
+        see.echo_position[w, i, e, 0] = saturate(x, MAX_RANGE_M)
+        see.echo_position[w, i, e, 1] = saturate(y, MAX_RANGE_M)
 
 
 @compiled_inner
