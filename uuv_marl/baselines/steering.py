@@ -1,0 +1,70 @@
+"""From a wished velocity to an action, and back: what policies that think in velocities share."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.policy import Limits, write_action
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+
+Float32 = NDArray[np.float32]
+
+_SHARE = 0.5
+"""Of a velocity error that a decision period's force makes good, at most: 1 would be at the edge of overshooting."""
+_MOST_RATE = 5.0
+"""Of velocity errors' decay [1/s]."""
+
+
+def velocity_gain(scenario: Scenario) -> float:
+    """Force per velocity error [N s/m] with which ``steer`` follows: quick, and stable at the decision period."""
+    rate = min(_SHARE / scenario.timing.decision_period_s, _MOST_RATE)
+    return rate * scenario.vehicle.inertia[0]
+
+
+@compiled
+def drag(speed: float, limits: Limits) -> float:
+    """Surge resistance [N] at a speed [m/s] of at least 0."""
+    return (limits.X_u + limits.X_uu * speed) * speed
+
+
+@compiled
+def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limits, out: Float32) -> None:
+    """The action that takes a vehicle towards a wished velocity: resistance made up for, error made good. Eq. 22.
+
+    The force lies in the horizontal plane. Its forward part becomes thrust, ahead or astern; its sideways part turns the
+    bow to it by the lever arm, since the vehicle can't push sideways.
+
+    Args:
+        w_x: wished velocity, forward [m/s].
+        w_y: wished velocity, to starboard [m/s].
+        u: own surge velocity [m/s].
+        v: own sway velocity [m/s].
+        gain: force per velocity error [N s/m], of ``velocity_gain``.
+        limits: of the actuators, and the surge resistance.
+        out: filled with shares of full force, shape (2,).
+    """
+    resistance = limits.X_u + limits.X_uu * math.hypot(w_x, w_y)
+    f_x, f_y = resistance * w_x + gain * (w_x - u), resistance * w_y + gain * (w_y - v)
+    write_action(f_x, f_y, limits, out)
+
+
+@compiled
+def wished_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, float]:
+    """The velocity [m/s] at which the resistance equals an action's force: what a force asks for. Eq. 22 backwards.
+
+    Args:
+        a_x: share of full thrust.
+        a_y: share of full torque.
+        limits: of the actuators, and the surge resistance.
+    """
+    f_x, f_y = a_x * limits.max_force, a_y * limits.max_torque / limits.lever_arm
+    force = math.hypot(f_x, f_y)
+    if force == 0.0:
+        return 0.0, 0.0
+    if limits.X_uu > 0.0:
+        speed = (math.sqrt(limits.X_u * limits.X_u + 4.0 * limits.X_uu * force) - limits.X_u) / (2.0 * limits.X_uu)
+    else:
+        speed = force / max(limits.X_u, 1e-9)
+    return speed * f_x / force, speed * f_y / force
