@@ -1,0 +1,152 @@
+"""The half-plane solver against every point that can be the answer, one by one."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from uuv_marl.baselines.halfplanes import nearest_velocity
+
+LIMIT = 4.0
+COORDINATES = st.floats(-6.0, 6.0).map(lambda value: round(value, 3))
+WISHES = st.tuples(COORDINATES, COORDINATES)
+ANGLES = st.integers(0, 359).map(np.radians)
+
+
+def planes_of(most):
+    """Lists of (n_x, n_y, b) with unit normals."""
+    plane = st.builds(lambda angle, b: (np.cos(angle), np.sin(angle), b), ANGLES, COORDINATES)
+    return st.lists(plane, min_size=0, max_size=most)
+
+
+def solved(wish, planes, firm=0, limit=LIMIT):
+    rows = np.array(planes, float).reshape(-1, 3)
+    v_x, v_y, violation = nearest_velocity(*wish, rows, len(rows), firm, limit)
+    return np.array([v_x, v_y]), violation
+
+
+def excess(points, planes):
+    """Largest violation of the planes by each point, shape (point,)."""
+    rows = np.array(planes, float).reshape(-1, 3)
+    return (points @ rows[:, :2].T - rows[:, 2]).max(axis=1, initial=-np.inf)
+
+
+def on_circle(normal, b, limit):
+    """Points of a line n.v = b at the speed limit."""
+    length = np.hypot(*normal)
+    if length < 1e-9 or abs(b) > limit * length:
+        return []
+    foot, along = normal * b / length**2, np.array([-normal[1], normal[0]]) / length
+    half = np.sqrt(max(limit**2 - foot @ foot, 0.0))
+    return [foot + half * along, foot - half * along]
+
+
+def crossing(a, b):
+    """The point of two lines n.v = b, if they cross."""
+    matrix = np.array([a[:2], b[:2]])
+    return [] if abs(np.linalg.det(matrix)) < 1e-9 else [np.linalg.solve(matrix, [a[2], b[2]])]
+
+
+def least_violation(planes, limit=LIMIT):
+    """The smallest largest violation that any velocity has, over all points at which it can lie."""
+    rows = [np.array(plane) for plane in planes]
+    points = [-limit * row[:2] for row in rows]
+    for a, b in itertools.combinations(rows, 2):
+        points += on_circle((a - b)[:2], (a - b)[2], limit)
+        points += [point for c in rows for point in crossing(a - b, a - c)]
+    near = [point for point in points if np.hypot(*point) <= limit * (1 + 1e-9)]
+    return excess(np.array(near), planes).min()
+
+
+def nearest_by_force(wish, planes, limit=LIMIT):
+    """The nearest of all points at which the answer can lie, for planes that can be kept; None where they can't."""
+    wish, rows = np.array(wish), [np.array(plane) for plane in planes]
+    points = [wish, wish * min(1.0, limit / max(np.hypot(*wish), 1e-9))]
+    for row in rows:
+        points += [wish - (wish @ row[:2] - row[2]) * row[:2], *on_circle(row[:2], row[2], limit)]
+    points += [point for a, b in itertools.combinations(rows, 2) for point in crossing(a, b)]
+    near = np.array([point for point in points if np.hypot(*point) <= limit * (1 + 1e-9)])
+    near = near[excess(near, planes) <= 1e-7]
+    return near[np.argmin(np.hypot(*(near - wish).T))] if len(near) else None
+
+
+@given(WISHES, planes_of(6))
+@example((0.0, 0.0), [(1.0, 0.0, -1.0), (1.0, 0.0, -1.0)])
+@example((0.0, 0.0), [(1.0, 0.0, -1.0), (-1.0, 0.0, 1.0)])
+def test_the_answer_is_the_nearest_velocity_that_keeps_all(wish, planes):
+    velocity, violation = solved(wish, planes)
+    expected = nearest_by_force(wish, planes)
+    assert np.hypot(*velocity) <= LIMIT * (1 + 1e-9)
+    if expected is None:
+        assert violation > 0.0
+    elif violation == 0.0:
+        np.testing.assert_allclose(velocity, expected, atol=1e-5)
+        assert excess(velocity[None], planes) <= 2e-9
+    else:
+        assert violation < 1e-6, "planes that can just be kept were given up"
+
+
+@given(WISHES, planes_of(5))
+@example((1.0, 2.0), [(1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)])
+@example((1.0, 2.0), [(1.0, 0.0, -5.0)])
+def test_what_cannot_be_kept_is_violated_least_and_next_to_the_wish(wish, planes):
+    velocity, violation = solved(wish, planes)
+    if not planes:
+        return
+    least = max(least_violation(planes), 0.0)
+    assert violation == pytest.approx(least, abs=1e-7)
+    assert excess(velocity[None], planes) <= violation + 1e-8
+    if violation > 1e-6:
+        relaxed = [(n_x, n_y, b + violation + 1e-6) for n_x, n_y, b in planes]
+        found = nearest_by_force(wish, relaxed)
+        assert np.hypot(*(velocity - wish)) <= np.hypot(*(found - wish)) + 1e-2
+
+
+@given(WISHES, planes_of(8), st.randoms(use_true_random=False))
+def test_the_order_of_the_planes_does_not_matter(wish, planes, random):
+    shuffled = list(planes)
+    random.shuffle(shuffled)
+    first, second = solved(wish, planes), solved(wish, shuffled)
+    assert first[1] == pytest.approx(second[1], abs=1e-7)
+    if first[1] == 0.0:
+        np.testing.assert_allclose(first[0], second[0], atol=1e-5)
+
+
+@given(WISHES, planes_of(4), planes_of(4))
+def test_firm_planes_are_kept_where_they_can_be(wish, firm, loose):
+    velocity, violation = solved(wish, firm + loose, len(firm))
+    if firm and nearest_by_force(wish, [(x, y, b - 1e-6) for x, y, b in firm]) is not None:
+        assert excess(velocity[None], firm) <= 1e-8
+    if violation == 0.0:
+        np.testing.assert_array_equal(velocity, solved(wish, firm + loose)[0])
+
+
+def test_a_firm_plane_decides_where_a_loose_one_gives_way():
+    wall, push = (1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)  # at most -1 m/s, and at least 1 m/s
+    assert solved((0.0, 2.0), [wall, push])[1] == pytest.approx(1.0)
+    np.testing.assert_allclose(solved((0.0, 2.0), [wall, push])[0], (0.0, 2.0), atol=1e-8)
+    velocity, violation = solved((0.0, 2.0), [wall, push], firm=1)
+    np.testing.assert_allclose(velocity, (-1.0, 2.0), atol=1e-8)
+    assert violation == pytest.approx(2.0)
+
+
+def test_without_planes_the_wish_is_cut_to_the_limit():
+    np.testing.assert_array_equal(solved((1.0, -2.0), [])[0], (1.0, -2.0))
+    np.testing.assert_allclose(solved((6.0, -8.0), [])[0], (2.4, -3.2))
+
+
+def test_a_general_optimiser_finds_the_same():
+    """SLSQP, which knows nothing of geometry, on crowds of half-planes."""
+    draw = np.random.default_rng(0)
+    for _ in range(20):
+        angle, b = draw.uniform(0, 2 * np.pi, 20), draw.uniform(0.5, 3.0, 20)
+        planes, wish = np.stack([np.cos(angle), np.sin(angle), b], axis=1), draw.uniform(-4, 4, 2)
+        kept = [
+            {"type": "ineq", "fun": lambda v, planes=planes: planes[:, 2] - planes[:, :2] @ v},
+            {"type": "ineq", "fun": lambda v: LIMIT**2 - v @ v},
+        ]
+        found = minimize(lambda v, wish=wish: ((v - wish) ** 2).sum(), np.zeros(2), constraints=kept, method="SLSQP")
+        np.testing.assert_allclose(solved(wish, planes)[0], found.x, atol=1e-4)

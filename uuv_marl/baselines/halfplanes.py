@@ -1,0 +1,169 @@
+"""The velocity nearest to a wished one that keeps to half-planes; where none does, the one that violates them least.
+
+The linear programs of van den Berg, Guy, Lin and Manocha, Reciprocal n-body collision avoidance, ISRR 2009 (Springer
+2011), section 5: one half-plane after the other, in the order given, a velocity that violates one moves to its border.
+Nothing is drawn at random, and both answers are unique, so that the order changes them by rounding alone.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.compiled import compiled
+
+Float64 = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+"""By which a half-plane that counts as kept may be violated [m/s]; assumed: far above rounding, far below any use."""
+_PARALLEL = 1e-12
+"""Sine of the angle below which two borders are parallel; assumed: their crossing would lie beyond any speed."""
+
+
+@compiled
+def nearest_velocity(
+    w_x: float, w_y: float, planes: Float64, num: int, firm: int, limit: float
+) -> tuple[float, float, float]:
+    """The velocity nearest to a wished one, within a speed limit, for which ``n_x v_x + n_y v_y <= b`` for each plane.
+
+    Where there is none, the largest violation ``n_x v_x + n_y v_y - b`` of the planes that are not firm becomes as
+    small as can be; of the velocities that do that, the nearest to the wished one. The time grows with the square of
+    the number of planes, and with its cube where there is none.
+
+    Args:
+        w_x: wished velocity [m/s], in any frame.
+        w_y: and across.
+        planes: n_x, n_y and b [m/s] of each, float64, shape (at least ``num``, 3). Normals have length 1, or a length
+            near it that weighs the plane's violation; the zero vector is no normal, and its row is passed over.
+        num: how many rows count.
+        firm: how many of these, the first, are not to be violated for the others' sake. Where they can't be kept
+            together, they count like the others.
+        limit: largest speed, above 0 [m/s].
+
+    Returns:
+        The velocity (v_x, v_y) [m/s], and the largest violation [m/s], 0 where every plane is kept. To
+        ``TOLERANCE``.
+    """
+    v_x, v_y, kept = _program(w_x, w_y, False, planes, num, -1, firm, 0.0, limit)
+    if kept == num:
+        return v_x, v_y, 0.0
+    firm = firm if kept >= firm else 0
+    worst = 0.0
+    for i in range(max(kept, firm), num):
+        if _excess(v_x, v_y, planes, i) > worst:
+            to_x, to_y, done = _program(-planes[i, 0], -planes[i, 1], True, planes, i, i, firm, 0.0, limit)
+            if done == i:  # else by rounding alone: the velocity before is as good
+                v_x, v_y = to_x, to_y
+            worst = max(worst, _excess(v_x, v_y, planes, i))
+    for i in range(firm, num):
+        worst = max(worst, _excess(v_x, v_y, planes, i))
+    to_x, to_y, done = _program(w_x, w_y, False, planes, num, -1, firm, worst, limit)
+    return (to_x, to_y, worst) if done == num else (v_x, v_y, worst)
+
+
+@compiled
+def _excess(v_x: float, v_y: float, planes: Float64, i: int) -> float:
+    """By how much a velocity violates a plane [m/s]; negative where it keeps it."""
+    return planes[i, 0] * v_x + planes[i, 1] * v_y - planes[i, 2]
+
+
+@compiled
+def _row(planes: Float64, j: int, rival: int, firm: int, slack: float) -> tuple[float, float, float, bool]:
+    """The unit normal and bound of a plane, or of those velocities that violate it no more than they do a rival.
+
+    Args:
+        planes: as in ``nearest_velocity``.
+        j: index of the plane.
+        rival: index of the other, -1 for none.
+        firm: planes before this one stay as they are.
+        slack: by which the others are moved outwards [m/s].
+
+    Returns:
+        n_x, n_y, b, and False where there is no border.
+    """
+    n_x, n_y, b = planes[j, 0], planes[j, 1], planes[j, 2]
+    if j >= firm:
+        b += slack
+        if rival >= 0:
+            n_x, n_y, b = n_x - planes[rival, 0], n_y - planes[rival, 1], b - planes[rival, 2]
+    length = math.sqrt(n_x * n_x + n_y * n_y)
+    if length <= TOLERANCE:
+        return 0.0, 0.0, 0.0, False
+    return n_x / length, n_y / length, b / length, True
+
+
+@compiled
+def _program(
+    c_x: float, c_y: float, far: bool, planes: Float64, num: int, rival: int, firm: int, slack: float, limit: float
+) -> tuple[float, float, int]:
+    """The velocity that is nearest to c, or lies farthest along it, within the limit and the planes.
+
+    Args:
+        c_x: what is aimed at [m/s].
+        c_y: and across.
+        far: farthest along c, else nearest to it.
+        planes: as in ``nearest_velocity``.
+        num: how many rows count.
+        rival: as in ``_row``, likewise ``firm`` and ``slack``.
+        firm: planes that have no rival and no slack.
+        slack: of the others [m/s].
+        limit: largest speed [m/s].
+
+    Returns:
+        The velocity [m/s], and how many planes were kept before one that can't be: ``num`` where all are.
+    """
+    size = math.sqrt(c_x * c_x + c_y * c_y)
+    v_x, v_y = (limit * c_x / size, limit * c_y / size) if (far or size > limit) and size > 0.0 else (c_x, c_y)
+    for i in range(num):
+        n_x, n_y, b, there = _row(planes, i, rival, firm, slack)
+        if there and n_x * v_x + n_y * v_y > b + TOLERANCE:
+            t, found = _along_border(c_x, c_y, far, planes, i, rival, firm, slack, limit)
+            if not found:
+                return v_x, v_y, i
+            v_x, v_y = b * n_x - t * n_y, b * n_y + t * n_x
+    return v_x, v_y, num
+
+
+@compiled
+def _along_border(
+    c_x: float, c_y: float, far: bool, planes: Float64, i: int, rival: int, firm: int, slack: float, limit: float
+) -> tuple[float, bool]:
+    """Where on the border of plane i, counted from its foot along (-n_y, n_x), the best velocity lies [m/s].
+
+    Args:
+        c_x: as in ``_program``, likewise the others.
+        c_y: and across.
+        far: farthest along c, else nearest to it.
+        planes: those before i are kept.
+        i: index of the plane.
+        rival: as in ``_row``.
+        firm: planes that have no rival and no slack.
+        slack: of the others [m/s].
+        limit: largest speed [m/s].
+
+    Returns:
+        The place, and whether there is one.
+    """
+    n_x, n_y, b, _ = _row(planes, i, rival, firm, slack)
+    if b * b > limit * limit:
+        return 0.0, False
+    high = math.sqrt(limit * limit - b * b)
+    low = -high
+    for j in range(i):
+        m_x, m_y, a, there = _row(planes, j, rival, firm, slack)
+        if not there:
+            continue
+        along, over = m_y * n_x - m_x * n_y, b * (m_x * n_x + m_y * n_y) - a
+        if abs(along) <= _PARALLEL:
+            if over > TOLERANCE:
+                return 0.0, False
+        elif along > 0.0:
+            high = min(high, -over / along)
+        else:
+            low = max(low, -over / along)
+    if low > high + TOLERANCE:
+        return 0.0, False
+    best = c_y * n_x - c_x * n_y
+    if far and best != 0.0:
+        best = math.copysign(2.0 * limit, best)
+    return min(max(best, low), high), True
