@@ -18,7 +18,7 @@ from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
 from uuv_marl.baselines.features import MOST_BARRIER
 from uuv_marl.baselines.learned import Learned, Trained
 from uuv_marl.baselines.policy import Limits, PolicyError
-from uuv_marl.baselines.registry import granted, policy_class
+from uuv_marl.baselines.registry import GUARDED, granted, policy_class
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario
@@ -127,6 +127,11 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
         PolicyError: the policy is no network, or was trained on another percept or vehicle than the scenario has.
         ResultsError: the file can't be written.
     """
+    if policy.startswith(GUARDED):
+        raise PolicyError(
+            f"policy {policy!r}: the safety filter has no form in ONNX, since it remembers; export "
+            f"{policy.removeprefix(GUARDED)!r}, and run the filter of uuv_marl.baselines.guarded behind it"
+        )
     kind = policy_class(policy)
     if not isinstance(kind, Trained):
         raise PolicyError(

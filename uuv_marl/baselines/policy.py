@@ -135,7 +135,10 @@ class Policy:
         if self.Memory is not None:
             self.flat(percept)
             self.remember(percept, self._gone_on(percept.clock))
-        return self.decide(percept)
+        action = self.decide(percept)
+        if self.Memory is not None:
+            self.acted(action, self.active)
+        return action
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Hook: take what these worlds perceive, shape (world,), into ``memory``."""
@@ -143,6 +146,9 @@ class Policy:
     def decide(self, percept: Percept) -> Float32:
         """Actions as ``act`` gives them, from the percept and ``memory``, which stay as they are."""
         raise NotImplementedError
+
+    def acted(self, action: Float32, worlds: Bool) -> None:
+        """Hook: take into ``memory`` what these worlds' vehicles do, shape (world, vehicle, 2)."""
 
     def _gone_on(self, clock: Clock | None) -> Bool:
         """Worlds that have gone on since the latest call, shape (world,); those that were reset are forgotten."""

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.checkpoint import is_checkpoint
 from uuv_marl.baselines.floors import Idle, Random
+from uuv_marl.baselines.guarded import Guarded
 from uuv_marl.baselines.learned import Trained, shipped
 from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
 from uuv_marl.percept import Percept
@@ -29,6 +31,7 @@ Kind = type[Policy] | Trained
 POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
     "bio_inspired_plus": BioInspiredPlus,
+    "scout": Scout,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,
@@ -75,6 +78,10 @@ class EnvPolicy:
         return {agent: actions[i] for i, agent in enumerate(self._agents) if agent in observations}
 
 
+GUARDED = "guarded:"
+"""Prefix of a policy's name that puts it inside the safety filter."""
+
+
 class Named(NamedTuple):
     """What the name of a policy says."""
 
@@ -84,17 +91,16 @@ class Named(NamedTuple):
 
 
 def parse(name: str) -> Named:
-    """A policy from its name: ``NAME[,key=value ...]``.
+    """A policy from its name: ``[guarded:]NAME[,key=value ...]``.
 
     Args:
         name: NAME is one of ``POLICIES``, the path of a checkpoint, or ``module:Class``; each key is one of the
-            policy's parameters or gains.
+            policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter.
 
     Raises:
         PolicyError: nobody has that name; the message names the nearest.
     """
-    if name.startswith("guarded:"):
-        raise PolicyError(f"policy {name!r}: the prefix 'guarded:' is reserved for a filter that does not exist yet")
+    name = name.removeprefix(GUARDED)
     plain, *pairs = [name] if Path(name).exists() else name.split(",")
     wrong = next((pair for pair in pairs if not all(pair.partition("="))), None)
     if wrong is not None:
@@ -159,7 +165,8 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
 
     Args:
         name: one of ``POLICIES``, the path of a checkpoint (``runs/mappo/best``), or ``module:Class``; parameters and
-            gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``.
+            gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``; ``guarded:`` before it
+            puts the policy inside the safety filter.
         target: a scenario, for a policy that maps ``Percept`` to actions; or a parallel environment of ours, wrapped
             or not, for one that maps its observation dictionaries to action dictionaries.
         num_worlds: worlds stepped together; 1 for an environment.
@@ -192,6 +199,10 @@ def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters
         num_worlds: first axis of the percepts.
         parameters: by name; texts stand for what they say.
     """
+    if name.startswith(GUARDED):
+        barrier = parameters.pop("barrier", None)
+        inner = _made(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
+        return Guarded(scenario, num_worlds, inner=inner, barrier=barrier)  # pyright: ignore[reportArgumentType] - the caller's
     constructor: Any = kind
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     if isinstance(parameters.get("gains"), str):

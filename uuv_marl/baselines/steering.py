@@ -11,9 +11,9 @@ from uuv_marl.sim.compiled import compiled
 
 Float32 = NDArray[np.float32]
 
-_SHARE = 0.5
+_SHARE = 1.5
 """Of a velocity error that a decision period's force makes good, at most: 1 would be at the edge of overshooting."""
-_MOST_RATE = 5.0
+_MOST_RATE = 8.0
 """Of velocity errors' decay [1/s]."""
 
 
@@ -33,8 +33,8 @@ def drag(speed: float, limits: Limits) -> float:
 def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limits, out: Float32) -> None:
     """The action that takes a vehicle towards a wished velocity: resistance made up for, error made good. Eq. 22.
 
-    The force lies in the horizontal plane. Its forward part becomes thrust, ahead or astern; its sideways part turns the
-    bow to it by the lever arm, since the vehicle can't push sideways.
+    The force lies in the horizontal plane. Its forward part becomes thrust, ahead or astern; its sideways part turns
+    the bow to it by the lever arm, since the vehicle can't push sideways.
 
     Args:
         w_x: wished velocity, forward [m/s].
@@ -68,3 +68,9 @@ def wished_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, floa
     else:
         speed = force / max(limits.X_u, 1e-9)
     return speed * f_x / force, speed * f_y / force
+
+
+@compiled
+def full_speed(limits: Limits) -> float:
+    """The speed [m/s] at which the resistance equals full thrust."""
+    return wished_velocity(1.0, 0.0, limits)[0]

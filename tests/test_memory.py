@@ -1,0 +1,108 @@
+"""What vehicles remember of their surroundings, beside the truth: places, obstacles, neighbours' velocities."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.sim.swarm import Swarm
+
+COURSE = {
+    "trajectory.waypoints_m": [[150.0, 150.0], [450.0, 250.0], [350.0, 450.0]],
+    "obstacles": [
+        {"centre_m": [260.0, 190.0], "radius_m": 15.0},
+        {"centre_m": [330.0, 270.0], "radius_m": 25.0},
+        {"centre_m": [430.0, 330.0], "radius_m": 10.0},
+    ],
+    "swarm.num_vehicles": 12,
+}
+"""Two legs, obstacles beside them, and rest."""
+SURFACE = {"sonar.echo_reports": "surface"}
+NOISE = {"noise.bearing_deg": 2.0, "noise.range_share": 0.02}
+LATE = {
+    "latency.processing_s": 0.3, "latency.compensated": True, "latency.active_period_s": 0.5,
+    "latency.passive_period_s": 0.5,
+}  # fmt: skip
+CURRENT = {"current.speed_mps": 0.5}
+
+
+class Seen(NamedTuple):
+    """Remembered beside true, over a run."""
+
+    place: np.ndarray
+    """Errors of own places [m]."""
+    turn: np.ndarray
+    """Errors of headings [rad]."""
+    centre: np.ndarray
+    """Errors of centres of confirmed discs within 40 m [m]."""
+    radius: np.ndarray
+    """Errors of their radii [m]."""
+    phantoms: float
+    """Share of the confirmed discs that are no obstacle."""
+    forgotten: float
+    """Share of the obstacles within 20 m that are not remembered."""
+    velocity: np.ndarray
+    """Errors of velocities of neighbours heard within 30 m [m/s]."""
+
+
+def run(overrides, seconds=140.0, policy="scout", seed=10_500):
+    """Remembered beside true, sampled every second."""
+    scenario = granted(policy, load_scenario("single_obstacle", overrides=COURSE | overrides))
+    swarm, acts = Swarm(scenario), make(policy, scenario)
+    percept, period = swarm.reset(seed), scenario.timing.decision_period_s
+    errors = {name: [] for name in ("place", "turn", "centre", "radius", "velocity")}
+    found, missed, phantoms, discs, turn, origin = 0, 0, 0, 0, None, None
+    for k in range(round(seconds / period)):
+        action, eta, m = acts.act(percept), swarm.state.eta[0].copy(), acts.memory
+        if turn is None:  # from maps to the world
+            turn = eta[:, 2] - np.arctan2(m.pose[0, :, 3], m.pose[0, :, 2])
+            origin = eta[:, :2] - rotated(m.pose[0, :, :2], turn)
+        if k % round(1.0 / period) == 0 and k * period > 10.0:
+            errors["place"].append(np.linalg.norm(origin + rotated(m.pose[0, :, :2], turn) - eta[:, :2], axis=1))
+            heading = np.arctan2(m.pose[0, :, 3], m.pose[0, :, 2]) + turn - eta[:, 2]
+            errors["turn"].append(np.abs((heading + np.pi) % (2 * np.pi) - np.pi))
+            for i in range(len(eta)):
+                there = swarm.course.obstacles[0, : swarm.course.num_obstacles[0]]
+                sure = m.disc[0, i, m.score[0, i] >= CONFIRMED]
+                sure = np.column_stack([origin[i] + rotated(sure[:, :2], turn[i]), sure[:, 2]])
+                away = np.linalg.norm(sure[:, None, :2] - there[None, :, :2], axis=2)
+                true = away < there[None, :, 2]
+                discs, phantoms = discs + len(sure), phantoms + (~true.any(axis=1)).sum()
+                reach = np.linalg.norm(eta[i, :2] - there[:, :2], axis=1) - there[:, 2]
+                found, missed = found + (reach < 20).sum(), missed + ((reach < 20) & ~true.any(axis=0)).sum()
+                for d, o in zip(*np.nonzero(true & (reach < 40.0)), strict=True):
+                    errors["centre"].append(away[d, o])
+                    errors["radius"].append(abs(sure[d, 2] - there[o, 2]))
+                errors["velocity"] += velocities(i, swarm, m, origin[i], turn[i])
+        percept = swarm.step(action)
+    measured = {name: np.concatenate(list(map(np.atleast_1d, values))) for name, values in errors.items()}
+    return Seen(**measured, phantoms=phantoms / max(discs, 1), forgotten=missed / max(found, 1))
+
+
+def rotated(points, angle):
+    """Points (..., 2) turned clockwise by an angle."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * points[..., 0] - s * points[..., 1], s * points[..., 0] + c * points[..., 1]], axis=-1)
+
+
+def velocities(i, swarm, m, origin, turn):
+    """Errors of the velocities that a vehicle remembers of those that it hears now."""
+    errors, eta = [], swarm.state.eta[0]
+    for k in np.flatnonzero((m.known[0, i] > 3) & (m.since[0, i] == 0.0)):
+        away = np.linalg.norm(origin + rotated(m.place[0, i, k], turn) - eta[:, :2], axis=1)
+        away[i] = np.inf
+        j = int(np.argmin(away))
+        if np.linalg.norm(eta[j, :2] - eta[i, :2]) < 30.0:
+            errors.append(np.linalg.norm(rotated(m.velocity[0, i, k], turn) - swarm.velocity[0, j]))
+    return errors
+
+
+@pytest.mark.parametrize("period", [0.1, 0.2, 0.5])
+@pytest.mark.parametrize("policy", ["scout", "guarded:bio_inspired"])
+def test_a_vehicle_knows_where_it_is_through_turns_and_rest(policy, period):
+    seen = run({"timing.decision_period_s": period}, policy=policy)
+    assert seen.place.max() < 1e-2
+    assert seen.turn.max() < 1e-3

@@ -1,0 +1,56 @@
+"""What policies share that remember their surroundings and keep to the safety filter."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.memory import Model, Surroundings, listen
+from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.steering import velocity_gain
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+
+class Filtered(Policy):
+    """A policy that remembers, and whose velocities are made safe. A subclass defines ``decide``.
+
+    Args:
+        scenario: gives the vehicle, the decision period and the percept's layout.
+        num_worlds: first axis of the percepts.
+        barrier: margins and rates of the filter.
+    """
+
+    Memory: ClassVar[type[Any] | None] = Surroundings
+
+    def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
+        super().__init__(scenario, num_worlds)
+        self.barrier = barrier
+        self.changed: Int64 = np.zeros(num_worlds, np.int64)
+        """Velocities that the filter changed since the reset, shape (world,)."""
+        self.infeasible: Int64 = np.zeros(num_worlds, np.int64)
+        """Those of them for which no velocity was safe, so that the least unsafe was taken, shape (world,)."""
+        self._model, self._gain = Model.of(scenario), velocity_gain(scenario)
+        self._planes: Float64 = np.zeros((self.memory.disc.shape[2] + scenario.sonar.num_sectors, 3))
+
+    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:  # noqa: ARG002 - nothing is drawn
+        """Count anew in these worlds."""
+        self.changed[list(worlds)] = self.infeasible[list(worlds)] = 0
+
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Take what is perceived into what is remembered."""
+        listen(self.flat(percept), self.layout.offsets, worlds, self._model, self.memory)
+
+    def acted(self, action: Float32, worlds: Bool) -> None:
+        """Keep the action: the vehicle's next place is reckoned from it."""
+        self.memory.action[worlds] = action[worlds]
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        return super()._arrays() | {"changed": self.changed, "infeasible": self.infeasible}

@@ -1,0 +1,286 @@
+"""Obstacles that a vehicle has heard, as discs in its own map: a recursive least-squares estimate of centre and radius.
+
+Each echo is a point of a disc's surface; where echoes report centres, it also gives the centre. A disc that should be
+heard and is not, decision after decision, is forgotten.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.memory.pose import to_body, to_map, to_map_axes
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.sonar import cross, suite
+from uuv_marl.sim.views import Fields
+
+Float64 = NDArray[np.float64]
+
+NOISE_M, NOISE_SHARE = 0.05, 0.02
+"""Standard deviation of an echo taken for granted: so much, and this share of its range. Assumed: a sonar's of 2 %."""
+RADIUS_M, RADIUS_SD_M = 18.0, 10.0
+"""Radius expected of an obstacle of which one point is known, and its deviation [m]. Assumed: those of random_field."""
+SIDE_SD_M = 8.0
+"""Deviation across of the centre of an obstacle whose nearest point may lie outside the sonar's fan [m]. Assumed."""
+GATE = 3.0
+"""Deviations by which an echo may miss a disc that it belongs to [1]."""
+CONFIRMED = 2.0
+"""Decisions at which a disc must have been heard to count."""
+MOST_SCORE_S = 3.0
+"""A disc is forgotten after it should have been heard for so long and was not [s]."""
+LOST_S = 1.0
+"""One that was heard but once is forgotten after this [s]."""
+SMALLEST_M, LARGEST_M = 0.5, 60.0
+"""Bounds of a radius [m]."""
+_FORGETS = 1.02
+"""Growth of the covariance per decision at which a disc is heard: about the last 50 count."""
+
+
+class Fans(NamedTuple):
+    """The active sub-sectors, and what they report."""
+
+    lower: Float64
+    """Lower edge of each, a unit vector, shape (active, 2)."""
+    upper: Float64
+    """Upper edge of each, shape (active, 2)."""
+    range_m: Float64
+    """Shape (active,)."""
+    centres: bool
+    """Echoes report centres; else points of surfaces."""
+    period_s: float
+    """Between two decisions [s]."""
+
+    @staticmethod
+    def of(scenario: Scenario) -> "Fans":
+        """Those of a scenario's sonar."""
+        all_of = suite(scenario)
+        return Fans(
+            all_of.lower[all_of.active], all_of.upper[all_of.active], all_of.active_range,
+            not all_of.reports_surface, scenario.timing.decision_period_s,
+        )  # fmt: skip
+
+
+@compiled
+def listen(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+    """Take a vehicle's echoes into its discs, and forget those that should have been heard and were not.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        fans: the active sub-sectors.
+        kept: what is remembered; the discs are brought up to date.
+    """
+    silence = kept.silence[w, i]
+    for d in range(silence.shape[0]):
+        silence[d] += fans.period_s
+    for a in range(see.echo.shape[2]):
+        if see.echo[w, i, a] > 0.0:
+            d = owner(w, i, a, see, fans, kept)
+            if d >= 0:
+                _hear(w, i, d, a, see, fans, kept)
+    for _ in range(see.echo.shape[2]):  # what is left belongs to obstacles that are new
+        a = _nearest_of_nobody(w, i, see, fans, kept)
+        if a < 0:
+            break
+        d = _place(w, i, kept)
+        _begin(w, i, d, a, see, fans, kept)
+        for b in range(see.echo.shape[2]):
+            if b != a and see.echo[w, i, b] > 0.0 and owner(w, i, b, see, fans, kept) == d:
+                _hear(w, i, d, b, see, fans, kept)
+    _judge(w, i, see, fans, kept)
+    _merge(w, i, kept)
+
+
+@compiled
+def _nearest_of_nobody(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> int:
+    """The active sub-sector of the nearest echo that belongs to no disc, -1 for none. Arguments as for ``listen``."""
+    nearest, reach = -1, math.inf
+    for a in range(see.echo.shape[2]):
+        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and owner(w, i, a, see, fans, kept) < 0:
+            nearest, reach = a, see.echo_range[w, i, a]
+    return nearest
+
+
+@compiled
+def surface_point(w: int, i: int, a: int, see: Fields, fans: Fans) -> tuple[float, float]:
+    """The point of a surface that an echo comes from, in the body frame [m].
+
+    Where echoes report centres it lies in the centre's direction, or on the edge of the sub-sector next to that.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        a: index of the active sub-sector; it holds an echo.
+        see: the fields of percepts, of all worlds.
+        fans: the active sub-sectors.
+    """
+    x, y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
+    if not fans.centres:
+        return x, y
+    away, reach = math.hypot(x, y), float(see.echo_range[w, i, a])
+    if away < 1e-6:
+        return 0.0, 0.0
+    e_x, e_y = x / away, y / away
+    l_x, l_y, u_x, u_y = fans.lower[a, 0], fans.lower[a, 1], fans.upper[a, 0], fans.upper[a, 1]
+    if not (cross(l_x, l_y, e_x, e_y) > 0.0 and cross(u_x, u_y, e_x, e_y) <= 0.0):
+        e_x, e_y = (l_x, l_y) if l_x * e_x + l_y * e_y > u_x * e_x + u_y * e_y else (u_x, u_y)
+    return reach * e_x, reach * e_y
+
+
+@compiled
+def centre_of(w: int, i: int, a: int, see: Fields, kept: Surroundings) -> tuple[float, float]:
+    """The centre that an echo reports, in the map [m]. Arguments as for ``owner``."""
+    return to_map(float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1]), kept.pose[w, i])
+
+
+@compiled
+def owner(w: int, i: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -> int:
+    """The disc that an echo belongs to, -1 for none: the one whose surface it misses least.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        a: index of the active sub-sector; it holds an echo.
+        see: the fields of percepts, of all worlds.
+        fans: the active sub-sectors.
+        kept: what is remembered.
+    """
+    x, y = surface_point(w, i, a, see, fans)
+    x, y = to_map(x, y, kept.pose[w, i])
+    sd = NOISE_M + NOISE_SHARE * see.echo_range[w, i, a]
+    best, least = -1, math.inf
+    for d in range(kept.score.shape[2]):
+        if kept.score[w, i, d] > 0.0:
+            disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
+            dx, dy = x - disc[0], y - disc[1]
+            away = max(math.hypot(dx, dy), 1e-6)
+            h_x, h_y = -dx / away, -dy / away
+            variance = (
+                h_x * (h_x * p[0] + 2.0 * h_y * p[1] - 2.0 * p[2]) + h_y * (h_y * p[3] - 2.0 * p[4]) + p[5] + sd * sd
+            )
+            miss = abs(away - disc[2])
+            if fans.centres:
+                c_x, c_y = centre_of(w, i, a, see, kept)
+                miss, variance = math.hypot(c_x - disc[0], c_y - disc[1]), p[0] + p[3] + 2.0 * sd * sd
+            if miss <= GATE * math.sqrt(variance) + 0.5 and miss < least:
+                best, least = d, miss
+    return best
+
+
+@compiled
+def correct(disc: Float64, p: Float64, h: tuple[float, float, float], wrong: float, variance: float) -> None:
+    """One step of recursive least squares: a measurement that is ``wrong`` by h . (x, y, R) corrects a disc.
+
+    Args:
+        disc: centre and radius [m], shape (3,); corrected.
+        p: their covariance [m2], shape (6,): xx, xy, xR, yy, yR, RR; corrected.
+        h: derivative of the measurement by centre and radius [1].
+        wrong: what was measured less what was expected [m].
+        variance: of the measurement [m2].
+    """
+    g_x = p[0] * h[0] + p[1] * h[1] + p[2] * h[2]
+    g_y = p[1] * h[0] + p[3] * h[1] + p[4] * h[2]
+    g_r = p[2] * h[0] + p[4] * h[1] + p[5] * h[2]
+    s = h[0] * g_x + h[1] * g_y + h[2] * g_r + variance
+    disc[0] += g_x * wrong / s
+    disc[1] += g_y * wrong / s
+    disc[2] = min(max(disc[2] + g_r * wrong / s, SMALLEST_M), LARGEST_M)
+    p[0], p[1], p[2] = p[0] - g_x * g_x / s, p[1] - g_x * g_y / s, p[2] - g_x * g_r / s
+    p[3], p[4], p[5] = p[3] - g_y * g_y / s, p[4] - g_y * g_r / s, p[5] - g_r * g_r / s
+
+
+@compiled
+def _hear(w: int, i: int, d: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+    """Correct a disc by one echo. Arguments as for ``owner``; d is the index of the disc."""
+    disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
+    if kept.silence[w, i, d] > 0.0:  # the first of this decision
+        kept.silence[w, i, d] = 0.0
+        kept.score[w, i, d] = min(kept.score[w, i, d] + 1.0, MOST_SCORE_S / fans.period_s)
+        for k in range(6):
+            p[k] *= _FORGETS
+    x, y = surface_point(w, i, a, see, fans)
+    x, y = to_map(x, y, kept.pose[w, i])
+    sd = NOISE_M + NOISE_SHARE * see.echo_range[w, i, a]
+    if fans.centres:
+        c_x, c_y = centre_of(w, i, a, see, kept)
+        correct(disc, p, (1.0, 0.0, 0.0), c_x - disc[0], sd * sd)
+        correct(disc, p, (0.0, 1.0, 0.0), c_y - disc[1], sd * sd)
+    dx, dy = x - disc[0], y - disc[1]
+    away = max(math.hypot(dx, dy), 1e-6)
+    correct(disc, p, (dx / away, dy / away, 1.0), away - disc[2], sd * sd)
+
+
+@compiled
+def _begin(w: int, i: int, d: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+    """A new disc behind its nearest echo. Arguments as for ``owner``; d is the index of the disc."""
+    x, y = surface_point(w, i, a, see, fans)
+    away = max(math.hypot(x, y), 1e-6)
+    sd = NOISE_M + NOISE_SHARE * away
+    e_x, e_y = x / away, y / away
+    inside = cross(fans.lower[a, 0], fans.lower[a, 1], e_x, e_y) > 1e-3
+    inside = inside and cross(fans.upper[a, 0], fans.upper[a, 1], e_x, e_y) < -1e-3
+    across = sd if inside or fans.centres else SIDE_SD_M
+    c_x, c_y = to_map(x + RADIUS_M * e_x, y + RADIUS_M * e_y, kept.pose[w, i])
+    e_x, e_y = to_map_axes(e_x, e_y, kept.pose[w, i])
+    disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
+    disc[0], disc[1], disc[2] = c_x, c_y, RADIUS_M
+    along, side, size = RADIUS_SD_M * RADIUS_SD_M + sd * sd, across * across, RADIUS_SD_M * RADIUS_SD_M
+    p[0] = along * e_x * e_x + side * e_y * e_y
+    p[1] = (along - side) * e_x * e_y
+    p[3] = along * e_y * e_y + side * e_x * e_x
+    p[2], p[4], p[5] = size * e_x, size * e_y, size
+    kept.score[w, i, d], kept.silence[w, i, d] = 1.0, 0.0
+    if fans.centres:
+        c_x, c_y = centre_of(w, i, a, see, kept)
+        correct(disc, p, (1.0, 0.0, 0.0), c_x - disc[0], sd * sd)
+        correct(disc, p, (0.0, 1.0, 0.0), c_y - disc[1], sd * sd)
+
+
+@compiled
+def _place(w: int, i: int, kept: Surroundings) -> int:
+    """Index for a new disc: a free one, or that of the farthest."""
+    farthest, most = 0, -1.0
+    for d in range(kept.score.shape[2]):
+        if kept.score[w, i, d] <= 0.0:
+            return d
+        away = math.hypot(kept.disc[w, i, d, 0] - kept.pose[w, i, 0], kept.disc[w, i, d, 1] - kept.pose[w, i, 1])
+        if away - kept.disc[w, i, d, 2] > most:
+            farthest, most = d, away - kept.disc[w, i, d, 2]
+    return farthest
+
+
+@compiled
+def _judge(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+    """Lower the score of discs that should have been heard and were not. Arguments as for ``listen``."""
+    for d in range(kept.score.shape[2]):
+        score, silence = kept.score[w, i, d], kept.silence[w, i, d]
+        if score <= 0.0 or silence == 0.0:
+            continue
+        if score < CONFIRMED and silence > LOST_S:
+            kept.score[w, i, d] = 0.0
+            continue
+        x, y = to_body(kept.disc[w, i, d, 0], kept.disc[w, i, d, 1], kept.pose[w, i])
+        away = max(math.hypot(x, y), 1e-6)
+        reach = away - kept.disc[w, i, d, 2]
+        for a in range(fans.lower.shape[0]):
+            inside = cross(fans.lower[a, 0], fans.lower[a, 1], x, y) > 0.0
+            if inside and cross(fans.upper[a, 0], fans.upper[a, 1], x, y) <= 0.0 and reach < 0.9 * fans.range_m[a]:
+                if see.echo[w, i, a] == 0.0 or see.echo_range[w, i, a] > reach + 1.0 + 0.1 * away:
+                    kept.score[w, i, d] = score - 1.0
+                break
+
+
+@compiled
+def _merge(w: int, i: int, kept: Surroundings) -> None:
+    """Of two discs one of which holds the other's centre, forget the one that has been heard less."""
+    disc, score = kept.disc[w, i], kept.score[w, i]
+    for d in range(score.shape[0]):
+        for e in range(d):
+            if score[d] > 0.0 and score[e] > 0.0:
+                apart = math.hypot(disc[d, 0] - disc[e, 0], disc[d, 1] - disc[e, 1])
+                if apart < max(disc[d, 2], disc[e, 2]):
+                    score[d if score[d] <= score[e] else e] = 0.0

@@ -1,0 +1,146 @@
+"""Neighbours that a vehicle hears, with velocities: an alpha-beta filter whose gains follow from the errors it sees."""
+
+import math
+
+from uuv_marl.baselines.memory.pose import to_map
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields
+
+GATE_M, GATE_SHARE = 2.0, 0.1
+"""By which a neighbour may be heard from where it was expected: so much, and this share of its range. Assumed."""
+ACCELERATION = 5.0
+"""Of neighbours, a typical one [m/s2]. Assumed: a third of what full force makes of the paper's vehicle."""
+LEAST_ERROR = 0.0002
+"""Errors of positions are never taken for smaller than this share of the range [1]."""
+KEPT_S = 1.0
+"""A neighbour that is heard no more is kept for so long [s]."""
+_SAME_M = 1e-3
+"""A reading that has not moved by this is the one before, of a sonar that reads more seldom than decisions are made."""
+_STALE_S = 2.0
+"""But it is believed to stand after so long [s]."""
+_LEARNS = 0.05
+"""Weight of the newest error in their mean [1]."""
+
+
+@compiled
+def gains(period: float, deviation: float) -> tuple[float, float]:
+    """Alpha and beta [1] for the tracking index: ACCELERATION period^2 / deviation. Kalata 1984.
+
+    Args:
+        period: since the reading before [s].
+        deviation: of the errors of positions [m].
+    """
+    index = ACCELERATION * period * period / deviation
+    r = 0.25 * (4.0 + index - math.sqrt(index * (8.0 + index)))
+    alpha = 1.0 - r * r
+    return alpha, min(2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha), 1.0)
+
+
+@compiled
+def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> None:
+    """Take the neighbours that a vehicle hears into those it knows.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        period: since the percept before [s].
+        kept: what is remembered; the neighbours are brought up to date.
+    """
+    known, since, place, velocity = kept.known[w, i], kept.since[w, i], kept.place[w, i], kept.velocity[w, i]
+    for k in range(known.shape[0]):
+        if known[k] > 0.0:
+            since[k] += period
+            place[k, 0] += period * velocity[k, 0]
+            place[k, 1] += period * velocity[k, 1]
+            known[k] = -known[k]  # not heard yet
+    for s in range(see.heard.shape[2]):
+        if see.heard[w, i, s] > 0.0:
+            p_x, p_y = float(see.neighbour[w, i, s, 0]), float(see.neighbour[w, i, s, 1])
+            x, y = to_map(p_x, p_y, kept.pose[w, i])
+            reach = math.hypot(p_x, p_y)
+            k = _match(x, y, reach, w, i, kept)
+            if k >= 0:
+                _follow(w, i, k, x, y, reach, kept)
+            else:
+                _meet(w, i, x, y, see, kept)
+    for k in range(known.shape[0]):
+        if known[k] < 0.0:
+            known[k] = 0.0 if since[k] > KEPT_S else -known[k]
+
+
+@compiled
+def _match(x: float, y: float, reach: float, w: int, i: int, kept: Surroundings) -> int:
+    """Index of the known neighbour that is expected nearest to where one is heard, -1 for none within the gate.
+
+    Args:
+        x: where one is heard, in the map [m].
+        y: the same, second axis [m].
+        reach: its range [m].
+        w: index of the world.
+        i: index of the vehicle.
+        kept: what is remembered.
+    """
+    best, least = -1, GATE_M + GATE_SHARE * reach
+    for k in range(kept.known.shape[2]):
+        if kept.known[w, i, k] < 0.0:
+            away = math.hypot(x - kept.place[w, i, k, 0], y - kept.place[w, i, k, 1])
+            if away < least:
+                best, least = k, away
+    return best
+
+
+@compiled
+def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surroundings) -> None:
+    """Correct a known neighbour by a reading.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        k: index of the neighbour.
+        x: where it is heard, in the map [m].
+        y: the same, second axis [m].
+        reach: its range [m].
+        kept: what is remembered.
+    """
+    place, velocity, last = kept.place[w, i, k], kept.velocity[w, i, k], kept.reading[w, i, k]
+    kept.known[w, i, k] = 1.0 - kept.known[w, i, k]
+    since = kept.since[w, i, k]
+    if math.hypot(x - last[0], y - last[1]) < _SAME_M and since < _STALE_S:
+        return
+    dx, dy = x - place[0], y - place[1]
+    error = math.hypot(dx, dy) / max(reach, 1.0)
+    kept.error[w, i] += _LEARNS * (error - kept.error[w, i])
+    alpha, beta = gains(since, max(kept.error[w, i], LEAST_ERROR) * max(reach, 1.0))
+    place[0], place[1] = place[0] + alpha * dx, place[1] + alpha * dy
+    velocity[0], velocity[1] = velocity[0] + beta * dx / since, velocity[1] + beta * dy / since
+    last[0], last[1] = x, y
+    kept.since[w, i, k] = 0.0
+
+
+@compiled
+def _meet(w: int, i: int, x: float, y: float, see: Fields, kept: Surroundings) -> None:
+    """Know a new neighbour, believed to move as l(t) does; where there is no room, that heard the longest ago goes.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        x: where it is heard, in the map [m].
+        y: the same, second axis [m].
+        see: the fields of percepts, of all worlds.
+        kept: what is remembered.
+    """
+    best, most = 0, -1.0
+    for k in range(kept.known.shape[2]):
+        if kept.known[w, i, k] == 0.0:
+            best = k
+            break
+        if kept.known[w, i, k] < 0.0 and kept.since[w, i, k] > most:
+            best, most = k, kept.since[w, i, k]
+    speed = math.hypot(float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1]))
+    kept.place[w, i, best, 0], kept.place[w, i, best, 1] = x, y
+    kept.reading[w, i, best, 0], kept.reading[w, i, best, 1] = x, y
+    kept.velocity[w, i, best, 0] = speed * kept.reference[w, i, 2]
+    kept.velocity[w, i, best, 1] = speed * kept.reference[w, i, 3]
+    kept.known[w, i, best], kept.since[w, i, best] = 1.0, 0.0

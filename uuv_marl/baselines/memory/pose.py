@@ -1,0 +1,175 @@
+"""Where a vehicle is in its own map: the reference point is the fix, its velocity the compass, dead reckoning the rest.
+
+Dead reckoning takes what the vehicle's own model says of its latest action, and makes up for half of what it measures
+to be different at the end.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, plant, project, turned
+from uuv_marl.sim.views import Fields
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+
+_MOVES_MPS = 0.05
+"""l(t) moves if it is faster."""
+_TURN_TOLERANCE = 0.01
+"""By which compass and dead reckoning may differ on a leg, beside what the yaw rate's error makes of it [rad]."""
+
+
+class Reckoning(NamedTuple):
+    """What a vehicle knows of its own motion between two decisions."""
+
+    plant: Plant
+    holds: int
+    """Control holds of a decision."""
+    steps: int
+    """Integration steps of a hold."""
+    step_s: float
+    """Time of one of them [s]."""
+    period_s: float
+    """Between two decisions [s]."""
+
+    @staticmethod
+    def of(scenario: Scenario) -> "Reckoning":
+        """That of a scenario's vehicle, undisturbed."""
+        timing = scenario.timing
+        holds = round(timing.decision_period_s / timing.control_hold_s)
+        steps = round(timing.control_hold_s / timing.integration_step_s)
+        return Reckoning(plant(scenario), holds, steps, timing.integration_step_s, timing.decision_period_s)
+
+
+@compiled
+def reckoned(motion: Float64, action: Float64 | Float32, own: Reckoning) -> State6:
+    """The state after one decision [m, rad, m/s, rad/s], from the origin ahead, in still water.
+
+    Args:
+        motion: surge and sway velocity [m/s] and yaw rate [rad/s] at the decision, shape (3,).
+        action: shares of full thrust and torque, shape (2,).
+        own: the vehicle.
+    """
+    state = (0.0, 0.0, 0.0, motion[0], motion[1], motion[2])
+    for _ in range(own.holds):
+        a_x, a_y = turned(action[0], action[1], state[2], own.plant)
+        a_x, a_y = project(a_x, a_y)
+        tau = actuators(a_x, a_y, state[5], own.plant)
+        for _ in range(own.steps):
+            state = advance(state, tau, STILL, own.step_s, own.plant)
+    return state
+
+
+@compiled
+def to_map_axes(x: float, y: float, pose: Float64) -> tuple[float, float]:
+    """A vector ahead and to starboard along the map's axes; ``pose`` as in ``Surroundings``, shape (4,)."""
+    return pose[2] * x - pose[3] * y, pose[3] * x + pose[2] * y
+
+
+@compiled
+def to_body_axes(x: float, y: float, pose: Float64) -> tuple[float, float]:
+    """A vector along the map's axes as ahead and to starboard; ``pose`` as in ``Surroundings``, shape (4,)."""
+    return pose[2] * x + pose[3] * y, pose[2] * y - pose[3] * x
+
+
+@compiled
+def to_map(x: float, y: float, pose: Float64) -> tuple[float, float]:
+    """A point ahead and to starboard [m] in the map [m]; ``pose`` as in ``Surroundings``, shape (4,)."""
+    x, y = to_map_axes(x, y, pose)
+    return pose[0] + x, pose[1] + y
+
+
+@compiled
+def to_body(x: float, y: float, pose: Float64) -> tuple[float, float]:
+    """A point of the map [m], ahead and to starboard [m]; ``pose`` as in ``Surroundings``, shape (4,)."""
+    return to_body_axes(x - pose[0], y - pose[1], pose)
+
+
+@compiled
+def begin(w: int, i: int, see: Fields, kept: Surroundings) -> None:
+    """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or the bow.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        kept: what is remembered; the pose is written.
+    """
+    v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
+    speed = math.hypot(v_x, v_y)
+    c, s, moving = 1.0, 0.0, 0.0
+    if speed > _MOVES_MPS:
+        c, s, moving = v_x / speed, -v_y / speed, 1.0
+    r_x, r_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
+    kept.pose[w, i, 0], kept.pose[w, i, 1] = -(c * r_x - s * r_y), -(s * r_x + c * r_y)
+    kept.pose[w, i, 2], kept.pose[w, i, 3] = c, s
+    kept.reference[w, i, 0] = kept.reference[w, i, 1] = kept.reference[w, i, 3] = 0.0
+    kept.reference[w, i, 2] = moving
+    kept.begun[w, i] = 1.0
+
+
+@compiled
+def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> None:
+    """A later percept: heading and place from l(t) while it stays on its leg, or at rest; else by dead reckoning.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        own: the vehicle.
+        kept: what is remembered; the pose is brought up to date.
+    """
+    pose, at, motion = kept.pose[w, i], kept.reference[w, i], kept.motion[w, i]
+    v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
+    speed, half = math.hypot(v_x, v_y), 0.5 * own.period_s
+    x, y, psi, u, v, r = reckoned(motion, kept.action[w, i], own)
+    wrong = see.yaw_rate[w, i, 0] - r
+    turn_c, turn_s = cos_sin(psi + half * wrong)
+    c, s = turn_c * pose[2] - turn_s * pose[3], turn_s * pose[2] + turn_c * pose[3]
+    moves, moved = speed > _MOVES_MPS, math.hypot(at[2], at[3]) > 0.0
+    steady = moves == moved
+    if moves:
+        b_x, b_y = v_x / speed, v_y / speed
+        leg_c, leg_s = b_x * at[2] + b_y * at[3], b_x * at[3] - b_y * at[2]
+        tolerance = _TURN_TOLERANCE + half * abs(wrong)
+        if steady and abs(leg_s * c - leg_c * s) <= tolerance and leg_c * c + leg_s * s > 0.0:
+            c, s = leg_c, leg_s
+        else:
+            steady = False
+            at[2], at[3] = c * b_x - s * b_y, s * b_x + c * b_y
+    else:
+        at[2] = at[3] = 0.0
+    r_x, r_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
+    if steady:
+        at[0], at[1] = at[0] + own.period_s * speed * at[2], at[1] + own.period_s * speed * at[3]
+        pose[0], pose[1] = at[0] - (c * r_x - s * r_y), at[1] - (s * r_x + c * r_y)
+    else:
+        x, y = pose[2] * x - pose[3] * y, pose[3] * x + pose[2] * y
+        u, v = see.velocity[w, i, 0] - u, see.velocity[w, i, 1] - v
+        pose[0] += x + half * (c * u - s * v)
+        pose[1] += y + half * (s * u + c * v)
+        at[0], at[1] = pose[0] + c * r_x - s * r_y, pose[1] + s * r_x + c * r_y
+    norm = math.hypot(c, s)
+    pose[2], pose[3] = c / norm, s / norm
+
+
+@compiled
+def keep_motion(w: int, i: int, see: Fields, kept: Surroundings) -> None:
+    """Own velocity, for the next percept.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        kept: what is remembered; the motion is written.
+    """
+    kept.motion[w, i, 0], kept.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
+    kept.motion[w, i, 2] = see.yaw_rate[w, i, 0]
+    kept.reference_speed[w, i] = math.hypot(see.reference_velocity[w, i, 0], see.reference_velocity[w, i, 1])

@@ -1,0 +1,54 @@
+"""A percept taken into what a vehicle remembers: where it is, the obstacles, the neighbours."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.memory import discs, neighbours, pose
+from uuv_marl.baselines.memory.discs import Fans
+from uuv_marl.baselines.memory.pose import Reckoning
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Starts, fields
+
+Float32 = NDArray[np.float32]
+Bool = NDArray[np.bool_]
+
+
+class Model(NamedTuple):
+    """What a vehicle knows of itself before it remembers anything."""
+
+    own: Reckoning
+    """How it moves."""
+    fans: Fans
+    """How it hears obstacles."""
+
+    @staticmethod
+    def of(scenario: Scenario) -> "Model":
+        """That of a scenario's vehicle."""
+        return Model(Reckoning.of(scenario), Fans.of(scenario))
+
+
+@compiled
+def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept: Surroundings) -> None:
+    """Take what every vehicle perceives into what it remembers. Once for every decision.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        worlds: those that have gone on, shape (world,).
+        model: what vehicles know of themselves.
+        kept: what they remember; brought up to date.
+    """
+    see = fields(flat, at)
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1] if worlds[w] else 0):
+            if kept.begun[w, i] == 0.0:
+                pose.begin(w, i, see, kept)
+            else:
+                pose.move(w, i, see, model.own, kept)
+            pose.keep_motion(w, i, see, kept)
+            discs.listen(w, i, see, model.fans, kept)
+            neighbours.listen(w, i, see, model.own.period_s, kept)

@@ -1,0 +1,40 @@
+"""What a vehicle keeps of its surroundings, from its own percepts alone, in a map of its own.
+
+The map's origin is the reference point l(t) when the vehicle first perceived it, and its first axis the direction in
+which l(t) moved then (the bow, if l(t) was at rest).
+"""
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.sim.tables import described
+
+Float64 = NDArray[np.float64]
+
+
+@described
+class Surroundings(NamedTuple):
+    """Where a vehicle is in its own map, the obstacles that it has heard, and its neighbours with their velocities."""
+
+    pose: Annotated[Float64, "world vehicle 4", "Own place in the map [m], cosine and sine of the heading in it."]
+    motion: Annotated[Float64, "world vehicle 3", "Own velocity, body frame [m/s], and yaw rate [rad/s]."]
+    action: Annotated[Float64, "world vehicle 2", "Own latest action: shares of full thrust and torque."]
+    reference: Annotated[Float64, "world vehicle 4", "Place of l(t) [m], unit vector of its leg, 0 where it rests."]
+    reference_speed: Annotated[Float64, "world vehicle", "Speed of l(t) [m/s]."]
+    begun: Annotated[Float64, "world vehicle", "1 once anything is remembered."]
+    disc: Annotated[Float64, "world vehicle 12 3", "Obstacles: centre in the map and radius [m]."]
+    spread: Annotated[Float64, "world vehicle 12 6", "Their covariance [m2]: xx, xy, xR, yy, yR, RR."]
+    score: Annotated[
+        Float64,
+        "world vehicle 12",
+        "Decisions at which each was heard less those at which it was not though it should have been; 0 for none.",
+    ]
+    silence: Annotated[Float64, "world vehicle 12", "Time since each was heard [s]."]
+    place: Annotated[Float64, "world vehicle sector 2", "Neighbours: place in the map [m]."]
+    velocity: Annotated[Float64, "world vehicle sector 2", "Their velocity [m/s]."]
+    reading: Annotated[Float64, "world vehicle sector 2", "Where each was heard last, in the map [m]."]
+    known: Annotated[Float64, "world vehicle sector", "Decisions at which each was heard, 0 for none."]
+    since: Annotated[Float64, "world vehicle sector", "Time since its latest new reading [s]."]
+    error: Annotated[Float64, "world vehicle", "Errors of predicted places of neighbours, over their range [1]."]

@@ -1,0 +1,129 @@
+"""A safety filter: the velocity nearest to a wished one that keeps clear of what a vehicle remembers.
+
+A control barrier function on velocities (Ames, Coogan, Egerstedt, Notomista, Sreenath and Tabuada, Control barrier
+functions: theory and applications, ECC 2019): the distance to an obstacle or neighbour may shrink no faster than in
+proportion to what is left of it beyond a margin, n . v <= gamma (d - margin), so that who keeps to it stays beyond the
+margin. Of a velocity that two neighbours must change, each changes a share, as in reciprocal avoidance (van den Berg et
+al. 2011, see ``halfplanes``).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.memory import Surroundings
+from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.baselines.memory.pose import to_map_axes
+from uuv_marl.sim.compiled import compiled
+
+Float64 = NDArray[np.float64]
+
+
+class Barrier(NamedTuple):
+    """Margins and rates of the filter."""
+
+    obstacle_m: float = 13.5
+    """Distance kept from surfaces of obstacles [m]."""
+    gap_share: float = 0.3
+    """Of the gap between two obstacles, the most that is kept from each of them [1]."""
+    narrowest_m: float = 8.0
+    """A gap narrower than this is no way through [m]."""
+    obstacle_rate: float = 1.0
+    """How fast that distance may be closed, per metre beyond it [1/s]."""
+    neighbour_m: float = 7.0
+    """Distance kept from neighbours [m]."""
+    neighbour_rate: float = 1.0
+    """How fast that distance may be closed, per metre beyond it [1/s]."""
+    share: float = 0.6
+    """Of what must change between two neighbours, what each of them does [1]; half would do if both knew all."""
+    horizon_m: float = 60.0
+    """Neighbours and surfaces farther than this are left out [m]."""
+
+
+MOST_CLOSED = 0.3
+"""Share of the distance left that may be closed in a decision period [1]."""
+GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
+"""Of ``guarded:``: it lets a policy nearer to obstacles than a law that makes room early has to go."""
+
+
+@compiled
+def margin(w: int, i: int, d: int, barrier: Barrier, kept: Surroundings) -> float:
+    """Distance to keep from the surface of a remembered obstacle [m]: less where the gap to the next is narrow.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        d: index of the disc.
+        barrier: margins and rates.
+        kept: what is remembered.
+    """
+    disc, least = kept.disc[w, i], barrier.obstacle_m
+    for e in range(kept.score.shape[2]):
+        if e != d and kept.score[w, i, e] >= CONFIRMED:
+            apart = math.hypot(disc[e, 0] - disc[d, 0], disc[e, 1] - disc[d, 1]) - disc[e, 2] - disc[d, 2]
+            if apart > barrier.narrowest_m:
+                least = min(least, barrier.gap_share * apart)
+    return least
+
+
+@compiled
+def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surroundings, planes: Float64) -> int:
+    """Half-planes of velocity in the vehicle's map, n . v <= b, for what it remembers.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        period: between two decisions [s].
+        barrier: margins and rates.
+        kept: what is remembered.
+        planes: filled with n_x, n_y and b [m/s], shape (disc + sector, 3).
+
+    Returns:
+        How many there are.
+    """
+    pose, num = kept.pose[w, i], 0
+    x, y = pose[0], pose[1]
+    v_x, v_y = to_map_axes(kept.motion[w, i, 0], kept.motion[w, i, 1], pose)
+    rate = min(barrier.obstacle_rate, MOST_CLOSED / period)
+    for d in range(kept.score.shape[2]):
+        if kept.score[w, i, d] < CONFIRMED:
+            continue
+        n_x, n_y = kept.disc[w, i, d, 0] - x, kept.disc[w, i, d, 1] - y
+        away = max(math.hypot(n_x, n_y), 1e-6)
+        left = away - kept.disc[w, i, d, 2]
+        if left < barrier.horizon_m:
+            planes[num, 0], planes[num, 1] = n_x / away, n_y / away
+            planes[num, 2] = rate * (left - margin(w, i, d, barrier, kept))
+            num += 1
+    rate = min(barrier.neighbour_rate, MOST_CLOSED / period)
+    for k in range(kept.known.shape[2]):
+        if kept.known[w, i, k] == 0.0:
+            continue
+        n_x, n_y = kept.place[w, i, k, 0] - x, kept.place[w, i, k, 1] - y
+        away = max(math.hypot(n_x, n_y), 1e-6)
+        if away < barrier.horizon_m:
+            n_x, n_y = n_x / away, n_y / away
+            own = n_x * v_x + n_y * v_y
+            closing = own - n_x * kept.velocity[w, i, k, 0] - n_y * kept.velocity[w, i, k, 1]
+            planes[num, 0], planes[num, 1] = n_x, n_y
+            planes[num, 2] = own + barrier.share * (rate * (away - barrier.neighbour_m) - closing)
+            num += 1
+    return num
+
+
+@compiled
+def keeps(v_x: float, v_y: float, planes: Float64, num: int) -> bool:
+    """Whether a velocity keeps to half-planes.
+
+    Args:
+        v_x: the velocity [m/s].
+        v_y: the same, second axis [m/s].
+        planes: n_x, n_y and b [m/s], shape (at least num, 3).
+        num: how many there are.
+    """
+    for k in range(num):  # noqa: SIM110 - compiled
+        if planes[k, 0] * v_x + planes[k, 1] * v_y > planes[k, 2]:
+            return False
+    return True

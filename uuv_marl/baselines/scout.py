@@ -1,0 +1,156 @@
+"""The strongest hand-made law here: it remembers, flows round obstacles before they are near, and keeps to the filter.
+
+What a vehicle wishes is l(t)'s velocity, a pull to l(t), and pushes from near neighbours. That wish is bent round what
+it remembers, made safe, and steered to.
+"""
+
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.filtered import Filtered
+from uuv_marl.baselines.halfplanes import nearest_velocity
+from uuv_marl.baselines.memory import Surroundings
+from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.baselines.memory.pose import to_body_axes
+from uuv_marl.baselines.policy import Limits
+from uuv_marl.baselines.safety import Barrier, keeps, margin, planes_of
+from uuv_marl.baselines.steering import full_speed, steer
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.sections import growth
+from uuv_marl.sim.compiled import compiled
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+
+class Gains(NamedTuple):
+    """Of the wished velocity. One set for all scenarios, swarm sizes, echoes and decision periods."""
+
+    pull: float = 0.05
+    """To l(t) [1/s], for up to 54 vehicles; divided by sqrt(n / 54) for more, which are spread farther."""
+    push: float = 10.0
+    """Away from a neighbour at no distance [m/s], falling linearly to none at ``push_range``."""
+    push_range: float = 12.0
+    """Where pushes end [m]: so near, hearing is mutual, and pushes cancel over the swarm."""
+    pull_at_rest: float = 4.0
+    """Times the pull where l(t) rests [1]."""
+    push_at_rest: float = 2.0
+    """Times the push where l(t) rests [1]."""
+
+
+class Scout(Filtered):
+    """Feed-forward and pull, pushes among near neighbours, a flow round remembered obstacles, and the safety filter."""
+
+    yaw_damping_nms: ClassVar[float] = 600.0
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
+    ) -> None:
+        super().__init__(scenario, num_worlds, barrier or Barrier())
+        self.gains = gains or Gains()
+        self._growth = growth(scenario.swarm.num_vehicles)
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        action = np.zeros((*self.flat(percept).shape[:2], 2), np.float32)
+        gains = self.gains._replace(pull=self.gains.pull / self._growth)
+        _decide(
+            self.active, self._model.own.period_s, gains, self.barrier, self.limits, self._gain, self.memory,
+            self._planes, self.changed, self.infeasible, action,
+        )  # fmt: skip
+        return action
+
+
+@compiled
+def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
+    """The velocity that a vehicle wishes where there are no obstacles, in its map [m/s].
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        g: the law's gains.
+        kept: what is remembered.
+    """
+    pose, reference, speed = kept.pose[w, i], kept.reference[w, i], kept.reference_speed[w, i]
+    pull, push = g.pull, g.push
+    if speed == 0.0:
+        pull, push = pull * g.pull_at_rest, push * g.push_at_rest
+    w_x = speed * reference[2] + pull * (reference[0] - pose[0])
+    w_y = speed * reference[3] + pull * (reference[1] - pose[1])
+    for k in range(kept.known.shape[2]):
+        d_x, d_y = pose[0] - kept.place[w, i, k, 0], pose[1] - kept.place[w, i, k, 1]
+        away = max(math.hypot(d_x, d_y), 1e-6)
+        if kept.known[w, i, k] > 0.0 and away < g.push_range:
+            share = push * (1.0 / away - 1.0 / g.push_range)
+            w_x, w_y = w_x + share * d_x, w_y + share * d_y
+    return w_x, w_y
+
+
+@compiled
+def flowing(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Surroundings) -> tuple[float, float]:
+    """A wished velocity [m/s] bent round the obstacles ahead, as an ideal fluid flows round cylinders.
+
+    The modulation of Khansari-Zadeh and Billard, A dynamical system approach to realtime obstacle avoidance, Autonomous
+    Robots 32 (2012), for discs: with (R / r)^2, R the radius and the margin, r the distance of the centre, the velocity
+    towards a disc shrinks by that share, and that past it grows. Each disc bends what the one before has left.
+
+    Args:
+        w_x: wished velocity in the map [m/s].
+        w_y: the same, second axis [m/s].
+        w: index of the world.
+        i: index of the vehicle.
+        barrier: has the margins.
+        kept: what is remembered.
+    """
+    for d in range(kept.score.shape[2]):
+        if kept.score[w, i, d] < CONFIRMED:
+            continue
+        n_x, n_y = kept.pose[w, i, 0] - kept.disc[w, i, d, 0], kept.pose[w, i, 1] - kept.disc[w, i, d, 1]
+        away = max(math.hypot(n_x, n_y), 1e-6)
+        n_x, n_y = n_x / away, n_y / away
+        outwards, past = n_x * w_x + n_y * w_y, n_x * w_y - n_y * w_x
+        if outwards < 0.0:
+            near = (kept.disc[w, i, d, 2] + margin(w, i, d, barrier, kept)) / away
+            near = min(near * near, 1.0)
+            outwards, past = (1.0 - near) * outwards, (1.0 + near) * past
+            w_x, w_y = n_x * outwards - n_y * past, n_y * outwards + n_x * past
+    return w_x, w_y
+
+
+@compiled
+def _decide(
+    worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
+    planes: Float64, changed: Int64, infeasible: Int64, action: Float32,
+) -> None:  # fmt: skip
+    """The law for every vehicle.
+
+    Args:
+        worlds: those that run, shape (world,).
+        period: between two decisions [s].
+        g: the law's gains.
+        barrier: margins and rates of the filter.
+        limits: of the actuators, and the surge resistance.
+        gain: force per velocity error [N s/m].
+        kept: what vehicles remember.
+        planes: room for half-planes, shape (disc + sector, 3).
+        changed: wishes that the filter changed, counted per world, shape (world,); added to.
+        infeasible: those for which nothing was safe, counted per world, shape (world,); added to.
+        action: filled with shares of full force, shape (world, vehicle, 2).
+    """
+    limit = full_speed(limits)
+    for w in range(action.shape[0]):
+        for i in range(action.shape[1] if worlds[w] else 0):
+            w_x, w_y = wished(w, i, g, kept)
+            w_x, w_y = flowing(w_x, w_y, w, i, barrier, kept)
+            num = planes_of(w, i, period, barrier, kept, planes)
+            changed[w] += not keeps(w_x, w_y, planes, num)
+            w_x, w_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, limit)
+            infeasible[w] += broken > 0.0
+            w_x, w_y = to_body_axes(w_x, w_y, kept.pose[w, i])
+            steer(w_x, w_y, kept.motion[w, i, 0], kept.motion[w, i, 1], gain, limits, action[w, i])
