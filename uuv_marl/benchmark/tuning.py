@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing, write_text
-from uuv_marl.baselines import bio_inspired, granted, sdc, sff
+from uuv_marl.baselines import apf, bio_inspired, granted, olfati_saber, orca, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.scenario import Scenario, load_scenario
 
@@ -45,6 +45,10 @@ SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
     "sff_informed": (_SFF | _RANGES["informed"], sff.Gains),
     "sdc": (_SDC, sdc.Gains),
     "sdc_informed": (_SDC, sdc.Gains),
+    "apf": (_RANGES["apf"], apf.Gains),
+    "olfati_saber": (_RANGES["olfati_saber"], olfati_saber.Gains),
+    "olfati_saber_informed": (_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.Gains),
+    "orca_informed": (_RANGES["orca"], orca.Gains),
 }
 """Free parameters of every tuned policy, and how they become its gains."""
 
