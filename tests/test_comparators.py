@@ -11,9 +11,10 @@ from scipy.integrate import quad
 from uuv_marl import load_scenario
 from uuv_marl.baselines import apf, granted, make, olfati_saber, orca
 from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.sim.swarm import Swarm
 
 APF = apf.Gains(80.0, 40_000.0, 50.0, 500_000.0, 20.0)
-FLOCK = olfati_saber.Gains(14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
+FLOCK = olfati_saber.Gains(2.0, 14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
 ORCA = orca.Gains(3.0, 5.0, 6.0, 6.0, 0.1)
 METRES = st.floats(-60.0, 60.0)
 
@@ -87,18 +88,17 @@ def test_the_field_is_bounded_and_what_was_cut_is_counted():
 # Olfati-Saber's flocking
 
 
-@given(st.floats(0.1, 40.0), st.floats(10.0, 2000.0), st.floats(10.0, 2000.0), st.floats(8.0, 20.0))
-def test_the_lattices_force_is_the_gradient_of_its_potential(distance, a, b, spacing):
-    """Per length of the source, of which there are 7 in a spacing; psi_alpha is the integral of phi_alpha."""
-    gains = FLOCK._replace(attraction=a, repulsion=b, spacing=spacing)
-    start = olfati_saber.sigma_norm(7.0)
+@given(st.floats(0.1, 40.0), st.floats(10.0, 2000.0), st.floats(10.0, 2000.0), st.floats(1.0, 5.0))
+def test_the_lattices_force_is_the_gradient_of_its_potential(distance, a, b, unit):
+    """Per length of the source; psi_alpha is the integral of phi_alpha."""
+    gains = FLOCK._replace(attraction=a, repulsion=b, unit=unit)
 
-    def potential(metres):
-        end = olfati_saber.sigma_norm(7.0 * metres / spacing)
-        return quad(lambda z: olfati_saber.phi_alpha(z, gains), start, end, limit=200)[0]
+    def gained(near, far):
+        ends = [olfati_saber.sigma_norm(metres / unit) for metres in (near, far)]
+        return quad(lambda z: olfati_saber.phi_alpha(z, gains), *ends)[0]
 
-    step = 1e-3 * spacing / 7.0
-    found = (potential(distance + step) - potential(distance - step)) / 2e-3
+    step = 1e-3 * unit
+    found = gained(distance - step, distance + step) / 2e-3
     assert olfati_saber.neighbour_force(distance, gains) == pytest.approx(found, rel=1e-3, abs=0.05)
 
 
@@ -108,8 +108,28 @@ def test_neighbours_repel_within_the_spacing_and_attract_beyond(a, b, spacing):
     assert olfati_saber.neighbour_force(spacing, gains) == pytest.approx(0.0, abs=1e-6 * (a + b))
     assert olfati_saber.neighbour_force(0.9 * spacing, gains) < 0 < olfati_saber.neighbour_force(1.1 * spacing, gains)
     assert olfati_saber.neighbour_force(1.5 * spacing, gains) == 0.0
-    # a and b are how far phi_alpha can go, in the source with c = |a - b| / sqrt(4 a b).
     assert -b < olfati_saber.phi_alpha(0.0, gains) < 0.0
+
+
+@pytest.mark.parametrize("spacing", [12.0, 15.0])
+def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
+    """An alpha-lattice: seven vehicles, led by a weak pull, end in triangles of side d."""
+    gains = FLOCK._replace(
+        spacing=spacing, reach=1.3, attraction=100.0, repulsion=500.0, pull=5.0, reference_velocity=300.0
+    )
+    scenario = granted("olfati_saber", load_scenario("tracking", num_vehicles=7))
+    swarm, policy = Swarm(scenario), make("olfati_saber", scenario, gains=gains)
+    swarm.reset(10_000)
+    angle = np.arange(6) * math.pi / 3
+    ring = 12.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    swarm.state.eta[0, :, :2] = swarm.facts.reference[0, :2] + np.concatenate([np.zeros((1, 2)), ring])
+    swarm.state.eta[0, :, :2] += np.random.default_rng(0).uniform(-2.0, 2.0, (7, 2))
+    percept = swarm.observe()
+    while swarm.facts.time_s[0] < 100.0:
+        percept = swarm.step(policy.act(percept))
+    place = swarm.state.eta[0, :, :2]
+    away = np.sort(np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)), axis=1)
+    np.testing.assert_allclose(away[:, 1:3], spacing, rtol=0.02)  # at a corner a vehicle has two
 
 
 def test_obstacles_repel_up_to_their_range():

@@ -2,9 +2,8 @@
 
 R. Olfati-Saber, IEEE Trans. Automatic Control 51(3), 401-420, 2006. Vehicles are alpha-agents that attract and repel
 each other towards a lattice; the nearest point of an obstacle's surface is a beta-agent that repels and brakes; the
-reference point is the gamma-agent. The source's lengths have no unit, and its spacing d is 7: here its unit is a
-seventh of the spacing. Its agents meet no resistance, so a vehicle makes up for its own; forces stand for its
-accelerations.
+reference point is the gamma-agent. The source's lengths have no unit; here ``unit`` metres stand for 1 of them. Forces
+stand for its accelerations; its agents meet no resistance, so vehicles make up for theirs at the reference's velocity.
 """
 
 import math
@@ -13,7 +12,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.avoidance import bump, obstacle_at, own_drag
+from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.percept import Percept
@@ -25,8 +24,6 @@ Float32 = NDArray[np.float32]
 
 EPSILON = 0.1
 """Of the sigma-norm, in the source's simulations [1]."""
-_SPACING = 7.0
-"""d in the source's lengths."""
 _H_ALPHA = 0.2
 """Share of the reach up to which neighbours count wholly, in the source's simulations [1]."""
 _H_BETA = 0.9
@@ -36,6 +33,8 @@ _H_BETA = 0.9
 class Gains(NamedTuple):
     """Free parameters, found by tuning; the source's symbols in brackets."""
 
+    unit: float
+    """Length that stands for 1 of the source, in which forces change over a length of about 1 [m]."""
     spacing: float
     """Of the lattice (d) [m]."""
     reach: float
@@ -53,7 +52,7 @@ class Gains(NamedTuple):
     pull: float
     """Largest pull to l(t) (c_1 of gamma) [N]."""
     pull_length: float
-    """Distance at which it is 0.7 of that; the source's unit of length [m]."""
+    """Distance at which it is 0.7 of that; 1 in the source [m]."""
     reference_velocity: float
     """Damping towards the reference's velocity (c_2 of gamma) [N s/m]."""
     alignment: float = 0.0
@@ -115,32 +114,34 @@ def phi_alpha(z: float, g: Gains) -> float:
     """Attraction [N] at a sigma-norm z of the distance to a neighbour; negative repels, 0 at the spacing."""
     a, b = g.attraction, g.repulsion
     c = abs(a - b) / math.sqrt(4.0 * a * b)
-    shifted = z - sigma_norm(_SPACING)
     # Zero at the spacing also where attraction is the stronger, which the source excludes.
-    pull = 0.5 * ((a + b) * sigma_1(shifted + math.copysign(c, b - a)) + (a - b))
-    return rho_h(z / sigma_norm(_SPACING * g.reach), _H_ALPHA) * pull
+    shifted = z - sigma_norm(g.spacing / g.unit) + math.copysign(c, b - a)
+    return alpha_weight(z, g) * 0.5 * ((a + b) * sigma_1(shifted) + (a - b))
+
+
+@compiled
+def alpha_weight(z: float, g: Gains) -> float:
+    """How much a neighbour counts at a sigma-norm z of its distance, from 1 to 0 [1]. a_ij of the source."""
+    return rho_h(z / sigma_norm(g.reach * g.spacing / g.unit), _H_ALPHA)
 
 
 @compiled
 def neighbour_force(distance: float, g: Gains) -> float:
-    """Attraction [N] by a neighbour at a distance [m]: the lattice's potential's slope, per length of the source."""
-    share = _SPACING * distance / g.spacing
-    return phi_alpha(sigma_norm(share), g) * slope(share)
+    """Attraction [N] by a neighbour at a distance [m]: the slope of the lattice's potential, per ``unit``."""
+    return phi_alpha(sigma_norm(distance / g.unit), g) * slope(distance / g.unit)
 
 
 @compiled
 def beta_weight(reach: float, g: Gains) -> float:
     """How much an obstacle counts at a distance to its surface [m], from 1 to 0 [1]. b_ik of the source."""
-    unit = _SPACING / g.spacing
-    return rho_h(sigma_norm(unit * reach) / sigma_norm(unit * g.obstacle_range), _H_BETA)
+    return rho_h(sigma_norm(reach / g.unit) / sigma_norm(g.obstacle_range / g.unit), _H_BETA)
 
 
 @compiled
 def obstacle_force(reach: float, g: Gains) -> float:
     """Repulsion [N] by an obstacle at a distance to its surface [m]. Minus phi_beta n_ik of the source."""
-    unit = _SPACING / g.spacing
-    gap = sigma_norm(unit * reach) - sigma_norm(unit * g.obstacle_range)
-    return g.obstacle * beta_weight(reach, g) * (1.0 - sigma_1(gap)) * slope(unit * reach)
+    gap = sigma_norm(reach / g.unit) - sigma_norm(g.obstacle_range / g.unit)
+    return g.obstacle * beta_weight(reach, g) * (1.0 - sigma_1(gap)) * slope(reach / g.unit)
 
 
 @compiled
@@ -161,9 +162,10 @@ def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, act
             u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
             l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
             pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
-            f_x, f_y = pull * l_x + own_drag(u, limits), pull * l_y
-            f_x += g.reference_velocity * (see.reference_velocity[w, i, 0] - u)
-            f_y += g.reference_velocity * (see.reference_velocity[w, i, 1] - v)
+            r_x, r_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
+            drag = limits.X_u + limits.X_uu * math.hypot(r_x, r_y)
+            f_x, f_y = pull * l_x + drag * r_x, pull * l_y + drag * r_y
+            f_x, f_y = f_x + g.reference_velocity * (r_x - u), f_y + g.reference_velocity * (r_y - v)
             d_x, d_y = _alpha(w, i, see, g)
             o_x, o_y = _beta(w, i, see, g, centres)
             write_action(f_x + d_x + o_x, f_y + d_y + o_y, limits, action[w, i])
@@ -188,8 +190,7 @@ def _alpha(w: int, i: int, see: Fields, g: Gains) -> tuple[float, float]:
         force = neighbour_force(distance, g) / distance
         f_x, f_y = f_x + force * p_x, f_y + force * p_y
         if see.link_identity.shape[2] > 0 and see.link_identity[w, i, k] >= 1.0:
-            share = sigma_norm(_SPACING * distance / g.spacing) / sigma_norm(_SPACING * g.reach)
-            weight = g.alignment * rho_h(share, _H_ALPHA)
+            weight = g.alignment * alpha_weight(sigma_norm(distance / g.unit), g)
             f_x += weight * (see.link_velocity[w, i, k, 0] - u)
             f_y += weight * (see.link_velocity[w, i, k, 1] - v)
     return f_x, f_y
