@@ -75,6 +75,8 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "studies.reproduce.make",
         "studies.dynamics.identify.identify",
         "studies.heldout.job.run",
+        "studies.robustness.job.run",
+        "studies.robustness.pilot.run",
         "replay.record.record",
         "replay.traces.from_folder",
     ):
