@@ -184,12 +184,12 @@ def _obstacles(w: int, i: int, see: Fields, g: Gains, period: float, centres: bo
         see: the fields of percepts, of all worlds.
         g: the law's gains.
         period: between two decisions [s].
-        centres: echoes report centres; else points of surfaces, each of which counts.
+        centres: echoes report centres; else points of surfaces, of which the nearest counts.
         planes: filled from the first row on.
     """
     u, v, num = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0
     for a in range(see.echo.shape[2]):
-        if see.echo[w, i, a] > 0.0 and (not centres or counts_once(w, i, a, see, centres)):
+        if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
             n_x, n_y, reach, radius = obstacle_at(w, i, a, see, centres)
             distance = reach + radius
             demand = escape(distance * n_x, distance * n_y, radius + g.clearance, u, v, g.obstacle_horizon, period)
