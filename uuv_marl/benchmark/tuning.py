@@ -146,7 +146,7 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         "seeds": list(SEEDS),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
         "space": {name: r._asdict() for name, r in space.items()},
-        "best": {name: float(f"{value:.4g}") for name, value in best.params.items()},
+        "best": best.params,  # in full, as evaluated: four digits of them can be another swarm, with a collision
         "best_cost_s": round(best.values[0], 3),
     }
     trials_path, path = output / f"{policy}.csv", output / f"{policy}.json"
@@ -154,6 +154,6 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["cost_s", *space])
         for trial in finished:
-            writer.writerow([f"{trial.values[0]:.3f}", *(f"{trial.params[name]:.4g}" for name in space)])
+            writer.writerow([f"{trial.values[0]:.3f}", *(trial.params[name] for name in space)])
     write_text(path, json.dumps(result, indent=1) + "\n")
     return path
