@@ -117,6 +117,20 @@ def test_forces_turn_with_the_world(name):
         np.testing.assert_allclose(actions[0], actions[1], atol=2e-4)
 
 
+@pytest.mark.parametrize("name", [name for name in POLICIES if name != "random"])
+def test_who_a_vehicle_is_does_not_matter(name):
+    """Vehicles that swap their places swap their actions."""
+    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=20))
+    order, actions = np.random.default_rng(0).permutation(20), []
+    for places in (np.arange(20), order):
+        swarm, policy = Swarm(scenario), make(name, scenario)
+        swarm.reset(3)
+        swarm.state.eta[0, :, :2] += 150.0
+        swarm.state.eta[0], swarm.state.nu[0] = swarm.state.eta[0, places], swarm.state.nu[0, places]
+        actions.append(policy.act(swarm.observe())[0])
+    np.testing.assert_allclose(actions[0][order], actions[1], atol=1e-6)
+
+
 def test_echoes_of_one_obstacle_count_once_where_asked():
     lone = load_scenario("single_obstacle", num_vehicles=1)
     layout = PerceptLayout.of(lone)

@@ -37,7 +37,7 @@ def excess(points, planes):
 def on_circle(normal, b, limit):
     """Points of a line n.v = b at the speed limit."""
     length = np.hypot(*normal)
-    if length < 1e-9 or abs(b) > limit * length:
+    if length < 1e-9 or abs(b) > limit * length * (1 + 1e-9):
         return []
     foot, along = normal * b / length**2, np.array([-normal[1], normal[0]]) / length
     half = np.sqrt(max(limit**2 - foot @ foot, 0.0))

@@ -93,7 +93,9 @@ def test_without_messages_the_channel_stays_empty():
         assert not swarm.percept["modem_age"].any()
 
 
-@pytest.mark.parametrize("policy", ["sff", "sff_informed", "sdc", "sdc_informed"])
+@pytest.mark.parametrize(
+    "policy", ["sff", "sff_informed", "sdc", "sdc_informed", "olfati_saber_informed", "orca_informed"]
+)
 def test_comparators_run_on_messages_as_on_the_link(policy):
     """The same law: where messages are as fresh as the link, it does the same."""
     base = {"modem.period_s": 0.1, "obstacles": []}

@@ -21,6 +21,25 @@ def bump(share: float) -> float:
 
 
 @compiled
+def obstacle_at(w: int, i: int, a: int, see: Fields, centres: bool) -> tuple[float, float, float, float]:
+    """Where the obstacle of an echo lies: a unit vector towards it, the distance to its surface and its radius [m].
+
+    The radius is what lies between surface and centre; 0 where echoes are points of surfaces, whose radius is unknown.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        a: index of the active sub-sector; it holds an echo.
+        see: the fields of percepts, of all worlds.
+        centres: echoes report centres; else points of surfaces.
+    """
+    n_x, n_y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
+    reach, distance = float(see.echo_range[w, i, a]), math.hypot(n_x, n_y)
+    n_x, n_y = (n_x / distance, n_y / distance) if distance > 0.0 else (1.0, 0.0)
+    return n_x, n_y, reach, max(distance - reach, 0.0) if centres else 0.0
+
+
+@compiled
 def pass_obstacle(
     w: int, i: int, see: Fields, repulsion: float, repulsion_range: float, tangential: float, tangential_range: float
 ) -> tuple[float, float]:

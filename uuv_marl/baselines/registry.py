@@ -11,11 +11,14 @@ from typing import Any, NamedTuple, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.apf import Apf
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.checkpoint import is_checkpoint
 from uuv_marl.baselines.floors import Idle, Random
 from uuv_marl.baselines.guarded import Guarded
 from uuv_marl.baselines.learned import Trained, shipped
+from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
+from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
@@ -36,6 +39,10 @@ POLICIES: dict[str, Kind] = {
     "sdc": Sdc,
     "sff_informed": SffInformed,
     "sdc_informed": SdcInformed,
+    "apf": Apf,
+    "olfati_saber": OlfatiSaber,
+    "olfati_saber_informed": OlfatiSaberInformed,
+    "orca_informed": OrcaInformed,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
     "ppo": shipped("ppo", "The same, trained by Stable-Baselines3's PPO."),
     "random": Random,

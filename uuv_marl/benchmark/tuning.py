@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing, write_text
-from uuv_marl.baselines import bio_inspired, granted, sdc, sff
+from uuv_marl.baselines import apf, bio_inspired, granted, olfati_saber, orca, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.scenario import Scenario, load_scenario
 
@@ -45,6 +45,10 @@ SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
     "sff_informed": (_SFF | _RANGES["informed"], sff.Gains),
     "sdc": (_SDC, sdc.Gains),
     "sdc_informed": (_SDC, sdc.Gains),
+    "apf": (_RANGES["apf"], apf.Gains),
+    "olfati_saber": (_RANGES["olfati_saber"], olfati_saber.Gains),
+    "olfati_saber_informed": (_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.Gains),
+    "orca_informed": (_RANGES["orca"], orca.Gains),
 }
 """Free parameters of every tuned policy, and how they become its gains."""
 
@@ -142,7 +146,7 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         "seeds": list(SEEDS),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
         "space": {name: r._asdict() for name, r in space.items()},
-        "best": {name: float(f"{value:.4g}") for name, value in best.params.items()},
+        "best": best.params,  # in full, as evaluated: four digits of them can be another swarm, with a collision
         "best_cost_s": round(best.values[0], 3),
     }
     trials_path, path = output / f"{policy}.csv", output / f"{policy}.json"
@@ -150,6 +154,6 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["cost_s", *space])
         for trial in finished:
-            writer.writerow([f"{trial.values[0]:.3f}", *(f"{trial.params[name]:.4g}" for name in space)])
+            writer.writerow([f"{trial.values[0]:.3f}", *(trial.params[name] for name in space)])
     write_text(path, json.dumps(result, indent=1) + "\n")
     return path

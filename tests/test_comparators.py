@@ -1,0 +1,262 @@
+"""Known properties of the comparators' sources: potential fields, flocking, reciprocal velocity obstacles."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import apf, granted, make, olfati_saber, orca
+from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.sim.swarm import Swarm
+
+APF = apf.Gains(80.0, 40_000.0, 50.0, 500_000.0, 20.0)
+FLOCK = olfati_saber.Gains(2.0, 14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
+ORCA = orca.Gains(3.0, 5.0, 6.0, 6.0, 0.1)
+METRES = st.floats(-60.0, 60.0)
+
+
+def seen(name, n=1, **overrides):
+    """A scenario that grants what a policy needs, and a percept in which nothing is perceived yet."""
+    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=n, overrides=overrides))
+    layout = PerceptLayout.of(scenario)
+    return scenario, Percept(np.zeros((1, n, layout.size), np.float32), layout)
+
+
+def gradient(potential, x, y, step=1e-4):
+    """Of a potential at a place, by central differences."""
+    return np.array([
+        potential(x + step, y) - potential(x - step, y), potential(x, y + step) - potential(x, y - step)
+    ]) / (2 * step)  # fmt: skip
+
+
+# Artificial potential field
+
+
+@given(METRES, METRES, METRES, METRES)
+def test_the_obstacles_force_is_the_gradient_of_ge_and_cuis_potential(x, y, goal_x, goal_y):
+    """eta / 2 (1 / rho - 1 / rho_0)^2 rho_goal^2, for a disc of 10 m around the origin."""
+    assume(math.hypot(x, y) > 10.6)
+    assume(abs(math.hypot(x, y) - 10.0 - APF.obstacle_range) > 0.01)
+
+    def potential(x, y):
+        rho = math.hypot(x, y) - 10.0
+        wall = max(1.0 / rho - 1.0 / APF.obstacle_range, 0.0)
+        return 0.5 * APF.obstacle * wall**2 * ((goal_x - x) ** 2 + (goal_y - y) ** 2)
+
+    distance = math.hypot(x, y)
+    f_x, f_y, bound = apf.obstacle_force(-x / distance, -y / distance, distance - 10.0, goal_x - x, goal_y - y, APF)
+    np.testing.assert_allclose((f_x, f_y), -gradient(potential, x, y), rtol=1e-4, atol=1e-3)
+    assert bound == 0
+
+
+@given(METRES, METRES)
+def test_the_neighbours_force_is_the_gradient_of_khatibs_potential(x, y):
+    assume(math.hypot(x, y) > 0.6)
+    assume(abs(math.hypot(x, y) - APF.neighbour_range) > 0.01)
+
+    def potential(x, y):
+        return 0.5 * APF.neighbour * max(1.0 / math.hypot(x, y) - 1.0 / APF.neighbour_range, 0.0) ** 2
+
+    # The vehicle is at (x, y), the neighbour at the origin.
+    np.testing.assert_allclose(apf.neighbour_force(-x, -y, APF)[:2], -gradient(potential, x, y), rtol=1e-4, atol=1e-3)
+
+
+def test_the_field_is_zero_at_the_goal_though_an_obstacle_is_near():
+    """What GNRON is for; Khatib's own repulsion would push the vehicle off."""
+    scenario, percept = seen("apf")
+    percept["echo"][0, 0, 3], percept["echo_range"][0, 0, 3] = 1.0, 5.0
+    percept["echo_position"][0, 0, 3] = (30.0, 0.0)
+    policy = make("apf", scenario, gains=APF)
+    np.testing.assert_array_equal(policy.act(percept)[0, 0], 0.0)
+    percept["reference"][0, 0] = (70.0, 0.0)  # beyond the obstacle
+    assert policy.act(percept)[0, 0, 0] < 0.0
+
+
+def test_the_field_is_bounded_and_what_was_cut_is_counted():
+    scenario, percept = seen("apf", 2)
+    percept["heard"][0, 0, 3] = 1.0  # a neighbour at the very same place
+    percept["echo"][0, 1, 3] = 1.0  # an obstacle's surface
+    policy = make("apf", scenario, gains=APF)
+    assert np.isfinite(policy.act(percept)).all()
+    assert policy.clamps.tolist() == [2]
+
+
+# Olfati-Saber's flocking
+
+
+@given(st.floats(0.1, 40.0), st.floats(10.0, 2000.0), st.floats(10.0, 2000.0), st.floats(1.0, 5.0))
+def test_the_lattices_force_is_the_gradient_of_its_potential(distance, a, b, unit):
+    """Per length of the source; psi_alpha is the integral of phi_alpha."""
+    gains = FLOCK._replace(attraction=a, repulsion=b, unit=unit)
+
+    def gained(near, far):
+        ends = [olfati_saber.sigma_norm(metres / unit) for metres in (near, far)]
+        return quad(lambda z: olfati_saber.phi_alpha(z, gains), *ends)[0]
+
+    step = 1e-3 * unit
+    found = gained(distance - step, distance + step) / 2e-3
+    assert olfati_saber.neighbour_force(distance, gains) == pytest.approx(found, rel=1e-3, abs=0.05)
+
+
+@given(st.floats(10.0, 2000.0), st.floats(10.0, 2000.0), st.floats(8.0, 20.0))
+def test_neighbours_repel_within_the_spacing_and_attract_beyond(a, b, spacing):
+    gains = FLOCK._replace(attraction=a, repulsion=b, spacing=spacing)
+    assert olfati_saber.neighbour_force(spacing, gains) == pytest.approx(0.0, abs=1e-6 * (a + b))
+    assert olfati_saber.neighbour_force(0.9 * spacing, gains) < 0 < olfati_saber.neighbour_force(1.1 * spacing, gains)
+    assert olfati_saber.neighbour_force(1.5 * spacing, gains) == 0.0
+    assert -b < olfati_saber.phi_alpha(0.0, gains) < 0.0
+
+
+@pytest.mark.parametrize("spacing", [12.0, 15.0])
+def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
+    """An alpha-lattice: seven vehicles, led by a weak pull, end in triangles of side d."""
+    gains = FLOCK._replace(
+        spacing=spacing, reach=1.3, attraction=100.0, repulsion=500.0, pull=5.0, reference_velocity=300.0
+    )
+    scenario = granted("olfati_saber", load_scenario("tracking", num_vehicles=7))
+    swarm, policy = Swarm(scenario), make("olfati_saber", scenario, gains=gains)
+    swarm.reset(10_000)
+    angle = np.arange(6) * math.pi / 3
+    ring = 12.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    swarm.state.eta[0, :, :2] = swarm.facts.reference[0, :2] + np.concatenate([np.zeros((1, 2)), ring])
+    swarm.state.eta[0, :, :2] += np.random.default_rng(0).uniform(-2.0, 2.0, (7, 2))
+    percept = swarm.observe()
+    while swarm.facts.time_s[0] < 100.0:
+        percept = swarm.step(policy.act(percept))
+    place = swarm.state.eta[0, :, :2]
+    away = np.sort(np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)), axis=1)
+    np.testing.assert_allclose(away[:, 1:3], spacing, rtol=0.02)  # at a corner a vehicle has two
+
+
+def test_obstacles_repel_up_to_their_range():
+    ranges = np.array([1.0, 5.0, 20.0, 36.0, 39.0, 40.0, 60.0])
+    forces = [olfati_saber.obstacle_force(reach, FLOCK) for reach in ranges]
+    assert all(force > 0.0 for force in forces[:5])
+    assert forces[5:] == [0.0, 0.0]
+    assert max(forces) < 2.0 * FLOCK.obstacle / math.sqrt(olfati_saber.EPSILON)
+
+
+def beta_velocity(p, v, centre, radius):
+    """How the nearest point of a disc moves as a vehicle does, by differences."""
+
+    def nearest(place):
+        return centre + radius * (place - centre) / np.hypot(*(place - centre))
+
+    return (nearest(p + 1e-5 * v) - nearest(p - 1e-5 * v)) / 2e-5
+
+
+def test_an_obstacle_brakes_relative_to_its_nearest_point():
+    gains = FLOCK._replace(obstacle=0.0, pull=0.0, reference_velocity=0.0)
+    scenario, percept = seen("olfati_saber")
+    velocity, centre, radius = np.array([2.0, 1.0]), np.array([30.0, 10.0]), 20.0
+    alone = make("olfati_saber", scenario, gains=gains)
+    percept["velocity"][0, 0] = velocity
+    free = alone.act(percept)[0, 0].astype(float)
+    percept["echo"][0, 0, 2], percept["echo_range"][0, 0, 2] = 1.0, np.hypot(*centre) - radius
+    percept["echo_position"][0, 0, 2] = centre
+    limits = alone.limits
+    force = (alone.act(percept)[0, 0] - free) * [limits.max_force, limits.max_torque / limits.lever_arm]
+    expected = gains.obstacle_damping * (beta_velocity(np.zeros(2), velocity, centre, radius) - velocity)
+    np.testing.assert_allclose(force, expected, rtol=1e-4, atol=0.02)
+    assert expected @ velocity < 0.0
+
+
+def test_alignment_follows_neighbours_and_needs_their_velocities():
+    scenario, percept = seen("olfati_saber_informed")
+    gains = FLOCK._replace(alignment=100.0)
+    percept["heard"][0, 0, 3], percept["link_identity"][0, 0, 3] = 1.0, 2.0
+    percept["neighbour"][0, 0, 3] = (2.0, 0.0)  # so near that it counts wholly
+    percept["link_velocity"][0, 0, 3] = (0.0, 3.0)
+    limits = make("olfati_saber_informed", scenario, gains=gains).limits
+    actions = [
+        make("olfati_saber_informed", scenario, gains=FLOCK._replace(alignment=weight)).act(percept)[0, 0]
+        for weight in (0.0, 100.0)
+    ]
+    assert (actions[1] - actions[0])[1] * limits.max_torque / limits.lever_arm == pytest.approx(300.0, rel=1e-4)
+    percept["link_identity"][0, 0, 3] = 0.0  # of whom no message has arrived
+    np.testing.assert_array_equal(make("olfati_saber_informed", scenario, gains=gains).act(percept)[0, 0], actions[0])
+
+
+# Reciprocal velocity obstacles
+
+
+def test_the_half_planes_are_those_of_the_source():
+    """By hand: a disc of radius 6 m, 10 m ahead. The cone's leg is (0.8, 0.6); cut off at 5 s it ends 0.8 m/s away."""
+    head_on = orca.escape(10.0, 0.0, 6.0, 2.0, 0.0, 100.0, 0.1)
+    np.testing.assert_allclose(head_on, (-0.72, 0.96, -0.6, 0.8), atol=1e-12)
+    slow = orca.escape(10.0, 0.0, 6.0, 1.0, 0.0, 5.0, 0.1)
+    np.testing.assert_allclose(slow, (-0.2, 0.0, -1.0, 0.0), atol=1e-12)
+    apart = orca.escape(10.0, 0.0, 6.0, -1.0, 0.0, 5.0, 0.1)  # may close in by 0.8 m/s
+    np.testing.assert_allclose(apart, (1.8, 0.0, -1.0, 0.0), atol=1e-12)
+    inside = orca.escape(4.0, 0.0, 6.0, 1.0, 0.0, 5.0, 0.5)  # out within one decision
+    np.testing.assert_allclose(inside, (-5.0, 0.0, -1.0, 0.0), atol=1e-12)
+
+
+def nearest_approach(p_x, p_y, v_x, v_y, horizon):
+    """Smallest distance to a point that a relative velocity reaches within a horizon."""
+    speed2 = v_x * v_x + v_y * v_y
+    time = min(max((p_x * v_x + p_y * v_y) / speed2, 0.0), horizon) if speed2 > 0.0 else 0.0
+    return math.hypot(p_x - v_x * time, p_y - v_y * time)
+
+
+SPEEDS = st.floats(-5.0, 5.0)
+
+
+@given(METRES, METRES, SPEEDS, SPEEDS, st.floats(2.0, 12.0), st.floats(1.0, 16.0))
+def test_the_change_grazes_the_disc_and_is_the_smallest(p_x, p_y, v_x, v_y, radius, horizon):
+    assume(math.hypot(p_x, p_y) > 1.01 * radius)
+    u_x, u_y, n_x, n_y = orca.escape(p_x, p_y, radius, v_x, v_y, horizon, 0.1)
+    assert math.hypot(n_x, n_y) == pytest.approx(1.0)
+    assert abs(u_x * n_y - u_y * n_x) < 1e-9, "the change is along the normal"
+    assert nearest_approach(p_x, p_y, v_x + u_x, v_y + u_y, horizon) == pytest.approx(radius, abs=1e-6)
+    collides = nearest_approach(p_x, p_y, v_x, v_y, horizon) < radius
+    assert collides == (u_x * n_x + u_y * n_y > 0.0) or abs(u_x * n_x + u_y * n_y) < 1e-6
+    size = math.hypot(u_x, u_y)
+    for angle in np.linspace(0.0, 2.0 * math.pi, 40):
+        d_x, d_y = 0.99 * size * math.cos(angle), 0.99 * size * math.sin(angle)
+        same = nearest_approach(p_x, p_y, v_x + d_x, v_y + d_y, horizon)
+        assert (same < radius + 1e-6) if collides else (same > radius - 1e-6)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.5, -0.5])
+def test_two_that_meet_head_on_swerve_to_the_same_side_and_share(offset):
+    """Each takes half, so that both together just pass; exactly head-on, both to starboard."""
+    scenario, percept = seen("orca_informed", 2)
+    policy = make("orca_informed", scenario, gains=ORCA)
+    percept["velocity"][0, :, 0] = percept["reference_velocity"][0, :, 0] = 2.0
+    percept["heard"][0, :, 3], percept["link_identity"][0, :, 3] = 1.0, (2.0, 1.0)
+    percept["neighbour"][0, :, 3] = (12.0, offset)  # each sees the other on the same side
+    percept["link_velocity"][0, :, 3] = (-2.0, 0.0)
+    actions = policy.act(percept)[0].astype(float)
+    np.testing.assert_array_equal(actions[0], actions[1])
+    assert actions[0, 1] * (-1.0 if offset > 0.0 else 1.0) > 0.0
+    u_x, u_y, *_ = orca.escape(12.0, offset, 6.0, 4.0, 0.0, ORCA.horizon, 0.1)
+    resistance = policy.limits.X_u + policy.limits.X_uu * math.hypot(2.0 + u_x / 2, u_y / 2)
+    force = resistance * np.array([2.0 + u_x / 2, u_y / 2]) + policy._follow * np.array([u_x / 2, u_y / 2])
+    expected = force * [1.0 / policy.limits.max_force, policy.limits.lever_arm / policy.limits.max_torque]
+    np.testing.assert_allclose(actions[0], expected / max(1.0, np.hypot(*expected)), atol=1e-5)
+
+
+def test_the_wish_is_taken_where_nothing_is_near():
+    scenario, percept = seen("orca_informed")
+    percept["velocity"][0, 0] = percept["reference_velocity"][0, 0] = (3.0, 0.0)
+    policy = make("orca_informed", scenario, gains=ORCA)
+    drag = (policy.limits.X_u + 3.0 * policy.limits.X_uu) * 3.0
+    np.testing.assert_allclose(policy.act(percept)[0, 0], (drag / policy.limits.max_force, 0.0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("reports", ["centre", "surface"])
+def test_an_obstacle_ahead_is_not_driven_at(reports):
+    """The vehicle takes the whole change: nobody shares it."""
+    scenario, percept = seen("orca_informed", **{"sonar.echo_reports": reports})
+    policy = make("orca_informed", scenario, gains=ORCA)
+    percept["velocity"][0, 0] = percept["reference_velocity"][0, 0] = (4.0, 0.0)
+    before = policy.act(percept)[0, 0].copy()
+    percept["echo"][0, 0, 3], percept["echo_range"][0, 0, 3] = 1.0, 12.0
+    percept["echo_position"][0, 0, 3] = (32.0 if reports == "centre" else 12.0, 0.0)
+    after = policy.act(percept)[0, 0]
+    assert after[0] < before[0]

@@ -1,0 +1,144 @@
+"""Artificial potential field (APF): Khatib 1986, with the repulsion by obstacles of Ge and Cui 2000.
+
+O. Khatib, Real-time obstacle avoidance for manipulators and mobile robots, Int. J. Robotics Research 5(1), 90-98: a
+quadratic well at the goal, and a repulsion that ends at a set distance, here also among neighbours. S. S. Ge and Y. J.
+Cui, New potential functions for mobile robot path planning, IEEE Trans. Robotics and Automation 16(5), 615-620: the
+repulsion by obstacles is weighted with the squared distance to the goal, so that an obstacle near the goal does not
+keep the vehicle from it (GNRON: goals nonreachable with obstacles nearby). The goal is l(t).
+"""
+
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.avoidance import obstacle_at
+from uuv_marl.baselines.bio_inspired import counts_once
+from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields, Starts, fields
+
+Float32 = NDArray[np.float32]
+Int64 = NDArray[np.int64]
+
+MIN_DISTANCE_M = 0.5
+"""Distances are bounded here, where the repulsion would grow beyond all bounds; as ``bio_inspired``."""
+
+
+class Gains(NamedTuple):
+    """Free parameters, found by tuning."""
+
+    attraction: float
+    """xi: pull to l(t) per distance [N/m]."""
+    obstacle: float
+    """eta: repulsion by obstacles, with Ge and Cui's n = 2 [N m]."""
+    obstacle_range: float
+    """rho_0: distance to a surface at which it ends [m]."""
+    neighbour: float
+    """eta of neighbours [N m^3]."""
+    neighbour_range: float
+    """rho_0 of neighbours [m]."""
+
+
+class Apf(Policy):
+    """Artificial potential field: a well at l(t), hills at neighbours, and at obstacles weighted by the way to l(t)."""
+
+    yaw_damping_nms: ClassVar[float] = 600.0
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+        super().__init__(scenario, num_worlds)
+        self.gains = gains or Gains(**tuned("apf"))
+        self._centres = scenario.sonar.echo_reports == "centre"
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        flat = self.flat(percept)
+        action = np.empty((*flat.shape[:2], 2), np.float32)
+        _act(flat, self.layout.offsets, self.gains, self.limits, self._centres, action, self.clamps)
+        return action
+
+
+@compiled
+def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g: Gains) -> tuple[float, float, int]:
+    """Force [N] from an obstacle: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2 rho_goal^2 within rho_0.
+
+    Ge and Cui 2000, with n = 2: one part points away from the obstacle, one to the goal.
+
+    Args:
+        n_x: unit vector to the surface's nearest point, forward.
+        n_y: and to starboard.
+        rho: distance to it [m].
+        l_x: the goal, forward [m].
+        l_y: and to starboard [m].
+        g: the law's gains.
+
+    Returns:
+        The force, forward and to starboard, and 1 where the distance's bound binds.
+    """
+    near = max(rho, MIN_DISTANCE_M)
+    if near >= g.obstacle_range:
+        return 0.0, 0.0, 0
+    gap = 1.0 / near - 1.0 / g.obstacle_range
+    away = g.obstacle * gap * (l_x * l_x + l_y * l_y) / (near * near)
+    homeward = g.obstacle * gap * gap
+    return homeward * l_x - away * n_x, homeward * l_y - away * n_y, int(rho < MIN_DISTANCE_M)
+
+
+@compiled
+def neighbour_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]:
+    """Force [N] from a neighbour at p [m]: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2. Khatib 1986."""
+    rho = math.hypot(p_x, p_y)
+    near = max(rho, MIN_DISTANCE_M)
+    if near >= g.neighbour_range:
+        return 0.0, 0.0, 0
+    weight = -g.neighbour * (1.0 / near - 1.0 / g.neighbour_range) / (near * near * near)
+    return weight * p_x, weight * p_y, int(rho < MIN_DISTANCE_M)
+
+
+@compiled
+def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, action: Float32, clamps: Int64) -> None:
+    """The law for every vehicle.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        g: the law's gains.
+        limits: of the actuators, and the surge resistance.
+        centres: echoes report centres; else points of surfaces.
+        action: filled with shares of full force, shape (world, vehicle, 2).
+        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
+    """
+    see = fields(flat, at)
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            f_x, f_y, bound = _force(w, i, see, g, centres)
+            clamps[w] += bound
+            write_action(f_x, f_y, limits, action[w, i])
+
+
+@compiled
+def _force(w: int, i: int, see: Fields, g: Gains, centres: bool) -> tuple[float, float, int]:
+    """Body-frame force on one vehicle [N], forward and to starboard, and how many bounds bound.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        g: the law's gains.
+        centres: echoes report centres; else points of surfaces.
+    """
+    l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
+    f_x, f_y, bound = g.attraction * l_x, g.attraction * l_y, 0
+    for k in range(see.heard.shape[2]):
+        if see.heard[w, i, k] > 0.0:
+            d_x, d_y, c = neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
+            f_x, f_y, bound = f_x + d_x, f_y + d_y, bound + c
+    for a in range(see.echo.shape[2]):
+        if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
+            n_x, n_y, reach, _ = obstacle_at(w, i, a, see, centres)
+            d_x, d_y, c = obstacle_force(n_x, n_y, reach, l_x, l_y, g)
+            f_x, f_y, bound = f_x + d_x, f_y + d_y, bound + c
+    return f_x, f_y, bound

@@ -1,0 +1,225 @@
+"""Optimal reciprocal collision avoidance (ORCA): van den Berg, Guy, Lin and Manocha, ISRR 2009 (Springer 2011).
+
+Of two vehicles on a course of collision within a horizon, each takes half of the smallest change of their relative
+velocity that avoids it; of an obstacle, the vehicle takes all. Each such demand is a half-plane of velocities, and the
+vehicle takes the velocity nearest to its wished one that keeps all; where none does, obstacles go first.
+"""
+
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.avoidance import obstacle_at
+from uuv_marl.baselines.bio_inspired import counts_once
+from uuv_marl.baselines.halfplanes import nearest_velocity
+from uuv_marl.baselines.policy import Limits, Policy, tuned
+from uuv_marl.baselines.steering import steer, velocity_gain, wished_velocity
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields, Starts, fields
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+
+_SHARE = 0.5
+"""Of a change that a vehicle takes; its neighbour takes the other half. Definition of ORCA^tau_A|B."""
+
+
+class Gains(NamedTuple):
+    """Free parameters, found by tuning."""
+
+    radius: float
+    """Of the disc that stands for a vehicle: half the distance that two of them keep [m]."""
+    clearance: float
+    """Kept from obstacles' surfaces [m]."""
+    horizon: float
+    """tau: how far ahead collisions with neighbours are avoided [s]."""
+    obstacle_horizon: float
+    """And with obstacles [s]."""
+    pull: float
+    """Wished velocity per distance to l(t), added to the reference's velocity [1/s]."""
+
+
+class OrcaInformed(Policy):
+    """Reciprocal velocity obstacles: half-planes of velocity from neighbours' velocities and from echoes."""
+
+    channels: ClassVar[tuple[str, ...]] = ("link",)
+    yaw_damping_nms: ClassVar[float] = 600.0
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+        super().__init__(scenario, num_worlds)
+        self.gains = gains or Gains(**tuned("orca_informed"))
+        self._speed = wished_velocity(1.0, 0.0, self.limits)[0]
+        self._follow = velocity_gain(scenario)
+        self._centres = scenario.sonar.echo_reports == "centre"
+        self._planes: Float64 = np.zeros((scenario.sonar.num_sectors + scenario.sonar.num_active_sectors, 3))
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        flat = self.flat(percept)
+        action = np.empty((*flat.shape[:2], 2), np.float32)
+        period = self.scenario.timing.decision_period_s
+        _act(
+            flat, self.at, self.gains, self.limits, self._speed, self._follow, period, self._centres,
+            self._planes, action,
+        )  # fmt: skip
+        return action
+
+
+@compiled
+def escape(
+    p_x: float, p_y: float, radius: float, v_x: float, v_y: float, horizon: float, period: float
+) -> tuple[float, float, float, float]:
+    """The smallest change u that takes a relative velocity to the edge of a velocity obstacle, and the normal there.
+
+    The velocity obstacle holds the velocities that meet the disc within the horizon: a cone, cut off by a disc that is
+    ``horizon`` times smaller. From inside the disc, those that are still in it after a decision period. The normal
+    points out of it. Straight at the disc, starboard counts as the shorter way round.
+
+    Args:
+        p_x: the disc's centre, forward of the vehicle [m].
+        p_y: and to starboard [m].
+        radius: of the disc, both vehicles' together [m].
+        v_x: velocity relative to it, forward [m/s].
+        v_y: and to starboard [m/s].
+        horizon: within which a collision counts [s].
+        period: between two decisions [s].
+
+    Returns:
+        u_x, u_y [m/s], n_x, n_y.
+    """
+    squared = p_x * p_x + p_y * p_y
+    inside = squared <= radius * radius
+    time = period if inside else horizon
+    w_x, w_y = v_x - p_x / time, v_y - p_y / time  # from the centre of the disc that cuts the cone off
+    along, length = w_x * p_x + w_y * p_y, math.hypot(w_x, w_y)
+    if inside or (along < 0.0 and along * along > radius * radius * length * length):
+        if length > 0.0:
+            n_x, n_y = w_x / length, w_y / length
+        else:
+            n_x, n_y = (-p_x / math.sqrt(squared), -p_y / math.sqrt(squared)) if squared > 0.0 else (-1.0, 0.0)
+        gap = radius / time - length
+        return gap * n_x, gap * n_y, n_x, n_y
+    leg, side = math.sqrt(squared - radius * radius), 1.0 if p_x * w_y - p_y * w_x >= 0.0 else -1.0
+    d_x, d_y = (p_x * leg - side * p_y * radius) / squared, (p_y * leg + side * p_x * radius) / squared
+    reach = v_x * d_x + v_y * d_y
+    return reach * d_x - v_x, reach * d_y - v_y, -side * d_y, side * d_x
+
+
+@compiled
+def _add(
+    planes: Float64,
+    num: int,
+    u: float,
+    v: float,
+    demand: tuple[float, float, float, float],
+    share: float,
+) -> int:
+    """Write the half-plane of velocities that take a share of a change; the number of planes then.
+
+    Args:
+        planes: n_x, n_y and b of n.v <= b, as ``nearest_velocity`` takes them.
+        num: how many there are.
+        u: own surge velocity [m/s].
+        v: own sway velocity [m/s].
+        demand: of ``escape``.
+        share: of the change.
+    """
+    u_x, u_y, n_x, n_y = demand
+    planes[num, 0], planes[num, 1] = -n_x, -n_y
+    planes[num, 2] = -(n_x * (u + share * u_x) + n_y * (v + share * u_y))
+    return num + 1
+
+
+@compiled
+def _act(
+    flat: Float32,
+    at: Starts,
+    g: Gains,
+    limits: Limits,
+    speed: float,
+    follow: float,
+    period: float,
+    centres: bool,
+    planes: Float64,
+    action: Float32,
+) -> None:
+    """The law for every vehicle.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        g: the law's gains.
+        limits: of the actuators, and the surge resistance.
+        speed: the vehicle's largest [m/s].
+        follow: of ``velocity_gain`` [N s/m].
+        period: between two decisions [s].
+        centres: echoes report centres; else points of surfaces.
+        planes: room for a half-plane for every sub-sector and every active one, shape (plane, 3).
+        action: filled with shares of full force, shape (world, vehicle, 2).
+    """
+    see = fields(flat, at)
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
+            firm = _obstacles(w, i, see, g, period, centres, planes)
+            num = _neighbours(w, i, see, g, period, planes, firm)
+            w_x = float(see.reference_velocity[w, i, 0]) + g.pull * float(see.reference[w, i, 0])
+            w_y = float(see.reference_velocity[w, i, 1]) + g.pull * float(see.reference[w, i, 1])
+            far = max(math.hypot(w_x, w_y) / speed, 1.0)
+            w_x, w_y, _ = nearest_velocity(w_x / far, w_y / far, planes, num, firm, speed)
+            steer(w_x, w_y, u, v, follow, limits, action[w, i])
+
+
+@compiled
+def _obstacles(w: int, i: int, see: Fields, g: Gains, period: float, centres: bool, planes: Float64) -> int:
+    """Write the half-planes of obstacles, each once; how many. The vehicle takes the whole change.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        g: the law's gains.
+        period: between two decisions [s].
+        centres: echoes report centres; else points of surfaces, of which the nearest counts.
+        planes: filled from the first row on.
+    """
+    u, v, num = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0
+    for a in range(see.echo.shape[2]):
+        if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
+            n_x, n_y, reach, radius = obstacle_at(w, i, a, see, centres)
+            distance = reach + radius
+            demand = escape(distance * n_x, distance * n_y, radius + g.clearance, u, v, g.obstacle_horizon, period)
+            num = _add(planes, num, u, v, demand, 1.0)
+    return num
+
+
+@compiled
+def _neighbours(w: int, i: int, see: Fields, g: Gains, period: float, planes: Float64, num: int) -> int:
+    """Add the half-planes of neighbours; how many planes there are then.
+
+    One whose velocity has not been told (``modem``) counts as moving like the reference point.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        see: the fields of percepts, of all worlds.
+        g: the law's gains.
+        period: between two decisions [s].
+        planes: written from row ``num`` on.
+        num: how many there are.
+    """
+    u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
+    for k in range(see.heard.shape[2]):
+        if see.heard[w, i, k] == 0.0:
+            continue
+        v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
+        if see.link_identity[w, i, k] >= 1.0:
+            v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
+        p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
+        demand = escape(p_x, p_y, 2.0 * g.radius, u - v_x, v - v_y, g.horizon, period)
+        num = _add(planes, num, u, v, demand, _SHARE)
+    return num
