@@ -149,10 +149,11 @@ def key_of(name):
 
 
 KERNEL = """
+from keyed import other
 from keyed.other import LIMIT, Plant, scaled as by
 
 def step(x, p: Plant):
-    return by(x) + p.mass + LIMIT
+    return by(x) + p.mass + LIMIT + other.dotted(x)
 
 def neighbour():
     return 1
@@ -174,6 +175,9 @@ def scaled(x):
 
 _FACTOR, _REST = 3.0, 4.0
 
+def dotted(x):
+    return 5 * x
+
 def neighbour():
     return 1
 """
@@ -186,6 +190,7 @@ def neighbour():
         ("_FACTOR, _REST = 3.0", "_FACTOR, _REST = 3.5", True),
         ("    mass: float\n    drag: float", "    drag: float\n    mass: float", True),
         ("return _FACTOR * x", "return x * _FACTOR", True),
+        ("return 5 * x", "return 6 * x", True),
         ("return _FACTOR * x", '"""A docstring."""\n    return _FACTOR * x  # and a comment', False),
         ("        return neighbour", "        return LIMIT", False),
         ("    return 1", "    return 2", False),

@@ -38,8 +38,8 @@ class Seen(NamedTuple):
     """Errors of headings [rad]."""
     centre: np.ndarray
     """Errors of centres of confirmed discs within 40 m [m]."""
-    radius: np.ndarray
-    """Errors of their radii [m]."""
+    surface: np.ndarray
+    """Errors of the distances of their surfaces [m]."""
     phantoms: float
     """Share of the confirmed discs that are no obstacle."""
     forgotten: float
@@ -53,7 +53,7 @@ def run(overrides, seconds=140.0, policy="scout", seed=10_500):
     scenario = granted(policy, load_scenario("single_obstacle", overrides=COURSE | overrides))
     swarm, acts = Swarm(scenario), make(policy, scenario)
     percept, period = swarm.reset(seed), scenario.timing.decision_period_s
-    errors = {name: [] for name in ("place", "turn", "centre", "radius", "velocity")}
+    errors = {name: [] for name in ("place", "turn", "centre", "surface", "velocity")}
     found, missed, phantoms, discs, turn, origin = 0, 0, 0, 0, None, None
     for k in range(round(seconds / period)):
         action, eta, m = acts.act(percept), swarm.state.eta[0].copy(), acts.memory
@@ -64,21 +64,27 @@ def run(overrides, seconds=140.0, policy="scout", seed=10_500):
             errors["place"].append(np.linalg.norm(origin + rotated(m.pose[0, :, :2], turn) - eta[:, :2], axis=1))
             heading = np.arctan2(m.pose[0, :, 3], m.pose[0, :, 2]) + turn - eta[:, 2]
             errors["turn"].append(np.abs((heading + np.pi) % (2 * np.pi) - np.pi))
-            for i in range(len(eta)):
-                there = swarm.course.obstacles[0, : swarm.course.num_obstacles[0]]
+            there = swarm.course.obstacles[0, : swarm.course.num_obstacles[0]]
+            for i, pose in enumerate(m.pose[0]):
+                now = eta[i, 2] - np.arctan2(pose[3], pose[2])  # what counts is where things are from here
+
+                def seen(points, i=i, pose=pose, now=now):
+                    return eta[i, :2] + rotated(points - pose[:2], now)
+
                 sure = m.disc[0, i, m.score[0, i] >= CONFIRMED]
-                sure = np.column_stack([origin[i] + rotated(sure[:, :2], turn[i]), sure[:, 2]])
+                sure = np.column_stack([seen(sure[:, :2]), sure[:, 2]])
                 away = np.linalg.norm(sure[:, None, :2] - there[None, :, :2], axis=2)
                 true = away < there[None, :, 2]
                 discs, phantoms = discs + len(sure), phantoms + (~true.any(axis=1)).sum()
                 reach = np.linalg.norm(eta[i, :2] - there[:, :2], axis=1) - there[:, 2]
                 found, missed = found + (reach < 20).sum(), missed + ((reach < 20) & ~true.any(axis=0)).sum()
                 for d, o in zip(*np.nonzero(true & (reach < 40.0)), strict=True):
+                    near = np.linalg.norm(eta[i, :2] - sure[d, :2]) - sure[d, 2]
                     errors["centre"].append(away[d, o])
-                    errors["radius"].append(abs(sure[d, 2] - there[o, 2]))
-                errors["velocity"] += velocities(i, swarm, m, origin[i], turn[i])
+                    errors["surface"].append(abs(near - reach[o]))
+                errors["velocity"] += velocities(i, swarm, m, seen(m.place[0, i]), now)
         percept = swarm.step(action)
-    measured = {name: np.concatenate(list(map(np.atleast_1d, values))) for name, values in errors.items()}
+    measured = {name: np.concatenate([np.atleast_1d(value) for value in values]) for name, values in errors.items()}
     return Seen(**measured, phantoms=phantoms / max(discs, 1), forgotten=missed / max(found, 1))
 
 
@@ -88,15 +94,15 @@ def rotated(points, angle):
     return np.stack([c * points[..., 0] - s * points[..., 1], s * points[..., 0] + c * points[..., 1]], axis=-1)
 
 
-def velocities(i, swarm, m, origin, turn):
-    """Errors of the velocities that a vehicle remembers of those that it hears now."""
+def velocities(i, swarm, m, places, turn):
+    """Errors of the velocities that a vehicle remembers of those that it heard within half a second."""
     errors, eta = [], swarm.state.eta[0]
-    for k in np.flatnonzero((m.known[0, i] > 3) & (m.since[0, i] == 0.0)):
-        away = np.linalg.norm(origin + rotated(m.place[0, i, k], turn) - eta[:, :2], axis=1)
+    for k in np.flatnonzero((m.known[0, i] > 3) & (m.since[0, i] < 0.55)):
+        away = np.linalg.norm(places[k] - eta[:, :2], axis=1)
         away[i] = np.inf
         j = int(np.argmin(away))
         if np.linalg.norm(eta[j, :2] - eta[i, :2]) < 30.0:
-            errors.append(np.linalg.norm(rotated(m.velocity[0, i, k], turn) - swarm.velocity[0, j]))
+            errors.append(np.linalg.norm(rotated(m.velocity[0, i, k], turn) - rotated(swarm.velocity[0, j], eta[j, 2])))
     return errors
 
 

@@ -5,6 +5,7 @@ fields in another file. So its cache is keyed by the code reached. Comments, doc
 """
 
 import ast
+import contextlib
 import functools
 import hashlib
 import importlib.util
@@ -27,8 +28,14 @@ def reached(function: Callable[..., Any]) -> dict[tuple[str, str], str]:
     waiting = [(function.__module__, function.__name__)]
     while waiting:
         module, name = waiting.pop()
+        name, _, attribute = name.partition(".")
         statement = _statements(module).get(name)
         if statement is None or (module, name) in found:
+            continue
+        if attribute:
+            home = _module(statement, name)
+            if home.partition(".")[0] in packages:
+                waiting.append((home, attribute))
             continue
         if isinstance(statement, ast.Import | ast.ImportFrom):
             home = statement.module or "" if isinstance(statement, ast.ImportFrom) else ""
@@ -40,13 +47,22 @@ def reached(function: Callable[..., Any]) -> dict[tuple[str, str], str]:
     return found
 
 
+def _module(statement: ast.stmt, name: str) -> str:
+    """The module that a statement binds a name to, where it imports one."""
+    if not isinstance(statement, ast.Import | ast.ImportFrom):
+        return ""
+    whole = next(alias.name for alias in statement.names if name in (alias.name, alias.asname))
+    return f"{statement.module}.{whole}" if isinstance(statement, ast.ImportFrom) else whole
+
+
 @functools.cache
 def _statements(module: str) -> dict[str, ast.stmt]:
     """A module's statements by the names that they bind."""
     file = getattr(sys.modules.get(module), "__file__", None)
     if file is None:
-        spec = importlib.util.find_spec(module)
-        file = spec and spec.origin
+        with contextlib.suppress(ModuleNotFoundError):  # a parameter that is called as a function elsewhere is none
+            spec = importlib.util.find_spec(module)
+            file = spec and spec.origin
     tree = ast.parse(Path(file).read_bytes()) if file and Path(file).is_file() else ast.Module([], [])
     return {name: statement for statement in tree.body for name in _bound(statement)}
 
@@ -77,7 +93,13 @@ def _content(module: str, name: str) -> tuple[str, frozenset[str]]:
     elif isinstance(statement, ast.FunctionDef):
         parts = [statement.args, *(line for line in statement.body if not _is_text(line))]
         decorators = statement.decorator_list
-    used = {node.id for part in [*parts, *annotations] for node in ast.walk(part) if isinstance(node, ast.Name)}
+    nodes = [node for part in [*parts, *annotations] for node in ast.walk(part)]
+    used = {node.id for node in nodes if isinstance(node, ast.Name)}
+    used |= {
+        f"{node.value.id}.{node.attr}"
+        for node in nodes
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+    }
     return "; ".join(ast.dump(part) for part in [*parts, *decorators]), frozenset(used - {name})
 
 

@@ -19,20 +19,20 @@ from uuv_marl.sim.views import Fields
 
 Float64 = NDArray[np.float64]
 
-NOISE_M, NOISE_SHARE = 0.05, 0.02
-"""Standard deviation of an echo taken for granted: so much, and this share of its range. Assumed: a sonar's of 2 %."""
+NOISE_M, NOISE_SHARE = 0.05, 0.03
+"""Standard deviation of an echo taken for granted: so much, and this share of its range. Assumed: 2 % of range noise and 1 degree of bearing noise."""
 RADIUS_M, RADIUS_SD_M = 18.0, 10.0
 """Radius expected of an obstacle of which one point is known, and its deviation [m]. Assumed: those of random_field."""
 SIDE_SD_M = 8.0
 """Deviation across of the centre of an obstacle whose nearest point may lie outside the sonar's fan [m]. Assumed."""
 GATE = 3.0
 """Deviations by which an echo may miss a disc that it belongs to [1]."""
-CONFIRMED = 2.0
+CONFIRMED = 3.0
 """Decisions at which a disc must have been heard to count."""
 MOST_SCORE_S = 3.0
-"""A disc is forgotten after it should have been heard for so long and was not [s]."""
-LOST_S = 1.0
-"""One that was heard but once is forgotten after this [s]."""
+"""One that was heard for so long is kept until it should have been heard for so long and was not [s]. Assumed."""
+LIFETIME = 10.0
+"""One that was heard for t seconds in all, less than that, is forgotten after this times t^2 [1/s]. Assumed."""
 SMALLEST_M, LARGEST_M = 0.5, 60.0
 """Bounds of a radius [m]."""
 _FORGETS = 1.02
@@ -260,7 +260,8 @@ def _judge(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
         score, silence = kept.score[w, i, d], kept.silence[w, i, d]
         if score <= 0.0 or silence == 0.0:
             continue
-        if score < CONFIRMED and silence > LOST_S:
+        evidence = score * fans.period_s
+        if evidence < MOST_SCORE_S - fans.period_s and silence > LIFETIME * evidence * evidence:
             kept.score[w, i, d] = 0.0
             continue
         x, y = to_body(kept.disc[w, i, d, 0], kept.disc[w, i, d, 1], kept.pose[w, i])
@@ -276,11 +277,12 @@ def _judge(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
 
 @compiled
 def _merge(w: int, i: int, kept: Surroundings) -> None:
-    """Of two discs one of which holds the other's centre, forget the one that has been heard less."""
+    """Forget the disc heard less of two that overlap: by half of the other's score, or else so that one holds a centre."""
     disc, score = kept.disc[w, i], kept.score[w, i]
     for d in range(score.shape[0]):
-        for e in range(d):
-            if score[d] > 0.0 and score[e] > 0.0:
+        for e in range(score.shape[0]):
+            if d != e and 0.0 < score[d] <= score[e]:
                 apart = math.hypot(disc[d, 0] - disc[e, 0], disc[d, 1] - disc[e, 1])
-                if apart < max(disc[d, 2], disc[e, 2]):
-                    score[d if score[d] <= score[e] else e] = 0.0
+                weak = score[d] <= 0.5 * score[e] and apart < disc[d, 2] + disc[e, 2]
+                if weak or apart < max(disc[d, 2], disc[e, 2]):
+                    score[d] = 0.0
