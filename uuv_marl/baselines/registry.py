@@ -207,9 +207,9 @@ def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters
         parameters: by name; texts stand for what they say.
     """
     if name.startswith(GUARDED):
-        barrier = parameters.pop("barrier", None)
+        filters = {key: parameters.pop(key) for key in ("barrier",) if key in parameters}
         inner = _made(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
-        return Guarded(scenario, num_worlds, inner=inner, barrier=barrier)  # pyright: ignore[reportArgumentType] - the caller's
+        return Guarded(scenario, num_worlds, inner=inner, **filters)  # pyright: ignore[reportArgumentType] - the caller's
     constructor: Any = kind
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     if isinstance(parameters.get("gains"), str):

@@ -277,11 +277,11 @@ def _judge(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
 
 @compiled
 def _merge(w: int, i: int, kept: Surroundings) -> None:
-    """Forget the disc heard less of two that overlap: by half of the other's score, or else so that one holds a centre."""
+    """Forget what overlaps a disc that is heard now, and has been heard less: half as often, or its centre is inside."""
     disc, score = kept.disc[w, i], kept.score[w, i]
     for d in range(score.shape[0]):
         for e in range(score.shape[0]):
-            if d != e and 0.0 < score[d] <= score[e]:
+            if d != e and 0.0 < score[d] <= score[e] and kept.silence[w, i, e] == 0.0:
                 apart = math.hypot(disc[d, 0] - disc[e, 0], disc[d, 1] - disc[e, 1])
                 weak = score[d] <= 0.5 * score[e] and apart < disc[d, 2] + disc[e, 2]
                 if weak or apart < max(disc[d, 2], disc[e, 2]):

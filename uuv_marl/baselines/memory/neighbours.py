@@ -9,10 +9,12 @@ from uuv_marl.sim.views import Fields
 
 GATE_M, GATE_SHARE = 2.0, 0.1
 """By which a neighbour may be heard from where it was expected: so much, and this share of its range. Assumed."""
-ACCELERATION = 5.0
+ACCELERATION = 2.0
 """Of neighbours, a typical one [m/s2]. Assumed: a third of what full force makes of the paper's vehicle."""
+MANOEUVRES = 0.005
+"""Of the mean error over range, what neighbours' manoeuvres make; the rest is the sonar's [1]. Assumed."""
 LEAST_ERROR = 0.0002
-"""Errors of positions are never taken for smaller than this share of the range [1]."""
+"""The sonar's is never taken for smaller than this [1]."""
 KEPT_S = 1.0
 """A neighbour that is heard no more is kept for so long [s]."""
 _SAME_M = 1e-3
@@ -112,7 +114,7 @@ def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surr
     dx, dy = x - place[0], y - place[1]
     error = math.hypot(dx, dy) / max(reach, 1.0)
     kept.error[w, i] += _LEARNS * (error - kept.error[w, i])
-    alpha, beta = gains(since, max(kept.error[w, i], LEAST_ERROR) * max(reach, 1.0))
+    alpha, beta = gains(since, max(kept.error[w, i] - MANOEUVRES, LEAST_ERROR) * max(reach, 1.0))
     place[0], place[1] = place[0] + alpha * dx, place[1] + alpha * dy
     velocity[0], velocity[1] = velocity[0] + beta * dx / since, velocity[1] + beta * dy / since
     last[0], last[1] = x, y
