@@ -91,7 +91,7 @@ def test_a_lone_vehicle_lags_by_drag_over_zeta_l(hold, tolerance):
     assert lag == pytest.approx(drag / 30.0, abs=tolerance)  # 62.7 m
 
 
-@pytest.mark.parametrize("name", [name for name in POLICIES if name != "random"])
+@pytest.mark.parametrize("name", [*(name for name in POLICIES if name != "random"), "guarded:mappo"])
 def test_forces_turn_with_the_world(name):
     """Body-frame actions don't change, up to float32, when the world is rotated and moved."""
     scenario = granted(name, load_scenario("single_obstacle", num_vehicles=20))
@@ -203,7 +203,7 @@ def test_slots_are_assigned_so_that_ways_are_short():
 
 
 def test_policies_that_remember_forget_on_reset():
-    for name in ("sff", "sdc", "random"):
+    for name in ("sff", "sdc", "scout", "guarded:mappo", "random"):
         scenario = granted(name, load_scenario("single_obstacle", num_vehicles=9))
         swarm, policy = Swarm(scenario), make(name, scenario)
         runs = []
@@ -267,7 +267,7 @@ def flown(name, scenario, decisions=6, worlds=2):
     return swarm, policy, percept
 
 
-@pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.parametrize("name", [*POLICIES, "guarded:mappo"])
 def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
     swarm, policy, percept = flown(name, "starter")
     again, kept, water = pickle.loads(pickle.dumps(policy)), policy.snapshot(), swarm.snapshot()
@@ -282,7 +282,7 @@ def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
         policy.restore({**kept, "clamps": np.zeros(5)})
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc"])
+@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
 def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
     swarm, policy, percept = flown(name, "starter")
     first = policy.act(percept)
@@ -295,7 +295,7 @@ def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
     policy.act(swarm.percept)
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc"])
+@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
 def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
     """So that memory does not outlive an autoreset, whichever API did it; the other world keeps its own."""
     swarm, policy, percept = flown(name, "starter")
@@ -331,7 +331,7 @@ def test_gains_and_parameters_can_be_written_behind_a_name():
         ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
         ("idle,gain=1", "has no parameter 'gain'; It has none"),
-        ("guarded:sff", "'guarded:' is reserved"),
+        ("guarded:bio_insp", "did you mean 'bio_inspired'"),
         ("bio_insp,zeta_n=1", "did you mean 'bio_inspired'"),
     ],
 )

@@ -68,8 +68,8 @@ def run(overrides, seconds=140.0, policy="scout", seed=10_500):
             for i, pose in enumerate(m.pose[0]):
                 now = eta[i, 2] - np.arctan2(pose[3], pose[2])  # what counts is where things are from here
 
-                def seen(points, i=i, pose=pose, now=now):
-                    return eta[i, :2] + rotated(points - pose[:2], now)
+                def seen(points, here=eta[i, :2], pose=pose, now=now):
+                    return here + rotated(points - pose[:2], now)
 
                 sure = m.disc[0, i, m.score[0, i] >= CONFIRMED]
                 sure = np.column_stack([seen(sure[:, :2]), sure[:, 2]])
@@ -112,3 +112,68 @@ def test_a_vehicle_knows_where_it_is_through_turns_and_rest(policy, period):
     seen = run({"timing.decision_period_s": period}, policy=policy)
     assert seen.place.max() < 1e-2
     assert seen.turn.max() < 1e-3
+
+
+@pytest.mark.parametrize("echoes", ["centre", "surface"])
+def test_obstacles_are_known_within_centimetres_without_noise(echoes):
+    seen = run({"sonar.echo_reports": echoes})
+    assert np.quantile(seen.surface, 0.99) < 0.05
+    assert seen.phantoms < 0.002
+    assert seen.forgotten == 0.0
+
+
+def test_neighbours_velocities_follow_from_their_places():
+    seen = run({})
+    assert np.median(seen.velocity) < 0.03
+    assert (seen.velocity < 0.3).mean() > 0.95
+
+
+@pytest.mark.parametrize(
+    ("disturbance", "median", "worst", "phantoms", "forgotten"),
+    [
+        (NOISE, 0.3, 3.0, 0.05, 0.02),
+        (LATE, 0.05, 0.5, 0.01, 0.02),
+        (CURRENT, 0.05, 0.5, 0.01, 0.02),
+        (NOISE | LATE | CURRENT, 0.5, 3.0, 0.05, 0.05),
+        ({"noise.silence_probability": 0.1, "noise.silence_readings": 10}, 0.05, 3.0, 0.02, 0.25),
+        ({"noise.false_echo_probability": 0.05}, 0.05, 2.0, 0.4, 0.05),
+    ],
+    ids=["noise", "late", "current", "all", "silence", "false_echoes"],
+)
+def test_obstacles_are_known_in_a_disturbed_sea(disturbance, median, worst, phantoms, forgotten):
+    """Margins of about three over what was seen; false echoes are what it bears least."""
+    seen = run(SURFACE | disturbance)
+    assert np.median(seen.surface) < median
+    assert np.quantile(seen.surface, 0.99) < worst
+    assert seen.phantoms < phantoms
+    assert seen.forgotten < forgotten
+
+
+def test_an_obstacle_that_is_gone_is_forgotten():
+    scenario = granted("scout", load_scenario("single_obstacle", num_vehicles=1))
+    swarm, policy = Swarm(scenario), make("scout", scenario)
+    percept = swarm.reset(0)
+    while not (policy.memory.score[0, 0] >= 20.0).any():
+        percept = swarm.step(policy.act(percept))
+    swarm.course.num_obstacles[0] = 0
+    percept = swarm.observe()
+    for _ in range(35):
+        percept = swarm.step(policy.act(percept))
+    assert not (policy.memory.score[0, 0] >= CONFIRMED).any()
+
+
+def test_a_neighbour_that_is_heard_no_more_is_kept_for_a_second():
+    scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
+    swarm, policy = Swarm(scenario), make("scout", scenario)
+    swarm.reset(0)
+    swarm.state.eta[0] = [(0.0, 0.0, 0.0), (0.0, 20.0, 0.0)]
+    percept = swarm.observe()
+    for _ in range(5):
+        percept = swarm.step(policy.act(percept))
+    assert (policy.memory.known[0, 0] > 0).sum() == 1
+    swarm.state.alive[0, 1] = False
+    known = []
+    for _ in range(15):
+        percept = swarm.step(policy.act(percept))
+        known.append(bool((policy.memory.known[0, 0] > 0).any()))
+    assert known in ([True] * 10 + [False] * 5, [True] * 11 + [False] * 4)

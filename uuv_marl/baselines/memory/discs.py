@@ -31,7 +31,7 @@ CONFIRMED = 3.0
 """Decisions at which a disc must have been heard to count."""
 MOST_SCORE_S = 3.0
 """One that was heard for so long is kept until it should have been heard for so long and was not [s]. Assumed."""
-LIFETIME = 10.0
+LIFETIME = 40.0
 """One that was heard for t seconds in all, less than that, is forgotten after this times t^2 [1/s]. Assumed."""
 SMALLEST_M, LARGEST_M = 0.5, 60.0
 """Bounds of a radius [m]."""

@@ -1,0 +1,160 @@
+"""The safety filter: what keeps to it stays beyond the margins, and where nothing is near it changes nothing."""
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import Policy, PolicyError, granted, make
+from uuv_marl.baselines.guarded import Guarded
+from uuv_marl.baselines.safety import Barrier
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.sim.swarm import Swarm
+
+
+class Ahead(Policy):
+    """Full thrust, and nothing else."""
+
+    yaw_damping_nms = 600.0
+
+    def act(self, percept):
+        action = np.zeros((*percept.flat.shape[:2], 2), np.float32)
+        action[..., 0] = 1.0
+        return action
+
+
+HERE = "tests.test_safety:Ahead"
+AHEAD = {"obstacles": [{"centre_m": [300.0, 0.0], "radius_m": 20.0}]}
+COURSE = {"trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
+
+
+def placed(overrides, poses, name, **parameters):
+    """A swarm with its vehicles at (x, y, heading), and a policy for it."""
+    scenario = load_scenario("single_obstacle", num_vehicles=len(poses), overrides=COURSE | overrides)
+    scenario = granted(name, scenario)
+    swarm, policy = Swarm(scenario), make(name, scenario, **parameters)
+    swarm.reset(0)
+    swarm.state.eta[0], swarm.state.nu[0] = np.array(poses), 0.0
+    return swarm, policy, swarm.observe()
+
+
+@pytest.mark.parametrize("period", [0.1, 0.5])
+@pytest.mark.parametrize("echoes", ["centre", "surface"])
+@pytest.mark.parametrize("aside", [0.0, 12.0])
+def test_who_steers_at_an_obstacle_stays_beyond_the_margin(period, echoes, aside):
+    overrides = AHEAD | {"timing.decision_period_s": period, "sonar.echo_reports": echoes}
+    swarm, policy, percept = placed(overrides, [(150.0, aside, 0.0)], f"guarded:{HERE}")
+    nearest = np.inf
+    for _ in range(round(60 / period)):
+        percept = swarm.step(policy.act(percept))
+        nearest = min(nearest, np.hypot(swarm.state.eta[0, 0, 0] - 300.0, swarm.state.eta[0, 0, 1]) - 20.0)
+    assert nearest > policy.barrier.obstacle_m - 1.5, "sway can not be braked, and costs a metre"
+    assert nearest < policy.barrier.obstacle_m + 3.0, "nor need it stay so far away"
+
+
+def test_two_that_meet_head_on_stay_beyond_the_margin():
+    swarm, policy, percept = placed({"obstacles": []}, [(0.0, 0.0, 0.0), (120.0, 0.5, np.pi)], f"guarded:{HERE}")
+    nearest = np.inf
+    for _ in range(400):
+        percept = swarm.step(policy.act(percept))
+        nearest = min(nearest, np.hypot(*(swarm.state.eta[0, 0, :2] - swarm.state.eta[0, 1, :2])))
+    assert 6.5 < nearest < 12.0
+
+
+def test_who_backs_into_what_it_no_longer_hears_is_stopped():
+    """The cause of the shipped learned policy's collisions: thrust astern, an obstacle outside the active fan."""
+
+    class Astern(Ahead):
+        def act(self, percept):
+            return -super().act(percept)
+
+    swarm, _, percept = placed(AHEAD, [(240.0, 0.0, 0.0)], HERE)
+    for acts, meets in ((Astern(swarm.scenario), True), (Guarded(swarm.scenario, inner=Astern(swarm.scenario)), False)):
+        swarm.reset(0)
+        swarm.state.eta[0], swarm.state.nu[0] = [(240.0, 0.0, 0.0)], 0.0
+        percept = swarm.observe()
+        for _ in range(10):  # it hears the obstacle ahead,
+            percept = swarm.step(np.zeros((1, 1, 2), np.float32) * acts.act(percept))
+        swarm.state.eta[0, 0, 2] = np.pi  # turns its back to it, which its own dead reckoning is told,
+        if acts.Memory:
+            acts.memory.pose[0, 0, 2:] *= -1.0
+        percept = swarm.observe()
+        clearance = np.inf
+        for _ in range(150):  # and runs astern.
+            percept = swarm.step(acts.act(percept))
+            clearance = min(clearance, np.hypot(swarm.state.eta[0, 0, 0] - 300.0, swarm.state.eta[0, 0, 1]) - 20.0)
+        assert bool(clearance < 0.0) is meets
+        assert meets or clearance > 5.0
+
+
+@pytest.mark.parametrize("name", ["bio_inspired", "bio_inspired_plus", "mappo", "sff"])
+def test_where_nothing_is_near_no_action_changes(name):
+    poses = [(0.0, 0.0, 0.3), (200.0, 250.0, -1.0), (-300.0, 100.0, 2.0)]
+    swarm, bare, percept = placed({"obstacles": []}, poses, name)
+    guarded = make(f"guarded:{name}", swarm.scenario)
+    for _ in range(100):
+        action = bare.act(percept)
+        np.testing.assert_array_equal(guarded.act(percept), action)
+        percept = swarm.step(action)
+        guarded.acted(action, guarded.active)
+    assert guarded.changed[0] == 0
+
+
+def test_where_no_velocity_is_safe_it_is_counted():
+    poses = [(0.0, 0.0, 0.0), (5.0, 0.0, np.pi), (-2.5, 4.3, 0.0), (-2.5, -4.3, 0.0)]
+    _, policy, percept = placed({"obstacles": []}, poses, f"guarded:{HERE}")
+    policy.act(percept)
+    assert policy.infeasible[0] > 0
+    policy.reset(0)
+    assert policy.infeasible[0] == 0
+
+
+@pytest.mark.parametrize("name", ["sff", "mappo", "bio_inspired_plus"])
+def test_policies_that_collide_alone_do_not_inside_the_filter(name):
+    """On crowded fields of the tuning seeds; the rest is in docs/policies.md."""
+    collisions = {}
+    for policy in (name, f"guarded:{name}"):
+        scenario = granted(policy, load_scenario("random_field"))
+        runs = [run for run in evaluate(scenario, policy, [10_000, 10_007]) if isinstance(run, Run)]
+        collisions[policy] = sum(run.metrics["collisions"] for run in runs)
+    assert collisions[name] > 0
+    assert collisions[f"guarded:{name}"] == 0
+
+
+def test_a_guarded_policy_goes_on_from_a_snapshot_and_forgets_on_reset():
+    scenario = granted("guarded:sff", load_scenario("starter"))
+    swarm, policy = Swarm(scenario, 2), make("guarded:sff", scenario, 2)
+    percept = swarm.reset(3)
+    for _ in range(20):
+        percept = swarm.step(policy.act(percept))
+    kept, water = policy.snapshot(), swarm.snapshot()
+    runs = []
+    for _ in range(2):
+        swarm.restore(water)
+        policy.restore(kept)
+        percept = swarm.percept
+        for _ in range(20):
+            percept = swarm.step(policy.act(percept))
+        runs.append(swarm.state.eta.tobytes())
+    assert runs[0] == runs[1]
+    policy.reset(0, [1])
+    assert policy.memory.begun[0].all()
+    assert not policy.memory.begun[1].any()
+    assert not policy.inner.memory.identity[1].any()
+
+
+def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
+    scenario = granted("guarded:bio_inspired", load_scenario("starter"))
+    policy = make("guarded:bio_inspired,zeta_n=0.5", scenario, barrier=Barrier(obstacle_m=9.0))
+    assert policy.name == "guarded:bio_inspired,zeta_n=0.5"
+    assert policy.inner.gains.zeta_n == 0.5
+    assert policy.barrier.obstacle_m == 9.0
+    with pytest.raises(PolicyError, match="policy 'bio_inspire' is unknown; did you mean 'bio_inspired'"):
+        make("guarded:bio_inspire", scenario)
+
+
+@pytest.mark.parametrize("echoes", ["centre", "surface"])
+def test_scout_arrives_and_touches_nothing(echoes):
+    scenario = granted("scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes}))
+    runs = [run for run in evaluate(scenario, "scout", [10_000, 10_007, 10_008]) if isinstance(run, Run)]
+    assert all(run.metrics["collisions"] == 0 for run in runs)
+    assert all(run.metrics["task_time_s"] is not None for run in runs)
