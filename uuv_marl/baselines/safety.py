@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.baselines.memory.neighbours import noise_of
 from uuv_marl.baselines.memory.pose import to_map_axes
 from uuv_marl.sim.compiled import compiled
 
@@ -36,6 +37,8 @@ class Barrier(NamedTuple):
     """Distance kept from neighbours [m]."""
     neighbour_rate: float = 1.0
     """How fast that distance may be closed, per metre beyond it [1/s]."""
+    doubt: float = 3.0
+    """Times the mean error of neighbours' places that is added to that distance [1]."""
     share: float = 0.6
     """Of what must change between two neighbours, what each of them does [1]; half would do if both knew all."""
     horizon_m: float = 60.0
@@ -108,7 +111,8 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surrounding
             own = n_x * v_x + n_y * v_y
             closing = own - n_x * kept.velocity[w, i, k, 0] - n_y * kept.velocity[w, i, k, 1]
             planes[num, 0], planes[num, 1] = n_x, n_y
-            planes[num, 2] = own + barrier.share * (rate * (away - barrier.neighbour_m) - closing)
+            left = away - barrier.neighbour_m - barrier.doubt * noise_of(w, i, kept) * away
+            planes[num, 2] = own + barrier.share * (rate * left - closing)
             num += 1
     return num
 

@@ -40,6 +40,12 @@ def gains(period: float, deviation: float) -> tuple[float, float]:
 
 
 @compiled
+def noise_of(w: int, i: int, kept: Surroundings) -> float:
+    """The sonar's mean error of places over range, as vehicle i of world w sees it [1]; 0 where manoeuvres explain all."""
+    return max(kept.error[w, i] - MANOEUVRES, 0.0)
+
+
+@compiled
 def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> None:
     """Take the neighbours that a vehicle hears into those it knows.
 
@@ -84,12 +90,13 @@ def _match(x: float, y: float, reach: float, w: int, i: int, kept: Surroundings)
         i: index of the vehicle.
         kept: what is remembered.
     """
-    best, least = -1, GATE_M + GATE_SHARE * reach
-    for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] < 0.0:
-            away = math.hypot(x - kept.place[w, i, k, 0], y - kept.place[w, i, k, 1])
-            if away < least:
-                best, least = k, away
+    gate = GATE_M + GATE_SHARE * reach
+    best, least, known, place = -1, gate * gate, kept.known[w, i], kept.place[w, i]
+    for k in range(known.shape[0]):
+        dx, dy = x - place[k, 0], y - place[k, 1]
+        squared = dx * dx + dy * dy
+        if known[k] < 0.0 and squared < least:
+            best, least = k, squared
     return best
 
 
@@ -114,7 +121,7 @@ def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surr
     dx, dy = x - place[0], y - place[1]
     error = math.hypot(dx, dy) / max(reach, 1.0)
     kept.error[w, i] += _LEARNS * (error - kept.error[w, i])
-    alpha, beta = gains(since, max(kept.error[w, i] - MANOEUVRES, LEAST_ERROR) * max(reach, 1.0))
+    alpha, beta = gains(since, max(noise_of(w, i, kept), LEAST_ERROR) * max(reach, 1.0))
     place[0], place[1] = place[0] + alpha * dx, place[1] + alpha * dy
     velocity[0], velocity[1] = velocity[0] + beta * dx / since, velocity[1] + beta * dy / since
     last[0], last[1] = x, y
