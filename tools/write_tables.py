@@ -5,6 +5,7 @@ from pathlib import Path
 
 import uuv_marl
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v0
+from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
@@ -34,12 +35,14 @@ def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:
 
 
 def benchmark() -> str:
-    """The short table of ``single_obstacle`` from the long one in docs/results.md."""
+    """The default policies' rows of ``single_obstacle``, shorter, from the long table in docs/results.md."""
     section = RESULTS.read_text(encoding="utf-8").partition("\n## single_obstacle")[2].partition("\n## ")[0]
     lines: list[tuple[str, ...]] = []
     for line in section.splitlines():
         if line.startswith("| ") and not line.startswith(("| policy", "| ---")):
             policy, extra, _, time, _, _, obstacle, _, spacing, _, _, collisions, _ = line.strip("| ").split(" | ")
+            if policy not in DEFAULT_POLICIES:
+                continue
             name = f"`{policy}`" + ("" if extra == "–" else f" with {extra.removesuffix(' 600 N m s')}")
             closest = f"{float(obstacle):.1f} m, {float(spacing):.1f} m"
             lines.append((name, f"{time.split()[0]} s", closest, collisions))

@@ -20,7 +20,7 @@ from uuv_marl.sim.views import Fields
 Float64 = NDArray[np.float64]
 
 NOISE_M, NOISE_SHARE = 0.05, 0.03
-"""Standard deviation of an echo taken for granted: so much, and this share of its range. Assumed: 2 % of range noise and 1 degree of bearing noise."""
+"""Standard deviation of an echo: so much, and this share of its range. Assumed: noise of 2 % and of 1 degree."""
 RADIUS_M, RADIUS_SD_M = 18.0, 10.0
 """Radius expected of an obstacle of which one point is known, and its deviation [m]. Assumed: those of random_field."""
 SIDE_SD_M = 8.0
@@ -277,7 +277,7 @@ def _judge(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
 
 @compiled
 def _merge(w: int, i: int, kept: Surroundings) -> None:
-    """Forget what overlaps a disc that is heard now, and has been heard less: half as often, or its centre is inside."""
+    """Forget what overlaps a disc that is heard now and was heard less: half as often, or with its centre inside."""
     disc, score = kept.disc[w, i], kept.score[w, i]
     for d in range(score.shape[0]):
         for e in range(score.shape[0]):

@@ -41,7 +41,7 @@ def gains(period: float, deviation: float) -> tuple[float, float]:
 
 @compiled
 def noise_of(w: int, i: int, kept: Surroundings) -> float:
-    """The sonar's mean error of places over range, as vehicle i of world w sees it [1]; 0 where manoeuvres explain all."""
+    """The sonar's mean error of places over range, as a vehicle sees it [1]; 0 where manoeuvres explain all."""
     return max(kept.error[w, i] - MANOEUVRES, 0.0)
 
 

@@ -3,13 +3,12 @@
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.studies.data import read_toml
 from uuv_marl.studies.suite import NOTHING, Case
 
 _BEST = ("bio_inspired_plus", "mappo")
 _FEW = ("bio_inspired", *_BEST)
-_OTHERS = (*(name for name in DEFAULT_POLICIES if name not in _BEST), "ppo")
+_OTHERS = ("bio_inspired", "sff", "sdc", "sff_informed", "sdc_informed", "ppo")
 
 
 class HeldOut(NamedTuple):
