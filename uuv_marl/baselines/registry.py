@@ -20,6 +20,7 @@ from uuv_marl.baselines.learned import Trained, shipped
 from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.pull import Pull
 from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
@@ -43,6 +44,7 @@ POLICIES: dict[str, Kind] = {
     "olfati_saber": OlfatiSaber,
     "olfati_saber_informed": OlfatiSaberInformed,
     "orca_informed": OrcaInformed,
+    "pull": Pull,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
     "ppo": shipped("ppo", "The same, trained by Stable-Baselines3's PPO."),
     "random": Random,

@@ -1,0 +1,60 @@
+"""The bare pull to the reference point: ``guarded:pull`` shows what the safety filter does alone."""
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.steering import steer, velocity_gain
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Starts, fields
+
+Float32 = NDArray[np.float32]
+
+
+class Gains(NamedTuple):
+    """Of the wished velocity."""
+
+    pull: float = 0.05
+    """To l(t) [1/s]; as that of ``scout``."""
+
+
+class Pull(Policy):
+    """The velocity of l(t) and a pull to it; neighbours and obstacles are ignored. Meant for ``guarded:pull``."""
+
+    yaw_damping_nms: ClassVar[float] = 600.0
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+        super().__init__(scenario, num_worlds)
+        self.gains = gains or Gains()
+        self._gain = velocity_gain(scenario)
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        flat = self.flat(percept)
+        action = np.empty((*flat.shape[:2], 2), np.float32)
+        _act(flat, self.layout.offsets, self.gains, self.limits, self._gain, action)
+        return action
+
+
+@compiled
+def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, gain: float, action: Float32) -> None:
+    """The law for every vehicle.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        g: the law's gains.
+        limits: of the actuators, and the surge resistance.
+        gain: force per velocity error [N s/m].
+        action: filled with shares of full force, shape (world, vehicle, 2).
+    """
+    see = fields(flat, at)
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            w_x = see.reference_velocity[w, i, 0] + g.pull * see.reference[w, i, 0]
+            w_y = see.reference_velocity[w, i, 1] + g.pull * see.reference[w, i, 1]
+            steer(w_x, w_y, see.velocity[w, i, 0], see.velocity[w, i, 1], gain, limits, action[w, i])
