@@ -177,3 +177,88 @@ def test_a_neighbour_that_is_heard_no_more_is_kept_for_a_second():
         percept = swarm.step(policy.act(percept))
         known.append(bool((policy.memory.known[0, 0] > 0).any()))
     assert known in ([True] * 10 + [False] * 5, [True] * 11 + [False] * 4)
+
+
+@pytest.mark.parametrize("speed", [0.02, 4.0])
+def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
+    """An arc of a hundred corners of half a degree; slow or quick."""
+    angles = np.radians(np.arange(100) * 0.5)
+    points = np.cumsum(np.column_stack([np.cos(angles), np.sin(angles)]) * (0.02 if speed < 1.0 else 2.0), axis=0)
+    overrides = {"trajectory.waypoints_m": points.tolist(), "trajectory.speed_mps": speed, "obstacles": []}
+    scenario = granted("guarded:pull", load_scenario("tracking", num_vehicles=1, overrides=overrides))
+    swarm, policy = Swarm(scenario), make("guarded:pull", scenario)
+    percept = swarm.reset(1)
+    for k in range(400):
+        action = policy.act(percept)
+        if k == 0:
+            turn = swarm.state.eta[0, 0, 2] - np.arctan2(*policy.memory.pose[0, 0, [3, 2]])
+            origin = swarm.state.eta[0, 0, :2] - rotated(policy.memory.pose[0, 0, :2], turn)
+        place = origin + rotated(policy.memory.pose[0, 0, :2], turn)
+        assert np.hypot(*(place - swarm.state.eta[0, 0, :2])) < 0.05
+        percept = swarm.step(action)
+
+
+def test_a_fix_that_is_cut_is_none():
+    scenario = granted("guarded:pull", load_scenario("tracking", num_vehicles=1))
+    swarm, policy = Swarm(scenario), make("guarded:pull", scenario)
+    swarm.reset(0)
+    swarm.state.eta[0, 0, :2] = (-9000.0, 5000.0)
+    percept = swarm.observe()
+    policy.act(percept)
+    before, then = policy.memory.pose[0, 0, :2].copy(), swarm.state.eta[0, 0, :2].copy()
+    for _ in range(200):
+        percept = swarm.step(policy.act(percept))
+    policy.act(percept)
+    went = np.hypot(*(swarm.state.eta[0, 0, :2] - then))
+    assert np.hypot(*(policy.memory.pose[0, 0, :2] - before)) == pytest.approx(went, rel=1e-3)
+
+
+def test_a_neighbour_in_two_overlapping_sub_sectors_is_one():
+    arrays = [
+        {
+            "name": "bow",
+            "kind": "active",
+            "mounting_deg": 0.0,
+            "aperture_deg": 120.0,
+            "range_m": 100.0,
+            "sub_sectors": 7,
+        },
+        {
+            "name": "all",
+            "kind": "passive",
+            "mounting_deg": 0.0,
+            "aperture_deg": 360.0,
+            "range_m": 500.0,
+            "sub_sectors": 9,
+        },
+    ]
+    scenario = load_scenario("tracking", num_vehicles=2, overrides={"sonar.arrays": arrays})
+    scenario = granted("scout", scenario)
+    swarm, policy = Swarm(scenario), make("scout", scenario)
+    swarm.reset(0)
+    swarm.state.eta[0] = [(0.0, 0.0, 0.0), (20.0, 3.0, 0.0)]
+    percept = swarm.observe()
+    for _ in range(5):
+        percept = swarm.step(policy.act(percept))
+    assert (policy.memory.known[0] > 0).sum(axis=1).tolist() == [1, 1]
+
+
+def test_one_world_is_forgotten_and_another_does_not_count():
+    scenario = granted("scout", load_scenario("starter"))
+    swarm, policy = Swarm(scenario, 3), make("scout", scenario, 3)
+    percept = swarm.reset([1, 2, 3])
+    for _ in range(30):
+        percept = swarm.step(policy.act(percept))
+    idle = [array[2].copy() for array in policy.memory]
+    policy.active[:] = [True, True, False]
+    percept = swarm.reset([5], worlds=[0])
+    alone = make("scout", scenario)
+    own = Swarm(scenario)
+    seen = own.reset(5)
+    for _ in range(20):
+        first = alone.act(seen)
+        action = policy.act(percept)
+        np.testing.assert_array_equal(action[0], first[0])
+        seen, percept = own.step(first), swarm.step(action)
+    for array, then in zip(policy.memory, idle, strict=True):
+        np.testing.assert_array_equal(array[2], then)

@@ -1,6 +1,5 @@
 """What policies share that remember their surroundings and keep to the safety filter."""
 
-from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,16 +32,21 @@ class Filtered(Policy):
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
         super().__init__(scenario, num_worlds)
         self.barrier = barrier
-        self.changed: Int64 = np.zeros(num_worlds, np.int64)
-        """Velocities that the filter changed since the reset, shape (world,)."""
-        self.infeasible: Int64 = np.zeros(num_worlds, np.int64)
-        """Those of them for which no velocity was safe, so that the least unsafe was taken, shape (world,)."""
         self._model, self._gain = Model.of(scenario), velocity_gain(scenario)
         self._planes: Float64 = np.zeros((self.memory.disc.shape[2] + scenario.sonar.num_sectors, 3))
 
-    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:  # noqa: ARG002 - nothing is drawn
-        """Count anew in these worlds."""
-        self.changed[list(worlds)] = self.infeasible[list(worlds)] = 0
+    @property
+    def changed(self) -> Int64:
+        """Velocities that the filter changed since the reset, shape (world,)."""
+        return self._times(0)
+
+    @property
+    def infeasible(self) -> Int64:
+        """Those of them for which none was safe, so that the least unsafe was taken, shape (world,)."""
+        return self._times(1)
+
+    def _times(self, what: int) -> Int64:
+        return (self.memory.counted + self.memory.filtered)[..., what].sum(axis=1).astype(np.int64)
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Take what is perceived into what is remembered."""
@@ -51,6 +55,3 @@ class Filtered(Policy):
     def acted(self, action: Float32, worlds: Bool) -> None:
         """Keep the action: the vehicle's next place is reckoned from it."""
         self.memory.action[worlds] = action[worlds]
-
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        return super()._arrays() | {"changed": self.changed, "infeasible": self.infeasible}

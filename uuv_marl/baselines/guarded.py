@@ -5,19 +5,18 @@ remembers, the safe velocity is taken instead that is nearest to what the action
 resistance equals its force. Where nothing is near, actions stay as they are, bit for bit.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.filtered import Filtered
-from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
-from uuv_marl.baselines.memory.pose import Reckoning, reckoned, to_body_axes, to_map_axes
+from uuv_marl.baselines.memory.pose import Reckoning, reckoned, to_map_axes
 from uuv_marl.baselines.policy import Limits, Policy
-from uuv_marl.baselines.safety import GUARD, Barrier, keeps, planes_of
-from uuv_marl.baselines.steering import full_speed, steer, wished_velocity
+from uuv_marl.baselines.safety import GUARD, Barrier, keeps, planes_of, steer_safely
+from uuv_marl.baselines.steering import wished_velocity
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -25,7 +24,6 @@ from uuv_marl.sim.trigonometry import cos_sin
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 
@@ -46,8 +44,7 @@ class Guarded(Filtered):
         super().__init__(scenario, num_worlds, barrier)
 
     def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:
-        """Count anew in these worlds, and reset the policy inside."""
-        super().forget(worlds, seeds)
+        """Reset the policy inside, too."""
         self.inner.reset(list(seeds), worlds)
 
     def decide(self, percept: Percept) -> Float32:
@@ -56,7 +53,7 @@ class Guarded(Filtered):
         action = self.inner.act(percept)
         _guard(
             self.active, self._model.own, self.barrier, self.limits, self._gain, self.memory, self._planes,
-            self.changed, self.infeasible, action,
+            action,
         )  # fmt: skip
         self.clamps[...] = self.inner.clamps
         return action
@@ -66,15 +63,9 @@ class Guarded(Filtered):
         super().acted(action, worlds)
         self.inner.acted(action, worlds)
 
-    def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All that later decisions depend on, of the policy inside too."""
-        return super().snapshot() | {f"inner.{name}": array for name, array in self.inner.snapshot().items()}
-
-    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot. Raises PolicyError where it is another policy's."""
-        super().restore(snapshot)
-        inner = {name: array for name, array in snapshot.items() if name.startswith("inner.")}
-        self.inner.restore({name.removeprefix("inner."): array for name, array in inner.items()})
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """Those of the policy inside too."""
+        return super()._arrays() | {f"inner.{name}": array for name, array in self.inner._arrays().items()}
 
 
 @compiled
@@ -96,7 +87,7 @@ def coming_velocity(w: int, i: int, action: Float32, own: Reckoning, kept: Surro
 @compiled
 def _guard(
     worlds: Bool, own: Reckoning, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, planes: Float64,
-    changed: Int64, infeasible: Int64, action: Float32,
+    action: Float32,
 ) -> None:  # fmt: skip
     """Replace actions that are not safe.
 
@@ -106,23 +97,18 @@ def _guard(
         barrier: margins and rates of the filter.
         limits: of the actuators, and the surge resistance.
         gain: force per velocity error [N s/m].
-        kept: what vehicles remember.
+        kept: what vehicles remember; whether the filter acts is written.
         planes: room for half-planes, shape (disc + sector, 3).
-        changed: counted per world, shape (world,); added to.
-        infeasible: counted per world, shape (world,); added to.
         action: shares of full force, shape (world, vehicle, 2); changed.
     """
-    limit = full_speed(limits)
     for w in range(action.shape[0]):
-        for i in range(action.shape[1] if worlds[w] else 0):
+        for i in range(action.shape[1]):
+            if not worlds[w] or kept.begun[w, i] == 0.0:
+                continue
             num = planes_of(w, i, own.period_s, barrier, kept, planes)
             v_x, v_y = coming_velocity(w, i, action[w, i], own, kept)
-            if keeps(v_x, v_y, planes, num):
-                continue
-            a_x, a_y = wished_velocity(action[w, i, 0], action[w, i, 1], limits)
-            w_x, w_y = to_map_axes(a_x, a_y, kept.pose[w, i])
-            w_x, w_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, limit)
-            changed[w] += 1
-            infeasible[w] += broken > 0.0
-            w_x, w_y = to_body_axes(w_x, w_y, kept.pose[w, i])
-            steer(w_x, w_y, kept.motion[w, i, 0], kept.motion[w, i, 1], gain, limits, action[w, i])
+            if not keeps(v_x, v_y, planes, num):
+                a_x, a_y = wished_velocity(action[w, i, 0], action[w, i, 1], limits)
+                w_x, w_y = to_map_axes(a_x, a_y, kept.pose[w, i])
+                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)
+                kept.filtered[w, i, 0] = 1.0

@@ -21,6 +21,7 @@ from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.pull import Pull
+from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
@@ -110,6 +111,8 @@ def parse(name: str) -> Named:
         PolicyError: nobody has that name; the message names the nearest.
     """
     name = name.removeprefix(GUARDED)
+    if name.startswith(GUARDED):
+        raise PolicyError(f"policy {GUARDED + name!r}: once is enough; write {name!r}")
     plain, *pairs = [name] if Path(name).exists() else name.split(",")
     wrong = next((pair for pair in pairs if not all(pair.partition("="))), None)
     if wrong is not None:
@@ -210,8 +213,13 @@ def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters
     """
     if name.startswith(GUARDED):
         filters = {key: parameters.pop(key) for key in ("barrier",) if key in parameters}
+        if not all(isinstance(value, Barrier) for value in filters.values()):
+            raise PolicyError(
+                f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {filters['barrier']!r}; "
+                "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
+            )
         inner = _made(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
-        return Guarded(scenario, num_worlds, inner=inner, **filters)  # pyright: ignore[reportArgumentType] - the caller's
+        return Guarded(scenario, num_worlds, inner=inner, **filters)  # pyright: ignore[reportArgumentType] - checked
     constructor: Any = kind
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     if isinstance(parameters.get("gains"), str):

@@ -13,12 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import noise_of
-from uuv_marl.baselines.memory.pose import to_map_axes
+from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
+from uuv_marl.baselines.policy import Limits
+from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.sim.compiled import compiled
 
+Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 
 
@@ -131,3 +135,31 @@ def keeps(v_x: float, v_y: float, planes: Float64, num: int) -> bool:
         if planes[k, 0] * v_x + planes[k, 1] * v_y > planes[k, 2]:
             return False
     return True
+
+
+@compiled
+def steer_safely(
+    w: int, i: int, w_x: float, w_y: float, num: int, planes: Float64, gain: float, limits: Limits,
+    kept: Surroundings, action: Float32,
+) -> None:  # fmt: skip
+    """The action that takes a vehicle to the velocity that keeps to half-planes and is nearest to a wished one.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        w_x: wished velocity in the map [m/s].
+        w_y: the same, second axis [m/s].
+        num: how many half-planes there are.
+        planes: n_x, n_y and b [m/s], shape (at least num, 3).
+        gain: force per velocity error [N s/m].
+        limits: of the actuators, and the surge resistance.
+        kept: what is remembered; whether the filter acts is written.
+        action: shares of full force, shape (world, vehicle, 2); the vehicle's are written.
+    """
+    safe_x, safe_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, full_speed(limits))
+    if broken > 0.0 or not keeps(w_x, w_y, planes, num):
+        kept.filtered[w, i, 0] = 1.0
+    if broken > 0.0:
+        kept.filtered[w, i, 1] = 1.0
+    w_x, w_y = to_body_axes(safe_x, safe_y, kept.pose[w, i])
+    steer(w_x, w_y, kept.motion[w, i, 0], kept.motion[w, i, 1], gain, limits, action[w, i])

@@ -11,13 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.filtered import Filtered
-from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.pose import to_body_axes
 from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.safety import Barrier, keeps, margin, planes_of
-from uuv_marl.baselines.steering import full_speed, steer
+from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
@@ -25,7 +22,6 @@ from uuv_marl.sim.compiled import compiled
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 
@@ -45,7 +41,14 @@ class Gains(NamedTuple):
 
 
 class Scout(Filtered):
-    """Feed-forward and pull, pushes among near neighbours, a flow round remembered obstacles, and the safety filter."""
+    """Feed-forward and pull, pushes among near neighbours, a flow round remembered obstacles, and the safety filter.
+
+    Args:
+        scenario: gives the vehicle, the decision period and the percept's layout.
+        num_worlds: first axis of the percepts.
+        gains: of the wished velocity.
+        barrier: margins and rates of the filter.
+    """
 
     yaw_damping_nms: ClassVar[float] = 600.0
 
@@ -62,7 +65,7 @@ class Scout(Filtered):
         gains = self.gains._replace(pull=self.gains.pull / self._growth)
         _decide(
             self.active, self._model.own.period_s, gains, self.barrier, self.limits, self._gain, self.memory,
-            self._planes, self.changed, self.infeasible, action,
+            self._planes, action,
         )  # fmt: skip
         return action
 
@@ -79,7 +82,7 @@ def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
     """
     pose, reference, speed = kept.pose[w, i], kept.reference[w, i], kept.reference_speed[w, i]
     pull, push = g.pull, g.push
-    if speed == 0.0:
+    if reference[2] == 0.0 and reference[3] == 0.0:
         pull, push = pull * g.pull_at_rest, push * g.push_at_rest
     w_x = speed * reference[2] + pull * (reference[0] - pose[0])
     w_y = speed * reference[3] + pull * (reference[1] - pose[1])
@@ -126,7 +129,7 @@ def flowing(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Surr
 @compiled
 def _decide(
     worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
-    planes: Float64, changed: Int64, infeasible: Int64, action: Float32,
+    planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle.
 
@@ -139,18 +142,12 @@ def _decide(
         gain: force per velocity error [N s/m].
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
-        changed: wishes that the filter changed, counted per world, shape (world,); added to.
-        infeasible: those for which nothing was safe, counted per world, shape (world,); added to.
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
-    limit = full_speed(limits)
     for w in range(action.shape[0]):
-        for i in range(action.shape[1] if worlds[w] else 0):
-            w_x, w_y = wished(w, i, g, kept)
-            w_x, w_y = flowing(w_x, w_y, w, i, barrier, kept)
-            num = planes_of(w, i, period, barrier, kept, planes)
-            changed[w] += not keeps(w_x, w_y, planes, num)
-            w_x, w_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, limit)
-            infeasible[w] += broken > 0.0
-            w_x, w_y = to_body_axes(w_x, w_y, kept.pose[w, i])
-            steer(w_x, w_y, kept.motion[w, i, 0], kept.motion[w, i, 1], gain, limits, action[w, i])
+        for i in range(action.shape[1]):
+            if worlds[w] and kept.begun[w, i] > 0.0:
+                w_x, w_y = wished(w, i, g, kept)
+                w_x, w_y = flowing(w_x, w_y, w, i, barrier, kept)
+                num = planes_of(w, i, period, barrier, kept, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)

@@ -24,12 +24,6 @@ def velocity_gain(scenario: Scenario) -> float:
 
 
 @compiled
-def drag(speed: float, limits: Limits) -> float:
-    """Surge resistance [N] at a speed [m/s] of at least 0."""
-    return (limits.X_u + limits.X_uu * speed) * speed
-
-
-@compiled
 def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limits, out: Float32) -> None:
     """The action that takes a vehicle towards a wished velocity: resistance made up for, error made good. Eq. 22.
 

@@ -35,8 +35,10 @@ LIFETIME = 40.0
 """One that was heard for t seconds in all, less than that, is forgotten after this times t^2 [1/s]. Assumed."""
 SMALLEST_M, LARGEST_M = 0.5, 60.0
 """Bounds of a radius [m]."""
-_FORGETS = 1.02
-"""Growth of the covariance per decision at which a disc is heard: about the last 50 count."""
+_FORGETS = 0.2
+"""Growth of the covariance of a disc that is heard [1/s]: about the last 5 s count ..."""
+_MOST_VARIANCE = 2.0 * RADIUS_SD_M * RADIUS_SD_M + SIDE_SD_M * SIDE_SD_M
+"""... unless it is as large as that of a new one already [m2]."""
 
 
 class Fans(NamedTuple):
@@ -47,19 +49,21 @@ class Fans(NamedTuple):
     upper: Float64
     """Upper edge of each, shape (active, 2)."""
     range_m: Float64
-    """Shape (active,)."""
+    """How far each hears, shape (active,) [m]."""
     centres: bool
     """Echoes report centres; else points of surfaces."""
     period_s: float
     """Between two decisions [s]."""
+    most_score: float
+    """Decisions that stand for ``MOST_SCORE_S``, at least twice ``CONFIRMED``."""
 
     @staticmethod
     def of(scenario: Scenario) -> "Fans":
         """Those of a scenario's sonar."""
-        all_of = suite(scenario)
+        all_of, period = suite(scenario), scenario.timing.decision_period_s
         return Fans(
             all_of.lower[all_of.active], all_of.upper[all_of.active], all_of.active_range,
-            not all_of.reports_surface, scenario.timing.decision_period_s,
+            not all_of.reports_surface, period, max(MOST_SCORE_S / period, 2.0 * CONFIRMED),
         )  # fmt: skip
 
 
@@ -199,9 +203,10 @@ def _hear(w: int, i: int, d: int, a: int, see: Fields, fans: Fans, kept: Surroun
     disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
     if kept.silence[w, i, d] > 0.0:  # the first of this decision
         kept.silence[w, i, d] = 0.0
-        kept.score[w, i, d] = min(kept.score[w, i, d] + 1.0, MOST_SCORE_S / fans.period_s)
-        for k in range(6):
-            p[k] *= _FORGETS
+        kept.score[w, i, d] = min(kept.score[w, i, d] + 1.0, fans.most_score)
+        if p[0] + p[3] + p[5] < _MOST_VARIANCE:
+            for k in range(6):
+                p[k] *= 1.0 + _FORGETS * fans.period_s
     x, y = surface_point(w, i, a, see, fans)
     x, y = to_map(x, y, kept.pose[w, i])
     sd = NOISE_M + NOISE_SHARE * see.echo_range[w, i, a]
@@ -260,8 +265,8 @@ def _judge(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
         score, silence = kept.score[w, i, d], kept.silence[w, i, d]
         if score <= 0.0 or silence == 0.0:
             continue
-        evidence = score * fans.period_s
-        if evidence < MOST_SCORE_S - fans.period_s and silence > LIFETIME * evidence * evidence:
+        evidence = MOST_SCORE_S * score / fans.most_score
+        if score < fans.most_score - 1.0 and silence > LIFETIME * evidence * evidence:
             kept.score[w, i, d] = 0.0
             continue
         x, y = to_body(kept.disc[w, i, d, 0], kept.disc[w, i, d, 1], kept.pose[w, i])

@@ -71,7 +71,7 @@ def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> No
             k = _match(x, y, reach, w, i, kept)
             if k >= 0:
                 _follow(w, i, k, x, y, reach, kept)
-            else:
+            elif not _is_heard(x, y, w, i, kept):
                 _meet(w, i, x, y, see, kept)
     for k in range(known.shape[0]):
         if known[k] < 0.0:
@@ -98,6 +98,16 @@ def _match(x: float, y: float, reach: float, w: int, i: int, kept: Surroundings)
         if known[k] < 0.0 and squared < least:
             best, least = k, squared
     return best
+
+
+@compiled
+def _is_heard(x: float, y: float, w: int, i: int, kept: Surroundings) -> bool:
+    """Whether another sub-sector, which overlaps, has heard the same at this decision. Arguments as for ``_match``."""
+    for k in range(kept.known.shape[2]):
+        dx, dy = x - kept.reading[w, i, k, 0], y - kept.reading[w, i, k, 1]
+        if kept.known[w, i, k] > 0.0 and dx * dx + dy * dy < _SAME_M * _SAME_M:
+            return True
+    return False
 
 
 @compiled

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory.table import Surroundings
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, plant, project, turned
@@ -20,9 +20,11 @@ from uuv_marl.sim.views import Fields
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 
-_MOVES_MPS = 0.05
-"""l(t) moves if it is faster."""
-_TURN_TOLERANCE = 0.01
+_MOVES_MPS = 0.005
+"""l(t) moves if it is faster; scenarios know no speed below 0.01 m/s."""
+FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)
+"""A vector to l(t) that is longer is cut, and no fix [m]."""
+_TURN_TOLERANCE = 0.001
 """By which compass and dead reckoning may differ on a leg, beside what the yaw rate's error makes of it [rad]."""
 
 
@@ -94,13 +96,13 @@ def to_body(x: float, y: float, pose: Float64) -> tuple[float, float]:
 
 @compiled
 def begin(w: int, i: int, see: Fields, kept: Surroundings) -> None:
-    """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or the bow.
+    """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow.
 
     Args:
         w: index of the world.
         i: index of the vehicle.
         see: the fields of percepts, of all worlds.
-        kept: what is remembered; the pose is written.
+        kept: what is remembered; pose, reference and begun are written.
     """
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed = math.hypot(v_x, v_y)
@@ -132,9 +134,10 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
     x, y, psi, u, v, r = reckoned(motion, kept.action[w, i], own)
     wrong = see.yaw_rate[w, i, 0] - r
     turn_c, turn_s = cos_sin(psi + half * wrong)
-    c, s = turn_c * pose[2] - turn_s * pose[3], turn_s * pose[2] + turn_c * pose[3]
+    c, s = to_map_axes(turn_c, turn_s, pose)
     moves, moved = speed > _MOVES_MPS, math.hypot(at[2], at[3]) > 0.0
-    steady = moves == moved
+    r_x, r_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
+    steady = moves == moved and math.hypot(r_x, r_y) < FARTHEST_FIX_M
     if moves:
         b_x, b_y = v_x / speed, v_y / speed
         leg_c, leg_s = b_x * at[2] + b_y * at[3], b_x * at[3] - b_y * at[2]
@@ -146,12 +149,11 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
             at[2], at[3] = c * b_x - s * b_y, s * b_x + c * b_y
     else:
         at[2] = at[3] = 0.0
-    r_x, r_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     if steady:
         at[0], at[1] = at[0] + own.period_s * speed * at[2], at[1] + own.period_s * speed * at[3]
         pose[0], pose[1] = at[0] - (c * r_x - s * r_y), at[1] - (s * r_x + c * r_y)
     else:
-        x, y = pose[2] * x - pose[3] * y, pose[3] * x + pose[2] * y
+        x, y = to_map_axes(x, y, pose)
         u, v = see.velocity[w, i, 0] - u, see.velocity[w, i, 1] - v
         pose[0] += x + half * (c * u - s * v)
         pose[1] += y + half * (s * u + c * v)
@@ -162,13 +164,13 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
 
 @compiled
 def keep_motion(w: int, i: int, see: Fields, kept: Surroundings) -> None:
-    """Own velocity, for the next percept.
+    """Own velocity and l(t)'s speed, for the next percept.
 
     Args:
         w: index of the world.
         i: index of the vehicle.
         see: the fields of percepts, of all worlds.
-        kept: what is remembered; the motion is written.
+        kept: what is remembered; motion and reference_speed are written.
     """
     kept.motion[w, i, 0], kept.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
     kept.motion[w, i, 2] = see.yaw_rate[w, i, 0]

@@ -32,6 +32,15 @@ class Model(NamedTuple):
 
 
 @compiled
+def is_lost(row: Float32) -> bool:
+    """Whether a percept, shape (entry,), is that of a lost vehicle: all zero."""
+    for k in range(row.shape[0]):  # noqa: SIM110 - compiled
+        if row[k] != 0.0:
+            return False
+    return True
+
+
+@compiled
 def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept: Surroundings) -> None:
     """Take what every vehicle perceives into what it remembers. Once for every decision.
 
@@ -45,6 +54,12 @@ def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept: Surround
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
+            kept.counted[w, i, 0] += kept.filtered[w, i, 0]
+            kept.counted[w, i, 1] += kept.filtered[w, i, 1]
+            kept.filtered[w, i, 0] = kept.filtered[w, i, 1] = 0.0
+            if is_lost(flat[w, i]):
+                kept.begun[w, i] = 0.0
+                continue
             if kept.begun[w, i] == 0.0:
                 pose.begin(w, i, see, kept)
             else:

@@ -23,7 +23,13 @@ class Surroundings(NamedTuple):
     action: Annotated[Float64, "world vehicle 2", "Own latest action: shares of full thrust and torque."]
     reference: Annotated[Float64, "world vehicle 4", "Place of l(t) [m], unit vector of its leg, 0 where it rests."]
     reference_speed: Annotated[Float64, "world vehicle", "Speed of l(t) [m/s]."]
-    begun: Annotated[Float64, "world vehicle", "1 once anything is remembered."]
+    filtered: Annotated[
+        Float64,
+        "world vehicle 2",
+        "1 where the safety filter changed the latest velocity; where it found none that is safe.",
+    ]
+    counted: Annotated[Float64, "world vehicle 2", "How often that was so at the decisions before."]
+    begun: Annotated[Float64, "world vehicle", "1 once anything is remembered, and until the vehicle is lost."]
     disc: Annotated[Float64, "world vehicle 12 3", "Obstacles: centre in the map and radius [m]."]
     spread: Annotated[Float64, "world vehicle 12 6", "Their covariance [m2]: xx, xy, xR, yy, yR, RR."]
     score: Annotated[
