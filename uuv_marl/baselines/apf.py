@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import obstacle_at
-from uuv_marl.baselines.bio_inspired import counts_once
+from uuv_marl.baselines.bio_inspired import MIN_DISTANCE_M, counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -23,9 +23,6 @@ from uuv_marl.sim.views import Fields, Starts, fields
 
 Float32 = NDArray[np.float32]
 Int64 = NDArray[np.int64]
-
-MIN_DISTANCE_M = 0.5
-"""Distances are bounded here, where the repulsion would grow beyond all bounds; as ``bio_inspired``."""
 
 
 class Gains(NamedTuple):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.policy import Limits
+from uuv_marl.baselines.policy import Limits, resistance
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields
 
@@ -79,4 +79,4 @@ def pass_obstacle(
 @compiled
 def own_drag(u: float, limits: Limits) -> float:
     """Surge resistance at a vehicle's own surge velocity [m/s], in N."""
-    return (limits.X_u + limits.X_uu * abs(u)) * u
+    return resistance(abs(u), limits) * u

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -159,7 +159,7 @@ def _act(
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
             v_x, v_y = see.reference_velocity[w, i, 0], see.reference_velocity[w, i, 1]
-            drag = g.feed_forward * (limits.X_u + limits.X_uu * math.hypot(v_x, v_y))
+            drag = g.feed_forward * resistance(math.hypot(v_x, v_y), limits)
             f_x = g.zeta_l * see.reference[w, i, 0] + drag * v_x
             f_y = g.zeta_l * see.reference[w, i, 1] + drag * v_y
             for k in range(see.heard.shape[2]):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
-from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -163,7 +163,7 @@ def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, act
             l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
             pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
             r_x, r_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
-            drag = limits.X_u + limits.X_uu * math.hypot(r_x, r_y)
+            drag = resistance(math.hypot(r_x, r_y), limits)
             f_x, f_y = pull * l_x + drag * r_x, pull * l_y + drag * r_y
             f_x, f_y = f_x + g.reference_velocity * (r_x - u), f_y + g.reference_velocity * (r_y - v)
             d_x, d_y = _alpha(w, i, see, g)

@@ -15,7 +15,7 @@ from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.policy import Limits, Policy, tuned
-from uuv_marl.baselines.steering import steer, velocity_gain, wished_velocity
+from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -52,7 +52,7 @@ class OrcaInformed(Policy):
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
         super().__init__(scenario, num_worlds)
         self.gains = gains or Gains(**tuned("orca_informed"))
-        self._speed = wished_velocity(1.0, 0.0, self.limits)[0]
+        self._speed = full_speed(self.limits)
         self._follow = velocity_gain(scenario)
         self._centres = scenario.sonar.echo_reports == "centre"
         self._planes: Float64 = np.zeros((scenario.sonar.num_sectors + scenario.sonar.num_active_sectors, 3))

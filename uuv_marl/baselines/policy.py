@@ -215,6 +215,12 @@ class Policy:
 
 
 @compiled
+def resistance(speed: float, limits: Limits) -> float:
+    """Surge resistance per velocity [N s/m] at a speed [m/s] of at least 0. Eq. 4."""
+    return limits.X_u + limits.X_uu * speed
+
+
+@compiled
 def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
     """The action for a desired body-frame force [N]: thrust along x, torque by the lever arm along y. Eq. 22.
 

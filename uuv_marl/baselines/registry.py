@@ -21,7 +21,7 @@ from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.pull import Pull
-from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.safety import GUARD, Barrier
 from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
@@ -212,14 +212,14 @@ def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters
         parameters: by name; texts stand for what they say.
     """
     if name.startswith(GUARDED):
-        filters = {key: parameters.pop(key) for key in ("barrier",) if key in parameters}
-        if not all(isinstance(value, Barrier) for value in filters.values()):
+        barrier = parameters.pop("barrier", GUARD)
+        if not isinstance(barrier, Barrier):
             raise PolicyError(
-                f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {filters['barrier']!r}; "
+                f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
                 "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
             )
         inner = _made(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
-        return Guarded(scenario, num_worlds, inner=inner, **filters)  # pyright: ignore[reportArgumentType] - checked
+        return Guarded(scenario, num_worlds, inner=inner, barrier=barrier)
     constructor: Any = kind
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     if isinstance(parameters.get("gains"), str):

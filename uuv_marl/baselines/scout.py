@@ -96,7 +96,7 @@ def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
 
 
 @compiled
-def flowing(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Surroundings) -> tuple[float, float]:
+def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Surroundings) -> tuple[float, float]:
     """A wished velocity [m/s] bent round the obstacles ahead, as an ideal fluid flows round cylinders.
 
     The modulation of Khansari-Zadeh and Billard, A dynamical system approach to realtime obstacle avoidance, Autonomous
@@ -148,6 +148,6 @@ def _decide(
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
                 w_x, w_y = wished(w, i, g, kept)
-                w_x, w_y = flowing(w_x, w_y, w, i, barrier, kept)
+                w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, barrier, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)

@@ -24,7 +24,7 @@ NOISE_M, NOISE_SHARE = 0.05, 0.03
 RADIUS_M, RADIUS_SD_M = 18.0, 10.0
 """Radius expected of an obstacle of which one point is known, and its deviation [m]. Assumed: those of random_field."""
 SIDE_SD_M = 8.0
-"""Deviation across of the centre of an obstacle whose nearest point may lie outside the sonar's fan [m]. Assumed."""
+"""Deviation across of the centre of an obstacle whose nearest point may lie outside the sonar's arc [m]. Assumed."""
 GATE = 3.0
 """Deviations by which an echo may miss a disc that it belongs to [1]."""
 CONFIRMED = 3.0
@@ -41,7 +41,7 @@ _MOST_VARIANCE = 2.0 * RADIUS_SD_M * RADIUS_SD_M + SIDE_SD_M * SIDE_SD_M
 """... unless it is as large as that of a new one already [m2]."""
 
 
-class Fans(NamedTuple):
+class ActiveSectors(NamedTuple):
     """The active sub-sectors, and what they report."""
 
     lower: Float64
@@ -58,59 +58,72 @@ class Fans(NamedTuple):
     """Decisions that stand for ``MOST_SCORE_S``, at least twice ``CONFIRMED``."""
 
     @staticmethod
-    def of(scenario: Scenario) -> "Fans":
+    def of(scenario: Scenario) -> "ActiveSectors":
         """Those of a scenario's sonar."""
         all_of, period = suite(scenario), scenario.timing.decision_period_s
-        return Fans(
+        return ActiveSectors(
             all_of.lower[all_of.active], all_of.upper[all_of.active], all_of.active_range,
             not all_of.reports_surface, period, max(MOST_SCORE_S / period, 2.0 * CONFIRMED),
         )  # fmt: skip
 
 
 @compiled
-def listen(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+def deviation(reach: float) -> float:
+    """Standard deviation of an echo [m] at a range [m]."""
+    return NOISE_M + NOISE_SHARE * reach
+
+
+@compiled
+def holds(a: int, x: float, y: float, sectors: ActiveSectors) -> bool:
+    """Whether a direction, ahead and to starboard, lies in an active sub-sector."""
+    lower, upper = sectors.lower, sectors.upper
+    return cross(lower[a, 0], lower[a, 1], x, y) > 0.0 and cross(upper[a, 0], upper[a, 1], x, y) <= 0.0
+
+
+@compiled
+def listen(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
     """Take a vehicle's echoes into its discs, and forget those that should have been heard and were not.
 
     Args:
         w: index of the world.
         i: index of the vehicle.
         see: the fields of percepts, of all worlds.
-        fans: the active sub-sectors.
+        sectors: the active sub-sectors.
         kept: what is remembered; the discs are brought up to date.
     """
-    silence = kept.silence[w, i]
-    for d in range(silence.shape[0]):
-        silence[d] += fans.period_s
+    unheard = kept.unheard[w, i]
+    for d in range(unheard.shape[0]):
+        unheard[d] += sectors.period_s
     for a in range(see.echo.shape[2]):
         if see.echo[w, i, a] > 0.0:
-            d = owner(w, i, a, see, fans, kept)
+            d = owner(w, i, a, see, sectors, kept)
             if d >= 0:
-                _hear(w, i, d, a, see, fans, kept)
+                _hear(w, i, d, a, see, sectors, kept)
     for _ in range(see.echo.shape[2]):  # what is left belongs to obstacles that are new
-        a = _nearest_of_nobody(w, i, see, fans, kept)
+        a = _nearest_of_nobody(w, i, see, sectors, kept)
         if a < 0:
             break
-        d = _place(w, i, kept)
-        _begin(w, i, d, a, see, fans, kept)
+        d = _free_row(w, i, kept)
+        _begin(w, i, d, a, see, sectors, kept)
         for b in range(see.echo.shape[2]):
-            if b != a and see.echo[w, i, b] > 0.0 and owner(w, i, b, see, fans, kept) == d:
-                _hear(w, i, d, b, see, fans, kept)
-    _judge(w, i, see, fans, kept)
+            if b != a and see.echo[w, i, b] > 0.0 and owner(w, i, b, see, sectors, kept) == d:
+                _hear(w, i, d, b, see, sectors, kept)
+    _lower_scores(w, i, see, sectors, kept)
     _merge(w, i, kept)
 
 
 @compiled
-def _nearest_of_nobody(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> int:
+def _nearest_of_nobody(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
     """The active sub-sector of the nearest echo that belongs to no disc, -1 for none. Arguments as for ``listen``."""
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):
-        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and owner(w, i, a, see, fans, kept) < 0:
+        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and owner(w, i, a, see, sectors, kept) < 0:
             nearest, reach = a, see.echo_range[w, i, a]
     return nearest
 
 
 @compiled
-def surface_point(w: int, i: int, a: int, see: Fields, fans: Fans) -> tuple[float, float]:
+def surface_point(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors) -> tuple[float, float]:
     """The point of a surface that an echo comes from, in the body frame [m].
 
     Where echoes report centres it lies in the centre's direction, or on the edge of the sub-sector next to that.
@@ -120,17 +133,17 @@ def surface_point(w: int, i: int, a: int, see: Fields, fans: Fans) -> tuple[floa
         i: index of the vehicle.
         a: index of the active sub-sector; it holds an echo.
         see: the fields of percepts, of all worlds.
-        fans: the active sub-sectors.
+        sectors: the active sub-sectors.
     """
     x, y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
-    if not fans.centres:
+    if not sectors.centres:
         return x, y
     away, reach = math.hypot(x, y), float(see.echo_range[w, i, a])
     if away < 1e-6:
         return 0.0, 0.0
     e_x, e_y = x / away, y / away
-    l_x, l_y, u_x, u_y = fans.lower[a, 0], fans.lower[a, 1], fans.upper[a, 0], fans.upper[a, 1]
-    if not (cross(l_x, l_y, e_x, e_y) > 0.0 and cross(u_x, u_y, e_x, e_y) <= 0.0):
+    if not holds(a, e_x, e_y, sectors):
+        l_x, l_y, u_x, u_y = sectors.lower[a, 0], sectors.lower[a, 1], sectors.upper[a, 0], sectors.upper[a, 1]
         e_x, e_y = (l_x, l_y) if l_x * e_x + l_y * e_y > u_x * e_x + u_y * e_y else (u_x, u_y)
     return reach * e_x, reach * e_y
 
@@ -142,7 +155,7 @@ def centre_of(w: int, i: int, a: int, see: Fields, kept: Surroundings) -> tuple[
 
 
 @compiled
-def owner(w: int, i: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -> int:
+def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
     """The disc that an echo belongs to, -1 for none: the one whose surface it misses least.
 
     Args:
@@ -150,12 +163,12 @@ def owner(w: int, i: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -
         i: index of the vehicle.
         a: index of the active sub-sector; it holds an echo.
         see: the fields of percepts, of all worlds.
-        fans: the active sub-sectors.
+        sectors: the active sub-sectors.
         kept: what is remembered.
     """
-    x, y = surface_point(w, i, a, see, fans)
+    x, y = surface_point(w, i, a, see, sectors)
     x, y = to_map(x, y, kept.pose[w, i])
-    sd = NOISE_M + NOISE_SHARE * see.echo_range[w, i, a]
+    sd = deviation(float(see.echo_range[w, i, a]))
     best, least = -1, math.inf
     for d in range(kept.score.shape[2]):
         if kept.score[w, i, d] > 0.0:
@@ -167,7 +180,7 @@ def owner(w: int, i: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -
                 h_x * (h_x * p[0] + 2.0 * h_y * p[1] - 2.0 * p[2]) + h_y * (h_y * p[3] - 2.0 * p[4]) + p[5] + sd * sd
             )
             miss = abs(away - disc[2])
-            if fans.centres:
+            if sectors.centres:
                 c_x, c_y = centre_of(w, i, a, see, kept)
                 miss, variance = math.hypot(c_x - disc[0], c_y - disc[1]), p[0] + p[3] + 2.0 * sd * sd
             if miss <= GATE * math.sqrt(variance) + 0.5 and miss < least:
@@ -198,37 +211,54 @@ def correct(disc: Float64, p: Float64, h: tuple[float, float, float], wrong: flo
 
 
 @compiled
-def _hear(w: int, i: int, d: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+def _correct_centre(w: int, i: int, d: int, a: int, sd: float, see: Fields, kept: Surroundings) -> None:
+    """Correct a disc by the centre that an echo reports.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        d: index of the disc.
+        a: index of the active sub-sector; it holds an echo.
+        sd: standard deviation of the centre [m].
+        see: the fields of percepts, of all worlds.
+        kept: what is remembered; the disc is corrected.
+    """
+    disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
+    x, y = centre_of(w, i, a, see, kept)
+    correct(disc, p, (1.0, 0.0, 0.0), x - disc[0], sd * sd)
+    correct(disc, p, (0.0, 1.0, 0.0), y - disc[1], sd * sd)
+
+
+@compiled
+def _hear(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
     """Correct a disc by one echo. Arguments as for ``owner``; d is the index of the disc."""
     disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
-    if kept.silence[w, i, d] > 0.0:  # the first of this decision
-        kept.silence[w, i, d] = 0.0
-        kept.score[w, i, d] = min(kept.score[w, i, d] + 1.0, fans.most_score)
+    if kept.unheard[w, i, d] > 0.0:  # the first of this decision
+        kept.unheard[w, i, d] = 0.0
+        kept.score[w, i, d] = min(kept.score[w, i, d] + 1.0, sectors.most_score)
         if p[0] + p[3] + p[5] < _MOST_VARIANCE:
             for k in range(6):
-                p[k] *= 1.0 + _FORGETS * fans.period_s
-    x, y = surface_point(w, i, a, see, fans)
+                p[k] *= 1.0 + _FORGETS * sectors.period_s
+    x, y = surface_point(w, i, a, see, sectors)
     x, y = to_map(x, y, kept.pose[w, i])
-    sd = NOISE_M + NOISE_SHARE * see.echo_range[w, i, a]
-    if fans.centres:
-        c_x, c_y = centre_of(w, i, a, see, kept)
-        correct(disc, p, (1.0, 0.0, 0.0), c_x - disc[0], sd * sd)
-        correct(disc, p, (0.0, 1.0, 0.0), c_y - disc[1], sd * sd)
+    sd = deviation(float(see.echo_range[w, i, a]))
+    if sectors.centres:
+        _correct_centre(w, i, d, a, sd, see, kept)
     dx, dy = x - disc[0], y - disc[1]
     away = max(math.hypot(dx, dy), 1e-6)
     correct(disc, p, (dx / away, dy / away, 1.0), away - disc[2], sd * sd)
 
 
 @compiled
-def _begin(w: int, i: int, d: int, a: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+def _begin(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
     """A new disc behind its nearest echo. Arguments as for ``owner``; d is the index of the disc."""
-    x, y = surface_point(w, i, a, see, fans)
+    x, y = surface_point(w, i, a, see, sectors)
     away = max(math.hypot(x, y), 1e-6)
-    sd = NOISE_M + NOISE_SHARE * away
+    sd = deviation(away)
     e_x, e_y = x / away, y / away
-    inside = cross(fans.lower[a, 0], fans.lower[a, 1], e_x, e_y) > 1e-3
-    inside = inside and cross(fans.upper[a, 0], fans.upper[a, 1], e_x, e_y) < -1e-3
-    across = sd if inside or fans.centres else SIDE_SD_M
+    inside = cross(sectors.lower[a, 0], sectors.lower[a, 1], e_x, e_y) > 1e-3
+    inside = inside and cross(sectors.upper[a, 0], sectors.upper[a, 1], e_x, e_y) < -1e-3
+    across = sd if inside or sectors.centres else SIDE_SD_M
     c_x, c_y = to_map(x + RADIUS_M * e_x, y + RADIUS_M * e_y, kept.pose[w, i])
     e_x, e_y = to_map_axes(e_x, e_y, kept.pose[w, i])
     disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
@@ -238,15 +268,13 @@ def _begin(w: int, i: int, d: int, a: int, see: Fields, fans: Fans, kept: Surrou
     p[1] = (along - side) * e_x * e_y
     p[3] = along * e_y * e_y + side * e_x * e_x
     p[2], p[4], p[5] = size * e_x, size * e_y, size
-    kept.score[w, i, d], kept.silence[w, i, d] = 1.0, 0.0
-    if fans.centres:
-        c_x, c_y = centre_of(w, i, a, see, kept)
-        correct(disc, p, (1.0, 0.0, 0.0), c_x - disc[0], sd * sd)
-        correct(disc, p, (0.0, 1.0, 0.0), c_y - disc[1], sd * sd)
+    kept.score[w, i, d], kept.unheard[w, i, d] = 1.0, 0.0
+    if sectors.centres:
+        _correct_centre(w, i, d, a, sd, see, kept)
 
 
 @compiled
-def _place(w: int, i: int, kept: Surroundings) -> int:
+def _free_row(w: int, i: int, kept: Surroundings) -> int:
     """Index for a new disc: a free one, or that of the farthest."""
     farthest, most = 0, -1.0
     for d in range(kept.score.shape[2]):
@@ -259,22 +287,21 @@ def _place(w: int, i: int, kept: Surroundings) -> int:
 
 
 @compiled
-def _judge(w: int, i: int, see: Fields, fans: Fans, kept: Surroundings) -> None:
+def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
     """Lower the score of discs that should have been heard and were not. Arguments as for ``listen``."""
     for d in range(kept.score.shape[2]):
-        score, silence = kept.score[w, i, d], kept.silence[w, i, d]
-        if score <= 0.0 or silence == 0.0:
+        score, unheard = kept.score[w, i, d], kept.unheard[w, i, d]
+        if score <= 0.0 or unheard == 0.0:
             continue
-        evidence = MOST_SCORE_S * score / fans.most_score
-        if score < fans.most_score - 1.0 and silence > LIFETIME * evidence * evidence:
+        evidence = MOST_SCORE_S * score / sectors.most_score
+        if score < sectors.most_score - 1.0 and unheard > LIFETIME * evidence * evidence:
             kept.score[w, i, d] = 0.0
             continue
         x, y = to_body(kept.disc[w, i, d, 0], kept.disc[w, i, d, 1], kept.pose[w, i])
         away = max(math.hypot(x, y), 1e-6)
         reach = away - kept.disc[w, i, d, 2]
-        for a in range(fans.lower.shape[0]):
-            inside = cross(fans.lower[a, 0], fans.lower[a, 1], x, y) > 0.0
-            if inside and cross(fans.upper[a, 0], fans.upper[a, 1], x, y) <= 0.0 and reach < 0.9 * fans.range_m[a]:
+        for a in range(sectors.lower.shape[0]):
+            if holds(a, x, y, sectors) and reach < 0.9 * sectors.range_m[a]:
                 if see.echo[w, i, a] == 0.0 or see.echo_range[w, i, a] > reach + 1.0 + 0.1 * away:
                     kept.score[w, i, d] = score - 1.0
                 break
@@ -286,7 +313,7 @@ def _merge(w: int, i: int, kept: Surroundings) -> None:
     disc, score = kept.disc[w, i], kept.score[w, i]
     for d in range(score.shape[0]):
         for e in range(score.shape[0]):
-            if d != e and 0.0 < score[d] <= score[e] and kept.silence[w, i, e] == 0.0:
+            if d != e and 0.0 < score[d] <= score[e] and kept.unheard[w, i, e] == 0.0:
                 apart = math.hypot(disc[d, 0] - disc[e, 0], disc[d, 1] - disc[e, 1])
                 weak = score[d] <= 0.5 * score[e] and apart < disc[d, 2] + disc[e, 2]
                 if weak or apart < max(disc[d, 2], disc[e, 2]):

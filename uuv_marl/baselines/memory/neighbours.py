@@ -10,7 +10,7 @@ from uuv_marl.sim.views import Fields
 GATE_M, GATE_SHARE = 2.0, 0.1
 """By which a neighbour may be heard from where it was expected: so much, and this share of its range. Assumed."""
 ACCELERATION = 2.0
-"""Of neighbours, a typical one [m/s2]. Assumed: a third of what full force makes of the paper's vehicle."""
+"""Of neighbours, a typical one [m/s2]. Assumed: a seventh of what full force makes of the default vehicle."""
 MANOEUVRES = 0.005
 """Of the mean error over range, what neighbours' manoeuvres make; the rest is the sonar's [1]. Assumed."""
 LEAST_ERROR = 0.0002
@@ -26,7 +26,7 @@ _LEARNS = 0.05
 
 
 @compiled
-def gains(period: float, deviation: float) -> tuple[float, float]:
+def alpha_beta(period: float, deviation: float) -> tuple[float, float]:
     """Alpha and beta [1] for the tracking index: ACCELERATION period^2 / deviation. Kalata 1984.
 
     Args:
@@ -72,7 +72,7 @@ def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> No
             if k >= 0:
                 _follow(w, i, k, x, y, reach, kept)
             elif not _is_heard(x, y, w, i, kept):
-                _meet(w, i, x, y, see, kept)
+                _meet(w, i, x, y, kept)
     for k in range(known.shape[0]):
         if known[k] < 0.0:
             known[k] = 0.0 if since[k] > KEPT_S else -known[k]
@@ -131,7 +131,7 @@ def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surr
     dx, dy = x - place[0], y - place[1]
     error = math.hypot(dx, dy) / max(reach, 1.0)
     kept.error[w, i] += _LEARNS * (error - kept.error[w, i])
-    alpha, beta = gains(since, max(noise_of(w, i, kept), LEAST_ERROR) * max(reach, 1.0))
+    alpha, beta = alpha_beta(since, max(noise_of(w, i, kept), LEAST_ERROR) * max(reach, 1.0))
     place[0], place[1] = place[0] + alpha * dx, place[1] + alpha * dy
     velocity[0], velocity[1] = velocity[0] + beta * dx / since, velocity[1] + beta * dy / since
     last[0], last[1] = x, y
@@ -139,7 +139,7 @@ def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surr
 
 
 @compiled
-def _meet(w: int, i: int, x: float, y: float, see: Fields, kept: Surroundings) -> None:
+def _meet(w: int, i: int, x: float, y: float, kept: Surroundings) -> None:
     """Know a new neighbour, believed to move as l(t) does; where there is no room, that heard the longest ago goes.
 
     Args:
@@ -147,7 +147,6 @@ def _meet(w: int, i: int, x: float, y: float, see: Fields, kept: Surroundings) -
         i: index of the vehicle.
         x: where it is heard, in the map [m].
         y: the same, second axis [m].
-        see: the fields of percepts, of all worlds.
         kept: what is remembered.
     """
     best, most = 0, -1.0
@@ -157,7 +156,7 @@ def _meet(w: int, i: int, x: float, y: float, see: Fields, kept: Surroundings) -
             break
         if kept.known[w, i, k] < 0.0 and kept.since[w, i, k] > most:
             best, most = k, kept.since[w, i, k]
-    speed = math.hypot(float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1]))
+    speed = kept.reference_speed[w, i]
     kept.place[w, i, best, 0], kept.place[w, i, best, 1] = x, y
     kept.reading[w, i, best, 0], kept.reading[w, i, best, 1] = x, y
     kept.velocity[w, i, best, 0] = speed * kept.reference[w, i, 2]

@@ -45,9 +45,10 @@ class Reckoning(NamedTuple):
     def of(scenario: Scenario) -> "Reckoning":
         """That of a scenario's vehicle, undisturbed."""
         timing = scenario.timing
-        holds = round(timing.decision_period_s / timing.control_hold_s)
-        steps = round(timing.control_hold_s / timing.integration_step_s)
-        return Reckoning(plant(scenario), holds, steps, timing.integration_step_s, timing.decision_period_s)
+        return Reckoning(
+            plant(scenario), timing.holds_per_decision, timing.steps_per_hold, timing.integration_step_s,
+            timing.decision_period_s,
+        )  # fmt: skip
 
 
 @compiled
@@ -174,4 +175,5 @@ def keep_motion(w: int, i: int, see: Fields, kept: Surroundings) -> None:
     """
     kept.motion[w, i, 0], kept.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
     kept.motion[w, i, 2] = see.yaw_rate[w, i, 0]
-    kept.reference_speed[w, i] = math.hypot(see.reference_velocity[w, i, 0], see.reference_velocity[w, i, 1])
+    v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
+    kept.reference_speed[w, i] = math.hypot(v_x, v_y)

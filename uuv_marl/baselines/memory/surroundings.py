@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory import discs, neighbours, pose
-from uuv_marl.baselines.memory.discs import Fans
+from uuv_marl.baselines.memory.discs import ActiveSectors
 from uuv_marl.baselines.memory.pose import Reckoning
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.scenario import Scenario
@@ -22,13 +22,13 @@ class Model(NamedTuple):
 
     own: Reckoning
     """How it moves."""
-    fans: Fans
+    sectors: ActiveSectors
     """How it hears obstacles."""
 
     @staticmethod
     def of(scenario: Scenario) -> "Model":
         """That of a scenario's vehicle."""
-        return Model(Reckoning.of(scenario), Fans.of(scenario))
+        return Model(Reckoning.of(scenario), ActiveSectors.of(scenario))
 
 
 @compiled
@@ -65,5 +65,5 @@ def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept: Surround
             else:
                 pose.move(w, i, see, model.own, kept)
             pose.keep_motion(w, i, see, kept)
-            discs.listen(w, i, see, model.fans, kept)
+            discs.listen(w, i, see, model.sectors, kept)
             neighbours.listen(w, i, see, model.own.period_s, kept)

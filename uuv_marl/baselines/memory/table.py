@@ -37,7 +37,7 @@ class Surroundings(NamedTuple):
         "world vehicle 12",
         "Decisions at which each was heard less those at which it was not though it should have been; 0 for none.",
     ]
-    silence: Annotated[Float64, "world vehicle 12", "Time since each was heard [s]."]
+    unheard: Annotated[Float64, "world vehicle 12", "Time since each was heard [s]."]
     place: Annotated[Float64, "world vehicle sector 2", "Neighbours: place in the map [m]."]
     velocity: Annotated[Float64, "world vehicle sector 2", "Their velocity [m/s]."]
     reading: Annotated[Float64, "world vehicle sector 2", "Where each was heard last, in the map [m]."]
