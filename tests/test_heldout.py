@@ -10,15 +10,16 @@ import pytest
 from scipy.stats import trim_mean
 from typer.testing import CliRunner
 
+from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark.tables import estimate
 from uuv_marl.cli import app
-from uuv_marl.studies.heldout import across, figures, job, page
+from uuv_marl.studies.heldout import across, figures, job, page, sets
 from uuv_marl.studies.heldout.across import efficiency, success
 from uuv_marl.studies.heldout.episodes import Episode, read_episodes, write_episodes
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
-from uuv_marl.studies.heldout.sets import SETS, HeldOut
-from uuv_marl.studies.heldout.targets import paired, targets
+from uuv_marl.studies.heldout.sets import GROUPS, LEADING, SETS, HeldOut
+from uuv_marl.studies.heldout.targets import later, targets, upper_bound
 from uuv_marl.studies.heldout.trainings import find_trainings
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "heldout"
@@ -26,18 +27,21 @@ QUICK = {"swarm.num_vehicles": 3, "time_limit.factor": 0.02, "time_limit.extra_s
 
 
 def episode(**changes):
-    good = Episode("random_field", "mappo", None, 0, 100.0, 125.0, 0, 15.0, 7.0, 8.0, 0.9, 2.0, 0.5, 0)
+    good = Episode("random_field", "mappo", None, 5000, 100.0, 160.0, 125.0, 0, 15.0, 7.0, 8.0, 0.9, 2.0, 0.5, 0)
     return good._replace(**changes)
 
 
-def test_seeds_are_the_benchmarks_and_sets_are_told_apart():
+def test_seeds_are_held_out_and_sets_are_told_apart():
     assert len({held.name for held in SETS}) == len(SETS)
-    assert max(held.seeds for held in SETS) == 500
+    assert LEADING == ("scout", "mappo")
     for held in SETS:
-        assert {case.load().name for case in held.cases(["a", "b"], None)} == {held.scenario}
+        cases = held.cases(["a", "b"], None)
+        assert {case.load().name for case in cases} == {held.scenario}
+        assert {seed for case in cases for seed in case.seeds} == set(range(5000, 5000 + held.seeds["leading"]))
         assert max(len(case.seeds) for case in held.cases([], 30)) <= 30
-        assert held.across <= held.seeds
+        assert held.seeds["leading"] == max(held.seeds.values()) >= held.across
     assert sum(held.across > 0 for held in SETS) == 3
+    assert all(name.removeprefix("guarded:") in POLICIES for group in GROUPS.values() for name in group)
 
 
 def test_scores_by_hand():
@@ -58,24 +62,44 @@ def test_runs_are_resampled_within_their_tasks():
 
 
 def test_targets_by_hand():
-    def met(mine, rival, demand):
-        rows = [e._replace(policy="bio_inspired_plus") for e in rival] + mine
-        return next(t.met for t in targets(rows, "mappo") if demand in t.demand)
+    def met(mine, other, demand):
+        rows = [e._replace(policy="scout") for e in mine] + other
+        return next(t.met for t in targets(rows) if t.policy == "scout" and demand in t.demand)
 
-    many = [episode(seed=k) for k in range(100)]
-    lost = [e._replace(task_time_s=None) if e.seed < 2 else e for e in many]
-    assert met(many, many, "arrive")
-    assert not met(lost, many, "at least 99%")
-    assert met(many, lost, "no longer")
-    assert not met([e._replace(task_time_s=125.1) for e in many], lost, "no longer")
+    many = [episode(seed=5000 + k) for k in range(100)]
+    lost = [many[0]._replace(task_time_s=None), *many[1:]]
+    assert met(many, many, "at least 99%")
+    assert met(lost, many, "at least 99%")
+    assert not met([many[0]._replace(task_time_s=None, seed=6000), *lost], many, "at least 99%")
+    assert met(many, many, "no collision")
     assert not met([*many[1:], episode(collisions=1)], many, "no collision")
-    single = [e._replace(set="single_obstacle") for e in many]
-    assert met(single, single, "mean time at most")
-    assert not met([e._replace(task_time_s=126.5) for e in single], single, "mean time at most")
-    assert met(single, single, "12.63")
-    assert not met([*single[1:], single[0]._replace(min_obstacle_distance_m=12.6)], single, "12.63")
-    assert not met([*single[1:], single[0]._replace(min_spacing_m=5.9)], single, "spacing")
-    assert paired(many[:3], [*lost[:2], episode(seed=2, task_time_s=120.0)]) == [5.0]
+    single = [e._replace(set="single_obstacle", task_time_s=100.9) for e in many]
+    assert met(single, [], "that of l(t)")
+    assert not met([e._replace(task_time_s=101.1) for e in single], [], "that of l(t)")
+    assert met(single, [], "12.63")
+    assert not met([*single[1:], single[0]._replace(min_obstacle_distance_m=12.6)], [], "12.63")
+    assert not met([*single[1:], single[0]._replace(min_spacing_m=5.9)], [], "spacing")
+
+
+def test_a_thousand_episodes_bound_the_share_of_collisions_and_compare_times():
+    def met(mine, demand):
+        rows = [e._replace(policy="scout") for e in mine] + many
+        return next(t.met for t in targets(rows) if t.policy == "scout" and demand in t.demand)
+
+    many = [episode(seed=5000 + k) for k in range(1000)]
+    hit = [e._replace(collisions=1) if e.seed < 5001 else e for e in many]
+    assert met(hit, "surely below 0.5%")
+    assert not met([e._replace(collisions=1) if e.seed < 5002 else e for e in many], "surely below 0.5%")
+    assert upper_bound(0, 1000) == pytest.approx(1.0 - 0.05 ** (1 / 1000))
+    assert met(many, "at most that of `mappo`")
+    assert not met([e._replace(task_time_s=125.1) for e in many], "at most that of `mappo`")
+    assert not met([hit[0]._replace(task_time_s=None), *hit[1:]], "at most that of `mappo`")
+
+
+def test_who_does_not_arrive_takes_the_time_limit():
+    mine = [episode(seed=k, task_time_s=None if k == 0 else 120.0) for k in range(5)]
+    other = [episode(seed=k) for k in range(6)]
+    assert later(mine, other).value == pytest.approx((35.0 - 4 * 5.0) / 5)
 
 
 def test_episodes_come_back_from_their_file(tmp_path):
@@ -86,7 +110,9 @@ def test_episodes_come_back_from_their_file(tmp_path):
 
 @pytest.fixture
 def quick(monkeypatch):
-    held = HeldOut("quick", "random_field", 2, ("bio_inspired_plus", "mappo"), ("bio_inspired",), 1, QUICK, "tiny", 2)
+    groups = {"leading": ["bio_inspired_plus", "mappo"], "guarded": ["guarded:mappo"], "others": ["bio_inspired"]}
+    monkeypatch.setattr(sets, "GROUPS", groups)
+    held = HeldOut("quick", "random_field", {"leading": 2, "guarded": 2, "others": 1}, QUICK, "tiny", 2)
     for module in (job, page, across):
         monkeypatch.setattr(module, "SETS", (held,))
     return held
@@ -116,15 +142,17 @@ def test_the_command_runs_what_is_missing_and_tells_of_it(tmp_path, quick):
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     rows = read_episodes(tmp_path / "out" / "episodes.csv")
-    assert len(rows) == 2 * 4 + 1
+    assert len(rows) == 2 * 5 + 1
     assert {(e.policy, e.training_seed) for e in rows} == {
-        ("bio_inspired", None), ("bio_inspired_plus", None), ("mappo", None), ("mappo", 0), ("ppo", 1)
+        ("bio_inspired", None), ("bio_inspired_plus", None), ("mappo", None), ("guarded:mappo", None), ("mappo", 0),
+        ("ppo", 1),
     }  # fmt: skip
     shipped = [e for e in rows if e.policy == "mappo" and e.training_seed is None]
     assert shipped == [e._replace(training_seed=None) for e in rows if (e.policy, e.training_seed) == ("mappo", 0)]
     text = (tmp_path / "out" / "report.md").read_text()
     assert "### quick" in text
-    assert "`random_field`, tiny, seeds from 0, at most 2." in text
+    assert "`random_field`, tiny, seeds from 5,000, at most 2." in text
+    assert "| guarded:mappo | quick | 2 |" in text
     assert "{" not in text
     data = json.loads((tmp_path / "out" / "marl_eval.json").read_text())
     run = data["uuv_marl"]["quick"]["ppo"]["run_1"]

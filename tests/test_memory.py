@@ -149,6 +149,25 @@ def test_obstacles_are_known_in_a_disturbed_sea(disturbance, median, worst, phan
     assert seen.forgotten < forgotten
 
 
+def test_surfaces_that_were_taken_for_one_obstacle_are_told_apart():
+    """A row of obstacles, heard from afar as one: what is near is on the surface of a disc that counts."""
+    scenario = granted("scout", load_scenario("random_field", overrides=SURFACE))
+    swarm, policy = Swarm(scenario), make("scout", scenario)
+    percept, misses = swarm.reset(11_517), []
+    for _ in range(650):
+        action, m = policy.act(percept), policy.memory
+        point = percept["echo_position"][0]
+        reach = np.where(percept["echo"][0] > 0.0, np.hypot(point[..., 0], point[..., 1]), np.inf)
+        for i in np.flatnonzero(reach.min(axis=1) < 20.0):
+            (x, y), (c, s) = point[i, reach[i].argmin()], m.pose[0, i, 2:]
+            heard = m.pose[0, i, :2] + [c * x - s * y, s * x + c * y]
+            sure = m.disc[0, i, m.score[0, i] >= CONFIRMED]
+            misses.append(np.abs(np.linalg.norm(sure[:, :2] - heard, axis=1) - sure[:, 2]).min(initial=np.inf))
+        percept = swarm.step(action)
+    assert len(misses) > 5000
+    assert max(misses) < 0.5
+
+
 def test_an_obstacle_that_is_gone_is_forgotten():
     scenario = granted("scout", load_scenario("single_obstacle", num_vehicles=1))
     swarm, policy = Swarm(scenario), make("scout", scenario)

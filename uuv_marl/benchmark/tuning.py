@@ -58,10 +58,10 @@ def cost(run: Run, scenario: Scenario) -> float:
 
     A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too.
     """
-    metrics, limit = run.metrics, scenario.time_limit
+    metrics = run.metrics
     time, clearance = metrics["task_time_s"], metrics["min_obstacle_distance_m"]
     if time is None:
-        time = limit.factor * metrics["duration_s"] + limit.extra_s + (metrics["centre_error_m"] or 0.0)
+        time = scenario.time_limit.of(metrics["duration_s"]) + (metrics["centre_error_m"] or 0.0)
     short = 0.0 if clearance is None else max(0.0, scenario.constraints.s_o_m - clearance)
     return time + _COLLISION_COST_S * metrics["collisions"] + _CLEARANCE_COST_S_PER_M * short
 

@@ -100,8 +100,7 @@ class BatchedEnv:
     def longest_episode(self) -> int:
         """Decisions after which any episode of the scenario is over."""
         scenario = self.swarm.scenario
-        limit = scenario.time_limit
-        seconds = limit.factor * longest_duration(scenario) + limit.extra_s
+        seconds = scenario.time_limit.of(longest_duration(scenario))
         cycles = math.ceil(seconds / scenario.timing.decision_period_s)
         return min(cycles, self.max_cycles or cycles)
 

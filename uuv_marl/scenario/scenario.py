@@ -153,11 +153,11 @@ def _check_losses(scenario: Scenario) -> None:
 
 def _check_times(scenario: Scenario) -> None:
     """Decisions that an episode has room for, and that are soon computed."""
-    timing, limit, field = scenario.timing, scenario.time_limit, scenario.random_field
+    timing, field = scenario.timing, scenario.random_field
     duration = scenario.trajectory.duration_s
     if field is not None:
         duration = field.legs[0] * field.leg_length_m[0] / scenario.trajectory.speed_mps
-    shortest = limit.factor * duration + limit.extra_s
+    shortest = scenario.time_limit.of(duration)
     period, steps = timing.decision_period_s, timing.holds_per_decision * timing.steps_per_hold
     if period > shortest:
         raise ValueError(

@@ -6,8 +6,10 @@ paper's Eq. 4.
 
 import math
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
@@ -37,6 +39,7 @@ NonNegative = Annotated[float, within(0, 1_000_000)]
 NonPositive = Annotated[float, within(-1_000_000, 0)]
 Speed = Annotated[float, within(0, 100)]
 Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
+Seconds = TypeVar("Seconds", float, NDArray[np.float64])
 Clock = Annotated[float, within(0.0001, 3_600)]
 Lag = Annotated[float, within(0, 3_600)]
 Legs = Annotated[int, within(1, 8)]
@@ -374,6 +377,10 @@ class TimeLimit(Section):
     """Times the trajectory's duration ..."""
     extra_s: NonNegative
     """... plus this."""
+
+    def of(self, duration_s: Seconds) -> Seconds:
+        """The limit [s] of trajectories that take so long [s], a number or an array."""
+        return self.factor * duration_s + self.extra_s
 
 
 class Disturbance(Section):

@@ -110,8 +110,7 @@ class Swarm:
     @property
     def time_limit_s(self) -> NDArray[np.float64]:
         """When a world is given up, shape (world,)."""
-        limit = self.scenario.time_limit
-        return limit.factor * self.duration_s + limit.extra_s
+        return self.scenario.time_limit.of(self.duration_s)
 
     @property
     def faulty(self) -> NDArray[np.bool_]:

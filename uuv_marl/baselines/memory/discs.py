@@ -100,7 +100,7 @@ def listen(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundin
             if d >= 0:
                 _hear(w, i, d, a, see, sectors, kept)
     for _ in range(see.echo.shape[2]):  # what is left belongs to obstacles that are new
-        a = _nearest_of_nobody(w, i, see, sectors, kept)
+        a = _nearest_unexplained(w, i, see, sectors, kept)
         if a < 0:
             break
         d = _free_row(w, i, kept)
@@ -109,17 +109,33 @@ def listen(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundin
             if b != a and see.echo[w, i, b] > 0.0 and owner(w, i, b, see, sectors, kept) == d:
                 _hear(w, i, d, b, see, sectors, kept)
     _lower_scores(w, i, see, sectors, kept)
-    _merge(w, i, kept)
+    _merge(w, i, sectors, kept)
 
 
 @compiled
-def _nearest_of_nobody(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
-    """The active sub-sector of the nearest echo that belongs to no disc, -1 for none. Arguments as for ``listen``."""
+def _nearest_unexplained(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
+    """The active sub-sector of the nearest echo that no disc explains, -1 for none. Arguments as for ``listen``."""
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):
-        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and owner(w, i, a, see, sectors, kept) < 0:
+        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and not _explained(w, i, a, see, sectors, kept):
             nearest, reach = a, see.echo_range[w, i, a]
     return nearest
+
+
+@compiled
+def _explained(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> bool:
+    """Whether an echo belongs to a disc which, now that it is corrected, has the echo on its surface.
+
+    Two obstacles of which one point each is heard may be taken for one, until no disc fits both. Arguments as for
+    ``owner``.
+    """
+    d = owner(w, i, a, see, sectors, kept)
+    if d < 0 or sectors.centres:
+        return d >= 0
+    x, y = surface_point(w, i, a, see, sectors)
+    x, y = to_map(x, y, kept.pose[w, i])
+    away = math.hypot(x - kept.disc[w, i, d, 0], y - kept.disc[w, i, d, 1])
+    return abs(away - kept.disc[w, i, d, 2]) <= GATE * deviation(float(see.echo_range[w, i, a])) + 0.5
 
 
 @compiled
@@ -308,12 +324,16 @@ def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Sur
 
 
 @compiled
-def _merge(w: int, i: int, kept: Surroundings) -> None:
-    """Forget what overlaps a disc that is heard now and was heard less: half as often, or with its centre inside."""
+def _merge(w: int, i: int, sectors: ActiveSectors, kept: Surroundings) -> None:
+    """Forget what overlaps a disc that is heard now and was heard less: half as often, or with its centre inside.
+
+    Surfaces alone don't tell which of two that are heard now is wrong: both stay. Arguments as for ``listen``.
+    """
     disc, score = kept.disc[w, i], kept.score[w, i]
     for d in range(score.shape[0]):
         for e in range(score.shape[0]):
-            if d != e and 0.0 < score[d] <= score[e] and kept.unheard[w, i, e] == 0.0:
+            heard = kept.unheard[w, i, d] == 0.0 and not sectors.centres
+            if d != e and not heard and 0.0 < score[d] <= score[e] and kept.unheard[w, i, e] == 0.0:
                 apart = math.hypot(disc[d, 0] - disc[e, 0], disc[d, 1] - disc[e, 1])
                 weak = score[d] <= 0.5 * score[e] and apart < disc[d, 2] + disc[e, 2]
                 if weak or apart < max(disc[d, 2], disc[e, 2]):

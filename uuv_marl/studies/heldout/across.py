@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from uuv_marl.studies.heldout.episodes import Episode
-from uuv_marl.studies.heldout.sets import SETS, HeldOut
+from uuv_marl.studies.heldout.sets import FIRST, SETS, HeldOut
 
 
 def success(episodes: Sequence[Episode]) -> float:
@@ -33,12 +33,16 @@ def runs(episodes: Sequence[Episode], held: HeldOut, policy: str, trained: bool)
 
     Args:
         episodes: of all sets and policies.
-        held: the task; seeds from ``held.across`` on are left out.
+        held: the task; seeds beyond its first ``across`` are left out.
         policy: its name.
         trained: whether its trainings are meant, not the policy of that name that ships.
     """
     found: dict[int | None, list[Episode]] = {}
     for e in episodes:
-        if (e.set, e.policy, e.training_seed is not None) == (held.name, policy, trained) and e.seed < held.across:
+        if (e.set, e.policy, e.training_seed is not None) == (
+            held.name,
+            policy,
+            trained,
+        ) and e.seed < FIRST + held.across:
             found.setdefault(e.training_seed, []).append(e)
     return list(found.values())

@@ -21,6 +21,8 @@ class Episode(NamedTuple):
     seed: int
     duration_s: float
     """What l(t) takes."""
+    limit_s: float
+    """When an episode ends at the latest."""
     task_time_s: float | None
     """None where the swarm did not arrive."""
     collisions: int
@@ -44,6 +46,11 @@ class Episode(NamedTuple):
     def succeeded(self) -> bool:
         """Arrived, and nobody touched anything."""
         return self.arrived and not self.collisions
+
+    @property
+    def time_s(self) -> float:
+        """The task time, or the limit where the swarm does not arrive: a mean over all episodes leaves out none."""
+        return self.limit_s if self.task_time_s is None else self.task_time_s
 
     @property
     def efficiency(self) -> float:
@@ -76,7 +83,11 @@ def episodes_of(results: Mapping[str, Results], trained: Sequence[Trained]) -> l
     for name, kept in results.items():
         for row in sorted(kept.rows, key=lambda row: (row.policy, row.seed)):
             policy, training_seed = trainings.get(row.policy, (row.policy, None))
-            values: dict[str, Any] = {**row.metrics, "within_eq7": row.metrics["constraint_share"]["all"]}
+            values: dict[str, Any] = {
+                **row.metrics,
+                "within_eq7": row.metrics["constraint_share"]["all"],
+                "limit_s": kept.scenarios[row.scenario].time_limit.of(row.metrics["duration_s"]),
+            }
             fields = {field: values[field] for field in Episode._fields if field in values}
             rows.append(Episode(set=name, policy=policy, training_seed=training_seed, seed=row.seed, **fields))
     return rows

@@ -39,7 +39,7 @@ def run(
     cases = [case for held in SETS if not only or held.name in only for case in held.cases(names, seeds)]
     for policy in {case.policy for case in cases}:
         policy_class(policy)  # refused now, not after hours of others' runs
-    suite = Suite(output)
+    suite = Suite(output, traces=False)
     with ExitStack() as locks:
         for folder in dict.fromkeys(output / case.folder for case in cases):
             locks.enter_context(locked(folder))

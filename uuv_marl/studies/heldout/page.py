@@ -13,16 +13,20 @@ from uuv_marl.studies.heldout.across import SCORES, runs, tasks
 from uuv_marl.studies.heldout.episodes import Episode, measured, read_episodes, select, write_episodes
 from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
-from uuv_marl.studies.heldout.sets import SETS, HeldOut
-from uuv_marl.studies.heldout.targets import RIVAL, paired, targets
+from uuv_marl.studies.heldout.sets import FIRST, SETS, HeldOut
+from uuv_marl.studies.heldout.targets import later, targets
 from uuv_marl.studies.heldout.trainings import Trained
+from uuv_marl.studies.robustness.scores import scored
 
 _NOTHING = "–"
 _NO_TRAININGS = "No trainings were given.\n"
 _HEADERS = (
-    "policy", "arrived", "collided", "task time [s]", "worst", f"beyond {RIVAL} [s]", "obstacle distance [m]", "worst",
+    "policy", "arrived", "collided", "task time [s]", "worst", "after l(t) [s]", "obstacle distance [m]", "worst",
     "spacing [m]", "worst", "within Eq. 7", "centre error [m]", "effort",
 )  # fmt: skip
+_GUARDED = "guarded:"
+_ORDER = (*POLICIES, *(f"{_GUARDED}{name}" for name in POLICIES))
+"""Policies in the order of tables."""
 
 
 def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trained]) -> list[Path]:
@@ -47,7 +51,10 @@ def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trai
 def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     """The page's text."""
     return read_text("heldout", "story.md").format(
+        first=FIRST,
         targets=_targets(episodes),
+        glance=_glance(episodes),
+        guarded=_guarded(episodes),
         sets="\n".join(_set(held, episodes) for held in SETS if any(e.set == held.name for e in episodes)),
         across=_across(episodes),
         trainings=_trainings(trained),
@@ -55,34 +62,69 @@ def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
 
 
 def _targets(episodes: Sequence[Episode]) -> str:
-    found = targets(episodes, "mappo")
-    kinds = [
-        (kind, f"{sum(t.met for t in found if t.kind == kind)} of {sum(t.kind == kind for t in found)}")
-        for kind in dict.fromkeys(t.kind for t in found)
+    found = targets(episodes)
+    policies = dict.fromkeys(t.policy for t in found)
+    words = [
+        f"`{policy}` meets {sum(t.met for t in mine)} of {len(mine)}"
+        for policy in policies
+        for mine in [[t for t in found if t.policy == policy]]
     ]
-    rows = [(t.set, t.demand, t.measured, "met" if t.met else "**missed**") for t in found]
-    met = f"{sum(t.met for t in found)} of {len(found)} are met by `mappo`."
-    tables = markdown_table(("targets for", "met"), kinds), markdown_table(("set", "demand", "measured", ""), rows)
-    return "\n\n".join([met, tables[0].rstrip("\n"), tables[1]])
+    rows = [(t.set, f"`{t.policy}`", t.demand, t.measured, "met" if t.met else "**missed**") for t in found]
+    return f"{'; '.join(words)}.\n\n" + markdown_table(("set", "policy", "demand", "measured", ""), rows)
+
+
+def _glance(episodes: Sequence[Episode]) -> str:
+    """How many episodes arrive untouched: a row for each policy, a column for each set."""
+    sets = [held.name for held in SETS if any(e.set == held.name for e in episodes)]
+    rows = [
+        (policy, *(f"{sum(e.succeeded for e in mine)}/{len(mine)}" if mine else _NOTHING for mine in found))
+        for policy in _ORDER
+        for found in [[select(episodes, name, policy) for name in sets]]
+        if any(found)
+    ]
+    return markdown_table(("policy", *sets), rows)
+
+
+def _guarded(episodes: Sequence[Episode]) -> str:
+    """What the filter does: policies alone and guarded, on the seeds of a set that both have."""
+    rows: list[tuple[str, ...]] = []
+    for name in (name for name in _ORDER if name.startswith(_GUARDED)):
+        for held in SETS:
+            guarded = select(episodes, held.name, name)
+            alone = select(episodes, held.name, name.removeprefix(_GUARDED))[: len(guarded)]
+            if guarded and alone:
+                both = alone, guarded
+                rows.append((
+                    name, held.name, f"{len(guarded)}",
+                    ", ".join(f"{sum(e.arrived for e in es)}" for es in both),
+                    ", ".join(f"{sum(e.collisions > 0 for e in es)}" for es in both),
+                    ", ".join(f"{np.mean([e.time_s for e in es]):.1f} s" for es in both),
+                    f"{later(guarded, alone):+.1f} s",
+                ))  # fmt: skip
+    headers = (
+        "policy", "set", "episodes", "arrived: alone, guarded", "collided: alone, guarded",
+        "mean time, or limit: alone, guarded", "later by",
+    )  # fmt: skip
+    return markdown_table(headers, rows) if rows else "No guarded policy was run.\n"
 
 
 def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:
-    found = {name: mine for name in POLICIES if (mine := select(episodes, held.name, name))}
-    rows = [(name, *_cells(mine, [] if name == RIVAL else found.get(RIVAL, []))) for name, mine in found.items()]
+    found = {name: mine for name in _ORDER if (mine := select(episodes, held.name, name))}
+    rows = [(name, *_cells(mine)) for name, mine in found.items()]
     note, count = f", {held.note}" if held.note else "", max(map(len, found.values()))
-    head = f"### {held.name}\n\n`{held.scenario}`{note}, seeds from 0, at most {count}.\n\n"
+    head = f"### {held.name}\n\n`{held.scenario}`{note}, seeds from {FIRST:,}, at most {count}.\n\n"
     return head + markdown_table(_HEADERS, rows)
 
 
-def _cells(mine: Sequence[Episode], rival: Sequence[Episode]) -> tuple[str, ...]:
-    times, extra = measured(mine, "task_time_s"), paired(mine, rival)
+def _cells(mine: Sequence[Episode]) -> tuple[str, ...]:
+    times, late = measured(mine, "task_time_s"), scored(np.array([e.time_s - e.duration_s for e in mine]))
     obstacle, spacing = measured(mine, "min_obstacle_distance_m"), measured(mine, "min_spacing_m")
     return (
         f"{len(times)}/{len(mine)}",
         f"{sum(e.collisions > 0 for e in mine)}",
         _interval(".1f", times),
         f"{max(times):.1f}" if times else _NOTHING,
-        f"{np.mean(extra):+.1f} ({len(extra)})" if extra else _NOTHING,
+        f"{late:.1f}",
         _interval(".2f", obstacle),
         f"{min(obstacle):.2f}" if obstacle else _NOTHING,
         _interval(".2f", spacing),
@@ -102,7 +144,7 @@ def _across(episodes: Sequence[Episode]) -> str:
     if not compared:
         return _NO_TRAININGS
     algorithms = sorted({e.policy for e in episodes if e.training_seed is not None})
-    hand_made = [p for p in ("bio_inspired", RIVAL) if any(e.policy == p for e in episodes)]
+    hand_made = [p for p in ("bio_inspired", "bio_inspired_plus", "scout") if any(e.policy == p for e in episodes)]
     headers = ["policy", *(f"{name}, {held.name}" for name in SCORES for held in compared)]
     rows: list[list[str]] = []
     for policy in [*algorithms, *hand_made]:

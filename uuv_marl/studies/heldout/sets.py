@@ -1,26 +1,27 @@
-"""What is held out: worlds, swarm sizes, losses, echoes and decision periods that no training has seen."""
+"""What is held out: seeds, worlds, swarm sizes, losses, echoes and decision periods that nothing was made with."""
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from uuv_marl.studies.data import read_toml
 from uuv_marl.studies.suite import NOTHING, Case
 
-_BEST = ("bio_inspired_plus", "mappo")
-_FEW = ("bio_inspired", *_BEST)
-_OTHERS = ("bio_inspired", "sff", "sdc", "sff_informed", "sdc_informed", "ppo")
+_TOLD: dict[str, Any] = read_toml("heldout", "sets.toml")
+FIRST: int = _TOLD["first"]
+"""The first held-out seed. Benchmarks count from 0, and tuning and training use seeds from 10,000 on."""
+GROUPS: dict[str, list[str]] = _TOLD["groups"]
+"""Policies by the name of their group."""
+LEADING = tuple(GROUPS["leading"])
+"""The strongest policies, which the targets are for."""
 
 
 class HeldOut(NamedTuple):
-    """Episodes of one kind, on the benchmark's seeds from 0."""
+    """Episodes of one kind."""
 
     name: str
     scenario: str
-    seeds: int
-    policies: tuple[str, ...] = _FEW
-    others: tuple[str, ...] = ()
-    """Policies that are run on the first ``fewer`` seeds."""
-    fewer: int = 0
+    seeds: Mapping[str, int]
+    """How many of each group of ``GROUPS``, from ``FIRST`` on."""
     overrides: Mapping[str, object] = NOTHING
     note: str = ""
     """What is different from the scenario as it is."""
@@ -29,19 +30,16 @@ class HeldOut(NamedTuple):
 
     def cases(self, trained: Iterable[str], most: int | None) -> list[Case]:
         """All that is run, with the policies of trainings; at most so many seeds of each."""
-        counts = dict.fromkeys(self.policies, self.seeds) | dict.fromkeys(self.others, self.fewer)
+        counts = {policy: count for group, count in self.seeds.items() for policy in GROUPS[group]}
         counts |= dict.fromkeys(trained if self.across else (), self.across)
         return [
             Case(
-                self.name, self.scenario, policy, self.overrides, routes=True, shared=True,
-                seeds=range(count if most is None else min(count, most)),
+                self.name, self.scenario, policy, self.overrides, shared=True,
+                seeds=range(FIRST, FIRST + (count if most is None else min(count, most))),
             )
             for policy, count in counts.items()
         ]  # fmt: skip
 
 
-SETS = tuple(
-    HeldOut(**({"policies": _BEST, "others": _OTHERS} if "fewer" in table else {}), **table)
-    for table in read_toml("heldout", "sets.toml")["set"]
-)
+SETS = tuple(HeldOut(**table) for table in _TOLD["set"])
 """Those of ``sets.toml``, in the order of the page."""
