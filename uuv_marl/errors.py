@@ -25,11 +25,16 @@ class ClusterError(RuntimeError):
     """A cluster that can't do the work; the message says what to do."""
 
 
+class RewardError(ValueError):
+    """A reward of a user's own that can't be imported, or gives what is no reward; the message says which."""
+
+
 class MissingExtraError(ModuleNotFoundError):
     """A library is missing that one of the package's extras would install; the message says how."""
 
 
 MENDABLE = (
-    ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, ClusterError, MissingExtraError,
+    ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, ClusterError, RewardError,
+    MissingExtraError,
 )  # fmt: skip
 """All of them."""

@@ -1,7 +1,6 @@
 """Policies by name, for a swarm or for an environment."""
 
 import difflib
-import importlib
 import inspect
 import math
 from collections.abc import Mapping, Sequence
@@ -25,6 +24,7 @@ from uuv_marl.baselines.safety import GUARD, Barrier
 from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
+from uuv_marl.modules import named_object
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
 
@@ -132,11 +132,10 @@ def _kind(name: str) -> Kind:
         trained.checkpoint  # noqa: B018 - refused now, not in the middle of a benchmark
         return trained
     if ":" in name:
-        module, _, attribute = name.partition(":")
         try:
-            made: object = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError, ValueError) as error:
-            raise PolicyError(f"policy {name!r} can't be imported: {error}") from None
+            made = named_object(name)
+        except ImportError as error:
+            raise PolicyError(f"policy {name!r} {error}") from None
         if not (isinstance(made, type) and issubclass(made, Policy)):
             raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {made!r}")
         return made

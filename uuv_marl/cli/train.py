@@ -2,16 +2,16 @@
 
 import re
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand
 
-from uuv_marl.cli.console import console, explained, extra, progress_bar, shown
+from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, progress_bar, shown
 
 app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
 
@@ -44,6 +44,36 @@ Steps = Annotated[
     int,
     typer.Option(parser=_whole, metavar="NUMBER", help="Agent-steps in all, such as 3e6: decisions times vehicles."),
 ]
+Length = Annotated[
+    int | None,
+    typer.Option(
+        parser=_whole, metavar="NUMBER",
+        help="Agent-steps in all, such as 3e6: decisions times vehicles. More at a --resume prolong the training. "
+        "Default: 3e7, or at a --resume those of before.",
+    ),
+]  # fmt: skip
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
+]
+Sizes = Annotated[
+    str | None, typer.Option(metavar="N,N,...", help="Train on swarms of these sizes at once, such as 5,10,20.")
+]
+Reward = Annotated[
+    str | None,
+    typer.Option(
+        metavar="MODULE:FUNCTION",
+        help="A reward of your own: from the swarm after a decision to an array (world, vehicle). The module is looked "
+        "for in the current folder too. Default: that of uuv_marl/train/shaping.py.",
+    ),
+]
+Network = Annotated[
+    str | None,
+    typer.Option(metavar="UNITS,UNITS,...", help="Layers of the actor's and of the critic's network. Default: 96,96."),
+]
+Device = Annotated[
+    str, typer.Option(help="Where networks and batches are: cpu, or cuda for a GPU. Worlds are on the CPU.")
+]
 Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
 Start = Annotated[
     Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
@@ -56,9 +86,14 @@ Resume = Annotated[bool, typer.Option("--resume", help="Go on from the folder's 
 def train_mappo(
     scenario: Scenario = "random_field",
     num_vehicles: Vehicles = None,
-    steps: Steps = 30_000_000,
+    sizes: Sizes = None,
+    overrides: Changes = None,
+    reward: Reward = None,
+    network: Network = None,
+    steps: Length = None,
     seed: Seed = 0,
     start: Start = None,
+    device: Device = "cpu",
     noise: Annotated[
         tuple[float, float] | None,
         typer.Option(
@@ -80,29 +115,36 @@ def train_mappo(
     Needs the extra "train". Writes config.json (settings, seeds, versions), progress.csv (a row per iteration),
     checkpoints/, tensorboard/ and best/, the policy that did best on validation seeds: give it to uuv-marl benchmark as
     --policy. Ctrl-C ends the training with a checkpoint after the iteration under way; the same command with --resume
-    goes on exactly. A kill leaves the last checkpoint, which is written every 20 iterations.
+    goes on exactly. A kill leaves the last checkpoint, which is written every 20 iterations. With --resume and more
+    --steps a finished training goes on, too, with the last noise and rates.
 
-    Example: uuv-marl train mappo --output runs/mappo
+    Example: uuv-marl train mappo --scenario starter --steps 2e6 --output runs/starter
     """
     with explained():
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
 
-        given = {name: pair for name, pair in (("noise", noise), ("learning_rate", rate)) if pair}
+        given = {"noise": noise, "learning_rate": rate, "hidden": _whole_numbers("--network", network)}
         try:
-            algorithm = replace(Hyperparameters(), **given)
+            algorithm = replace(Hyperparameters(), **{name: value for name, value in given.items() if value})
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
-        _train(output, resume, num_vehicles, start, scenario=scenario, steps=steps, seed=seed, algorithm=algorithm)
+        swarms = Swarms(scenario, num_vehicles, sizes, overrides or [])
+        _train(output, resume, swarms, start, steps, device, reward=reward, seed=seed, algorithm=algorithm)
 
 
 @app.command("ppo", cls=_Command)
 def train_ppo(
     scenario: Scenario = "random_field",
     num_vehicles: Vehicles = None,
-    steps: Steps = 30_000_000,
+    sizes: Sizes = None,
+    overrides: Changes = None,
+    reward: Reward = None,
+    network: Network = None,
+    steps: Length = None,
     seed: Seed = 0,
     start: Start = None,
+    device: Device = "cpu",
     output: Output = Path("results/ppo"),
     resume: Resume = False,
 ) -> None:
@@ -117,24 +159,86 @@ def train_ppo(
         with extra("train", "training with Stable-Baselines3"):
             from uuv_marl.train.ppo import Hyperparameters
 
-        algorithm = Hyperparameters()
-        _train(output, resume, num_vehicles, start, scenario=scenario, steps=steps, seed=seed, algorithm=algorithm)
+        units = _whole_numbers("--network", network)
+        algorithm = replace(Hyperparameters(), hidden=units or Hyperparameters.hidden)
+        swarms = Swarms(scenario, num_vehicles, sizes, overrides or [])
+        _train(output, resume, swarms, start, steps, device, reward=reward, seed=seed, algorithm=algorithm)
 
 
-def _train(output: Path, resume: bool, num_vehicles: int | None, start: Path | None, **settings: Any) -> None:
-    """Train with these settings, and show how it goes."""
-    from uuv_marl.train.training import OVERRIDES, Settings, train
+class Swarms(NamedTuple):
+    """What is trained on, as the options say it."""
 
-    size = {} if num_vehicles is None else {"swarm.num_vehicles": num_vehicles}
-    chosen = Settings(**settings, overrides={**OVERRIDES, **size}, start=None if start is None else str(start))
+    scenario: str
+    num_vehicles: int | None
+    sizes: str | None
+    overrides: Sequence[str]
+
+    def settings(self) -> dict[str, Any]:
+        """The same, as a training's settings hold it."""
+        from uuv_marl.train.training import OVERRIDES, swarms_of
+
+        size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
+        sizes = _whole_numbers("--sizes", self.sizes)
+        if sizes and size:
+            raise typer.BadParameter("--num-vehicles is the size of every swarm; give it or --sizes")
+        changes = {**OVERRIDES, **size, **changes_of(self.overrides)}
+        return {"scenario": self.scenario, "overrides": changes, "sizes": swarms_of(sizes) if sizes else ()}
+
+
+def _whole_numbers(option: str, text: str | None) -> tuple[int, ...]:
+    """The numbers of a text such as 96,96; none where there is no text."""
+    if text is None:
+        return ()
+    parts = text.split(",")
+    if not all(re.fullmatch(r"[1-9]\d{0,5}", part) for part in parts):
+        raise typer.BadParameter(f"{option} must be whole numbers from 1 on, such as 96,96; got {text!r}")
+    return tuple(map(int, parts))
+
+
+def _train(
+    output: Path, resume: bool, swarms: Swarms, start: Path | None, steps: int | None, device: str, **settings: Any
+) -> None:
+    """Train with these settings, and show how it goes.
+
+    Args:
+        output: folder of the training.
+        resume: go on with it.
+        swarms: what is trained on.
+        start: folder of another training's weights to begin with.
+        steps: agent-steps in all; None for the default, or at a resume those of before.
+        device: where networks and batches are.
+        settings: the other settings of the training.
+    """
+    from uuv_marl.train.folder import begun_with
+    from uuv_marl.train.training import Settings, train
+
+    _check_device(device)
+    if settings["reward"]:
+        find_modules([settings["reward"]])
+    before = begun_with(output).get("steps") if resume else None
+    length = steps or before or Settings.steps
+    chosen = Settings(**settings, **swarms.settings(), steps=length, start=None if start is None else str(start))
     texts = {
         "reward": "reward {reward:.3f}",
         "score": "validation: score {score:.3f} (best {best:.3f}), arrived {arrived:.0%}, collisions {collisions}",
     }
     with _stoppable(output) as stop:
-        records = train(output, chosen, resume=resume, say=console.print, stop=stop)
+        records = train(output, chosen, resume=resume, device=device, say=console.print, stop=stop)
         last = _follow(records, chosen.steps, texts)
     console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
+
+
+def _check_device(device: str) -> None:
+    """Refuse what torch can't compute on here."""
+    import torch
+
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).splitlines()[0]
+        raise typer.BadParameter(
+            f"--device {device} can't be used: {reason}; give cpu, or install a torch that can"
+        ) from None
 
 
 def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str:

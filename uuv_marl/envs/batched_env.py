@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from uuv_marl.envs.observation import observe
-from uuv_marl.envs.reward import RewardFunction, compute_reward, named, reward_weights
+from uuv_marl.envs.reward import RewardFunction, compute_reward, named, own_reward, reward_weights
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
@@ -160,7 +160,7 @@ class BatchedEnv:
     def _rewards(self, before: Bool) -> tuple[Float64, Float64, Float64 | None]:
         """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step."""
         if callable(self._reward):
-            own = np.where(before, self._own_reward(self._reward, before), 0.0)
+            own = own_reward(self._reward, self.swarm, before)
             return own, own.mean(axis=1), None
         reward, terms = compute_reward(self.swarm, self._weights, ~self._over)
         mean = reward.sum(axis=1) / self.swarm.num_vehicles  # twice as fast as reward.mean(axis=1), and its bits
@@ -168,17 +168,6 @@ class BatchedEnv:
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
             reward = np.where(before, mean[:, None] + named(terms)["loss"], 0.0)
         return reward, mean, terms
-
-    def _own_reward(self, function: RewardFunction, before: Bool) -> Float64:
-        reward = np.asarray(function(self.swarm), np.float64)
-        if reward.shape != before.shape:
-            raise ValueError(f"the reward function must give an array {before.shape}, got {reward.shape}")
-        if not np.isfinite(reward[before]).all():
-            raise ValueError(
-                "the reward function must give finite numbers; distances are infinite where nobody is near "
-                "(facts.spacing of a lone vehicle) or nothing is there (facts.clearance without obstacles)"
-            )
-        return reward
 
 
 class Changes(TypedDict, total=False):

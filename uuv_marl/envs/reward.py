@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from uuv_marl.errors import RewardError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Bool, Facts, Float64, State
 from uuv_marl.sim.compiled import compiled, compiled_parallel
@@ -21,6 +22,28 @@ from uuv_marl.sim.swarm import Swarm
 
 RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""
+
+
+def own_reward(function: RewardFunction, swarm: Swarm, present: Bool) -> Float64:
+    """What a user's own reward gives, shape (world, vehicle); zero for vehicles that are not present.
+
+    Args:
+        function: the reward.
+        swarm: after a step.
+        present: vehicles that were there before the step, shape (world, vehicle).
+
+    Raises:
+        RewardError: it gives an array of another shape, or numbers that are not finite.
+    """
+    reward = np.asarray(function(swarm), np.float64)
+    if reward.shape != present.shape:
+        raise RewardError(f"the reward function must give an array {present.shape}, got {reward.shape}")
+    if not np.isfinite(reward[present]).all():
+        raise RewardError(
+            "the reward function must give finite numbers; distances are infinite where nobody is near "
+            "(facts.spacing of a lone vehicle) or nothing is there (facts.clearance without obstacles)"
+        )
+    return np.where(present, reward, 0.0)
 
 
 TERMS: Mapping[str, str] = {

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.features import BARRIER, Features
 from uuv_marl.envs.batched_env import refuse_losses
+from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train.shaping import PRIVILEGED_SIZE, Weights, privileged_observation, shaped_reward
+from uuv_marl.train.shaping import PRIVILEGED_SIZE, privileged_observation
 
 Arrays = Mapping[str, NDArray[Any]]
 Seeds = Callable[[int], Sequence[int] | NDArray[np.integer] | None]
@@ -55,16 +56,18 @@ class TrainingEnv:
     Args:
         scenario: what to simulate.
         sizes: number of vehicles and of worlds of each swarm.
-        weights: of the reward.
+        reward: what vehicles are paid for a decision, from the swarm after it.
         seeds: asked for seeds whenever worlds start; a snapshot and what it draws from determine all that follows.
 
     Raises:
         ScenarioError: vehicles can be lost in this scenario: their rows would be learned from.
     """
 
-    def __init__(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seeds: Seeds) -> None:
+    def __init__(
+        self, scenario: Scenario, sizes: Sequence[tuple[int, int]], reward: RewardFunction, seeds: Seeds
+    ) -> None:
         refuse_losses(scenario, "training")
-        self._seeds, self._weights = seeds, weights
+        self._seeds, self._reward = seeds, reward
         patience = min(scenario.time_limit.extra_s, PATIENCE_S)
         scenario = load_scenario(scenario, overrides={"time_limit.factor": 1.0, "time_limit.extra_s": patience})
         self._swarms = [Swarm(load_scenario(scenario, num_vehicles=n), worlds) for n, worlds in sizes]
@@ -93,7 +96,7 @@ class TrainingEnv:
         for k, swarm in enumerate(self._swarms):
             rows, shape = self._rows(k), (swarm.num_worlds, swarm.num_vehicles)
             swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
-            paid, ends = shaped_reward(swarm, self._weights), np.array(swarm.endings())
+            paid, ends = own_reward(self._reward, swarm, np.ones(shape, np.bool_)), np.array(swarm.endings())
             reward[rows], ended[:, rows] = paid.reshape(-1), ends.repeat(shape[1], axis=1)
             self._sums[k] += np.stack([paid.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
             self._look(k)

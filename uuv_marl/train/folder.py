@@ -73,7 +73,7 @@ class TrainingFolder(Generic[R]):
             field, then, now = other[0]
             remedy = ", or another --output"
             if field == "steps":
-                remedy = f"; noise and rates anneal over them. To train its policy further: --start {self.path}/best"
+                remedy = ", or more: noise and rates anneal over them"
             raise ResultsError(
                 f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give the same options{remedy}"
             )
@@ -174,6 +174,14 @@ def opened(
         if folder.found:
             say(folder.found)
         yield folder
+
+
+def begun_with(path: Path) -> dict[str, Any]:
+    """The settings that a training was begun with; empty where there is none that can be read."""
+    try:
+        return dict(json.loads((path / "config.json").read_text(encoding="utf-8"))["settings"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
 
 
 def versions(libraries: Sequence[str]) -> dict[str, str]:

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.checkpoint import Layer
+from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
-from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with MAPPO"):
     import torch
@@ -72,16 +72,24 @@ class Hyperparameters(PPOHyperparameters):
     average: float = 0.98
     """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
 
-    def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Mappo":
+    def begin(
+        self,
+        scenario: Scenario,
+        sizes: Sequence[tuple[int, int]],
+        reward: RewardFunction,
+        seed: int,
+        device: str = "cpu",
+    ) -> "Mappo":
         """A training that has not begun.
 
         Args:
             scenario: what to train on.
             sizes: number of vehicles and of worlds of each swarm.
-            weights: of the reward.
+            reward: what vehicles are paid for a decision, from the swarm after it.
             seed: of weights, worlds and noise.
+            device: where networks and batches are.
         """
-        return Mappo(self, scenario, sizes, weights, seed)
+        return Mappo(self, scenario, sizes, reward, seed, device)
 
 
 class Environment(Protocol):
@@ -142,12 +150,15 @@ class Learner:
         size: the critic's inputs.
         by: the algorithm's numbers.
         rng: draws the first weights, and the order of samples.
+        device: where networks and batches are.
     """
 
-    def __init__(self, features: int, size: int, by: Hyperparameters, rng: np.random.Generator) -> None:
-        self.by, self._rng, self._features = by, rng, features
-        self.actor = network((features, *by.hidden, 2), 0.01, rng)
-        self.critic = network((size, *by.hidden, 1), 1.0, rng)
+    def __init__(
+        self, features: int, size: int, by: Hyperparameters, rng: np.random.Generator, device: str = "cpu"
+    ) -> None:
+        self.by, self._rng, self._features, self._device = by, rng, features, device
+        self.actor = network((features, *by.hidden, 2), 0.01, rng).to(device)
+        self.critic = network((size, *by.hidden, 1), 1.0, rng).to(device)
         self._optimisers = [torch.optim.Adam(net.parameters(), eps=1e-5) for net in (self.actor, self.critic)]
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
         self._average = [x.detach().clone() for x in self.actor.parameters()]
@@ -157,18 +168,19 @@ class Learner:
     def layers(self) -> list[Layer]:
         """The averaged actor's, for a checkpoint."""
         weights, biases = self._average[::2], self._average[1::2]
-        return [Layer(w.numpy().T.copy(), b.numpy().copy()) for w, b in zip(weights, biases, strict=True)]
+        return [Layer(w.cpu().numpy().T.copy(), b.cpu().numpy().copy()) for w, b in zip(weights, biases, strict=True)]
 
     @torch.no_grad()
     def act(self, observation: Float32) -> Float32:
         """Mean action of every row."""
-        return self.actor(torch.from_numpy(observation)[:, : self._features]).numpy()
+        return self.actor(torch.from_numpy(observation)[:, : self._features].to(self._device)).cpu().numpy()
 
     @torch.no_grad()
     def value(self, observation: Float32) -> Float32:
         """Expected return of every row, shape (..., row) for inputs (..., row, size)."""
         mean, std = self._scale()
-        return self.critic(torch.from_numpy(observation)).squeeze(-1).numpy() * np.float32(std) + np.float32(mean)
+        value = self.critic(torch.from_numpy(observation).to(self._device)).squeeze(-1).cpu().numpy()
+        return value * np.float32(std) + np.float32(mean)
 
     def sample(self, env: Environment, noise: float) -> tuple[Rollout, float]:
         """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
@@ -189,7 +201,8 @@ class Learner:
         value = self.value(observation)
         advantage = gae(reward, value, ended, by.gamma, by.gae_lambda)
         arrays = (observation[:-1], action, mean, advantage, advantage + value[:-1])
-        return Rollout(*(torch.from_numpy(array.reshape(-1, *array.shape[2:])) for array in arrays)), paid
+        rows = (torch.from_numpy(array.reshape(-1, *array.shape[2:])) for array in arrays)
+        return Rollout(*(array.to(self._device) for array in rows)), paid
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
         """Some epochs of PPO on a batch, and of regression to its returns."""
@@ -238,7 +251,7 @@ class Learner:
 
     def _minibatches(self, rows: int, epochs: int) -> Iterator[Tensor]:
         for _ in range(epochs):
-            order = torch.from_numpy(self._rng.permutation(rows))
+            order = torch.from_numpy(self._rng.permutation(rows)).to(self._device)
             yield from order.split(self.by.minibatch)
 
     def _scale(self) -> tuple[float, float]:
@@ -264,9 +277,9 @@ class Learner:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All of it, for ``restore``."""
         arrays: dict[str, NDArray[Any]] = {"moments": self._moments.copy(), "updates": np.array(self._updates)}
-        arrays |= {f"average.{k}": value.numpy().copy() for k, value in enumerate(self._average)}
+        arrays |= {f"average.{k}": value.cpu().numpy().copy() for k, value in enumerate(self._average)}
         for name, net, optimiser in self._parts():
-            arrays |= {f"{name}.{key}": value.numpy().copy() for key, value in net.state_dict().items()}
+            arrays |= {f"{name}.{key}": value.cpu().numpy().copy() for key, value in net.state_dict().items()}
             arrays |= adam_arrays(optimiser, f"{name}_adam")
         return arrays
 
@@ -274,7 +287,7 @@ class Learner:
         """Go on with the ``arrays`` of a learner of the same sizes."""
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
         self._moments, self._updates = np.array(arrays["moments"]), int(arrays["updates"])
-        self._average = [tensors[f"average.{k}"] for k in range(len(self._average))]
+        self._average = [tensors[f"average.{k}"].to(self._device) for k in range(len(self._average))]
         for name, net, optimiser in self._parts():
             net.load_state_dict({key: tensors[f"{name}.{key}"] for key in net.state_dict()})
             restore_adam(optimiser, f"{name}_adam", tensors)
@@ -298,17 +311,24 @@ class Mappo:
         by: the algorithm's numbers.
         scenario: what to train on.
         sizes: number of vehicles and of worlds of each swarm.
-        weights: of the reward.
+        reward: what vehicles are paid for a decision, from the swarm after it.
         seed: of weights, worlds and noise.
+        device: where networks and batches are.
     """
 
     def __init__(
-        self, by: Hyperparameters, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int
+        self,
+        by: Hyperparameters,
+        scenario: Scenario,
+        sizes: Sequence[tuple[int, int]],
+        reward: RewardFunction,
+        seed: int,
+        device: str = "cpu",
     ) -> None:
         self._by = by
         self._rng = np.random.default_rng(seed)
-        self.env = TrainingEnv(scenario, sizes, weights, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
-        self.learner = Learner(self.env.features, self.env.size, by, self._rng)
+        self.env = TrainingEnv(scenario, sizes, reward, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
+        self.learner = Learner(self.env.features, self.env.size, by, self._rng, device)
         self.agent_steps = by.horizon * self.env.rows
         """Of an iteration."""
         self.pop_episode_stats = self.env.pop_episode_stats
@@ -354,7 +374,7 @@ def network(sizes: Sequence[int], last_gain: float, rng: np.random.Generator) ->
 def adam_arrays(optimiser: torch.optim.Optimizer, name: str) -> dict[str, NDArray[Any]]:
     """Moments and counters of an optimiser, as ``name.parameter.key``."""
     states = optimiser.state_dict()["state"].items()
-    return {f"{name}.{k}.{key}": value.numpy().copy() for k, state in states for key, value in state.items()}
+    return {f"{name}.{k}.{key}": value.cpu().numpy().copy() for k, state in states for key, value in state.items()}
 
 
 def restore_adam(optimiser: torch.optim.Optimizer, name: str, tensors: Mapping[str, Tensor]) -> None:

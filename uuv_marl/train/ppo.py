@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.checkpoint import Layer
+from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats
 from uuv_marl.train.mappo import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
-from uuv_marl.train.shaping import Weights
 from uuv_marl.train.vec_env import TrainingVecEnv
 
 with extra("train", "training with Stable-Baselines3"):
@@ -39,16 +39,24 @@ class Hyperparameters(PPOHyperparameters):
     noise: float = 0.4
     """Standard deviation of actions at the start [full force]; then it is learned."""
 
-    def begin(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int) -> "Ppo":
+    def begin(
+        self,
+        scenario: Scenario,
+        sizes: Sequence[tuple[int, int]],
+        reward: RewardFunction,
+        seed: int,
+        device: str = "cpu",
+    ) -> "Ppo":
         """A training that has not begun.
 
         Args:
             scenario: what to train on.
             sizes: number of vehicles and of worlds of each swarm.
-            weights: of the reward.
+            reward: what vehicles are paid for a decision, from the swarm after it.
             seed: of weights, worlds and noise.
+            device: where networks and batches are.
         """
-        return Ppo(self, scenario, sizes, weights, seed)
+        return Ppo(self, scenario, sizes, reward, seed, device)
 
 
 class Ppo:
@@ -61,15 +69,22 @@ class Ppo:
         by: the algorithm's numbers.
         scenario: what to train on.
         sizes: number of vehicles and of worlds of each swarm.
-        weights: of the reward.
+        reward: what vehicles are paid for a decision, from the swarm after it.
         seed: of weights, worlds and noise.
+        device: where networks and batches are.
     """
 
     def __init__(
-        self, by: Hyperparameters, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights, seed: int
+        self,
+        by: Hyperparameters,
+        scenario: Scenario,
+        sizes: Sequence[tuple[int, int]],
+        reward: RewardFunction,
+        seed: int,
+        device: str = "cpu",
     ) -> None:
-        self._by, self._share = by, 0.0
-        self._vec_env = TrainingVecEnv(scenario, sizes, weights)
+        self._by, self._share, self._device = by, 0.0, device
+        self._vec_env = TrainingVecEnv(scenario, sizes, reward)
         self._env = VecNormalize(self._vec_env, norm_obs=False, gamma=by.gamma)
         first = int(np.random.default_rng(seed).integers(*TRAINING_SEEDS))
         self.agent_steps = by.horizon * self._vec_env.num_envs
@@ -94,7 +109,7 @@ class Ppo:
             target_kl=by.kl_stop,
             policy_kwargs={"net_arch": list(by.hidden), "log_std_init": math.log(by.noise)},
             seed=seed,
-            device="cpu",
+            device=self._device,
         )
 
     def iterate(self, share: float) -> tuple[float, Update]:
@@ -111,7 +126,9 @@ class Ppo:
         """The actor's, for a checkpoint."""
         policy: Any = self.model.policy
         linear = [layer for layer in policy.mlp_extractor.policy_net if isinstance(layer, nn.Linear)]
-        weights = [(x.weight.detach().numpy(), x.bias.detach().numpy()) for x in (*linear, policy.action_net)]
+        weights = [
+            (x.weight.detach().cpu().numpy(), x.bias.detach().cpu().numpy()) for x in (*linear, policy.action_net)
+        ]
         return [Layer(weight.T.copy(), bias.copy()) for weight, bias in weights]
 
     def pop_episode_stats(self) -> EpisodeStats:
@@ -125,7 +142,7 @@ class Ppo:
             "counters": np.array([self.model.num_timesteps, self.model._n_updates]),
             "scale": np.array([scale.mean, scale.var, scale.count]),
         }
-        arrays |= {f"policy.{key}": value.numpy().copy() for key, value in self.model.policy.state_dict().items()}
+        arrays |= {f"policy.{key}": value.cpu().numpy().copy() for key, value in self.model.policy.state_dict().items()}
         return arrays | adam_arrays(self.model.policy.optimizer, "adam")
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -37,6 +37,10 @@ class Weights(NamedTuple):
     effort: float = 0.02
     """Times the squared action."""
 
+    def __call__(self, swarm: Swarm) -> Float64:
+        """The reward of the latest decision, shape (world, vehicle)."""
+        return shaped_reward(swarm, self)
+
 
 def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
     """The reward of the latest decision, shape (world, vehicle)."""

@@ -7,11 +7,11 @@ the best validation; ``tensorboard/``. Needs ``train``.
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 import safetensors.numpy
@@ -20,12 +20,14 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
 from uuv_marl.baselines.features import BARRIER
-from uuv_marl.errors import ResultsError
+from uuv_marl.envs.reward import RewardFunction
+from uuv_marl.errors import ResultsError, RewardError
 from uuv_marl.extras import extra
+from uuv_marl.modules import named_object
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, conditions, load_scenario
 from uuv_marl.train.env import EpisodeStats
-from uuv_marl.train.folder import Say, opened, quiet, versions
+from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
 from uuv_marl.train.mappo import Hyperparameters, Mappo
 from uuv_marl.train.shaping import OVERRIDES, Weights
 from uuv_marl.train.validation import ValidationResult, validate
@@ -49,9 +51,10 @@ MIXED_VALIDATION: Sizes = ((10, 4), (54, 8), (100, 2))
 """Vehicles and episodes of each size."""
 
 
-def own_size(num_vehicles: int) -> Sizes:
-    """Swarms of one size, about as many vehicles in all as ``MIXED`` has."""
-    return ((num_vehicles, max(1, round(sum(n * worlds for n, worlds in MIXED) / num_vehicles))),)
+def swarms_of(sizes: Sequence[int]) -> Sizes:
+    """Swarms of these sizes: about as many vehicles of each, and in all as many as ``MIXED`` has."""
+    share = sum(n * worlds for n, worlds in MIXED) / len(sizes)
+    return tuple((n, max(1, round(share / n))) for n in sizes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +75,9 @@ class Settings:
     """A folder with a learner to start from: ``best`` or a checkpoint of another training."""
     weights: Weights = field(default_factory=Weights)
     """Of the training's reward."""
+    reward: str | None = None
+    """A reward of one's own in its place, ``module:function``: from the swarm after a decision to an array (world,
+    vehicle)."""
     algorithm: "Hyperparameters | ppo.Hyperparameters" = field(default_factory=Hyperparameters)
     checkpoint_every: int = 20
     """Iterations."""
@@ -82,10 +88,22 @@ class Settings:
 
     def __post_init__(self) -> None:
         n = self.load().swarm.num_vehicles
-        sizes = self.sizes or (MIXED if n == load_scenario(type(self).scenario).swarm.num_vehicles else own_size(n))
+        sizes = self.sizes or (MIXED if n == load_scenario(type(self).scenario).swarm.num_vehicles else swarms_of([n]))
         validation = self.validation or (MIXED_VALIDATION if sizes == MIXED else tuple((n, 4) for n, _ in sizes))
         object.__setattr__(self, "sizes", sizes)
         object.__setattr__(self, "validation", validation)
+
+    def paid(self) -> RewardFunction:
+        """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
+        if self.reward is None:
+            return self.weights
+        try:
+            function = named_object(self.reward)
+        except ImportError as error:
+            raise RewardError(f"reward {self.reward!r} {error}; give module:function") from None
+        if not callable(function):
+            raise RewardError(f"reward {self.reward!r} must be a function of the swarm, got {function!r}")
+        return cast(RewardFunction, function)
 
     def load(self) -> Scenario:
         """The scenario that is trained on."""
@@ -126,13 +144,14 @@ class Trainer:
 
     Args:
         settings: of the training.
+        device: torch's name of where networks and batches are; worlds are on the CPU.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, device: str = "cpu") -> None:
         self.settings = settings
         self.scenario = settings.load()
         self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
-            self.scenario, settings.sizes, settings.weights, settings.seed
+            self.scenario, settings.sizes, settings.paid(), settings.seed, device
         )
         if settings.start is not None:
             remedy = "give a folder best or a checkpoint of the same algorithm and sizes of network"
@@ -190,6 +209,7 @@ def train(
     settings: Settings | None = None,
     *,
     resume: bool = False,
+    device: str = "cpu",
     say: Say = quiet,
     stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Record]:
@@ -200,33 +220,39 @@ def train(
 
     Args:
         output: a new or empty folder, or with ``resume`` that of an earlier training.
-        settings: the default ones if None; a resume needs the same.
+        settings: the default ones if None; a resume needs the same, but for more steps: it goes on to them, with noise
+            and rates as they were at the end.
         resume: go on from the last checkpoint.
+        device: torch's name of where networks and batches are (cpu, cuda); may change at a resume.
         say: told on what is trained, and from where a resume goes on.
         stop: asked after every iteration; where it says so, the training ends with a checkpoint.
 
     Raises:
         ResultsError: the folder is used, by another process too, holds no training of these settings, or can't be
             written; the last checkpoint is whole.
+        RewardError: the reward can't be imported, or gives what is no reward.
     """
     settings = settings or Settings()
+    until = settings.steps
+    if resume:
+        settings = replace(settings, steps=min(until, begun_with(output).get("steps", until)))
     scenario = settings.load()
     described = {**asdict(settings), "scenario": scenario.model_dump(mode="json")}
     with opened(output, described, resume, Record(), say) as folder:
         record, stopped = folder.record, False
-        if record.agent_steps >= settings.steps:
+        if record.agent_steps >= until:
             return
         sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in settings.sizes)
         say(f"Training on swarms of {sizes}; {conditions(scenario)}.")
         torch.set_num_threads(1)  # sums in another order give other bits
-        trainer = Trainer(settings)
+        trainer = Trainer(settings, device)
         if folder.checkpoint:
             trainer.restore(folder.checkpoint)
-        folder.begin({"seed": settings.seed}, _LIBRARIES)
+        folder.begin({"seed": settings.seed, "steps": until, "device": device}, _LIBRARIES)
         with writing(output), SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps) as board:
-            while record.agent_steps < settings.steps and not stopped:
+            while record.agent_steps < until and not stopped:
                 record = trainer.iterate(record)
-                done = record.agent_steps >= settings.steps
+                done = record.agent_steps >= until
                 if done or record.iteration % settings.validate_every == 0:
                     record = _validated(trainer, record, output)
                 folder.note(record)

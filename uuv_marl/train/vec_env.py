@@ -8,12 +8,12 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.features import MOST_BARRIER
+from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.envs.sb3 import SharedEnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
 from uuv_marl.train.env import TrainingEnv
-from uuv_marl.train.shaping import Weights
 
 with extra("train", "training with Stable-Baselines3"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
@@ -25,12 +25,12 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
     Args:
         scenario: what to simulate.
         sizes: number of vehicles and of worlds of each swarm.
-        weights: of the reward.
+        reward: what vehicles are paid for a decision, from the swarm after it.
     """
 
-    def __init__(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], weights: Weights) -> None:
+    def __init__(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], reward: RewardFunction) -> None:
         self._next_seed: int | None = None
-        self.env = TrainingEnv(scenario, sizes, weights, self._draw)
+        self.env = TrainingEnv(scenario, sizes, reward, self._draw)
         self.reward_sum = 0.0
         """Mean reward of the rows, summed over the steps so far."""
         self.render_mode = None

@@ -1,0 +1,12 @@
+"""Code of a user's own, by name: ``module:attribute``."""
+
+import importlib
+
+
+def named_object(name: str) -> object:
+    """What ``module:attribute`` names. Raises ImportError with the reason, in words that follow the name."""
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ImportError(f"can't be imported: {error}") from None
