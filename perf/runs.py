@@ -106,7 +106,9 @@ def trained(algorithm: str) -> str:
     """Weights and progress of five updates on small swarms."""
     by = importlib.import_module(f"uuv_marl.train.{algorithm}").Hyperparameters(horizon=16, minibatch=64)
     scenario = load_scenario("random_field", overrides={"actuators.yaw_damping_nms": 600.0})
-    training = by.begin(scenario, [(5, 4), (10, 2)], Weights(), 3)
+    problem = scenario, [(5, 4), (10, 2)], Weights()
+    env = importlib.import_module("uuv_marl.train.env")
+    training = by.begin(env.Problem(*problem), 3) if hasattr(env, "Problem") else by.begin(*problem, 3)  # from 0.2.0 on
     told = [training.iterate(k / 5) for k in range(5)]
     return digest(*(array for layer in training.layers for array in layer), told)
 

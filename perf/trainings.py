@@ -31,9 +31,10 @@ def scenario(agents: int) -> Scenario:
 
 def recipe(by: Any, agents: int, worlds: int) -> Case:
     """A training of ours; a unit is an iteration."""
+    from uuv_marl.train.env import Problem
     from uuv_marl.train.shaping import Weights
 
-    training = by.begin(scenario(agents), [(agents, worlds)], Weights(), SEED)
+    training = by.begin(Problem(scenario(agents), [(agents, worlds)], Weights()), SEED)
     return repeated(lambda _: training.iterate(0.0), training.agent_steps)
 
 

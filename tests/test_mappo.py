@@ -27,7 +27,7 @@ from uuv_marl.errors import ResultsError, RewardError
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import env as env_module
 from uuv_marl.train import training as trainings
-from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
+from uuv_marl.train.env import TRAINING_SEEDS, Problem, TrainingEnv, Transition
 from uuv_marl.train.mappo import Hyperparameters, Learner, Mappo, annealed, gae
 from uuv_marl.train.shaping import OVERRIDES, PRIVILEGED_SIZE, Weights, lead, privileged_observation, shaped_reward
 from uuv_marl.train.training import Record, Settings, Trainer, train
@@ -56,7 +56,7 @@ def test_advantages_by_hand():
     np.testing.assert_allclose(gae(reward, value, ended, 0.5, 0.5), expected)
 
 
-class Problem:
+class Toy:
     """Rows that see noise and are paid by a function of (observation, action); all end every ``length`` steps."""
 
     features, size, rows = 2, 3, 64
@@ -103,7 +103,7 @@ def test_a_one_step_task_is_solved():
     def pay(observation, action):
         return 3.0 * observation[:, 2] - 10.0 * np.sum((action - observation[:, :2] * (0.5, -0.5)) ** 2, axis=1)
 
-    problem = Problem(pay)
+    problem = Toy(pay)
     learner, _ = learned(problem, 120, Hyperparameters(hidden=(32,), horizon=8, minibatch=128, kl_stop=0.05))
     x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)
     error = learner.act(x) - x[:, :2] * (0.5, -0.5)
@@ -118,7 +118,7 @@ def test_values_of_a_steady_income(cut_off, values):
     Seeds 0 to 4 gave 9.998 to 10.001, and 2.303 to 2.305, with AVX-512 and with torch's default kernels.
     """
     by = Hyperparameters(hidden=(16,), horizon=16, minibatch=256, gamma=0.9, value_decay=0.9)
-    learner, _ = learned(Problem(lambda observation, _: np.ones(len(observation)), 4, cut_off), 80, by)
+    learner, _ = learned(Toy(lambda observation, _: np.ones(len(observation)), 4, cut_off), 80, by)
     value = learner.value(np.random.default_rng(2).uniform(-1, 1, (200, 3)).astype(np.float32)).mean()
     assert value == pytest.approx(10.0 if cut_off else 2.33, rel=0.05)
     assert values[0] * 0.95 < value < values[1] * 1.05
@@ -141,7 +141,7 @@ def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
     for limit in (0.01, 1e9):
         by = Hyperparameters(hidden=(16,), horizon=8, minibatch=64, actor_epochs=20, kl_stop=limit)
         learner = Learner(2, 3, by, np.random.default_rng(seed))
-        batch, _ = learner.sample(Problem(lambda observation, action: action[:, 0]), 0.3)
+        batch, _ = learner.sample(Toy(lambda observation, action: action[:, 0]), 0.3)
         divergence.append(learner.update(batch, 0.3, 3e-3).kl)
     assert 0.01 < divergence[0] < 0.03
     assert divergence[1] > 2.0 * divergence[0]
@@ -150,7 +150,7 @@ def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
 def open_water(sizes, seed=0, weights=None, **overrides):
     scenario = load_scenario("tracking", overrides={**OPEN_WATER, **overrides})
     rng = np.random.default_rng(seed)
-    return TrainingEnv(scenario, sizes, weights or Weights(), lambda num: rng.integers(*TRAINING_SEEDS, num))
+    return TrainingEnv(Problem(scenario, sizes, weights or Weights()), lambda num: rng.integers(*TRAINING_SEEDS, num))
 
 
 def test_a_swarm_of_one_finds_the_force_that_follows():
@@ -229,7 +229,7 @@ def test_arrival_terminates():
 
 
 def test_training_worlds_are_not_those_of_validation():
-    env = TINY.begin(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights(), 0).env
+    env = TINY.begin(Problem(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights()), 0).env
     seeds = []
     env._swarms[0].reset = lambda drawn, worlds: seeds.extend(drawn)
     for _ in range(500):
@@ -652,7 +652,8 @@ def test_modules_of_optional_libraries_name_their_extra(module, library, name):
     assert f"pip install 'uuv_marl[{name}]'" in done.stderr
 
 
-OPTIONS = ["--sizes=5,20", "--network=32,16", "--reward=mine:reward", "--set", "sonar.echo_reports=surface"]
+OPTIONS = ["--sizes=5,20", "--network=32,16", "--reward=mine:reward", "--set", "sonar.echo_reports=surface",
+           "--sees=memory"]  # fmt: skip
 
 
 def test_the_command(tmp_path, monkeypatch):
@@ -690,6 +691,7 @@ def test_the_command(tmp_path, monkeypatch):
     assert settings.sizes == ((5, 100), (20, 25))
     assert settings.algorithm.hidden == (32, 16)
     assert settings.reward == "mine:reward"
+    assert settings.sees == "memory"
     assert settings.load().sonar.echo_reports == "surface"
     calls.clear()
     stopped = CliRunner().invoke(app, [*command, "--resume"])
@@ -719,6 +721,7 @@ def test_the_command(tmp_path, monkeypatch):
         (["--sizes=5", "--num-vehicles=5"], "--num-vehicles is the size of every swarm; give it or --sizes"),
         (["--set", "sonar.echo_report=surface"], "sonar.echo_report"),
         (["--reward=nowhere:reward"], "reward 'nowhere:reward' can't be imported"),
+        (["--sees=nothing"], "--sees must be percept or memory, got 'nothing'"),
         (["--device=nothing"], "--device nothing can't be used"),
     ],
 )

@@ -15,7 +15,7 @@ from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import ppo as ppos
 from uuv_marl.train import training as trainings
-from uuv_marl.train.env import TrainingEnv
+from uuv_marl.train.env import Problem, TrainingEnv
 from uuv_marl.train.ppo import Hyperparameters, Ppo
 from uuv_marl.train.shaping import Weights
 from uuv_marl.train.training import Settings, train
@@ -73,7 +73,7 @@ def test_a_one_step_task_is_solved(monkeypatch):
     """Seeds 0 to 4 miss by 0.007 to 0.011, the same with AVX-512 and with torch's default kernels."""
     monkeypatch.setattr(ppos, "TrainingVecEnv", OneStep)
     by = Hyperparameters(hidden=(32,), horizon=8, minibatch=128, kl_stop=0.05, learning_rate=(3e-3, 5e-4))
-    algorithm = Ppo(by, open_water(), SIZES, Weights(), 0)
+    algorithm = Ppo(by, Problem(open_water(), SIZES, Weights()), 0)
     rewards = [algorithm.iterate(k / 100)[0] for k in range(100)]
     assert np.mean(rewards[:5]) < -2.0
     x = np.random.default_rng(5).uniform(-1, 1, (500, 2)).astype(np.float32)
@@ -83,7 +83,7 @@ def test_a_one_step_task_is_solved(monkeypatch):
 
 def test_a_checkpoint_acts_as_the_model_does():
     """Whatever was learned: the layers that are kept give the mean of Stable-Baselines3's own distribution."""
-    algorithm = Ppo(TINY, open_water(), SIZES, Weights(), 0)
+    algorithm = Ppo(TINY, Problem(open_water(), SIZES, Weights()), 0)
     algorithm.iterate(0.0)
     x = np.random.default_rng(5).standard_normal((50, algorithm.model.observation_space.shape[0]), np.float32)
     with torch.no_grad():
@@ -103,7 +103,7 @@ def test_endings_are_told_as_sb3_wants_them():
         (arrives, True),
         ({**arrives, "arrival.radius_m": 1e-3, "time_limit.extra_s": 5.0}, False),
     ):
-        vec_env = TrainingVecEnv(open_water(**overrides), [(1, 1), (3, 1)], Weights())
+        vec_env = TrainingVecEnv(Problem(open_water(**overrides), [(1, 1), (3, 1)], Weights()))
         vec_env.seed(0)
         start = vec_env.reset()
         for _ in range(12):
@@ -185,9 +185,9 @@ def test_a_short_training_beats_random_by_far():
     Torch's default kernels gave -1.43 to -2.03 for seeds 0 to 4."""
     sizes = [(4, 8), (9, 4)]
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=272, epochs=6, kl_stop=0.1, learning_rate=(3e-3, 3e-4))
-    algorithm = Ppo(by, open_water(), sizes, Weights(), 0)
+    algorithm = Ppo(by, Problem(open_water(), sizes, Weights()), 0)
     rewards = [algorithm.iterate(k / 60)[0] for k in range(60)]
-    env = TrainingEnv(open_water(), sizes, Weights(), lambda num: range(100_000, 100_000 + num))
+    env = TrainingEnv(Problem(open_water(), sizes, Weights()), lambda num: range(100_000, 100_000 + num))
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (60, env.rows, 2)).astype(np.float32)
     floor = np.mean([env.step(action).reward for action in actions])

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
+from uuv_marl.baselines.actors import Trained
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
 from uuv_marl.baselines.features import MOST_BARRIER
-from uuv_marl.baselines.learned import Learned, Trained
+from uuv_marl.baselines.learned import Learned
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.registry import GUARDED, granted, policy_class
 from uuv_marl.extras import extra
@@ -138,7 +139,10 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
             f"policy {policy!r} is no network, so ONNX has no form for it; give a learned policy, such as the folder "
             "best of a training (uuv-marl train mappo)"
         )
-    model = _model(kind(granted(policy, scenario)))
+    made = kind(granted(policy, scenario))
+    if not isinstance(made, Learned):
+        raise PolicyError(f"policy {policy!r} remembers, and its memory has no form in ONNX yet; run it from Python")
+    model = _model(made)
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(model.SerializeToString())

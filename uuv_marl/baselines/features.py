@@ -48,7 +48,7 @@ class Features:
 
 
 @compiled
-def _put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
+def put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
     """A position [m] as four features: its direction, longer the nearer than about ``near`` it is, and itself.
 
     Args:
@@ -94,7 +94,7 @@ def _look(
             for s in range(see.heard.shape[2]):
                 if see.heard[w, i, s] > 0.0:
                     p_x, p_y = see.neighbour[w, i, s, 0], see.neighbour[w, i, s, 1]
-                    _put(p_x, p_y, 10.0, out, k)
+                    put(p_x, p_y, 10.0, out, k)
                     d_x, d_y, clamped = neighbour_force(p_x, p_y, gains)
                     f_x, f_y, clamps[w] = f_x + d_x, f_y + d_y, clamps[w] + clamped
                 k += 4

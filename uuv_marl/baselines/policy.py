@@ -132,13 +132,21 @@ class Policy:
         Raises:
             PolicyError: the percept is of another swarm; or the policy has a memory and was left out of a decision.
         """
-        if self.Memory is not None:
-            self.flat(percept)
-            self.remember(percept, self._gone_on(percept.clock))
+        self.hear(percept)
         action = self.decide(percept)
         if self.Memory is not None:
             self.acted(action, self.active)
         return action
+
+    def hear(self, percept: Percept) -> None:
+        """Remember what is perceived: the first half of ``act``, for who looks at ``memory`` before deciding.
+
+        Args:
+            percept: of shape (world, vehicle, ...).
+        """
+        if self.Memory is not None:
+            self.flat(percept)
+            self.remember(percept, self._gone_on(percept.clock))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Hook: take what these worlds perceive, shape (world,), into ``memory``."""

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.actors import Trained, shipped
 from uuv_marl.baselines.apf import Apf
 from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.checkpoint import is_checkpoint
 from uuv_marl.baselines.floors import Idle, Random
 from uuv_marl.baselines.guarded import Guarded
-from uuv_marl.baselines.learned import Trained, shipped
 from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.baselines.memory.pose import to_map_axes
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
 from uuv_marl.percept import Percept
@@ -58,16 +59,24 @@ class Scout(Filtered):
         super().__init__(scenario, num_worlds, barrier or Barrier())
         self.gains = gains or Gains()
         self._growth = growth(scenario.swarm.num_vehicles)
+        self._offset = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
 
-    def decide(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2)."""
-        action = np.zeros((*self.flat(percept).shape[:2], 2), np.float32)
-        gains = self.gains._replace(pull=self.gains.pull / self._growth)
+        return self._decided()
+
+    def _decided(self) -> Float32:
+        """The actions, where ``_offset`` is added to what vehicles wish."""
+        action = np.zeros_like(self._offset)
         _decide(
-            self.active, self._model.own.period_s, gains, self.barrier, self.limits, self._gain, self.memory,
-            self._planes, action,
+            self.active, self._model.own.period_s, self._grown(), self.barrier, self.limits, self._gain, self.memory,
+            self._planes, self._offset, action,
         )  # fmt: skip
         return action
+
+    def _grown(self) -> Gains:
+        """The gains for as many vehicles as the swarm has."""
+        return self.gains._replace(pull=self.gains.pull / self._growth)
 
 
 @compiled
@@ -129,7 +138,7 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
 @compiled
 def _decide(
     worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
-    planes: Float64, action: Float32,
+    planes: Float64, offset: Float32, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle.
 
@@ -142,12 +151,15 @@ def _decide(
         gain: force per velocity error [N s/m].
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
+        offset: added to what vehicles wish, in their own frame [m/s], shape (world, vehicle, 2).
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
                 w_x, w_y = wished(w, i, g, kept)
+                o_x, o_y = to_map_axes(offset[w, i, 0], offset[w, i, 1], kept.pose[w, i])
+                w_x, w_y = w_x + o_x, w_y + o_y
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, barrier, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)

@@ -71,6 +71,14 @@ Network = Annotated[
     str | None,
     typer.Option(metavar="UNITS,UNITS,...", help="Layers of the actor's and of the critic's network. Default: 96,96."),
 ]
+Sees = Annotated[
+    str,
+    typer.Option(
+        metavar="percept|memory",
+        help="What the actor sees. percept: the latest percept; it gives a force. memory: what vehicles remember; it "
+        "corrects the wish of scout, inside the safety filter.",
+    ),
+]
 Device = Annotated[
     str, typer.Option(help="Where networks and batches are: cpu, or cuda for a GPU. Worlds are on the CPU.")
 ]
@@ -90,6 +98,7 @@ def train_mappo(
     overrides: Changes = None,
     reward: Reward = None,
     network: Network = None,
+    sees: Sees = "percept",
     steps: Length = None,
     seed: Seed = 0,
     start: Start = None,
@@ -130,7 +139,18 @@ def train_mappo(
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
         swarms = Swarms(scenario, num_vehicles, sizes, overrides or [])
-        _train(output, resume, swarms, start, steps, device, reward=reward, seed=seed, algorithm=algorithm)
+        _train(
+            output,
+            resume,
+            swarms,
+            start,
+            steps,
+            device,
+            reward=reward,
+            sees=sees,
+            seed=seed,
+            algorithm=algorithm,
+        )
 
 
 @app.command("ppo", cls=_Command)
@@ -141,6 +161,7 @@ def train_ppo(
     overrides: Changes = None,
     reward: Reward = None,
     network: Network = None,
+    sees: Sees = "percept",
     steps: Length = None,
     seed: Seed = 0,
     start: Start = None,
@@ -162,7 +183,18 @@ def train_ppo(
         units = _whole_numbers("--network", network)
         algorithm = replace(Hyperparameters(), hidden=units or Hyperparameters.hidden)
         swarms = Swarms(scenario, num_vehicles, sizes, overrides or [])
-        _train(output, resume, swarms, start, steps, device, reward=reward, seed=seed, algorithm=algorithm)
+        _train(
+            output,
+            resume,
+            swarms,
+            start,
+            steps,
+            device,
+            reward=reward,
+            sees=sees,
+            seed=seed,
+            algorithm=algorithm,
+        )
 
 
 class Swarms(NamedTuple):
@@ -213,6 +245,8 @@ def _train(
     from uuv_marl.train.training import Settings, train
 
     _check_device(device)
+    if settings["sees"] not in ("percept", "memory"):
+        raise typer.BadParameter(f"--sees must be percept or memory, got {settings['sees']!r}")
     if settings["reward"]:
         find_modules([settings["reward"]])
     before = begun_with(output).get("steps") if resume else None

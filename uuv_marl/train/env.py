@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.features import BARRIER, Features
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.train.acting import ACTING, Sees
 from uuv_marl.train.shaping import PRIVILEGED_SIZE, privileged_observation
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -22,6 +22,20 @@ TRAINING_SEEDS = (100_000, 900_000)
 """Worlds are drawn from these; 900,000-999,999 are for validation."""
 PATIENCE_S = 40.0
 """An episode is cut off so long after l(t) came to rest: waiting for stragglers teaches little."""
+
+
+class Problem(NamedTuple):
+    """What is trained on."""
+
+    scenario: Scenario
+    sizes: Sequence[tuple[int, int]]
+    """Number of vehicles and of worlds of each swarm."""
+    reward: RewardFunction
+    """What vehicles are paid for a decision, from the swarm after it."""
+    sees: Sees = "percept"
+    """What the actor sees."""
+    change_cost: float = 0.0
+    """Paid for each 0.5 s in which the safety filter changed a vehicle's action."""
 
 
 class Transition(NamedTuple):
@@ -54,30 +68,26 @@ class TrainingEnv:
     everywhere (``Swarm.ended``), but waits no longer than ``PATIENCE_S`` for stragglers.
 
     Args:
-        scenario: what to simulate.
-        sizes: number of vehicles and of worlds of each swarm.
-        reward: what vehicles are paid for a decision, from the swarm after it.
+        problem: what is trained on.
         seeds: asked for seeds whenever worlds start; a snapshot and what it draws from determine all that follows.
 
     Raises:
         ScenarioError: vehicles can be lost in this scenario: their rows would be learned from.
     """
 
-    def __init__(
-        self, scenario: Scenario, sizes: Sequence[tuple[int, int]], reward: RewardFunction, seeds: Seeds
-    ) -> None:
+    def __init__(self, problem: Problem, seeds: Seeds) -> None:
+        scenario, sizes, self._reward, sees, self._change_cost = problem
         refuse_losses(scenario, "training")
-        self._seeds, self._reward = seeds, reward
+        self._seeds = seeds
         patience = min(scenario.time_limit.extra_s, PATIENCE_S)
         scenario = load_scenario(scenario, overrides={"time_limit.factor": 1.0, "time_limit.extra_s": patience})
         self._swarms = [Swarm(load_scenario(scenario, num_vehicles=n), worlds) for n, worlds in sizes]
-        self._features = Features(scenario, BARRIER)
-        self.features = self._features.size
+        self._acting = [ACTING[sees](swarm.scenario, swarm.num_worlds) for swarm in self._swarms]
+        self.features = self._acting[0].size
         self.size = self.features + PRIVILEGED_SIZE
         self._ends = np.cumsum([n * worlds for n, worlds in sizes])
         self.rows = int(self._ends[-1])
         self.observation = np.zeros((self.rows, self.size), np.float32)
-        self._barrier = np.zeros((self.rows, 2), np.float32)
         self._sums = [np.zeros((worlds, 3)) for _, worlds in sizes]
         self._ended = np.zeros(len(EpisodeStats._fields))
         self.reset()
@@ -90,13 +100,16 @@ class TrainingEnv:
             self._sums[k][...] = 0.0
 
     def step(self, action: Float32) -> Transition:
-        """One decision; ``action`` (row, 2) is what the actor adds to the barrier [full force]."""
+        """One decision; ``action`` (row, 2) is the actor's output, as ``Acting`` takes it."""
         reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
         final = [np.empty((0, self.size), np.float32)]
         for k, swarm in enumerate(self._swarms):
             rows, shape = self._rows(k), (swarm.num_worlds, swarm.num_vehicles)
-            swarm.step((action[rows] + self._barrier[rows]).reshape(*shape, 2))
+            swarm.step(self._acting[k].actions(action[rows].reshape(*shape, 2)))
             paid, ends = own_reward(self._reward, swarm, np.ones(shape, np.bool_)), np.array(swarm.endings())
+            if self._change_cost:
+                share = swarm.scenario.timing.decision_period_s / 0.5
+                paid = paid - share * self._change_cost * self._acting[k].changed
             reward[rows], ended[:, rows] = paid.reshape(-1), ends.repeat(shape[1], axis=1)
             self._sums[k] += np.stack([paid.mean(axis=1), swarm.facts.collisions, np.ones(shape[0])], axis=1)
             self._look(k)
@@ -121,13 +134,16 @@ class TrainingEnv:
         for k, (swarm, sums) in enumerate(zip(self._swarms, self._sums, strict=True)):
             kept |= {f"{k}.{name}": array for name, array in swarm.snapshot().items()}
             kept[f"{k}.sums"] = sums.copy()
+            kept |= {f"{k}.acting.{name}": array for name, array in self._acting[k].snapshot().items()}
         return kept
 
     def restore(self, snapshot: Arrays) -> None:
         """Go on from a snapshot of an environment of the same sizes."""
         for k, swarm in enumerate(self._swarms):
-            swarm.restore({name.split(".")[1]: array for name, array in snapshot.items() if name.startswith(f"{k}.")})
-            self._sums[k][...] = snapshot[f"{k}.sums"]
+            mine = {name.removeprefix(f"{k}."): array for name, array in snapshot.items() if name.startswith(f"{k}.")}
+            swarm.restore(mine)
+            self._acting[k].restore({name.removeprefix("acting."): mine[name] for name in mine if "acting." in name})
+            self._sums[k][...] = mine["sums"]
             self._look(k)
         self._ended[...] = snapshot["episodes"]
 
@@ -137,10 +153,7 @@ class TrainingEnv:
     def _look(self, k: int) -> None:
         swarm, rows = self._swarms[k], self._rows(k)
         observation = self.observation[rows].reshape(swarm.num_worlds, swarm.num_vehicles, self.size)
-        barrier = self._barrier[rows].reshape(swarm.num_worlds, swarm.num_vehicles, 2)
-        self._features.look(
-            swarm.percept.flat, observation[:, :, : self.features], barrier, np.zeros(swarm.num_worlds, np.int64)
-        )
+        self._acting[k].look(swarm.percept, observation[:, :, : self.features])
         privileged_observation(swarm, observation[:, :, self.features :])
 
     def _restart(self, k: int, worlds: Sequence[int]) -> None:

@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.checkpoint import Layer
-from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.extras import extra
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Bool, Float32
-from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
+from uuv_marl.train.env import TRAINING_SEEDS, Problem, TrainingEnv, Transition
 
 with extra("train", "training with MAPPO"):
     import torch
@@ -72,24 +70,15 @@ class Hyperparameters(PPOHyperparameters):
     average: float = 0.98
     """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
 
-    def begin(
-        self,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        reward: RewardFunction,
-        seed: int,
-        device: str = "cpu",
-    ) -> "Mappo":
+    def begin(self, problem: Problem, seed: int, device: str = "cpu") -> "Mappo":
         """A training that has not begun.
 
         Args:
-            scenario: what to train on.
-            sizes: number of vehicles and of worlds of each swarm.
-            reward: what vehicles are paid for a decision, from the swarm after it.
+            problem: what is trained on.
             seed: of weights, worlds and noise.
             device: where networks and batches are.
         """
-        return Mappo(self, scenario, sizes, reward, seed, device)
+        return Mappo(self, problem, seed, device)
 
 
 class Environment(Protocol):
@@ -309,25 +298,15 @@ class Mappo:
 
     Args:
         by: the algorithm's numbers.
-        scenario: what to train on.
-        sizes: number of vehicles and of worlds of each swarm.
-        reward: what vehicles are paid for a decision, from the swarm after it.
+        problem: what is trained on.
         seed: of weights, worlds and noise.
         device: where networks and batches are.
     """
 
-    def __init__(
-        self,
-        by: Hyperparameters,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        reward: RewardFunction,
-        seed: int,
-        device: str = "cpu",
-    ) -> None:
+    def __init__(self, by: Hyperparameters, problem: Problem, seed: int, device: str = "cpu") -> None:
         self._by = by
         self._rng = np.random.default_rng(seed)
-        self.env = TrainingEnv(scenario, sizes, reward, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
+        self.env = TrainingEnv(problem, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
         self.learner = Learner(self.env.features, self.env.size, by, self._rng, device)
         self.agent_steps = by.horizon * self.env.rows
         """Of an iteration."""

@@ -4,7 +4,7 @@ What differs is the algorithm: the critic sees what the actor sees, and action n
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.checkpoint import Layer
-from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.extras import extra
-from uuv_marl.scenario import Scenario
-from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats
+from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats, Problem
 from uuv_marl.train.mappo import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
 from uuv_marl.train.vec_env import TrainingVecEnv
 
@@ -39,24 +37,15 @@ class Hyperparameters(PPOHyperparameters):
     noise: float = 0.4
     """Standard deviation of actions at the start [full force]; then it is learned."""
 
-    def begin(
-        self,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        reward: RewardFunction,
-        seed: int,
-        device: str = "cpu",
-    ) -> "Ppo":
+    def begin(self, problem: Problem, seed: int, device: str = "cpu") -> "Ppo":
         """A training that has not begun.
 
         Args:
-            scenario: what to train on.
-            sizes: number of vehicles and of worlds of each swarm.
-            reward: what vehicles are paid for a decision, from the swarm after it.
+            problem: what is trained on.
             seed: of weights, worlds and noise.
             device: where networks and batches are.
         """
-        return Ppo(self, scenario, sizes, reward, seed, device)
+        return Ppo(self, problem, seed, device)
 
 
 class Ppo:
@@ -67,24 +56,14 @@ class Ppo:
 
     Args:
         by: the algorithm's numbers.
-        scenario: what to train on.
-        sizes: number of vehicles and of worlds of each swarm.
-        reward: what vehicles are paid for a decision, from the swarm after it.
+        problem: what is trained on.
         seed: of weights, worlds and noise.
         device: where networks and batches are.
     """
 
-    def __init__(
-        self,
-        by: Hyperparameters,
-        scenario: Scenario,
-        sizes: Sequence[tuple[int, int]],
-        reward: RewardFunction,
-        seed: int,
-        device: str = "cpu",
-    ) -> None:
+    def __init__(self, by: Hyperparameters, problem: Problem, seed: int, device: str = "cpu") -> None:
         self._by, self._share, self._device = by, 0.0, device
-        self._vec_env = TrainingVecEnv(scenario, sizes, reward)
+        self._vec_env = TrainingVecEnv(problem)
         self._env = VecNormalize(self._vec_env, norm_obs=False, gamma=by.gamma)
         first = int(np.random.default_rng(seed).integers(*TRAINING_SEEDS))
         self.agent_steps = by.horizon * self._vec_env.num_envs

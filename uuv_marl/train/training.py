@@ -26,7 +26,8 @@ from uuv_marl.extras import extra
 from uuv_marl.modules import named_object
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, conditions, load_scenario
-from uuv_marl.train.env import EpisodeStats
+from uuv_marl.train.acting import Sees
+from uuv_marl.train.env import EpisodeStats, Problem
 from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
 from uuv_marl.train.mappo import Hyperparameters, Mappo
 from uuv_marl.train.shaping import OVERRIDES, Weights
@@ -78,6 +79,11 @@ class Settings:
     reward: str | None = None
     """A reward of one's own in its place, ``module:function``: from the swarm after a decision to an array (world,
     vehicle)."""
+    sees: Sees = "percept"
+    """What the actor sees: features of one percept, its output being a force; or ``memory``, what is remembered, its
+    output being added to the wish of ``scout``, inside the safety filter."""
+    change_cost: float = 0.0
+    """With memory: paid for each 0.5 s in which the filter changed a vehicle's action."""
     algorithm: "Hyperparameters | ppo.Hyperparameters" = field(default_factory=Hyperparameters)
     checkpoint_every: int = 20
     """Iterations."""
@@ -151,7 +157,9 @@ class Trainer:
         self.settings = settings
         self.scenario = settings.load()
         self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
-            self.scenario, settings.sizes, settings.paid(), settings.seed, device
+            Problem(self.scenario, settings.sizes, settings.paid(), settings.sees, settings.change_cost),
+            settings.seed,
+            device,
         )
         if settings.start is not None:
             remedy = "give a folder best or a checkpoint of the same algorithm and sizes of network"
@@ -186,6 +194,7 @@ class Trainer:
             percept=rows_of(PerceptLayout.of(self.scenario)),
             yaw_damping_nms=self.scenario.actuators.yaw_damping_nms,
             channels=self.scenario.sonar.channels,
+            features=self.settings.sees,
             barrier=BARRIER,
             vehicle=vehicle_of(self.scenario),
             training=training,

@@ -7,13 +7,11 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.features import MOST_BARRIER
-from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.envs.sb3 import SharedEnvMixin
 from uuv_marl.extras import extra
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
-from uuv_marl.train.env import TrainingEnv
+from uuv_marl.train.acting import ACTING
+from uuv_marl.train.env import Problem, TrainingEnv
 
 with extra("train", "training with Stable-Baselines3"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
@@ -23,19 +21,17 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
     """Rows of a ``TrainingEnv``: features of the actor in, what it adds to the barrier [full force] out.
 
     Args:
-        scenario: what to simulate.
-        sizes: number of vehicles and of worlds of each swarm.
-        reward: what vehicles are paid for a decision, from the swarm after it.
+        problem: what is trained on.
     """
 
-    def __init__(self, scenario: Scenario, sizes: Sequence[tuple[int, int]], reward: RewardFunction) -> None:
+    def __init__(self, problem: Problem) -> None:
         self._next_seed: int | None = None
-        self.env = TrainingEnv(scenario, sizes, reward, self._draw)
+        self.env = TrainingEnv(problem, self._draw)
         self.reward_sum = 0.0
         """Mean reward of the rows, summed over the steps so far."""
         self.render_mode = None
-        size = (self.env.features,)
-        super().__init__(self.env.rows, Box(-np.inf, np.inf, size), Box(-MOST_BARRIER, MOST_BARRIER, (2,), np.float32))
+        size, most = (self.env.features,), ACTING[problem.sees].most
+        super().__init__(self.env.rows, Box(-np.inf, np.inf, size), Box(-most, most, (2,), np.float32))
 
     def _draw(self, num: int) -> Sequence[int] | None:
         """Counted on through all swarms at a reset after ``seed``; later each world goes on with its own stream."""

@@ -1,0 +1,216 @@
+"""Learned policies with memory: nothing said is ``scout``, the same in training and in use, resumed exactly."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.learned_wish import MOST_WISH, WISH_MPS, Wishing
+from uuv_marl.baselines.recall import RECALLED
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.percept import PerceptLayout
+from uuv_marl.sim.swarm import Swarm
+
+FEW = {"swarm.num_vehicles": 12, "timing.decision_period_s": 0.2, "sonar.echo_reports": "surface"}
+ROUGH = {
+    "noise.bearing_deg": 10.0, "noise.range_share": 0.2, "noise.false_echo_probability": 0.1, "current.speed_mps": 1.5,
+    "latency.processing_s": 0.5, "noise.silence_probability": 0.1, "noise.silence_readings": 10,
+}  # fmt: skip
+
+
+def actor(scale, seed=0):
+    rng = np.random.default_rng(seed)
+    return [
+        Layer(scale * rng.standard_normal((a, b), np.float32), scale * rng.standard_normal(b, np.float32))
+        for a, b in itertools.pairwise((RECALLED, 16, 2))
+    ]
+
+
+@pytest.fixture
+def saved(tmp_path):
+    def save(scale, **changes):
+        card = Card(percept=rows_of(PerceptLayout.of(load_scenario("tracking"))), features="memory", **changes)
+        save_checkpoint(tmp_path / f"{scale}" / WEIGHTS_FILE, card, actor(scale))
+        return str(tmp_path / f"{scale}")
+
+    return save
+
+
+def actions(policy, seed=10_007, decisions=150, worlds=1, overrides=FEW):
+    scenario = granted(policy, load_scenario("random_field", overrides=overrides))
+    swarm, acts = Swarm(scenario, worlds), make(policy, scenario, worlds)
+    percept, done = swarm.reset(seed), []
+    for _ in range(decisions):
+        done.append(acts.act(percept).copy())
+        percept = swarm.step(done[-1])
+    return np.array(done)
+
+
+def test_an_actor_that_says_nothing_is_scout(saved):
+    np.testing.assert_array_equal(actions(saved(0.0)), actions("scout"))
+    assert not np.array_equal(actions(saved(0.3)), actions("scout"))
+
+
+def test_a_run_depends_on_its_seed_alone(saved):
+    policy = saved(0.3)
+    both = actions(policy, decisions=80, worlds=2)
+    np.testing.assert_array_equal(both[:, 1:], actions(policy, seed=10_008, decisions=80))
+
+
+def test_whatever_the_actor_says_the_filter_has_the_last_word(saved):
+    """An actor that pushes at random at full length collides no more than ``scout`` does: not at all."""
+    policy = saved(3.0)
+    scenario = granted(policy, load_scenario("random_field", overrides=FEW))
+    runs = [event for event in evaluate(scenario, policy, [10_007, 10_008]) if isinstance(event, Run)]
+    assert [run.metrics["collisions"] for run in runs] == [0, 0]
+
+
+def test_outputs_are_bounded_velocities_in_the_vehicles_frame():
+    scenario = granted("scout", load_scenario("tracking", num_vehicles=1))
+    swarm, policy = Swarm(scenario), Wishing(scenario)
+    policy.hear(swarm.reset(0))
+    once = policy.wish(np.array([[[0.0, MOST_WISH]]], np.float32)).copy()
+    np.testing.assert_array_equal(policy.wish(np.array([[[0.0, 50.0]]], np.float32)), once)
+    quiet = policy.wish(np.zeros((1, 1, 2), np.float32)).copy()
+    assert WISH_MPS > 0.0
+    assert once[0, 0, 1] > quiet[0, 0, 1], "a wish to starboard turns to starboard"
+
+
+@pytest.mark.parametrize("overrides", [FEW, FEW | ROUGH], ids=["calm", "rough"])
+def test_what_an_actor_sees_is_bounded(overrides):
+    scenario = granted("scout", load_scenario("random_field", overrides=overrides))
+    swarm, policy = Swarm(scenario), Wishing(scenario)
+    percept, features = swarm.reset(10_008), np.full((1, 12, RECALLED), np.nan, np.float32)
+    most = np.zeros(RECALLED)
+    for _ in range(400):
+        policy.hear(percept)
+        policy.look(features)
+        most = np.maximum(most, np.abs(features[0]).max(axis=0))
+        action = policy.wish(np.zeros((1, 12, 2), np.float32))
+        policy.acted(action, policy.active)
+        percept = swarm.step(action)
+    assert np.isfinite(most).all()
+    assert most.max() < 8.0
+    assert (most > 0.0).sum() > RECALLED - 10, "most features say something"
+
+
+def test_what_an_actor_sees_turns_with_the_world():
+    """The same swarm elsewhere and turned: the vehicles' own frames are all that there is."""
+    seen, turn = [], 0.7
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    for moved in (False, True):
+        scenario = granted("scout", load_scenario("single_obstacle", overrides={"swarm.num_vehicles": 10}))
+        swarm, policy = Swarm(scenario), Wishing(scenario)
+        swarm.reset(3)
+        if moved:
+            swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (50.0, -80.0)
+            swarm.state.eta[0, :, 2] += turn
+            swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (50.0, -80.0)
+            swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (50.0, -80.0)
+        features = np.zeros((1, 10, RECALLED), np.float32)
+        policy.hear(swarm.observe())
+        policy.look(features)
+        seen.append(features)
+    np.testing.assert_allclose(seen[0], seen[1], atol=1e-3)
+
+
+def test_refusals_name_what_is_wrong(saved, tmp_path):
+    policy = saved(0.1)
+    slow = granted(policy, load_scenario("random_field", overrides={"timing.decision_period_s": 1.0}))
+    with pytest.raises(PolicyError, match="decides every 0.1 to 0.5 s"):
+        make(policy, slow)
+    wrong = Card(percept=rows_of(PerceptLayout.of(load_scenario("tracking"))))
+    save_checkpoint(tmp_path / "wrong" / WEIGHTS_FILE, wrong, actor(0.1))
+    with pytest.raises(PolicyError, match="expected float32"):
+        load_checkpoint(tmp_path / "wrong")
+
+
+@pytest.mark.needs("onnx")
+def test_it_is_not_exported(saved, tmp_path):
+    from uuv_marl.baselines.export import write_onnx
+
+    with pytest.raises(PolicyError, match="remembers, and its memory has no form in ONNX yet"):
+        write_onnx(saved(0.1), load_scenario("random_field"), tmp_path / "policy.onnx")
+
+
+@pytest.mark.needs("torch")
+@pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
+def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, monkeypatch):
+    import importlib
+
+    from uuv_marl.train import training as trainings
+    from uuv_marl.train.validation import ValidationResult
+
+    verdict = ValidationResult(-1.0, 1.0, 0, 1.0, 7.0, 15.0)
+    monkeypatch.setattr(trainings, "validate", lambda *_: verdict)
+    by = importlib.import_module(f"uuv_marl.train.{algorithm}").Hyperparameters(hidden=(8,), horizon=8, minibatch=64)
+    overrides = {
+        "timing.decision_period_s": 0.5,
+        "actuators.yaw_damping_nms": 600.0,
+        "time_limit.factor": 0.02,
+        "sonar.echo_reports": "surface",
+    }
+
+    def settings(steps):
+        return trainings.Settings(
+            sizes=((3, 3), (6, 2)), steps=steps * 8 * 21, algorithm=by, overrides=overrides, sees="memory",
+            checkpoint_every=1, validation=((3, 1),), change_cost=0.1,
+        )  # fmt: skip
+
+    whole = list(trainings.train(tmp_path / "whole", settings(4)))
+    first = trainings.train(tmp_path / "parts", settings(4))
+    next(first), next(first)
+    first.close()
+    rest = list(trainings.train(tmp_path / "parts", settings(4), resume=True))
+    assert [record.reward for record in rest] == [record.reward for record in whole[2:]]
+    weights = [
+        (tmp_path / name / "checkpoints" / "000004" / "learner.safetensors").read_bytes() for name in ("whole", "parts")
+    ]
+    assert weights[0] == weights[1]
+
+    made = load_checkpoint(tmp_path / "whole" / "best")
+    assert made.card.features == "memory"
+    trainer = trainings.Trainer(settings(4))
+    env = trainer.algorithm.env if algorithm == "mappo" else trainer.algorithm._vec_env.env
+    swarm, acting = env._swarms[0], env._acting[0]
+    policy = make(str(tmp_path / "whole" / "best"), swarm.scenario, swarm.num_worlds)
+    for _ in range(10):
+        percept = swarm.percept
+        features = env.observation[env._rows(0), : env.features]
+        used = policy.act(percept)
+        np.testing.assert_array_equal(policy._features.reshape(-1, RECALLED), features)
+        rows = np.zeros((env.rows, 2), np.float32)
+        rows[env._rows(0)] = used_output(policy)
+        env.step(rows)
+        np.testing.assert_array_equal(acting._policy.memory.action, used)
+
+
+def used_output(policy):
+    """What the policy's network said."""
+    return (policy._offset / WISH_MPS).reshape(-1, 2)
+
+
+@pytest.mark.needs("torch")
+def test_what_the_filter_changes_is_charged():
+    from uuv_marl.train.env import Problem, TrainingEnv
+
+    rewards = []
+    for cost in (0.0, 2.0):
+        overrides = FEW | {"actuators.yaw_damping_nms": 600.0}
+        problem = Problem(
+            load_scenario("random_field", overrides=overrides), [(12, 2)], lambda s: np.zeros(s.state.alive.shape),
+            "memory", cost,
+        )  # fmt: skip
+        env = TrainingEnv(problem, lambda num: range(10_007, 10_007 + num))
+        paid = []
+        for _ in range(120):
+            paid.append(env.step(np.zeros((24, 2), np.float32)).reward)
+            changed = env._acting[0].changed.reshape(-1)
+            np.testing.assert_allclose(paid[-1], -cost * 0.4 * changed, atol=1e-6)
+        rewards.append(np.sum(paid))
+    assert rewards[0] == 0.0
+    assert rewards[1] < -1.0

@@ -1,0 +1,47 @@
+"""Learned policies by their checkpoints, whatever their actors see."""
+
+import functools
+from pathlib import Path
+
+from uuv_marl.baselines.checkpoint import Checkpoint, load_checkpoint
+from uuv_marl.baselines.learned import Learned
+from uuv_marl.baselines.learned_wish import LearnedWish
+from uuv_marl.scenario import Scenario
+
+
+class Trained:
+    """A learned policy before it is made for a scenario: call it with a scenario.
+
+    Args:
+        name: by which messages call it.
+        path: of the checkpoint, a file or the folder that holds it; read when something of it is asked for.
+        doc: what it is.
+    """
+
+    def __init__(self, name: str, path: Path, doc: str | None = Learned.__doc__) -> None:
+        self.name, self._path, self.__doc__ = name, path, doc
+
+    @functools.cached_property
+    def checkpoint(self) -> Checkpoint:
+        """What the file holds. Raises PolicyError where that is no policy."""
+        return load_checkpoint(self._path)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels needed beyond the percept."""
+        return self.checkpoint.card.channels
+
+    @property
+    def yaw_damping_nms(self) -> float:
+        """Inner loop that it was trained with [N m s]."""
+        return self.checkpoint.card.yaw_damping_nms
+
+    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedWish:
+        """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
+        kind = LearnedWish if self.checkpoint.card.features == "memory" else Learned
+        return kind(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)
+
+
+def shipped(name: str, doc: str) -> Trained:
+    """The policy of a checkpoint in ``uuv_marl/baselines/trained``."""
+    return Trained(name, Path(__file__).parent / "trained" / f"{name}.safetensors", doc)

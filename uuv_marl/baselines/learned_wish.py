@@ -1,0 +1,69 @@
+"""A learned policy with memory: a network changes what the hand-made law wishes, and the filter has the last word.
+
+Residual learning (Johannink et al., Residual reinforcement learning for robot control, ICRA 2019): with a network that
+says nothing the policy is ``scout``.
+"""
+
+import numpy as np
+
+from uuv_marl.baselines.checkpoint import Checkpoint
+from uuv_marl.baselines.learned import forward, need_same
+from uuv_marl.baselines.recall import RECALLED, recall
+from uuv_marl.baselines.scout import Scout
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Float32
+
+WISH_MPS = 2.0
+"""What an output of 1 adds to the wished velocity [m/s]. Assumed: half of l(t)'s speed."""
+MOST_WISH = 3.0
+"""Outputs are bounded here [1]. Assumed: more than what the fastest vehicle could use."""
+
+
+class Wishing(Scout):
+    """``scout``, to whose wishes an actor adds something. Arguments as for ``Scout``."""
+
+    def look(self, features: Float32) -> None:
+        """Fill what an actor sees of what is remembered, shape (world, vehicle, ``RECALLED``)."""
+        recall(
+            self.active, self._model.own.period_s, self._grown(), self.barrier, self.limits, self.memory,
+            self._planes, features,
+        )  # fmt: skip
+
+    def wish(self, output: Float32) -> Float32:
+        """The actions for an actor's output, shape (world, vehicle, 2)."""
+        np.multiply(np.clip(output, -MOST_WISH, MOST_WISH), np.float32(WISH_MPS), out=self._offset)
+        return self._decided()
+
+
+class LearnedWish(Wishing):
+    """A checkpoint's actor inside ``scout``'s law, memory and filter. Deterministic.
+
+    Args:
+        scenario: gives the vehicle, the decision period and the percept's layout.
+        num_worlds: first axis of the percepts.
+        name: by which messages call it.
+        checkpoint: the actor, and what it was trained on.
+        any_vehicle: run it also on a vehicle that it was not trained on.
+
+    Raises:
+        PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.
+    """
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False
+    ) -> None:
+        self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
+        self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
+        super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety)
+        need_same(self, card, any_vehicle)
+        self._features = np.zeros((*self._offset.shape[:2], RECALLED), np.float32)
+
+    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
+        """Actions of shape (world, vehicle, 2)."""
+        self.look(self._features)
+        acting = np.flatnonzero(self.active)
+        output = np.zeros_like(self._offset)
+        rows = self._features[acting].reshape(-1, RECALLED)
+        output[acting] = forward(self.checkpoint.layers, rows).reshape(len(acting), -1, 2)
+        return self.wish(output)

@@ -1,0 +1,118 @@
+"""How the actor in training sees a swarm and drives it: as the policies do that its checkpoints become."""
+
+from collections.abc import Mapping
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features
+from uuv_marl.baselines.learned_wish import MOST_WISH, Wishing
+from uuv_marl.baselines.recall import RECALLED
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Float32
+
+Arrays = dict[str, NDArray[Any]]
+Sees = Literal["percept", "memory"]
+"""What an actor sees: features of one percept, or of what is remembered."""
+
+
+class Acting(Protocol):
+    """The way from percepts to features, and from an actor's output to actions, for a swarm."""
+
+    size: int
+    """Features of a vehicle."""
+    most: float
+    """Outputs mean no more beyond this."""
+    changed: Float32
+    """1 where the safety filter changed the latest action, shape (world, vehicle)."""
+
+    def look(self, percept: Percept, features: Float32) -> None:
+        """Fill the features, shape (world, vehicle, ``size``); twice at a time where some worlds begin anew."""
+        ...
+
+    def actions(self, output: Float32) -> Float32:
+        """The actions for an output, shape (world, vehicle, 2)."""
+        ...
+
+    def snapshot(self) -> Arrays:
+        """All that ``restore`` needs, besides a ``look`` at the same percept."""
+        ...
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot."""
+        ...
+
+
+class Forces:
+    """An actor without memory: its output is a force [full force], to which a fixed barrier is added.
+
+    Args:
+        scenario: what is simulated.
+        num_worlds: of the swarm.
+    """
+
+    most = MOST_BARRIER
+
+    def __init__(self, scenario: Scenario, num_worlds: int) -> None:
+        self._features = Features(scenario, BARRIER)
+        self.size = self._features.size
+        shape = num_worlds, scenario.swarm.num_vehicles
+        self._barrier, self.changed = np.zeros((*shape, 2), np.float32), np.zeros(shape, np.float32)
+        self._clamps = np.zeros(num_worlds, np.int64)
+
+    def look(self, percept: Percept, features: Float32) -> None:
+        """Fill the features, and the barrier's force."""
+        self._features.look(percept.flat, features, self._barrier, self._clamps)
+
+    def actions(self, output: Float32) -> Float32:
+        """The force and the barrier's."""
+        return output + self._barrier
+
+    def snapshot(self) -> Arrays:
+        """Nothing: there is no memory."""
+        return {}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Nothing to do."""
+
+
+class Wishes:
+    """An actor with memory: its output is added to the hand-made law's wish, and the filter makes it safe.
+
+    Args:
+        scenario: what is simulated.
+        num_worlds: of the swarm.
+    """
+
+    size = RECALLED
+    most = MOST_WISH
+
+    def __init__(self, scenario: Scenario, num_worlds: int) -> None:
+        self._policy = Wishing(scenario, num_worlds)
+        self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
+
+    def look(self, percept: Percept, features: Float32) -> None:
+        """Remember what is perceived, then fill the features."""
+        self._policy.hear(percept)
+        self._policy.look(features)
+
+    def actions(self, output: Float32) -> Float32:
+        """Those of the policy, which is told what it did."""
+        action = self._policy.wish(output)
+        self._policy.acted(action, self._policy.active)
+        self.changed[...] = self._policy.memory.filtered[:, :, 0]
+        return action
+
+    def snapshot(self) -> Arrays:
+        """What is remembered."""
+        return self._policy.snapshot()
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Remember it again."""
+        self._policy.restore(snapshot)
+
+
+ACTING: dict[Sees, type[Forces] | type[Wishes]] = {"percept": Forces, "memory": Wishes}
+"""By what an actor sees."""
