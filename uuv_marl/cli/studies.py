@@ -1,4 +1,4 @@
-"""``uuv-marl reproduce``, ``identify`` and ``heldout``: the paper again, what it leaves open, and learned policies."""
+"""``uuv-marl reproduce``, ``identify`` and ``heldout``: the paper again, what it leaves open, and every policy anew."""
 
 from pathlib import Path
 from typing import Annotated
@@ -63,19 +63,19 @@ def heldout(
         list[str] | None, typer.Option(help="Run only this set, such as random_field. Repeat it for several sets.")
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, max=10_000, help="Most seeds of a set. Without it a set has 20 to 500.")
+        int | None, typer.Option(min=1, max=10_000, help="Most seeds of a policy on a set. Without it 5 to 1,000.")
     ] = None,
     trainings: Annotated[
         Path | None, typer.Option(help="Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/heldout"),
 ) -> None:
-    """Evaluate the shipped learned policies beside the hand-made ones, on what no training has seen.
+    """Evaluate every policy on seeds that no training, no tuning and no choice has used.
 
-    The sets are 500 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface,
+    The sets are 1,000 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface,
     and other decision periods. It writes report.md, episodes.csv and pictures; with --trainings it also compares
-    algorithms over training seeds, and writes marl_eval.json. All sets took 40 minutes in two processes, each with its
-    own --only. Ctrl-C keeps the finished episodes, and the same command continues.
+    algorithms over training seeds, and writes marl_eval.json. All sets took about two hours in two processes, each with
+    its own --only. Ctrl-C keeps the finished episodes, and the same command continues.
 
     Example: uuv-marl heldout --only single_obstacle --seeds 5
     """
