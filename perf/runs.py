@@ -27,8 +27,17 @@ from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.shaping import Weights
 
-_SETS = "uuv_marl.studies.heldout.sets" if importlib.util.find_spec("uuv_marl.studies") else "uuv_marl.heldout.sets"
-SETS = importlib.import_module(_SETS).SETS
+SIZES: dict[str, dict[str, object]] = {f"_n{n}": {"swarm.num_vehicles": n} for n in (10, 100, 200)}
+SURFACE: dict[str, dict[str, object]] = {"_surface": {"sonar.echo_reports": "surface"}}
+PERIODS: dict[str, dict[str, object]] = {f"_every_{t}_s": {"timing.decision_period_s": t} for t in (0.2, 0.5)}
+SETS = {name: (name, {}) for name in ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")} | {
+    f"{name}{end}": (name, changes)
+    for name, all_changes in (
+        ("random_field", SIZES | SURFACE | PERIODS), ("single_obstacle", SIZES | SURFACE),
+    )
+    for end, changes in all_changes.items()
+}  # fmt: skip
+"""Scenario and changed fields of what episodes are run on, by name."""
 SEED, MOST_AGENT_STEPS = 10_000, 30_000
 """The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
@@ -107,8 +116,10 @@ def trained(algorithm: str) -> str:
     by = importlib.import_module(f"uuv_marl.train.{algorithm}").Hyperparameters(horizon=16, minibatch=64)
     scenario = load_scenario("random_field", overrides={"actuators.yaw_damping_nms": 600.0})
     problem = scenario, [(5, 4), (10, 2)], Weights()
-    env = importlib.import_module("uuv_marl.train.env")
-    training = by.begin(env.Problem(*problem), 3) if hasattr(env, "Problem") else by.begin(*problem, 3)  # from 0.2.0 on
+    try:  # from 0.2.0 on
+        training = by.begin(importlib.import_module("uuv_marl.train.env").Problem(*problem), 3)
+    except (ImportError, AttributeError):
+        training = by.begin(*problem, 3)
     told = [training.iterate(k / 5) for k in range(5)]
     return digest(*(array for layer in training.layers for array in layer), told)
 
@@ -125,9 +136,9 @@ def exported() -> str:
 
 def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any, ...]]]:
     """Kind, name, maker and its arguments of every hash."""
-    for held, policy in itertools.product(SETS, POLICIES):
-        name = f"{held.name} {policy}"
-        scenario = load_scenario(held.scenario, overrides=held.overrides)
+    for (kind, (base, changes)), policy in itertools.product(SETS.items(), POLICIES):
+        name = f"{kind} {policy}"
+        scenario = load_scenario(base, overrides=changes)
         yield "episodes", name, episodes, (scenario, policy, SEED + zlib.crc32(name.encode()) % 80_000)
     for name in SCENARIOS:
         yield "parallel_env", f"{name} bio_inspired", parallel, (name, "bio_inspired", "individual")

@@ -30,15 +30,15 @@ class Gains(NamedTuple):
     """Of the wished velocity. One set for all scenarios, swarm sizes, echoes and decision periods."""
 
     pull: float = 0.05
-    """To l(t) [1/s], for up to 54 vehicles; divided by sqrt(n / 54) for more, which are spread farther."""
+    """To l(t) [1/s], for up to 54 vehicles; divided by g = sqrt(n / 54) for more, which are spread farther."""
     push: float = 10.0
     """Away from a neighbour at no distance [m/s], falling linearly to none at ``push_range``."""
     push_range: float = 12.0
     """Where pushes end [m]: so near, hearing is mutual, and pushes cancel over the swarm."""
     pull_at_rest: float = 4.0
-    """Times the pull where l(t) rests [1]."""
+    """Times the pull where l(t) rests [1]; times sqrt(g) for larger swarms."""
     push_at_rest: float = 2.0
-    """Times the push where l(t) rests [1]."""
+    """Times the push where l(t) rests [1]; times g for larger swarms: those outside press the others together."""
 
 
 class Scout(Filtered):
@@ -76,7 +76,11 @@ class Scout(Filtered):
 
     def _grown(self) -> Gains:
         """The gains for as many vehicles as the swarm has."""
-        return self.gains._replace(pull=self.gains.pull / self._growth)
+        g = self._growth
+        return self.gains._replace(
+            pull=self.gains.pull / g, pull_at_rest=self.gains.pull_at_rest * math.sqrt(g),
+            push_at_rest=self.gains.push_at_rest * g,
+        )  # fmt: skip
 
 
 @compiled
