@@ -115,7 +115,7 @@ def test_plans():
     assert len(job.QUICK.axes) == 8
     assert len(job.cells(job.QUICK)) * job.QUICK.seeds == 2 * 3 * 25 * 5
     # 21 axes have three levels, and the shipped policies use neither link nor modem.
-    assert len(job.cells(job.SHIPPED)) == 3 * (1 + 3 * (len(AXES) - 1))
+    assert len(job.cells(job.SHIPPED)) == 4 * (1 + 3 * (len(AXES) - 1))
 
 
 # Scores
