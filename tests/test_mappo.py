@@ -28,8 +28,10 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import env as env_module
 from uuv_marl.train import training as trainings
 from uuv_marl.train.env import TRAINING_SEEDS, Problem, TrainingEnv, Transition
-from uuv_marl.train.mappo import Hyperparameters, Learner, Mappo, annealed, gae
+from uuv_marl.train.folder import steps_before
+from uuv_marl.train.mappo import Hyperparameters, Learner, Mappo, gae
 from uuv_marl.train.shaping import OVERRIDES, PRIVILEGED_SIZE, Weights, lead, privileged_observation, shaped_reward
+from uuv_marl.train.shared import annealed
 from uuv_marl.train.training import Record, Settings, Trainer, train
 from uuv_marl.train.validation import VALIDATION_SEEDS, cost, validation_result
 
@@ -339,6 +341,8 @@ def test_a_finished_training_goes_on_to_more_steps_as_it_ended(tmp_path, no_vali
     assert files(tmp_path / "parts") == files(tmp_path / "whole")
     config = json.loads((tmp_path / "parts" / "config.json").read_text())
     assert config["settings"]["steps"] == 2 * 168
+    assert steps_before(tmp_path / "parts") == 5 * 168
+    assert steps_before(tmp_path) == 0
     assert [(session["steps"], session["device"]) for session in config["sessions"]] == [
         (2 * 168, "cpu"), (4 * 168, "cpu"), (5 * 168, "cpu")
     ]  # fmt: skip

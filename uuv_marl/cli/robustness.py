@@ -54,8 +54,8 @@ def robustness(
 
     Each axis makes one thing worse in five levels (uuv_marl/studies/robustness/axes.toml, with sources). It writes
     report.md (scores, critical severities, every cell), figures/severity.png and episodes.csv (a row for each episode;
-    Python: pandas.read_csv). Without --quick or --full it makes the report that ships in docs/robustness, in about
-    80 minutes on two cores. Needs the extra "analysis". Ctrl-C keeps the finished episodes; the same command goes on.
+    Python: pandas.read_csv). Without --quick or --full it makes the report that ships in docs/robustness, in more
+    than an hour on two cores. Needs the extra "analysis". Ctrl-C keeps the finished episodes; the same command goes on.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """

@@ -1,96 +1,39 @@
 """``uuv-marl train``: a command for each library."""
 
-import re
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
-from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, progress_bar, shown
+from uuv_marl.cli.console import console, explained, extra, progress_bar, shown
+from uuv_marl.cli.train_options import (
+    Changes,
+    Command,
+    Device,
+    Length,
+    Network,
+    Output,
+    Resume,
+    Reward,
+    Scenario,
+    Seed,
+    Sees,
+    Sizes,
+    Start,
+    Steps,
+    Task,
+    Vehicles,
+    whole_numbers,
+)
 
 app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
 
 
-def _whole(text: str) -> int:
-    if not re.fullmatch(r"[1-9]\d{0,14}|[1-9](\.\d+)?e\d{1,2}", str(text)):
-        raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give for instance 3000000 or 3e6")
-    return int(float(text))
-
-
-class _Command(TyperCommand):
-    """Says how an option of two values looks."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As a command does, with an example in the message."""
-        try:
-            return super().parse_args(ctx, args)
-        except Exception as error:
-            if "2 arguments" not in str(error):
-                raise
-            raise typer.BadParameter(f"{error} Give it at the start and at the end: --noise 0.4 0.08", ctx) from None
-
-
-Scenario = Annotated[str, typer.Option(help="Name or TOML file.")]
-Vehicles = Annotated[
-    int | None,
-    typer.Option(min=1, help="Of every swarm. Default: the scenario's; 10 to 100 at once where that has 54."),
-]
-Steps = Annotated[
-    int,
-    typer.Option(parser=_whole, metavar="NUMBER", help="Agent-steps in all, such as 3e6: decisions times vehicles."),
-]
-Length = Annotated[
-    int | None,
-    typer.Option(
-        parser=_whole, metavar="NUMBER",
-        help="Agent-steps in all, such as 3e6: decisions times vehicles. More at a --resume prolong the training. "
-        "Default: 3e7, or at a --resume those of before.",
-    ),
-]  # fmt: skip
-Changes = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
-]
-Sizes = Annotated[
-    str | None, typer.Option(metavar="N,N,...", help="Train on swarms of these sizes at once, such as 5,10,20.")
-]
-Reward = Annotated[
-    str | None,
-    typer.Option(
-        metavar="MODULE:FUNCTION",
-        help="A reward of your own: from the swarm after a decision to an array (world, vehicle). The module is looked "
-        "for in the current folder too. Default: that of uuv_marl/train/shaping.py.",
-    ),
-]
-Network = Annotated[
-    str | None,
-    typer.Option(metavar="UNITS,UNITS,...", help="Layers of the actor's and of the critic's network. Default: 96,96."),
-]
-Sees = Annotated[
-    str,
-    typer.Option(
-        metavar="percept|memory",
-        help="What the actor sees. percept: the latest percept; it gives a force. memory: what vehicles remember; it "
-        "corrects the wish of scout, inside the safety filter.",
-    ),
-]
-Device = Annotated[
-    str, typer.Option(help="Where networks and batches are: cpu, or cuda for a GPU. Worlds are on the CPU.")
-]
-Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
-Start = Annotated[
-    Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
-]
-Output = Annotated[Path, typer.Option(help="Folder of settings, progress and checkpoint.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")]
-
-
-@app.command("mappo", cls=_Command)
+@app.command("mappo", cls=Command)
 def train_mappo(
     scenario: Scenario = "random_field",
     num_vehicles: Vehicles = None,
@@ -133,27 +76,16 @@ def train_mappo(
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
 
-        given = {"noise": noise, "learning_rate": rate, "hidden": _whole_numbers("--network", network)}
+        given = {"noise": noise, "learning_rate": rate, "hidden": whole_numbers("--network", network)}
         try:
             algorithm = replace(Hyperparameters(), **{name: value for name, value in given.items() if value})
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
-        swarms = Swarms(scenario, num_vehicles, sizes, overrides or [])
-        _train(
-            output,
-            resume,
-            swarms,
-            start,
-            steps,
-            device,
-            reward=reward,
-            sees=sees,
-            seed=seed,
-            algorithm=algorithm,
-        )
+        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed)
+        _train(output, resume, task, start, steps, device, algorithm)
 
 
-@app.command("ppo", cls=_Command)
+@app.command("ppo", cls=Command)
 def train_ppo(
     scenario: Scenario = "random_field",
     num_vehicles: Vehicles = None,
@@ -180,78 +112,33 @@ def train_ppo(
         with extra("train", "training with Stable-Baselines3"):
             from uuv_marl.train.ppo import Hyperparameters
 
-        units = _whole_numbers("--network", network)
+        units = whole_numbers("--network", network)
         algorithm = replace(Hyperparameters(), hidden=units or Hyperparameters.hidden)
-        swarms = Swarms(scenario, num_vehicles, sizes, overrides or [])
-        _train(
-            output,
-            resume,
-            swarms,
-            start,
-            steps,
-            device,
-            reward=reward,
-            sees=sees,
-            seed=seed,
-            algorithm=algorithm,
-        )
-
-
-class Swarms(NamedTuple):
-    """What is trained on, as the options say it."""
-
-    scenario: str
-    num_vehicles: int | None
-    sizes: str | None
-    overrides: Sequence[str]
-
-    def settings(self) -> dict[str, Any]:
-        """The same, as a training's settings hold it."""
-        from uuv_marl.train.training import OVERRIDES, swarms_of
-
-        size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
-        sizes = _whole_numbers("--sizes", self.sizes)
-        if sizes and size:
-            raise typer.BadParameter("--num-vehicles is the size of every swarm; give it or --sizes")
-        changes = {**OVERRIDES, **size, **changes_of(self.overrides)}
-        return {"scenario": self.scenario, "overrides": changes, "sizes": swarms_of(sizes) if sizes else ()}
-
-
-def _whole_numbers(option: str, text: str | None) -> tuple[int, ...]:
-    """The numbers of a text such as 96,96; none where there is no text."""
-    if text is None:
-        return ()
-    parts = text.split(",")
-    if not all(re.fullmatch(r"[1-9]\d{0,5}", part) for part in parts):
-        raise typer.BadParameter(f"{option} must be whole numbers from 1 on, such as 96,96; got {text!r}")
-    return tuple(map(int, parts))
+        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed)
+        _train(output, resume, task, start, steps, device, algorithm)
 
 
 def _train(
-    output: Path, resume: bool, swarms: Swarms, start: Path | None, steps: int | None, device: str, **settings: Any
+    output: Path, resume: bool, task: Task, start: Path | None, steps: int | None, device: str, algorithm: Any
 ) -> None:
-    """Train with these settings, and show how it goes.
+    """Train, and show how it goes.
 
     Args:
         output: folder of the training.
         resume: go on with it.
-        swarms: what is trained on.
+        task: what is trained on.
         start: folder of another training's weights to begin with.
         steps: agent-steps in all; None for the default, or at a resume those of before.
         device: where networks and batches are.
-        settings: the other settings of the training.
+        algorithm: its hyperparameters.
     """
-    from uuv_marl.train.folder import begun_with
+    from uuv_marl.train.folder import steps_before
     from uuv_marl.train.training import Settings, train
 
     _check_device(device)
-    if settings["sees"] not in ("percept", "memory"):
-        raise typer.BadParameter(f"--sees must be percept or memory, got {settings['sees']!r}")
-    if settings["reward"]:
-        find_modules([settings["reward"]])
-    before = begun_with(output).get("steps") if resume else None
-    length = steps or before or Settings.steps
-    chosen = Settings(**settings, **swarms.settings(), steps=length, start=None if start is None else str(start))
+    length = steps or (steps_before(output) if resume else 0) or Settings.steps
+    weights = None if start is None else str(start)
+    chosen = Settings(**task.settings(), steps=length, start=weights, algorithm=algorithm)
     texts = {
         "reward": "reward {reward:.3f}",
         "score": "validation: score {score:.3f} (best {best:.3f}), arrived {arrived:.0%}, collisions {collisions}",
@@ -313,7 +200,7 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
         raise typer.Exit(130)
 
 
-@app.command("rllib", cls=_Command)
+@app.command("rllib", cls=Command)
 def train_rllib(
     scenario: Scenario = "single_obstacle",
     num_vehicles: Annotated[int | None, typer.Option(min=1, help="Replaces the scenario's.")] = None,

@@ -40,6 +40,7 @@ NonPositive = Annotated[float, within(-1_000_000, 0)]
 Speed = Annotated[float, within(0, 100)]
 Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
 Seconds = TypeVar("Seconds", float, NDArray[np.float64])
+"""A time or an array of times [s]."""
 Clock = Annotated[float, within(0.0001, 3_600)]
 Lag = Annotated[float, within(0, 3_600)]
 Legs = Annotated[int, within(1, 8)]

@@ -184,6 +184,15 @@ def begun_with(path: Path) -> dict[str, Any]:
         return {}
 
 
+def steps_before(path: Path) -> int:
+    """Agent-steps to which a training was to go when it was run last; 0 where none can be read."""
+    try:
+        config = json.loads((path / "config.json").read_text(encoding="utf-8"))
+        return int(config["sessions"][-1].get("steps", config["settings"]["steps"]))
+    except (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError):
+        return 0
+
+
 def versions(libraries: Sequence[str]) -> dict[str, str]:
     """Of this package and of libraries."""
     return {"uuv_marl": __version__, **{library: version(library) for library in libraries}}

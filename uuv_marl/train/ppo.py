@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats, Problem
-from uuv_marl.train.mappo import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
+from uuv_marl.train.shared import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
 from uuv_marl.train.vec_env import TrainingVecEnv
 
 with extra("train", "training with Stable-Baselines3"):

@@ -18,7 +18,7 @@ with extra("train", "training with Stable-Baselines3"):
 
 
 class TrainingVecEnv(SharedEnvMixin, VecEnv):
-    """Rows of a ``TrainingEnv``: features of the actor in, what it adds to the barrier [full force] out.
+    """Rows of a ``TrainingEnv``: features of the actor in, its output out, as ``Acting`` takes it.
 
     Args:
         problem: what is trained on.

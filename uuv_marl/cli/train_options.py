@@ -1,0 +1,128 @@
+"""The options of ``uuv-marl train``, which its commands share, and what they say of the task."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import typer
+from typer.core import TyperCommand
+
+from uuv_marl.cli.console import changes_of, find_modules
+
+
+def whole_number(text: str) -> int:
+    """A number such as 3000000 or 3e6."""
+    if not re.fullmatch(r"[1-9]\d{0,14}|[1-9](\.\d+)?e\d{1,2}", str(text)):
+        raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give for instance 3000000 or 3e6")
+    return int(float(text))
+
+
+class Command(TyperCommand):
+    """Says how an option of two values looks."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As a command does, with an example in the message."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            if "2 arguments" not in str(error):
+                raise
+            raise typer.BadParameter(f"{error} Give it at the start and at the end: --noise 0.4 0.08", ctx) from None
+
+
+Scenario = Annotated[str, typer.Option(help="Name or TOML file.")]
+Vehicles = Annotated[
+    int | None,
+    typer.Option(min=1, help="Of every swarm. Default: the scenario's; 10 to 100 at once where that has 54."),
+]
+Steps = Annotated[
+    int,
+    typer.Option(
+        parser=whole_number, metavar="NUMBER", help="Agent-steps in all, such as 3e6: decisions times vehicles."
+    ),
+]
+Length = Annotated[
+    int | None,
+    typer.Option(
+        parser=whole_number, metavar="NUMBER",
+        help="Agent-steps in all, such as 3e6: decisions times vehicles. More at a --resume prolong the training. "
+        "Default: 3e7, or at a --resume those of before.",
+    ),
+]  # fmt: skip
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
+]
+Sizes = Annotated[
+    str | None, typer.Option(metavar="N,N,...", help="Train on swarms of these sizes at once, such as 5,10,20.")
+]
+Reward = Annotated[
+    str | None,
+    typer.Option(
+        metavar="MODULE:FUNCTION",
+        help="A reward of your own: from the swarm after a decision to an array (world, vehicle). The module is looked "
+        "for in the current folder too. Default: that of uuv_marl/train/shaping.py.",
+    ),
+]
+Network = Annotated[
+    str | None,
+    typer.Option(metavar="UNITS,UNITS,...", help="Layers of the actor's and of the critic's network. Default: 96,96."),
+]
+Sees = Annotated[
+    str,
+    typer.Option(
+        metavar="percept|memory",
+        help="What the actor sees. percept: the latest percept; it gives a force. memory: what vehicles remember; it "
+        "corrects the wish of scout, inside the safety filter.",
+    ),
+]
+Device = Annotated[
+    str, typer.Option(help="Where networks and batches are: cpu, or cuda for a GPU. Worlds are on the CPU.")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
+Start = Annotated[
+    Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
+]
+Output = Annotated[Path, typer.Option(help="Folder of settings, progress and checkpoint.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")]
+
+
+class Task(NamedTuple):
+    """What is trained on, as the options say it."""
+
+    scenario: str
+    num_vehicles: int | None
+    sizes: str | None
+    overrides: Sequence[str] | None
+    reward: str | None
+    sees: str
+    seed: int
+
+    def settings(self) -> dict[str, Any]:
+        """The same, as a training's settings hold it."""
+        from uuv_marl.train.training import OVERRIDES, swarms_of
+
+        size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
+        sizes = whole_numbers("--sizes", self.sizes)
+        if sizes and size:
+            raise typer.BadParameter("--num-vehicles is the size of every swarm; give it or --sizes")
+        if self.sees not in ("percept", "memory"):
+            raise typer.BadParameter(f"--sees must be percept or memory, got {self.sees!r}")
+        if self.reward:
+            find_modules([self.reward])
+        changes = {**OVERRIDES, **size, **changes_of(self.overrides or [])}
+        return {
+            "scenario": self.scenario, "overrides": changes, "sizes": swarms_of(sizes) if sizes else (),
+            "reward": self.reward, "sees": self.sees, "seed": self.seed,
+        }  # fmt: skip
+
+
+def whole_numbers(option: str, text: str | None) -> tuple[int, ...]:
+    """The numbers of a text such as 96,96; none where there is no text."""
+    if text is None:
+        return ()
+    parts = text.split(",")
+    if not all(re.fullmatch(r"[1-9]\d{0,5}", part) for part in parts):
+        raise typer.BadParameter(f"{option} must be whole numbers from 1 on, such as 96,96; got {text!r}")
+    return tuple(map(int, parts))
