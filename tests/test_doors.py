@@ -209,7 +209,8 @@ def test_divergence_never_becomes_a_row_of_results(runaway):
 def test_training_refuses_scenarios_in_which_vehicles_are_lost():
     pytest.importorskip("torch")
     from uuv_marl.scenario import ScenarioError
-    from uuv_marl.train.env import Problem, TrainingEnv
+    from uuv_marl.train.env import TrainingEnv
+    from uuv_marl.train.group import Problem
     from uuv_marl.train.shaping import Weights
 
     with pytest.raises(ScenarioError, match="training can't show that a vehicle is lost"):

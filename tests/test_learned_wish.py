@@ -176,15 +176,15 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
     assert made.card.features == "memory"
     trainer = trainings.Trainer(settings(4))
     env = trainer.algorithm.env if algorithm == "mappo" else trainer.algorithm._vec_env.env
-    swarm, acting = env._swarms[0], env._acting[0]
+    swarm, acting = env._groups[0].swarm, env._groups[0].acting
     policy = make(str(tmp_path / "whole" / "best"), swarm.scenario, swarm.num_worlds)
     for _ in range(10):
         percept = swarm.percept
-        features = env.observation[env._rows(0), : env.features]
+        features = env.observation[env._rows[0], : env.features]
         used = policy.act(percept)
         np.testing.assert_array_equal(policy._features.reshape(-1, RECALLED), features)
         rows = np.zeros((env.rows, 2), np.float32)
-        rows[env._rows(0)] = used_output(policy)
+        rows[env._rows[0]] = used_output(policy)
         env.step(rows)
         np.testing.assert_array_equal(acting._policy.memory.action, used)
 
@@ -196,7 +196,8 @@ def used_output(policy):
 
 @pytest.mark.needs("torch")
 def test_what_the_filter_changes_is_charged():
-    from uuv_marl.train.env import Problem, TrainingEnv
+    from uuv_marl.train.env import TrainingEnv
+    from uuv_marl.train.group import Problem
 
     rewards = []
     for cost in (0.0, 2.0):
@@ -209,7 +210,7 @@ def test_what_the_filter_changes_is_charged():
         paid = []
         for _ in range(120):
             paid.append(env.step(np.zeros((24, 2), np.float32)).reward)
-            changed = env._acting[0].changed.reshape(-1)
+            changed = env._groups[0].acting.changed.reshape(-1)
             np.testing.assert_allclose(paid[-1], -cost * 0.4 * changed, atol=1e-6)
         rewards.append(np.sum(paid))
     assert rewards[0] == 0.0

@@ -25,10 +25,11 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError, RewardError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train import env as env_module
+from uuv_marl.train import group as group_module
 from uuv_marl.train import training as trainings
-from uuv_marl.train.env import TRAINING_SEEDS, Problem, TrainingEnv, Transition
+from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.folder import steps_before
+from uuv_marl.train.group import Problem
 from uuv_marl.train.mappo import Hyperparameters, Learner, Mappo, gae
 from uuv_marl.train.shaping import OVERRIDES, PRIVILEGED_SIZE, Weights, lead, privileged_observation, shaped_reward
 from uuv_marl.train.shared import annealed
@@ -201,7 +202,7 @@ def test_a_short_training_beats_random_by_far():
 
 
 def test_a_training_env_ends_worlds_and_starts_them_anew(monkeypatch):
-    monkeypatch.setattr(env_module, "PATIENCE_S", 0.0)  # cut off when l(t) comes to rest, after 2 s
+    monkeypatch.setattr(group_module, "PATIENCE_S", 0.0)  # cut off when l(t) comes to rest, after 2 s
     env = open_water([(1, 2), (3, 2)], **{"trajectory.waypoints_m": [[0.0, 0.0], [8.0, 0.0]]})
     assert env.observation.shape == (8, env.features + PRIVILEGED_SIZE)
     idle = np.zeros((8, 2), np.float32)
@@ -233,9 +234,9 @@ def test_arrival_terminates():
 def test_training_worlds_are_not_those_of_validation():
     env = TINY.begin(Problem(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights()), 0).env
     seeds = []
-    env._swarms[0].reset = lambda drawn, worlds: seeds.extend(drawn)
+    env._groups[0].swarm.reset = lambda drawn, worlds: seeds.extend(drawn)
     for _ in range(500):
-        env._restart(0, [0, 1])
+        env.reset()
     assert TRAINING_SEEDS == (100_000, VALIDATION_SEEDS)
     assert 100_000 <= min(seeds) < 110_000
     assert 890_000 < max(seeds) < VALIDATION_SEEDS

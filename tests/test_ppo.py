@@ -15,7 +15,8 @@ from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import ppo as ppos
 from uuv_marl.train import training as trainings
-from uuv_marl.train.env import Problem, TrainingEnv
+from uuv_marl.train.env import TrainingEnv
+from uuv_marl.train.group import Problem
 from uuv_marl.train.ppo import Hyperparameters, Ppo
 from uuv_marl.train.shaping import Weights
 from uuv_marl.train.training import Settings, train

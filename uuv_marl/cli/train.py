@@ -17,6 +17,7 @@ from uuv_marl.cli.train_options import (
     Length,
     Network,
     Output,
+    Recipe,
     Resume,
     Reward,
     Scenario,
@@ -27,6 +28,7 @@ from uuv_marl.cli.train_options import (
     Steps,
     Task,
     Vehicles,
+    alone,
     whole_numbers,
 )
 
@@ -35,6 +37,8 @@ app = typer.Typer(help="Train a policy; each command is named after its library.
 
 @app.command("mappo", cls=Command)
 def train_mappo(
+    context: typer.Context,
+    recipe: Recipe = None,
     scenario: Scenario = "random_field",
     num_vehicles: Vehicles = None,
     sizes: Sizes = None,
@@ -76,13 +80,19 @@ def train_mappo(
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
 
+        alone(context, "recipe", ("seed", "steps", "device", "output", "resume"))
+        if recipe is not None:
+            from uuv_marl.train.recipe import load_recipe
+
+            _train(output, resume, load_recipe(recipe).settings(seed), steps, device)
+            return
         given = {"noise": noise, "learning_rate": rate, "hidden": whole_numbers("--network", network)}
         try:
             algorithm = replace(Hyperparameters(), **{name: value for name, value in given.items() if value})
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
-        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed)
-        _train(output, resume, task, start, steps, device, algorithm)
+        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed, start)
+        _train(output, resume, task.settings(algorithm), steps, device)
 
 
 @app.command("ppo", cls=Command)
@@ -114,31 +124,25 @@ def train_ppo(
 
         units = whole_numbers("--network", network)
         algorithm = replace(Hyperparameters(), hidden=units or Hyperparameters.hidden)
-        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed)
-        _train(output, resume, task, start, steps, device, algorithm)
+        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed, start)
+        _train(output, resume, task.settings(algorithm), steps, device)
 
 
-def _train(
-    output: Path, resume: bool, task: Task, start: Path | None, steps: int | None, device: str, algorithm: Any
-) -> None:
+def _train(output: Path, resume: bool, settings: Any, steps: int | None, device: str) -> None:
     """Train, and show how it goes.
 
     Args:
         output: folder of the training.
         resume: go on with it.
-        task: what is trained on.
-        start: folder of another training's weights to begin with.
-        steps: agent-steps in all; None for the default, or at a resume those of before.
+        settings: of the training.
+        steps: agent-steps in all; None for those of the settings, or at a resume those of before.
         device: where networks and batches are.
-        algorithm: its hyperparameters.
     """
     from uuv_marl.train.folder import steps_before
-    from uuv_marl.train.training import Settings, train
+    from uuv_marl.train.training import train
 
     _check_device(device)
-    length = steps or (steps_before(output) if resume else 0) or Settings.steps
-    weights = None if start is None else str(start)
-    chosen = Settings(**task.settings(), steps=length, start=weights, algorithm=algorithm)
+    chosen = replace(settings, steps=steps or (steps_before(output) if resume else 0) or settings.steps)
     texts = {
         "reward": "reward {reward:.3f}",
         "score": "validation: score {score:.3f} (best {best:.3f}), arrived {arrived:.0%}, collisions {collisions}",

@@ -80,6 +80,14 @@ Sees = Annotated[
 Device = Annotated[
     str, typer.Option(help="Where networks and batches are: cpu, or cuda for a GPU. Worlds are on the CPU.")
 ]
+Recipe = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="All of a training from a file: scenario, sizes, disturbances, reward and algorithm. shipped gives the "
+        "shipped policy's like. Besides it give --seed, --steps, --device and --output alone.",
+    ),
+]
 Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
 Start = Annotated[
     Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
@@ -98,10 +106,11 @@ class Task(NamedTuple):
     reward: str | None
     sees: str
     seed: int
+    start: Path | None
 
-    def settings(self) -> dict[str, Any]:
-        """The same, as a training's settings hold it."""
-        from uuv_marl.train.training import OVERRIDES, swarms_of
+    def settings(self, algorithm: Any) -> Any:
+        """The settings of a training with this algorithm."""
+        from uuv_marl.train.training import OVERRIDES, Settings, swarms_of
 
         size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
         sizes = whole_numbers("--sizes", self.sizes)
@@ -112,10 +121,21 @@ class Task(NamedTuple):
         if self.reward:
             find_modules([self.reward])
         changes = {**OVERRIDES, **size, **changes_of(self.overrides or [])}
-        return {
-            "scenario": self.scenario, "overrides": changes, "sizes": swarms_of(sizes) if sizes else (),
-            "reward": self.reward, "sees": self.sees, "seed": self.seed,
-        }  # fmt: skip
+        return Settings(
+            scenario=self.scenario, overrides=changes, sizes=swarms_of(sizes) if sizes else (), reward=self.reward,
+            sees=self.sees, seed=self.seed, start=None if self.start is None else str(self.start), algorithm=algorithm,
+        )  # fmt: skip
+
+
+def alone(context: typer.Context, option: str, beside: Sequence[str]) -> None:
+    """Refuse other options than these beside one that says all the rest."""
+    if context.params[option] is None:
+        return
+    for name, value in context.params.items():
+        source = context.get_parameter_source(name)
+        if name not in (option, *beside) and source is not None and source.name == "COMMANDLINE":
+            given = next(parameter.opts[0] for parameter in context.command.params if parameter.name == name)
+            raise typer.BadParameter(f"--{option} says this already; leave out {given} {value}")
 
 
 def whole_numbers(option: str, text: str | None) -> tuple[int, ...]:

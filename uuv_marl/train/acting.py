@@ -6,7 +6,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features
+from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_features
 from uuv_marl.baselines.learned_wish import MOST_WISH, Wishing
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.percept import Percept
@@ -22,14 +22,23 @@ class Acting(Protocol):
     """The way from percepts to features, and from an actor's output to actions, for a swarm."""
 
     size: int
-    """Features of a vehicle."""
+    """Features of a vehicle, see ``num_features``."""
     most: float
     """Outputs mean no more beyond this."""
     changed: Float32
     """1 where the safety filter changed the latest action, shape (world, vehicle)."""
 
+    @staticmethod
+    def num_features(scenario: Scenario) -> int:
+        """Features of a vehicle in a scenario."""
+        ...
+
+    def hear(self, percept: Percept) -> None:
+        """Take in what is perceived while an output is held."""
+        ...
+
     def look(self, percept: Percept, features: Float32) -> None:
-        """Fill the features, shape (world, vehicle, ``size``); twice at a time where some worlds begin anew."""
+        """The same, and fill the features, shape (world, vehicle, ``size``); twice where worlds begin anew."""
         ...
 
     def actions(self, output: Float32) -> Float32:
@@ -62,6 +71,15 @@ class Forces:
         self._barrier, self.changed = np.zeros((*shape, 2), np.float32), np.zeros(shape, np.float32)
         self._clamps = np.zeros(num_worlds, np.int64)
 
+    @staticmethod
+    def num_features(scenario: Scenario) -> int:
+        """As in ``Acting``."""
+        return num_features(scenario.sonar.num_sectors, scenario.sonar.num_active_sectors)
+
+    def hear(self, percept: Percept) -> None:
+        """The barrier's force from what is perceived."""
+        self.look(percept, np.empty((*self.changed.shape, self.size), np.float32))
+
     def look(self, percept: Percept, features: Float32) -> None:
         """Fill the features, and the barrier's force."""
         self._features.look(percept.flat, features, self._barrier, self._clamps)
@@ -93,9 +111,18 @@ class Wishes:
         self._policy = Wishing(scenario, num_worlds)
         self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
 
+    @staticmethod
+    def num_features(scenario: Scenario) -> int:  # noqa: ARG004 - of what is remembered, whatever the sonar
+        """As in ``Acting``."""
+        return RECALLED
+
+    def hear(self, percept: Percept) -> None:
+        """Remember what is perceived."""
+        self._policy.hear(percept)
+
     def look(self, percept: Percept, features: Float32) -> None:
         """Remember what is perceived, then fill the features."""
-        self._policy.hear(percept)
+        self.hear(percept)
         self._policy.look(features)
 
     def actions(self, output: Float32) -> Float32:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.sim.arrays import Bool, Float32
-from uuv_marl.train.env import TRAINING_SEEDS, Problem, TrainingEnv, Transition
+from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
+from uuv_marl.train.group import Problem
 from uuv_marl.train.shared import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
 
 with extra("train", "training with MAPPO"):

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
-from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats, Problem
+from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats
+from uuv_marl.train.group import Problem
 from uuv_marl.train.shared import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
 from uuv_marl.train.vec_env import TrainingVecEnv
 

@@ -36,6 +36,11 @@ class Weights(NamedTuple):
     """Per contact that begins."""
     effort: float = 0.02
     """Times the squared action."""
+    team: float = 0.0
+    """All vehicles pay this for each metre from the swarm's centre to l(t), up to 60 m."""
+    late: float = 0.0
+    """All vehicles pay this while l(t) rests and the swarm has not arrived; less, by up to two thirds, the nearer the
+    swarm's centre is to the end."""
 
     def __call__(self, swarm: Swarm) -> Float64:
         """The reward of the latest decision, shape (world, vehicle)."""
@@ -55,7 +60,17 @@ def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
         - by.spacing * close * close
         - by.effort * facts.effort
     )
+    if by.team or by.late:
+        rate = rate - _shared(swarm, by)[:, None]
     return share * rate - by.collision * facts.contacts
+
+
+def _shared(swarm: Swarm, by: Weights) -> Float64:
+    """What all vehicles of a world pay for where their centre is, shape (world,)."""
+    facts = swarm.facts
+    error = np.hypot(*(facts.centre - facts.reference[:, :2]).T)
+    waits = facts.time_s >= swarm.duration_s
+    return by.team * np.minimum(error, 60.0) + by.late * waits * (1.0 - 2.0 / 3.0 * np.exp(-error / 4.0))
 
 
 def lead(swarm: Swarm) -> Float64:

@@ -27,8 +27,9 @@ from uuv_marl.modules import named_object
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, conditions, load_scenario
 from uuv_marl.train.acting import Sees
-from uuv_marl.train.env import EpisodeStats, Problem
+from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
+from uuv_marl.train.group import Conditions, Problem
 from uuv_marl.train.mappo import Hyperparameters, Mappo
 from uuv_marl.train.shaping import OVERRIDES, Weights
 from uuv_marl.train.validation import ValidationResult, validate
@@ -84,6 +85,10 @@ class Settings:
     output being added to the wish of ``scout``, inside the safety filter."""
     change_cost: float = 0.0
     """With memory: paid for each 0.5 s in which the filter changed a vehicle's action."""
+    held_s: float = 0.0
+    """An output of the actor is held for so long; 0: for one decision."""
+    conditions: Conditions = ()
+    """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
     algorithm: "Hyperparameters | ppo.Hyperparameters" = field(default_factory=Hyperparameters)
     checkpoint_every: int = 20
     """Iterations."""
@@ -157,7 +162,15 @@ class Trainer:
         self.settings = settings
         self.scenario = settings.load()
         self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
-            Problem(self.scenario, settings.sizes, settings.paid(), settings.sees, settings.change_cost),
+            Problem(
+                self.scenario,
+                settings.sizes,
+                settings.paid(),
+                settings.sees,
+                settings.change_cost,
+                settings.held_s,
+                settings.conditions,
+            ),
             settings.seed,
             device,
         )

@@ -11,7 +11,8 @@ from uuv_marl.envs.sb3 import SharedEnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.sim.arrays import Float32
 from uuv_marl.train.acting import ACTING
-from uuv_marl.train.env import Problem, TrainingEnv
+from uuv_marl.train.env import TrainingEnv
+from uuv_marl.train.group import Problem
 
 with extra("train", "training with Stable-Baselines3"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv

@@ -38,9 +38,9 @@ class Axis(NamedTuple):
     """Fields that are shares of the speed of l(t)."""
 
     def overrides(self, level: int, speed_mps: float) -> dict[str, object]:
-        """Fields of a scenario in which l(t) moves at this speed [m/s], the base's too; ``level`` is one of mine."""
+        """Fields of a scenario in which l(t) moves at this speed [m/s]; ``level`` is one of mine."""
         changes = self.changes[self.levels.index(level)]
-        return BASE | {f: speed_mps * v if f in self.of_speed else v for f, v in changes.items()}
+        return {f: speed_mps * v if f in self.of_speed else v for f, v in changes.items()}
 
     def concerns(self, policy: str) -> bool:
         """Whether the policy uses what goes wrong here."""
@@ -73,7 +73,7 @@ def overrides(axis: str, level: int, scenario: str) -> dict[str, object]:
     """The fields of a scenario that a cell of the suite changes."""
     if axis == CALM:
         return BASE
-    return AXES[axis].overrides(level, load_scenario(scenario).trajectory.speed_mps)
+    return BASE | AXES[axis].overrides(level, load_scenario(scenario).trajectory.speed_mps)
 
 
 def known(names: Sequence[str]) -> list[str]:

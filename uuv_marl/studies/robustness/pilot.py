@@ -13,7 +13,7 @@ from uuv_marl.benchmark.runner import Evaluate
 from uuv_marl.benchmark.tables import counted, markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.columns import columns, write_columns
-from uuv_marl.studies.robustness.axes import AXES, BASE
+from uuv_marl.studies.robustness.axes import AXES
 from uuv_marl.studies.suite import Case, Report, Suite
 
 _TOLD = tomllib.loads(resources.files("uuv_marl.studies.robustness").joinpath("pilot.toml").read_text(encoding="utf-8"))
@@ -63,8 +63,7 @@ def _overrides(row: dict[str, Any]) -> dict[str, object]:
         return row.get("set", {})
     axis, _, level = row["axis"].partition(".")
     speed = load_scenario(row.get("scenario", "single_obstacle")).trajectory.speed_mps
-    changed = AXES[axis].overrides(int(level), speed)
-    return {field: value for field, value in changed.items() if field not in BASE} | {"arrival.radius_m": 20.0}
+    return AXES[axis].overrides(int(level), speed) | {"arrival.radius_m": 20.0}
 
 
 def _slug(what: str) -> str:

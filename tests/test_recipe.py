@@ -1,0 +1,110 @@
+"""Recipes: what they say is what is trained on, in turn; they resume exactly, on any number of threads."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines.checkpoint import load_checkpoint
+from uuv_marl.scenario.conditions import disturbances
+
+pytestmark = pytest.mark.needs("torch")
+WEIGHTS: dict[str, np.ndarray] = {}
+"""What the first of the runs on one and two threads gave."""
+
+
+def recipe(path, **changes):
+    """A recipe of small swarms and short courses; ``changes`` replace its fields."""
+    told = {
+        "title": '"small"', "sees": '"memory"', "sizes": "[[4, 2], [6, 1]]", "validation": "[[4, 1]]", "held_s": 0.5,
+        "steps": 4000, "validate_every": 10, **changes,
+    }  # fmt: skip
+    episodes = '[episodes]\ncalm = 0.3\nsurface = 0.5\nperiods_s = [0.1, 0.5]\naxes = ["W1", "S1", "A1"]\nnumber = 12\n'
+    short = '[episodes.changes]\n"random_field.legs" = [1, 1]\n"random_field.leg_length_m" = [60.0, 80.0]\n'
+    path.write_text("".join(f"{key} = {value}\n" for key, value in told.items()) + episodes + short, encoding="utf-8")
+    return str(path)
+
+
+def test_a_recipe_draws_what_it_says():
+    from uuv_marl.train.recipe import load_recipe
+
+    one, other = (load_recipe("shipped").settings(seed) for seed in (0, 1))
+    assert one == load_recipe("shipped").settings(0)
+    assert one.conditions != other.conditions
+    for conditions in (one.conditions, other.conditions):
+        loaded = [load_scenario(one.scenario, overrides={**one.overrides, **changes}) for changes in conditions]
+        calm = [scenario for scenario in loaded if not disturbances(scenario)]
+        assert 0.3 < len(calm) / len(loaded) < 0.7
+        assert {scenario.sonar.echo_reports for scenario in loaded} == {"centre", "surface"}
+        assert {scenario.timing.decision_period_s for scenario in loaded} == {0.1, 0.5}
+
+
+def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
+    from uuv_marl.train.env import TrainingEnv
+    from uuv_marl.train.group import Problem
+    from uuv_marl.train.recipe import load_recipe
+
+    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(0)
+    problem = Problem(
+        settings.load(), settings.sizes, settings.weights, settings.sees, held_s=0.5, conditions=settings.conditions
+    )
+    rng = np.random.default_rng(0)
+    env = TrainingEnv(problem, lambda num: rng.integers(100_000, 900_000, num))
+    seen = [[group.swarm] for group in env._groups]
+    for _ in range(260):
+        before = [group.swarm.facts.time_s[0] for group in env._groups]
+        env.step(np.zeros((env.rows, 2), np.float32))
+        for group, swarms, then in zip(env._groups, seen, before, strict=True):
+            if group.swarm is swarms[-1]:
+                assert group.swarm.facts.time_s[0] == pytest.approx(then + 0.5)
+            else:
+                swarms.append(group.swarm)
+    conditions = settings.conditions
+    for group, swarms in zip(env._groups, seen, strict=True):
+        assert len(swarms) > 2
+        made = [(s.scenario.timing.decision_period_s, s.scenario.sonar.echo_reports) for s in swarms]
+        first = group._turn - len(swarms) + 1
+        told = [conditions[(first + k) % len(conditions)] for k in range(len(swarms))]
+        assert made == [(t["timing.decision_period_s"], t.get("sonar.echo_reports", "centre")) for t in told]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_recipe_resumes_bit_for_bit_on_any_number_of_threads(tmp_path, threads):
+    import numba
+
+    from uuv_marl.train import training as trainings
+    from uuv_marl.train.recipe import load_recipe
+
+    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(3)
+    settings = dataclasses.replace(settings, checkpoint_every=1)
+    before = numba.get_num_threads()
+    try:
+        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+        list(trainings.train(tmp_path / "whole", settings))
+        stopped = iter([False, True])
+        list(trainings.train(tmp_path / "parts", settings, stop=lambda: next(stopped)))
+        list(trainings.train(tmp_path / "parts", settings, resume=True))
+    finally:
+        numba.set_num_threads(before)
+    one, two = (load_checkpoint(tmp_path / name / "best").layers for name in ("whole", "parts"))
+    for a, b in zip(one, two, strict=True):
+        np.testing.assert_array_equal(a.weight, b.weight)
+    np.testing.assert_array_equal(WEIGHTS.setdefault("first", one[0].weight), one[0].weight)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"sees": '"nothing"'}, "sees"),
+        ({"sizez": "[[4, 2]]"}, "sizez"),
+        ({"scenario": '"nowhere"'}, "nowhere"),
+        ({"held_s": -1}, "held_s"),
+    ],
+)
+def test_bad_recipes_are_refused_by_name(tmp_path, changes, told):
+    from uuv_marl.errors import ResultsError
+    from uuv_marl.train.recipe import load_recipe
+
+    with pytest.raises(ResultsError, match=told):
+        load_recipe(recipe(tmp_path / "bad.toml", **changes))

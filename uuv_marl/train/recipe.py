@@ -1,0 +1,115 @@
+"""Recipes: files that say all of a training, so that one command gives a policy's like again."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pydantic
+
+from uuv_marl.errors import ResultsError
+from uuv_marl.scenario import load_scenario
+from uuv_marl.studies.robustness.axes import AXES, known
+from uuv_marl.train.acting import Sees
+from uuv_marl.train.mappo import Hyperparameters
+from uuv_marl.train.shaping import OVERRIDES, Weights
+from uuv_marl.train.training import Settings
+
+
+class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
+    """What differs from one episode to the next: echoes, decision period, disturbance."""
+
+    changes: dict[str, Any] = {}
+    """Fields of the scenario that all have, but validation has not."""
+    calm: float = pydantic.Field(1.0, ge=0.0, le=1.0)
+    """Share of episodes without a disturbance."""
+    surface: float = pydantic.Field(0.0, ge=0.0, le=1.0)
+    """Share of episodes in which echoes report surfaces instead of centres."""
+    periods_s: tuple[float, ...] = (0.1,)
+    """Decision periods, as often as they are to come."""
+    axes: tuple[str, ...] = ()
+    """Disturbances: axes of the robustness suite."""
+    levels: tuple[int, ...] = (1, 2, 3, 4, 5)
+    """Their levels."""
+    number: int = pydantic.Field(1, ge=1)
+    """So many different ones are drawn; then they come again."""
+
+    def draw(self, scenario: str, seed: int) -> tuple[Mapping[str, object], ...]:
+        """Fields of the scenario for each of ``number`` episodes."""
+        rng = np.random.default_rng(seed)
+        speed = load_scenario(scenario).trajectory.speed_mps
+        places = [(axis, level) for axis in known(self.axes) for level in self.levels if level in AXES[axis].levels]
+        drawn: list[Mapping[str, object]] = []
+        for _ in range(self.number):
+            echo, disturbed = rng.random(2) < (self.surface, 1.0 - self.calm)
+            changes = {**self.changes, "timing.decision_period_s": float(rng.choice(self.periods_s))}
+            if echo:
+                changes["sonar.echo_reports"] = "surface"
+            if disturbed and places:
+                axis, level = places[rng.integers(len(places))]
+                changes |= AXES[axis].overrides(level, speed)
+            drawn.append(changes)
+        return tuple(drawn)
+
+
+class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
+    """A file's content; what it leaves out is as in ``Settings``."""
+
+    title: str
+    scenario: str = "random_field"
+    overrides: dict[str, Any] = {}
+    sees: Sees = "percept"
+    sizes: tuple[tuple[int, int], ...] = ()
+    validation: tuple[tuple[int, int], ...] = ()
+    steps: int = pydantic.Field(Settings.steps, ge=1)
+    held_s: float = pydantic.Field(0.0, ge=0.0, le=10.0)
+    change_cost: float = pydantic.Field(0.0, ge=0.0)
+    validate_every: int = pydantic.Field(Settings.validate_every, ge=1)
+    weights: dict[str, float] = {}
+    mappo: dict[str, Any] = {}
+    episodes: Episodes | None = None
+
+    def settings(self, seed: int) -> Settings:
+        """The settings of a training, whose seed draws the episodes' conditions too."""
+        taken = {name: getattr(self, name) for name in _TAKEN}
+        numbers = {name: tuple(value) if isinstance(value, list) else value for name, value in self.mappo.items()}
+        return Settings(
+            **taken,
+            seed=seed,
+            overrides={**OVERRIDES, **self.overrides},
+            weights=Weights(**self.weights),
+            algorithm=Hyperparameters(**numbers),
+            conditions=self.episodes.draw(self.scenario, seed) if self.episodes else (),
+        )
+
+
+_TAKEN = ("scenario", "sees", "sizes", "validation", "steps", "held_s", "change_cost", "validate_every")
+
+
+def recipes() -> Sequence[str]:
+    """Names of the recipes that come with the package."""
+    return sorted(path.name.removesuffix(".toml") for path in _folder().iterdir() if path.name.endswith(".toml"))
+
+
+def _folder() -> Any:
+    return resources.files("uuv_marl.train") / "recipes"
+
+
+def load_recipe(name: str) -> Recipe:
+    """A recipe by name, or from a TOML file. Raises ResultsError naming what is wrong in it."""
+    path = Path(name)
+    try:
+        text = path.read_text(encoding="utf-8") if path.suffix == ".toml" else (_folder() / f"{name}.toml").read_text()
+    except OSError as error:
+        there = ", ".join(recipes())
+        raise ResultsError(
+            f"recipe {name!r} can't be read ({error.strerror}); give one of {there}, or a TOML file"
+        ) from None
+    try:
+        recipe = Recipe(**tomllib.loads(text))
+        recipe.settings(0)
+    except (pydantic.ValidationError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
+        raise ResultsError(f"recipe {name!r} can't be used: {error}") from None
+    return recipe
