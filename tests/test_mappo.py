@@ -260,6 +260,17 @@ def test_the_reward_by_hand(place):
     np.testing.assert_allclose(shaped_reward(swarm, only)[0], expected - [0, 0, 8], rtol=1e-12)
 
 
+@pytest.mark.parametrize("at_rest", [False, True])
+def test_what_all_pay_for_their_centre_by_hand(place, at_rest):
+    swarm = place("single_obstacle", [[0, 0, 0], [30.0, 0, 0], [0, 300.0, 0]], obstacles=[(0.0, -37.0, 25.0)])
+    swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (3.0, -4.0)
+    swarm.facts.time_s[0] = swarm.duration_s[0] + (0.1 if at_rest else -0.1)
+    alone, all_pay = shaped_reward(swarm, Weights()), shaped_reward(swarm, Weights(team=0.1, late=3.0))
+    per_step = swarm.scenario.timing.decision_period_s / 0.5
+    expected = 0.1 * 5.0 + at_rest * (3.0 - 2.0 * np.exp(-5.0 / 4.0))
+    np.testing.assert_allclose(alone - all_pay, per_step * expected, rtol=1e-9)
+
+
 def test_moving_the_centre_is_paid_in_full():
     """One of n vehicles moves by 1 m towards where the centre should be: paid about 1 m, and not 1/n of it."""
     swarm = Swarm(load_scenario("tracking", num_vehicles=50))

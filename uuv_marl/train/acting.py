@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_features
 from uuv_marl.baselines.learned_wish import MOST_WISH, Wishing
 from uuv_marl.baselines.recall import RECALLED
+from uuv_marl.baselines.scout import Gains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
@@ -60,11 +61,12 @@ class Forces:
     Args:
         scenario: what is simulated.
         num_worlds: of the swarm.
+        law: of the hand-made law, which it does not use.
     """
 
     most = MOST_BARRIER
 
-    def __init__(self, scenario: Scenario, num_worlds: int) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains) -> None:  # noqa: ARG002
         self._features = Features(scenario, BARRIER)
         self.size = self._features.size
         shape = num_worlds, scenario.swarm.num_vehicles
@@ -102,13 +104,14 @@ class Wishes:
     Args:
         scenario: what is simulated.
         num_worlds: of the swarm.
+        law: gains of the hand-made law.
     """
 
     size = RECALLED
     most = MOST_WISH
 
-    def __init__(self, scenario: Scenario, num_worlds: int) -> None:
-        self._policy = Wishing(scenario, num_worlds)
+    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains) -> None:
+        self._policy = Wishing(scenario, num_worlds, gains=law)
         self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
 
     @staticmethod

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pydantic
 
+from uuv_marl.baselines.scout import Gains
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.robustness.axes import AXES, known
@@ -67,6 +68,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     held_s: float = pydantic.Field(0.0, ge=0.0, le=10.0)
     change_cost: float = pydantic.Field(0.0, ge=0.0)
     validate_every: int = pydantic.Field(Settings.validate_every, ge=1)
+    law: dict[str, float] = {}
     weights: dict[str, float] = {}
     mappo: dict[str, Any] = {}
     episodes: Episodes | None = None
@@ -79,6 +81,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
             **taken,
             seed=seed,
             overrides={**OVERRIDES, **self.overrides},
+            law=Gains(**self.law),
             weights=Weights(**self.weights),
             algorithm=Hyperparameters(**numbers),
             conditions=self.episodes.draw(self.scenario, seed) if self.episodes else (),

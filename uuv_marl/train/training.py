@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
 from uuv_marl.baselines.features import BARRIER
+from uuv_marl.baselines.scout import Gains
 from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import ResultsError, RewardError
 from uuv_marl.extras import extra
@@ -85,6 +86,8 @@ class Settings:
     output being added to the wish of ``scout``, inside the safety filter."""
     change_cost: float = 0.0
     """With memory: paid for each 0.5 s in which the filter changed a vehicle's action."""
+    law: Gains = field(default_factory=Gains)
+    """With memory: of the hand-made law that the actor corrects."""
     held_s: float = 0.0
     """An output of the actor is held for so long; 0: for one decision."""
     conditions: Conditions = ()
@@ -169,6 +172,7 @@ class Trainer:
                 settings.sees,
                 settings.change_cost,
                 settings.held_s,
+                settings.law,
                 settings.conditions,
             ),
             settings.seed,
@@ -209,6 +213,7 @@ class Trainer:
             channels=self.scenario.sonar.channels,
             features=self.settings.sees,
             barrier=BARRIER,
+            law=self.settings.law,
             vehicle=vehicle_of(self.scenario),
             training=training,
         )
