@@ -9,7 +9,7 @@ from uuv_marl.baselines.features import put
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.neighbours import noise_of
+from uuv_marl.baselines.memory.neighbours import middle, noise_of
 from uuv_marl.baselines.memory.pose import to_body, to_body_axes
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of
@@ -95,31 +95,10 @@ def _own(
     out[16] = 1.0 if reference[2] == 0.0 and reference[3] == 0.0 else 0.0
     out[17] = 2.0 * period
     out[18] = min(10.0 * noise_of(w, i, kept), 2.0)
-    c_x, c_y, heard = _middle(w, i, kept)
+    c_x, c_y, heard = middle(w, i, kept)
     out[19], out[20] = to_body_axes(c_x / 32.0, c_y / 32.0, pose)
     out[21] = heard / kept.known.shape[2]
     out[22] = 0.5 * math.sqrt(kept.known.shape[1] / NOMINAL_VEHICLES)
-
-
-@compiled
-def _middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
-    """The mean place of the known neighbours from the vehicle [m], and how many they are.
-
-    A vehicle in the middle of a swarm has neighbours all round; one at the edge has them on one side, and so can tell
-    where the swarm is.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        kept: what is remembered.
-    """
-    x, y, num, pose = 0.0, 0.0, 0, kept.pose[w, i]
-    for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] > 0.0:
-            d_x, d_y = kept.place[w, i, k, 0] - pose[0], kept.place[w, i, k, 1] - pose[1]
-            near = 64.0 / max(64.0, math.hypot(d_x, d_y))
-            x, y, num = x + near * d_x, y + near * d_y, num + 1
-    return x / max(num, 1), y / max(num, 1), num
 
 
 @compiled

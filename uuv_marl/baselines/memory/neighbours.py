@@ -46,6 +46,27 @@ def noise_of(w: int, i: int, kept: Surroundings) -> float:
 
 
 @compiled
+def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
+    """The mean place of the known neighbours from the vehicle [m], and how many they are.
+
+    A vehicle in the middle of a swarm has neighbours all round; one at the edge has them on one side, and so can tell
+    where the swarm is.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        kept: what is remembered.
+    """
+    x, y, num, pose = 0.0, 0.0, 0, kept.pose[w, i]
+    for k in range(kept.known.shape[2]):
+        if kept.known[w, i, k] > 0.0:
+            d_x, d_y = kept.place[w, i, k, 0] - pose[0], kept.place[w, i, k, 1] - pose[1]
+            near = 64.0 / max(64.0, math.hypot(d_x, d_y))
+            x, y, num = x + near * d_x, y + near * d_y, num + 1
+    return x / max(num, 1), y / max(num, 1), num
+
+
+@compiled
 def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> None:
     """Take the neighbours that a vehicle hears into those it knows.
 
