@@ -62,7 +62,8 @@ def test_advantages_by_hand():
 class Toy:
     """Rows that see noise and are paid by a function of (observation, action); all end every ``length`` steps."""
 
-    features, size, rows = 2, 3, 64
+    features, size, outputs, rows = 2, 3, 2, 64
+    world = np.arange(64)
 
     def __init__(self, pay, length=1, cut_off=False):
         self._pay, self._length, self._cut_off, self._t = pay, length, cut_off, 0
@@ -87,7 +88,7 @@ class Toy:
 
 
 def learned(problem, iterations, by, noise=(0.4, 0.1), rate=(3e-3, 5e-4)):
-    learner = Learner(problem.features, problem.size, by, np.random.default_rng(0))
+    learner = Learner(problem.features, problem.size, 2, by, np.random.default_rng(0))
     rewards = []
     for k in range(iterations):
         share = k / iterations
@@ -128,7 +129,7 @@ def test_values_of_a_steady_income(cut_off, values):
 
 
 def test_a_new_scale_of_returns_keeps_values():
-    learner = Learner(2, 3, TINY, np.random.default_rng(0))
+    learner = Learner(2, 3, 2, TINY, np.random.default_rng(0))
     observation = np.random.default_rng(1).standard_normal((20, 3), np.float32)
     learner._follow(torch.linspace(-50.0, -30.0, 9, dtype=torch.float64))
     before = learner.value(observation)
@@ -143,7 +144,7 @@ def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
     divergence = []
     for limit in (0.01, 1e9):
         by = Hyperparameters(hidden=(16,), horizon=8, minibatch=64, actor_epochs=20, kl_stop=limit)
-        learner = Learner(2, 3, by, np.random.default_rng(seed))
+        learner = Learner(2, 3, 2, by, np.random.default_rng(seed))
         batch, _ = learner.sample(Toy(lambda observation, action: action[:, 0]), 0.3)
         divergence.append(learner.update(batch, 0.3, 3e-3).kl)
     assert 0.01 < divergence[0] < 0.03
@@ -164,7 +165,7 @@ def test_a_swarm_of_one_finds_the_force_that_follows():
     """
     env = open_water([(1, 64)], **{"trajectory.waypoints_m": [[0.0, 0.0], [320.0, 0.0]]})
     by = Hyperparameters(hidden=(32, 32), horizon=32, minibatch=512)
-    learner = Learner(env.features, env.size, by, np.random.default_rng(0))
+    learner = Learner(env.features, env.size, 2, by, np.random.default_rng(0))
     for k in range(80):
         noise = annealed((0.4, 0.1), k / 80)
         batch, _ = learner.sample(env, noise)

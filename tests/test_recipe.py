@@ -54,7 +54,7 @@ def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
     seen = [[group.swarm] for group in env._groups]
     for _ in range(260):
         before = [group.swarm.facts.time_s[0] for group in env._groups]
-        env.step(np.zeros((env.rows, 2), np.float32))
+        env.step(np.zeros((env.rows, env.outputs), np.float32))
         for group, swarms, then in zip(env._groups, seen, before, strict=True):
             if group.swarm is swarms[-1]:
                 assert group.swarm.facts.time_s[0] == pytest.approx(then + 0.5)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from uuv_marl.baselines.checkpoint import Checkpoint, load_checkpoint
 from uuv_marl.baselines.learned import Learned
-from uuv_marl.baselines.learned_wish import LearnedWish
+from uuv_marl.baselines.learned_law import LearnedLaw
 from uuv_marl.scenario import Scenario
 
 
@@ -36,9 +36,9 @@ class Trained:
         """Inner loop that it was trained with [N m s]."""
         return self.checkpoint.card.yaw_damping_nms
 
-    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedWish:
+    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedLaw:
         """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
-        kind = LearnedWish if self.checkpoint.card.features == "memory" else Learned
+        kind = LearnedLaw if self.checkpoint.card.features == "memory" else Learned
         return kind(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)
 
 

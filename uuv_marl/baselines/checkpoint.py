@@ -23,6 +23,7 @@ from uuv_marl.baselines.features import BARRIER, num_features
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.scout import TRIMS
 from uuv_marl.baselines.scout import Gains as Law
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
@@ -70,7 +71,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """What the tensors are: ``mlp``, tanh layers."""
     features: Literal["percept", "memory"] = "percept"
     """What the first layer is given: ``percept``, what ``Features`` make of one percept, and the last gives a force; or
-    ``memory``, what ``recall`` makes of what is remembered, and the last gives what is added to the wish of ``law``."""
+    ``memory``, what ``recall`` makes of what is remembered, and the last trims the gains of ``law``."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every field of the percept."""
     decision_period_s: tuple[float, float] = (0.1, 0.5)
@@ -82,7 +83,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     barrier: Annotated[Gains, pydantic.BeforeValidator(_all_gains)] = BARRIER
     """Of Eq. 20-21; what an actor without memory says is added to their force."""
     law: Law = Law()
-    """Gains of the hand-made law that an actor with memory corrects."""
+    """Gains of the hand-made law that an actor with memory trims."""
     safety: Barrier = Barrier()
     """Margins and rates of the filter around it."""
     vehicle: dict[str, float] = pydantic.Field(default_factory=lambda: _numbers(load_vehicle(_FIRST_VEHICLE)))
@@ -163,9 +164,11 @@ def _check(card: Card, layers: Sequence[Layer]) -> None:
     sizes: Mapping[str, int] = {name: size for name, size, _, _ in card.percept}
     if not 0.0 < card.decision_period_s[0] <= card.decision_period_s[1]:
         raise ValueError(f"its card's decision_period_s must be [shortest, longest], got {card.decision_period_s}")
-    width = RECALLED if card.features == "memory" else num_features(sizes["heard"], sizes.get("echo", 0))
+    remembers = card.features == "memory"
+    width = RECALLED if remembers else num_features(sizes["heard"], sizes.get("echo", 0))
+    last = TRIMS if remembers else 2
     for k, (weight, bias) in enumerate(layers):
-        outputs = weight.shape[-1] if weight.ndim == 2 and k < len(layers) - 1 else 2
+        outputs = weight.shape[-1] if weight.ndim == 2 and k < len(layers) - 1 else last
         for name, array, shape in (("weight", weight, (width, outputs)), ("bias", bias, (outputs,))):
             if array.dtype != np.float32 or array.shape != shape:
                 raise ValueError(f"{k}.{name} is {array.dtype} {array.shape}, expected float32 {shape}")

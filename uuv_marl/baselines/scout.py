@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.pose import to_map_axes
+from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
 from uuv_marl.percept import Percept
@@ -39,6 +39,19 @@ class Gains(NamedTuple):
     """Times the pull where l(t) rests [1]; times sqrt(g) for larger swarms."""
     push_at_rest: float = 2.0
     """Times the push where l(t) rests [1]; times g for larger swarms: those outside press the others together."""
+    together: float = 0.0
+    """While l(t) moves, to l(t) from the mean place of the neighbours that a vehicle hears [1/s]; divided by g^3, as in
+    a large swarm they are a small part of it. All go the same way, and the swarm is not pressed together."""
+    behind_m: float = 0.0
+    """How far behind a moving l(t) to go [m]: a swarm coasts on for about 2 m where l(t) stops."""
+
+
+TRIMS = 4
+"""Numbers of ``trimmed``."""
+MOST_TRIM = 3.0
+"""They are bounded here [1]. Assumed: a factor of 20 is more than any gain should change."""
+_TRIM_M = 2.0
+"""What 1 adds to ``behind_m`` [m]."""
 
 
 class Scout(Filtered):
@@ -59,28 +72,42 @@ class Scout(Filtered):
         super().__init__(scenario, num_worlds, barrier or Barrier())
         self.gains = gains or Gains()
         self._growth = growth(scenario.swarm.num_vehicles)
-        self._offset = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
+        self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, TRIMS), np.float32)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2)."""
         return self._decided()
 
     def _decided(self) -> Float32:
-        """The actions, where ``_offset`` is added to what vehicles wish."""
-        action = np.zeros_like(self._offset)
+        """The actions, where ``_trims`` change the gains."""
+        action = np.zeros((*self._trims.shape[:2], 2), np.float32)
         _decide(
             self.active, self._model.own.period_s, self._grown(), self.barrier, self.limits, self._gain, self.memory,
-            self._planes, self._offset, action,
+            self._planes, self._trims, action,
         )  # fmt: skip
         return action
 
     def _grown(self) -> Gains:
         """The gains for as many vehicles as the swarm has."""
-        g = self._growth
-        return self.gains._replace(
-            pull=self.gains.pull / g, pull_at_rest=self.gains.pull_at_rest * math.sqrt(g),
-            push_at_rest=self.gains.push_at_rest * g,
+        by, g = self.gains, self._growth
+        return by._replace(
+            pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
+            together=by.together / g**3,
         )  # fmt: skip
+
+
+@compiled
+def trimmed(g: Gains, trims: Float32) -> Gains:
+    """Gains of one vehicle, changed: pull, push and together by factors, and how far behind l(t) it goes.
+
+    Args:
+        g: the law's.
+        trims: of pull, together, push and behind_m, shape (TRIMS,); 0 changes nothing.
+    """
+    return Gains(
+        g.pull * math.exp(trims[0]), g.push * math.exp(trims[2]), g.push_range, g.pull_at_rest, g.push_at_rest,
+        g.together * math.exp(trims[1]), g.behind_m + _TRIM_M * trims[3],
+    )  # fmt: skip
 
 
 @compiled
@@ -94,11 +121,15 @@ def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
         kept: what is remembered.
     """
     pose, reference, speed = kept.pose[w, i], kept.reference[w, i], kept.reference_speed[w, i]
-    pull, push = g.pull, g.push
+    pull, push, together = g.pull, g.push, g.together
     if reference[2] == 0.0 and reference[3] == 0.0:
-        pull, push = pull * g.pull_at_rest, push * g.push_at_rest
-    w_x = speed * reference[2] + pull * (reference[0] - pose[0])
-    w_y = speed * reference[3] + pull * (reference[1] - pose[1])
+        pull, push, together = pull * g.pull_at_rest, push * g.push_at_rest, 0.0
+    to_x = reference[0] - g.behind_m * reference[2] - pose[0]
+    to_y = reference[1] - g.behind_m * reference[3] - pose[1]
+    w_x, w_y = speed * reference[2] + pull * to_x, speed * reference[3] + pull * to_y
+    if together > 0.0:
+        m_x, m_y, _ = middle(w, i, kept)
+        w_x, w_y = w_x + together * (to_x - m_x), w_y + together * (to_y - m_y)
     for k in range(kept.known.shape[2]):
         d_x, d_y = pose[0] - kept.place[w, i, k, 0], pose[1] - kept.place[w, i, k, 1]
         away = max(math.hypot(d_x, d_y), 1e-6)
@@ -142,7 +173,7 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
 @compiled
 def _decide(
     worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
-    planes: Float64, offset: Float32, action: Float32,
+    planes: Float64, trims: Float32, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle.
 
@@ -155,15 +186,13 @@ def _decide(
         gain: force per velocity error [N s/m].
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
-        offset: added to what vehicles wish, in their own frame [m/s], shape (world, vehicle, 2).
+        trims: changes of the gains, see ``trimmed``, shape (world, vehicle, TRIMS).
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                w_x, w_y = wished(w, i, g, kept)
-                o_x, o_y = to_map_axes(offset[w, i, 0], offset[w, i, 1], kept.pose[w, i])
-                w_x, w_y = w_x + o_x, w_y + o_y
+                w_x, w_y = wished(w, i, trimmed(g, trims[w, i]), kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, barrier, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_features
-from uuv_marl.baselines.learned_wish import MOST_WISH, Wishing
+from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.scout import Gains
+from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
@@ -24,6 +24,8 @@ class Acting(Protocol):
 
     size: int
     """Features of a vehicle, see ``num_features``."""
+    outputs: int
+    """Numbers that the actor gives for a vehicle."""
     most: float
     """Outputs mean no more beyond this."""
     changed: Float32
@@ -43,7 +45,7 @@ class Acting(Protocol):
         ...
 
     def actions(self, output: Float32) -> Float32:
-        """The actions for an output, shape (world, vehicle, 2)."""
+        """The actions, shape (world, vehicle, 2), for an output, shape (world, vehicle, ``outputs``)."""
         ...
 
     def snapshot(self) -> Arrays:
@@ -64,6 +66,7 @@ class Forces:
         law: of the hand-made law, which it does not use.
     """
 
+    outputs = 2
     most = MOST_BARRIER
 
     def __init__(self, scenario: Scenario, num_worlds: int, law: Gains) -> None:  # noqa: ARG002
@@ -98,8 +101,8 @@ class Forces:
         """Nothing to do."""
 
 
-class Wishes:
-    """An actor with memory: its output is added to the hand-made law's wish, and the filter makes it safe.
+class Trims:
+    """An actor with memory: its output trims the gains of the hand-made law, and the filter makes what it does safe.
 
     Args:
         scenario: what is simulated.
@@ -108,10 +111,11 @@ class Wishes:
     """
 
     size = RECALLED
-    most = MOST_WISH
+    outputs = TRIMS
+    most = MOST_TRIM
 
     def __init__(self, scenario: Scenario, num_worlds: int, law: Gains) -> None:
-        self._policy = Wishing(scenario, num_worlds, gains=law)
+        self._policy = TrimmedLaw(scenario, num_worlds, gains=law)
         self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
 
     @staticmethod
@@ -130,7 +134,7 @@ class Wishes:
 
     def actions(self, output: Float32) -> Float32:
         """Those of the policy, which is told what it did."""
-        action = self._policy.wish(output)
+        action = self._policy.trim(output)
         self._policy.acted(action, self._policy.active)
         self.changed[...] = self._policy.memory.filtered[:, :, 0]
         return action
@@ -144,5 +148,5 @@ class Wishes:
         self._policy.restore(snapshot)
 
 
-ACTING: dict[Sees, type[Forces] | type[Wishes]] = {"percept": Forces, "memory": Wishes}
+ACTING: dict[Sees, type[Forces] | type[Trims]] = {"percept": Forces, "memory": Trims}
 """By what an actor sees."""

@@ -64,11 +64,15 @@ class TrainingEnv:
             sizes = [(n, 1) for n, worlds in sizes for _ in range(worlds)]
         threads = get_num_threads()  # as many as step the worlds of a swarm
         self._pool = ThreadPoolExecutor(threads) if turns and threads > 1 else None
-        self.features = ACTING[problem.sees].num_features(problem.scenario)
+        acting = ACTING[problem.sees]
+        self.features, self.outputs = acting.num_features(problem.scenario), acting.outputs
         self.size = self.features + PRIVILEGED_SIZE
         ends = np.cumsum([0, *(n * worlds for n, worlds in sizes)]).tolist()
         self.rows: int = ends[-1]
         self.observation = np.zeros((self.rows, self.size), np.float32)
+        num_vehicles = [n for n, worlds in sizes for _ in range(worlds)]
+        self.world = np.repeat(np.arange(len(num_vehicles)), num_vehicles)
+        """Index of each row's world."""
         self._rows = [slice(first, end) for first, end in itertools.pairwise(ends)]
         self._groups = [
             Group(problem, n, worlds, k * turns // len(sizes), self.observation[self._rows[k]])
@@ -83,7 +87,7 @@ class TrainingEnv:
             group.start(self._seeds, np.ones(group.num_worlds, np.bool_))
 
     def step(self, action: Float32) -> Transition:
-        """Act on the actor's output, shape (row, 2), as ``Acting`` takes it."""
+        """Act on the actor's output, shape (row, ``outputs``), as ``Acting`` takes it."""
         reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
         final = [np.empty((0, self.size), np.float32)]
         outcomes = (self._pool.map if self._pool else map)(Group.step, self._groups, [action[r] for r in self._rows])

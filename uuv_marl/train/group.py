@@ -38,7 +38,7 @@ class Problem(NamedTuple):
     held_s: float = 0.0
     """An output of the actor is held for so long; 0: for one decision."""
     law: Gains = Gains()
-    """Of the hand-made law that an actor with memory corrects."""
+    """Of the hand-made law that an actor with memory trims."""
     conditions: Conditions = ()
     """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
 
@@ -104,9 +104,9 @@ class Group:
         privileged_observation(self.swarm, self._seen[:, :, features:])
 
     def step(self, output: Float32) -> Outcome:
-        """Act on an output of the actor, shape (world x vehicle, 2), and fill the rows with what comes of it."""
+        """Act on an output of the actor, shape (world x vehicle, outputs), and fill the rows with what comes of it."""
         swarm, by = self.swarm, self._problem
-        output = output.reshape(self.num_worlds, self.num_vehicles, 2)
+        output = output.reshape(self.num_worlds, self.num_vehicles, self.acting.outputs)
         reward = np.zeros((self.num_worlds, self.num_vehicles))
         for decision in range(self._held):
             running = ~swarm.ended

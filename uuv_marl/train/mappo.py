@@ -37,7 +37,12 @@ class Hyperparameters(PPOHyperparameters):
     critic_rate: float = 1.0
     """The critic's learning rate, in the actor's."""
     noise: tuple[float, float] = (0.4, 0.08)
-    """Standard deviation of actions [full force], at the start and at the end."""
+    """Standard deviation of outputs [1], at the start and at the end."""
+    shared_noise: float = 0.0
+    """Share of that variance which all vehicles of a world have in common, so that what a swarm does together is
+    tried: one vehicle alone moves its centre by 1/n. The objective takes each output as if it were drawn alone."""
+    noise_kept: float = 0.0
+    """Of the common noise, what is left at the next decision [1]."""
     max_gradient: float = 1.0
     value_decay: float = 0.99
     """Of the running mean and variance by which returns are normalised."""
@@ -60,7 +65,9 @@ class Environment(Protocol):
 
     features: int
     size: int
+    outputs: int
     rows: int
+    world: NDArray[np.int64]
     observation: Float32
 
     def step(self, action: Float32) -> Transition:
@@ -104,16 +111,17 @@ class Learner:
     Args:
         features: the actor's inputs, the first of what the critic sees.
         size: the critic's inputs.
+        outputs: the actor's.
         by: the algorithm's numbers.
         rng: draws the first weights, and the order of samples.
         device: where networks and batches are.
     """
 
     def __init__(
-        self, features: int, size: int, by: Hyperparameters, rng: np.random.Generator, device: str = "cpu"
+        self, features: int, size: int, outputs: int, by: Hyperparameters, rng: np.random.Generator, device: str = "cpu"
     ) -> None:
         self.by, self._rng, self._features, self._device = by, rng, features, device
-        self.actor = network((features, *by.hidden, 2), 0.01, rng).to(device)
+        self.actor = network((features, *by.hidden, outputs), 0.01, rng).to(device)
         self.critic = network((size, *by.hidden, 1), 1.0, rng).to(device)
         self._optimisers = [torch.optim.Adam(net.parameters(), eps=1e-5) for net in (self.actor, self.critic)]
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
@@ -142,12 +150,12 @@ class Learner:
         """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
         by, shape = self.by, (self.by.horizon, env.rows)
         observation = np.empty((by.horizon + 1, env.rows, env.size), np.float32)
-        action, mean = np.empty((*shape, 2), np.float32), np.empty((*shape, 2), np.float32)
+        action, mean = np.empty((2, *shape, env.outputs), np.float32)
         reward, paid, ended = np.empty(shape, np.float32), 0.0, np.empty(shape, np.bool_)
-        for t in range(by.horizon):
+        for t, drawn in zip(range(by.horizon), self._noise(env), strict=False):
             observation[t] = env.observation
             mean[t] = self.act(observation[t])
-            action[t] = mean[t] + np.float32(noise) * self._rng.standard_normal(mean[t].shape, np.float32)
+            action[t] = mean[t] + np.float32(noise) * drawn
             transition = env.step(action[t])
             paid += float(transition.reward.mean()) / by.horizon
             reward[t], ended[t] = transition.reward, transition.terminated | transition.truncated
@@ -159,6 +167,20 @@ class Learner:
         arrays = (observation[:-1], action, mean, advantage, advantage + value[:-1])
         rows = (torch.from_numpy(array.reshape(-1, *array.shape[2:])) for array in arrays)
         return Rollout(*(array.to(self._device) for array in rows)), paid
+
+    def _noise(self, env: Environment) -> Iterator[Float32]:
+        """Standard normal numbers for the outputs of each decision, shape (row, output); a world's rows share some."""
+        shared, kept = self.by.shared_noise, self.by.noise_kept
+        shape = env.rows, env.outputs
+        if shared == 0.0:
+            while True:
+                yield self._rng.standard_normal(shape, np.float32)
+        common = self._rng.standard_normal((env.world[-1] + 1, env.outputs), np.float32)
+        while True:
+            own = self._rng.standard_normal(shape, np.float32)
+            yield np.float32(math.sqrt(shared)) * common[env.world] + np.float32(math.sqrt(1.0 - shared)) * own
+            fresh = self._rng.standard_normal(common.shape, np.float32)
+            common = np.float32(kept) * common + np.float32(math.sqrt(1.0 - kept * kept)) * fresh
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
         """Some epochs of PPO on a batch, and of regression to its returns."""
@@ -274,7 +296,7 @@ class Mappo:
         self._by = by
         self._rng = np.random.default_rng(seed)
         self.env = TrainingEnv(problem, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
-        self.learner = Learner(self.env.features, self.env.size, by, self._rng, device)
+        self.learner = Learner(self.env.features, self.env.size, self.env.outputs, by, self._rng, device)
         self.agent_steps = by.horizon * self.env.rows
         """Of an iteration."""
         self.pop_episode_stats = self.env.pop_episode_stats

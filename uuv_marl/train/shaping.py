@@ -4,6 +4,7 @@ The reward is dense and steeper than the environment's own (``uuv_marl.envs.rewa
 compare. All numbers here are our own.
 """
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ class Weights(NamedTuple):
     """Of the terms of one decision of 0.5 s; shorter ones are paid in proportion, collisions whole."""
 
     distance_m: float = 35.0
-    """A vehicle pays its distance to l(t) over this."""
+    """A vehicle pays its distance to l(t) over this [m]; inf: nothing."""
     centre: float = 0.4
     """Per metre of a vehicle's ``lead``."""
     obstacle: float = 28.0
@@ -38,6 +39,8 @@ class Weights(NamedTuple):
     """Times the squared action."""
     team: float = 0.0
     """All vehicles pay this for each metre from the swarm's centre to l(t), up to 60 m."""
+    team_s: float = math.inf
+    """And the less, the longer l(t) still moves: by exp(-time left / team_s)."""
     late: float = 0.0
     """All vehicles pay this while l(t) rests and the swarm has not arrived; less, by up to two thirds, the nearer the
     swarm's centre is to the end."""
@@ -69,8 +72,9 @@ def _shared(swarm: Swarm, by: Weights) -> Float64:
     """What all vehicles of a world pay for where their centre is, shape (world,)."""
     facts = swarm.facts
     error = np.hypot(*(facts.centre - facts.reference[:, :2]).T)
-    waits = facts.time_s >= swarm.duration_s
-    return by.team * np.minimum(error, 60.0) + by.late * waits * (1.0 - 2.0 / 3.0 * np.exp(-error / 4.0))
+    left = np.maximum(swarm.duration_s - facts.time_s, 0.0)
+    far, astray = np.minimum(error, 60.0), 1.0 - 2.0 / 3.0 * np.exp(-error / 4.0)
+    return by.team * np.exp(-left / by.team_s) * far + by.late * (left == 0.0) * astray
 
 
 def lead(swarm: Swarm) -> Float64:

@@ -83,11 +83,11 @@ class Settings:
     vehicle)."""
     sees: Sees = "percept"
     """What the actor sees: features of one percept, its output being a force; or ``memory``, what is remembered, its
-    output being added to the wish of ``scout``, inside the safety filter."""
+    output trimming the gains of ``law``, inside the safety filter."""
     change_cost: float = 0.0
     """With memory: paid for each 0.5 s in which the filter changed a vehicle's action."""
     law: Gains = field(default_factory=Gains)
-    """With memory: of the hand-made law that the actor corrects."""
+    """With memory: of the hand-made law that the actor trims."""
     held_s: float = 0.0
     """An output of the actor is held for so long; 0: for one decision."""
     conditions: Conditions = ()

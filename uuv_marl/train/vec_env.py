@@ -32,7 +32,7 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
         """Mean reward of the rows, summed over the steps so far."""
         self.render_mode = None
         size, most = (self.env.features,), ACTING[problem.sees].most
-        super().__init__(self.env.rows, Box(-np.inf, np.inf, size), Box(-most, most, (2,), np.float32))
+        super().__init__(self.env.rows, Box(-np.inf, np.inf, size), Box(-most, most, (self.env.outputs,), np.float32))
 
     def _draw(self, num: int) -> Sequence[int] | None:
         """Counted on through all swarms at a reset after ``seed``; later each world goes on with its own stream."""
@@ -59,7 +59,7 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
         return self.observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions, shape (row, 2), for ``step_wait``."""
+        """Keep the actions, shape (row, outputs), for ``step_wait``."""
         self._actions = np.asarray(actions, np.float32)
 
     def step_wait(self) -> tuple[Float32, Float32, NDArray[np.bool_], list[dict[str, Any]]]:

@@ -1,7 +1,6 @@
-"""A learned policy with memory: a network changes what the hand-made law wishes, and the filter has the last word.
+"""A learned policy with memory: a network trims the gains of the hand-made law, and the filter has the last word.
 
-Residual learning (Johannink et al., Residual reinforcement learning for robot control, ICRA 2019): with a network that
-says nothing the policy is ``scout``.
+Each vehicle has gains of its own at each decision. With a network that says nothing the policy is the law alone.
 """
 
 import numpy as np
@@ -9,19 +8,14 @@ import numpy as np
 from uuv_marl.baselines.checkpoint import Checkpoint
 from uuv_marl.baselines.learned import forward, need_same
 from uuv_marl.baselines.recall import RECALLED, recall
-from uuv_marl.baselines.scout import Scout
+from uuv_marl.baselines.scout import MOST_TRIM, Scout
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
 
-WISH_MPS = 2.0
-"""What an output of 1 adds to the wished velocity [m/s]. Assumed: half of l(t)'s speed."""
-MOST_WISH = 3.0
-"""Outputs are bounded here [1]. Assumed: more than what the fastest vehicle could use."""
 
-
-class Wishing(Scout):
-    """``scout``, to whose wishes an actor adds something. Arguments as for ``Scout``."""
+class TrimmedLaw(Scout):
+    """``scout``'s law, whose gains an actor trims. Arguments as for ``Scout``."""
 
     def look(self, features: Float32) -> None:
         """Fill what an actor sees of what is remembered, shape (world, vehicle, ``RECALLED``)."""
@@ -30,13 +24,13 @@ class Wishing(Scout):
             self._planes, features,
         )  # fmt: skip
 
-    def wish(self, output: Float32) -> Float32:
-        """The actions for an actor's output, shape (world, vehicle, 2)."""
-        np.multiply(np.clip(output, -MOST_WISH, MOST_WISH), np.float32(WISH_MPS), out=self._offset)
+    def trim(self, output: Float32) -> Float32:
+        """The actions, shape (world, vehicle, 2), for an actor's output, shape (world, vehicle, TRIMS)."""
+        np.clip(output, -MOST_TRIM, MOST_TRIM, out=self._trims)
         return self._decided()
 
 
-class LearnedWish(Wishing):
+class LearnedLaw(TrimmedLaw):
     """A checkpoint's actor inside ``scout``'s law, memory and filter. Deterministic.
 
     Args:
@@ -57,13 +51,13 @@ class LearnedWish(Wishing):
         self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety)
         need_same(self, card, any_vehicle)
-        self._features = np.zeros((*self._offset.shape[:2], RECALLED), np.float32)
+        self._features = np.zeros((*self._trims.shape[:2], RECALLED), np.float32)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2)."""
         self.look(self._features)
         acting = np.flatnonzero(self.active)
-        output = np.zeros_like(self._offset)
+        output = np.zeros_like(self._trims)
         rows = self._features[acting].reshape(-1, RECALLED)
-        output[acting] = forward(self.checkpoint.layers, rows).reshape(len(acting), -1, 2)
-        return self.wish(output)
+        output[acting] = forward(self.checkpoint.layers, rows).reshape(len(acting), *self._trims.shape[1:])
+        return self.trim(output)

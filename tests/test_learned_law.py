@@ -9,8 +9,9 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
-from uuv_marl.baselines.learned_wish import MOST_WISH, WISH_MPS, Wishing
+from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.recall import RECALLED
+from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains, trimmed
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -26,7 +27,7 @@ def actor(scale, seed=0):
     rng = np.random.default_rng(seed)
     return [
         Layer(scale * rng.standard_normal((a, b), np.float32), scale * rng.standard_normal(b, np.float32))
-        for a, b in itertools.pairwise((RECALLED, 16, 2))
+        for a, b in itertools.pairwise((RECALLED, 16, TRIMS))
     ]
 
 
@@ -69,28 +70,35 @@ def test_whatever_the_actor_says_the_filter_has_the_last_word(saved):
     assert [run.metrics["collisions"] for run in runs] == [0, 0]
 
 
-def test_outputs_are_bounded_velocities_in_the_vehicles_frame():
-    scenario = granted("scout", load_scenario("tracking", num_vehicles=1))
-    swarm, policy = Swarm(scenario), Wishing(scenario)
+def test_trims_are_bounded_factors_of_a_vehicle_s_own_gains():
+    scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
+    swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
     policy.hear(swarm.reset(0))
-    once = policy.wish(np.array([[[0.0, MOST_WISH]]], np.float32)).copy()
-    np.testing.assert_array_equal(policy.wish(np.array([[[0.0, 50.0]]], np.float32)), once)
-    quiet = policy.wish(np.zeros((1, 1, 2), np.float32)).copy()
-    assert WISH_MPS > 0.0
-    assert once[0, 0, 1] > quiet[0, 0, 1], "a wish to starboard turns to starboard"
+    quiet = policy.trim(np.zeros((1, 2, TRIMS), np.float32)).copy()
+    once = policy.trim(np.array([[[MOST_TRIM, 0, 0, 0], [0, 0, 0, 0]]], np.float32)).copy()
+    np.testing.assert_array_equal(policy.trim(np.array([[[50.0, 0, 0, 0], [0, 0, 0, 0]]], np.float32)), once)
+    assert (once[0, 0] != quiet[0, 0]).any()
+    np.testing.assert_array_equal(once[0, 1], quiet[0, 1], "the other's gains are as they were")
+
+
+def test_trims_by_hand():
+    law = Gains(together=0.1, behind_m=1.0)
+    changed = trimmed(law, np.log(np.array([2.0, 3.0, 0.5, math.e**0.5], np.float32)))
+    assert changed == pytest.approx(law._replace(pull=0.1, together=0.3, push=5.0, behind_m=2.0), rel=1e-6)
+    assert trimmed(law, np.zeros(TRIMS, np.float32)) == law
 
 
 @pytest.mark.parametrize("overrides", [FEW, FEW | ROUGH], ids=["calm", "rough"])
 def test_what_an_actor_sees_is_bounded(overrides):
     scenario = granted("scout", load_scenario("random_field", overrides=overrides))
-    swarm, policy = Swarm(scenario), Wishing(scenario)
+    swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
     percept, features = swarm.reset(10_008), np.full((1, 12, RECALLED), np.nan, np.float32)
     most = np.zeros(RECALLED)
     for _ in range(400):
         policy.hear(percept)
         policy.look(features)
         most = np.maximum(most, np.abs(features[0]).max(axis=0))
-        action = policy.wish(np.zeros((1, 12, 2), np.float32))
+        action = policy.trim(np.zeros((1, 12, TRIMS), np.float32))
         policy.acted(action, policy.active)
         percept = swarm.step(action)
     assert np.isfinite(most).all()
@@ -104,7 +112,7 @@ def test_what_an_actor_sees_turns_with_the_world():
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     for moved in (False, True):
         scenario = granted("scout", load_scenario("single_obstacle", overrides={"swarm.num_vehicles": 10}))
-        swarm, policy = Swarm(scenario), Wishing(scenario)
+        swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
         swarm.reset(3)
         if moved:
             swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (50.0, -80.0)
@@ -183,15 +191,10 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
         features = env.observation[env._rows[0], : env.features]
         used = policy.act(percept)
         np.testing.assert_array_equal(policy._features.reshape(-1, RECALLED), features)
-        rows = np.zeros((env.rows, 2), np.float32)
-        rows[env._rows[0]] = used_output(policy)
+        rows = np.zeros((env.rows, TRIMS), np.float32)
+        rows[env._rows[0]] = policy._trims.reshape(-1, TRIMS)
         env.step(rows)
         np.testing.assert_array_equal(acting._policy.memory.action, used)
-
-
-def used_output(policy):
-    """What the policy's network said."""
-    return (policy._offset / WISH_MPS).reshape(-1, 2)
 
 
 @pytest.mark.needs("torch")
@@ -209,7 +212,7 @@ def test_what_the_filter_changes_is_charged():
         env = TrainingEnv(problem, lambda num: range(10_007, 10_007 + num))
         paid = []
         for _ in range(120):
-            paid.append(env.step(np.zeros((24, 2), np.float32)).reward)
+            paid.append(env.step(np.zeros((24, TRIMS), np.float32)).reward)
             changed = env._groups[0].acting.changed.reshape(-1)
             np.testing.assert_allclose(paid[-1], -cost * 0.4 * changed, atol=1e-6)
         rewards.append(np.sum(paid))
