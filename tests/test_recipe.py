@@ -29,8 +29,8 @@ def recipe(path, **changes):
 def test_a_recipe_draws_what_it_says():
     from uuv_marl.train.recipe import load_recipe
 
-    one, other = (load_recipe("shipped").settings(seed) for seed in (0, 1))
-    assert one == load_recipe("shipped").settings(0)
+    one, other = (load_recipe("memory").settings(seed) for seed in (0, 1))
+    assert one == load_recipe("memory").settings(0)
     assert one.conditions != other.conditions
     for conditions in (one.conditions, other.conditions):
         loaded = [load_scenario(one.scenario, overrides={**one.overrides, **changes}) for changes in conditions]

@@ -84,8 +84,8 @@ Recipe = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE",
-        help="All of a training from a file: scenario, sizes, disturbances, reward and algorithm. shipped gives the "
-        "shipped policy's like. Besides it give --seed, --steps, --device and --output alone.",
+        help="All of a training from a file: scenario, sizes, disturbances, reward and algorithm; memory is one that "
+        "comes with the package. Besides it give --seed, --steps, --device, --output and --resume alone.",
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]

@@ -36,6 +36,9 @@ class Hyperparameters(PPOHyperparameters):
     critic_epochs: int = 2
     critic_rate: float = 1.0
     """The critic's learning rate, in the actor's."""
+    critic_first: float = 0.0
+    """Share of the training in which the critic learns alone: an actor that begins well is spoilt by a critic that
+    knows nothing (Silver, Allen, Tenenbaum and Kaelbling, Residual policy learning, 2018)."""
     noise: tuple[float, float] = (0.4, 0.08)
     """Standard deviation of outputs [1], at the start and at the end."""
     shared_noise: float = 0.0
@@ -182,15 +185,15 @@ class Learner:
             fresh = self._rng.standard_normal(common.shape, np.float32)
             common = np.float32(kept) * common + np.float32(math.sqrt(1.0 - kept * kept)) * fresh
 
-    def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
-        """Some epochs of PPO on a batch, and of regression to its returns."""
+    def update(self, batch: Rollout, noise: float, learning_rate: float, actor_learns: bool = True) -> Update:
+        """Some epochs of PPO on a batch, if the actor learns, and of regression to its returns."""
         by = self.by
         for optimiser, rate in zip(self._optimisers, (1.0, by.critic_rate), strict=True):
             for group in optimiser.param_groups:
                 group["lr"] = rate * learning_rate
         error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
-        kl = self._improve(batch._replace(advantage=_standard(batch.advantage)), noise)
+        kl = self._improve(batch._replace(advantage=_standard(batch.advantage)), noise) if actor_learns else 0.0
         self._regress(batch.observation, batch.returns)
         self._updates += 1
         fresh = max(1.0 - by.average, 10.0 / (9.0 + self._updates))  # about the last tenth at first
@@ -309,7 +312,8 @@ class Mappo:
         """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
         noise = annealed(self._by.noise, share)
         batch, reward = self.learner.sample(self.env, noise)
-        return reward, self.learner.update(batch, noise, annealed(self._by.learning_rate, share))
+        learns = share >= self._by.critic_first
+        return reward, self.learner.update(batch, noise, annealed(self._by.learning_rate, share), learns)
 
     @property
     def layers(self) -> list[Layer]:

@@ -4,7 +4,6 @@ The reward is dense and steeper than the environment's own (``uuv_marl.envs.rewa
 compare. All numbers here are our own.
 """
 
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -24,7 +23,7 @@ class Weights(NamedTuple):
     """Of the terms of one decision of 0.5 s; shorter ones are paid in proportion, collisions whole."""
 
     distance_m: float = 35.0
-    """A vehicle pays its distance to l(t) over this [m]; inf: nothing."""
+    """A vehicle pays its distance to l(t) over this [m]; 1e9: nothing."""
     centre: float = 0.4
     """Per metre of a vehicle's ``lead``."""
     obstacle: float = 28.0
@@ -39,7 +38,7 @@ class Weights(NamedTuple):
     """Times the squared action."""
     team: float = 0.0
     """All vehicles pay this for each metre from the swarm's centre to l(t), up to 60 m."""
-    team_s: float = math.inf
+    team_s: float = 1e9
     """And the less, the longer l(t) still moves: by exp(-time left / team_s)."""
     late: float = 0.0
     """All vehicles pay this while l(t) rests and the swarm has not arrived; less, by up to two thirds, the nearer the
