@@ -108,3 +108,14 @@ def test_bad_recipes_are_refused_by_name(tmp_path, changes, told):
 
     with pytest.raises(ResultsError, match=told):
         load_recipe(recipe(tmp_path / "bad.toml", **changes))
+
+
+def test_conditions_are_refused_where_worlds_draw_their_own_seeds(tmp_path):
+    from uuv_marl.train import ppo
+    from uuv_marl.train.group import Problem
+    from uuv_marl.train.recipe import load_recipe
+
+    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(0)
+    problem = Problem(settings.load(), settings.sizes, settings.weights, conditions=settings.conditions)
+    with pytest.raises(ValueError, match=r"conditions \(12\) are for MAPPO alone"):
+        ppo.Hyperparameters().begin(problem, 0)

@@ -249,10 +249,11 @@ def test_what_cannot_be_run_is_refused_with_the_remedy(tmp_path, args, message):
 
 
 @pytest.mark.docs
-def test_the_shipped_page_is_made_of_the_shipped_episodes(tmp_path):
-    shutil.copy(DOCS / job.EPISODES, tmp_path)
+@pytest.mark.parametrize("folder", [DOCS, DOCS / "comparators"], ids=["report", "comparators"])
+def test_the_shipped_pages_are_made_of_the_shipped_episodes(folder, tmp_path):
+    shutil.copy(folder / job.EPISODES, tmp_path)
     page.write_report(tmp_path)
-    assert (tmp_path / "report.md").read_text() == (DOCS / "report.md").read_text()
+    assert (tmp_path / "report.md").read_text() == (folder / "report.md").read_text()
 
 
 # The pilot

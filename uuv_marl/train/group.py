@@ -79,7 +79,7 @@ class Group:
     def _make(self) -> None:
         """Worlds under the present condition."""
         problem, limit = self._problem, self._problem.scenario.time_limit
-        changes = {"time_limit.factor": 1.0, "time_limit.extra_s": min(limit.extra_s, PATIENCE_S)}
+        changes: dict[str, object] = {"time_limit.factor": 1.0, "time_limit.extra_s": min(limit.extra_s, PATIENCE_S)}
         if problem.conditions:
             changes |= problem.conditions[self._turn % len(problem.conditions)]
         scenario = load_scenario(problem.scenario, num_vehicles=self.num_vehicles, overrides=changes)

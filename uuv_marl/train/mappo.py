@@ -180,8 +180,10 @@ class Learner:
                 yield self._rng.standard_normal(shape, np.float32)
         common = self._rng.standard_normal((env.world[-1] + 1, env.outputs), np.float32)
         while True:
-            own = self._rng.standard_normal(shape, np.float32)
-            yield np.float32(math.sqrt(shared)) * common[env.world] + np.float32(math.sqrt(1.0 - shared)) * own
+            drawn = self._rng.standard_normal(shape, np.float32)
+            drawn *= np.float32(math.sqrt(1.0 - shared))
+            drawn += np.float32(math.sqrt(shared)) * common[env.world]
+            yield drawn
             fresh = self._rng.standard_normal(common.shape, np.float32)
             common = np.float32(kept) * common + np.float32(math.sqrt(1.0 - kept * kept)) * fresh
 

@@ -76,7 +76,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     def settings(self, seed: int) -> Settings:
         """The settings of a training, whose seed draws the episodes' conditions too."""
         taken = {name: getattr(self, name) for name in _TAKEN}
-        numbers = {name: tuple(value) if isinstance(value, list) else value for name, value in self.mappo.items()}
+        numbers: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in self.mappo.items()}
         return Settings(
             **taken,
             seed=seed,

@@ -22,10 +22,17 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
     """Rows of a ``TrainingEnv``: features of the actor in, its output out, as ``Acting`` takes it.
 
     Args:
-        problem: what is trained on.
+        problem: what is trained on, without conditions: worlds go on with streams of their own here.
+
+    Raises:
+        ValueError: the problem has conditions.
     """
 
     def __init__(self, problem: Problem) -> None:
+        if problem.conditions:
+            raise ValueError(
+                f"conditions ({len(problem.conditions)}) are for MAPPO alone; train with it, or without them"
+            )
         self._next_seed: int | None = None
         self.env = TrainingEnv(problem, self._draw)
         self.reward_sum = 0.0
