@@ -76,7 +76,9 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     def settings(self, seed: int) -> Settings:
         """The settings of a training, whose seed draws the episodes' conditions too."""
         taken = {name: getattr(self, name) for name in _TAKEN}
-        numbers: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in self.mappo.items()}
+        numbers: dict[str, Any] = {
+            k: tuple(value) if isinstance(value, list) else value for k, value in self.mappo.items()
+        }
         return Settings(
             **taken,
             seed=seed,
@@ -102,9 +104,9 @@ def _folder() -> Any:
 
 def load_recipe(name: str) -> Recipe:
     """A recipe by name, or from a TOML file. Raises ResultsError naming what is wrong in it."""
-    path = Path(name)
+    path = Path(name) if name.endswith(".toml") else _folder() / f"{name}.toml"
     try:
-        text = path.read_text(encoding="utf-8") if path.suffix == ".toml" else (_folder() / f"{name}.toml").read_text()
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         there = ", ".join(recipes())
         raise ResultsError(
