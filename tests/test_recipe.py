@@ -4,9 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines.checkpoint import load_checkpoint
+from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 
 pytestmark = pytest.mark.needs("torch")
@@ -119,3 +121,14 @@ def test_conditions_are_refused_where_worlds_draw_their_own_seeds(tmp_path):
     problem = Problem(settings.load(), settings.sizes, settings.weights, conditions=settings.conditions)
     with pytest.raises(ValueError, match=r"conditions \(12\) are for MAPPO alone"):
         ppo.Hyperparameters().begin(problem, 0)
+
+
+def test_the_command_trains_what_a_recipe_says_and_nothing_else_beside_it(tmp_path):
+    command = ["train", "mappo", "--recipe", recipe(tmp_path / "r.toml"), "--output", str(tmp_path / "run")]
+    refused = CliRunner().invoke(app, [*command, "--scenario", "tracking"])
+    assert refused.exit_code == 2
+    assert "--recipe says this already; leave out --scenario tracking" in " ".join(refused.output.split())
+    done = CliRunner().invoke(app, [*command, "--steps", "1000", "--seed", "2"])
+    assert done.exit_code == 0, done.output
+    card = load_checkpoint(tmp_path / "run" / "best").card
+    assert (card.features, card.training["seed"], len(card.training["conditions"])) == ("memory", 2, 12)
