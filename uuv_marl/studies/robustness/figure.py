@@ -33,9 +33,9 @@ def draw(table: Any) -> Figure:
         ax.set_ylim(-0.04, 1.04)
     for ax in fields[len(axes) :]:
         ax.set_axis_off()
-    figure.supylabel("success: share of the healthy vehicles that are safe and done")
+    figure.supylabel("success: share of the healthy\nvehicles that are safe and done")
     where = ", ".join(scenarios)
-    figure.suptitle(f"Success over severity on {where}: mean over seeds and its 95 % bootstrap interval")
+    figure.suptitle(f"Success over severity on {where}:\nmean over seeds and its 95 % bootstrap interval")
     return legend(figure, fields[len(axes)])
 
 
