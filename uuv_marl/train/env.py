@@ -2,11 +2,9 @@
 
 import itertools
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import get_num_threads
 from numpy.typing import NDArray
 
 from uuv_marl.envs.batched_env import refuse_losses
@@ -62,8 +60,6 @@ class TrainingEnv:
         sizes, turns = list(problem.sizes), len(problem.conditions)
         if turns:
             sizes = [(n, 1) for n, worlds in sizes for _ in range(worlds)]
-        threads = get_num_threads()  # as many as step the worlds of a swarm
-        self._pool = ThreadPoolExecutor(threads) if turns and threads > 1 else None
         acting = ACTING[problem.sees]
         self.features, self.outputs = acting.num_features(problem.scenario), acting.outputs
         self.size = self.features + PRIVILEGED_SIZE
@@ -90,7 +86,7 @@ class TrainingEnv:
         """Act on the actor's output, shape (row, ``outputs``), as ``Acting`` takes it."""
         reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
         final = [np.empty((0, self.size), np.float32)]
-        outcomes = (self._pool.map if self._pool else map)(Group.step, self._groups, [action[r] for r in self._rows])
+        outcomes = map(Group.step, self._groups, [action[rows] for rows in self._rows])
         for group, rows, (paid, *ends) in zip(self._groups, self._rows, outcomes, strict=True):
             reward[rows], ended[:, rows] = paid.reshape(-1), np.repeat(ends, group.num_vehicles, axis=1)
             over = ends[0] | ends[1]
