@@ -47,11 +47,11 @@ class Gains(NamedTuple):
 
 
 TRIMS = 4
-"""Numbers of ``trimmed``."""
+"""Changes of a vehicle's gains that an actor decides on, see ``trimmed``."""
 MOST_TRIM = 3.0
 """They are bounded here [1]. Assumed: a factor of 20 is more than any gain should change."""
 _TRIM_M = 2.0
-"""What 1 adds to ``behind_m`` [m]."""
+"""What 1 adds to ``behind_m`` [m]. Assumed: the way for which a swarm coasts on."""
 
 
 class Scout(Filtered):

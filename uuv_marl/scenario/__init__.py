@@ -6,6 +6,7 @@ every number with its source.
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario.conditions import IDEAL, conditions, disturbances, hears_ideally
+from uuv_marl.scenario.fields import MAX_RANGE_M
 from uuv_marl.scenario.files import (
     differences,
     load_scenario,
@@ -17,7 +18,7 @@ from uuv_marl.scenario.files import (
     vehicle_names,
 )
 from uuv_marl.scenario.scenario import Scenario
-from uuv_marl.scenario.sections import MAX_RANGE_M, growth
+from uuv_marl.scenario.sections import growth
 
 __all__ = [
     "IDEAL", "MAX_RANGE_M", "Scenario", "ScenarioError", "conditions", "differences", "disturbances",

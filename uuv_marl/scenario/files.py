@@ -14,9 +14,9 @@ from tomlkit.container import Container
 from tomlkit.items import AbstractTable
 
 from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario.hardware import Vehicle
 from uuv_marl.scenario.messages import explain, short, shown
 from uuv_marl.scenario.scenario import Scenario
-from uuv_marl.scenario.sections import Vehicle
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"

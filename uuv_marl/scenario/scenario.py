@@ -10,7 +10,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from uuv_marl.scenario import sea, sections
+from uuv_marl.scenario import fields, hardware, sea, sections
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
 MAX_READINGS = 64
@@ -23,25 +23,25 @@ MAX_STEPS = 10_000
 """Most integration steps in a decision; compiled code can't be interrupted."""
 
 
-class Scenario(sections.Section):
+class Scenario(fields.Section):
     """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
 
-    name: sections.Name
+    name: fields.Name
     """Set by the loader: the file's name; names results and pictures."""
     title: str
     """One line."""
     source: str
     """Where it comes from."""
-    version: Annotated[int, sections.within(1, 1_000_000)]
+    version: Annotated[int, fields.within(1, 1_000_000)]
     """Raised by any change of its numbers."""
     swarm: sections.Swarm
     start: sections.Start
     trajectory: sections.Trajectory
     obstacles: Annotated[tuple[sections.Obstacle, ...], Field(max_length=1024)] = ()
     random_field: sections.RandomField | None = None
-    vehicle: sections.Vehicle
-    actuators: sections.Actuators
-    sonar: sections.Sonar
+    vehicle: hardware.Vehicle
+    actuators: hardware.Actuators
+    sonar: hardware.Sonar
     timing: sections.Timing
     constraints: sections.Constraints
     contact: sections.Contact

@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, Literal
 
-from uuv_marl.scenario.sections import Clock, NonNegative, Radius, Section, Speed, within
+from uuv_marl.scenario.fields import Clock, NonNegative, Radius, Section, Speed, within
 
 Probability = Annotated[float, within(0, 1)]
 Angle = Annotated[float, within(0, 180)]

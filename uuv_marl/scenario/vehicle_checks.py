@@ -9,7 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.scenario.sections import Actuators, Timing, Vehicle
+from uuv_marl.scenario.hardware import Actuators, Vehicle
+from uuv_marl.scenario.sections import Timing
 
 Float64 = NDArray[np.float64]
 RK4_LIMIT = 2.78

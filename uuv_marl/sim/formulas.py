@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.scenario.sections import SonarArray
+from uuv_marl.scenario.hardware import SonarArray
 from uuv_marl.sim.trigonometry import cos_sin as compiled_cos_sin
 from uuv_marl.sim.vehicle import Plant
 

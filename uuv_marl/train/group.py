@@ -16,6 +16,7 @@ from uuv_marl.train.acting import ACTING, Sees
 from uuv_marl.train.shaping import privileged_observation
 
 Conditions = Sequence[Mapping[str, object]]
+"""Fields of a scenario, for one episode after the other."""
 Seeds = Callable[[int], Sequence[int] | NDArray[np.integer] | None]
 """Seeds for so many worlds that start, or None for each to go on with its own stream."""
 

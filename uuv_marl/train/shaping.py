@@ -41,8 +41,8 @@ class Weights(NamedTuple):
     team_s: float = 1e9
     """And the less, the longer l(t) still moves: by exp(-time left / team_s)."""
     late: float = 0.0
-    """All vehicles pay this while l(t) rests and the swarm has not arrived; less, by up to two thirds, the nearer the
-    swarm's centre is to the end."""
+    """All vehicles pay this while l(t) rests and the swarm has not arrived; less, by up to two thirds, where the
+    swarm's centre is within about 4 m of the end."""
 
     def __call__(self, swarm: Swarm) -> Float64:
         """The reward of the latest decision, shape (world, vehicle)."""

@@ -21,6 +21,9 @@ _SAME_M = 1e-3
 """A reading that has not moved by this is the one before, of a sonar that reads more seldom than decisions are made."""
 _STALE_S = 2.0
 """But it is believed to stand after so long [s]."""
+_FAR_M = 64.0
+"""In their mean place, neighbours farther than this count as if they were here, in the same direction. Assumed: about
+twice the radius in which 54 vehicles move."""
 _LEARNS = 0.05
 """Weight of the newest error in their mean [1]."""
 
@@ -47,7 +50,7 @@ def noise_of(w: int, i: int, kept: Surroundings) -> float:
 
 @compiled
 def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
-    """The mean place of the known neighbours from the vehicle [m], and how many they are.
+    """The mean place of the known neighbours from the vehicle [m], those far away drawn in, and how many they are.
 
     A vehicle in the middle of a swarm has neighbours all round; one at the edge has them on one side, and so can tell
     where the swarm is.
@@ -61,7 +64,7 @@ def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
     for k in range(kept.known.shape[2]):
         if kept.known[w, i, k] > 0.0:
             d_x, d_y = kept.place[w, i, k, 0] - pose[0], kept.place[w, i, k, 1] - pose[1]
-            near = 64.0 / max(64.0, math.hypot(d_x, d_y))
+            near = _FAR_M / max(_FAR_M, math.hypot(d_x, d_y))
             x, y, num = x + near * d_x, y + near * d_y, num + 1
     return x / max(num, 1), y / max(num, 1), num
 

@@ -9,7 +9,7 @@ from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera
 from uuv_marl.envs.drawing.scene import Float, Scene, Sonar
 from uuv_marl.extras import extra
-from uuv_marl.scenario.sections import SonarArray
+from uuv_marl.scenario.hardware import SonarArray
 
 with extra("render", "rendering"):
     import pygame

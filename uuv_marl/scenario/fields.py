@@ -1,0 +1,46 @@
+"""What the fields of a scenario may hold: plausible ranges, names, and the base of all sections."""
+
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+MAX_RANGE_M = 4096.0
+"""Positions in a percept saturate here, so that observation bounds are finite."""
+
+
+def within(low: float, high: float) -> AfterValidator:
+    """The range in which a number is plausible, both ends included."""
+
+    def check(value: float) -> float:
+        if not low <= value <= high:
+            limits = {"low": f"{low:,.9g}", "high": f"{high:,.9g}"}
+            raise PydanticCustomError("range", "must lie within {low} to {high}", limits)
+        return value
+
+    return AfterValidator(check)
+
+
+Signed = Annotated[float, within(-1_000_000, 1_000_000)]
+Positive = Annotated[float, within(0.001, 1_000_000)]
+NonNegative = Annotated[float, within(0, 1_000_000)]
+NonPositive = Annotated[float, within(-1_000_000, 0)]
+Speed = Annotated[float, within(0, 100)]
+Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
+Clock = Annotated[float, within(0.0001, 3_600)]
+Lag = Annotated[float, within(0, 3_600)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+
+
+class Section(BaseModel):
+    """A part of a scenario: immutable, no unknown fields, no silent conversion."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True)
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        self._check()
+        return self
+
+    def _check(self) -> None:
+        """Raise ValueError where one field contradicts another."""
