@@ -11,7 +11,8 @@ from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
 from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains, trimmed
+from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains, trimmed, widened
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -75,17 +76,25 @@ def test_trims_are_bounded_factors_of_a_vehicle_s_own_gains():
     swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
     policy.hear(swarm.reset(0))
     quiet = policy.trim(np.zeros((1, 2, TRIMS), np.float32)).copy()
-    once = policy.trim(np.array([[[MOST_TRIM, 0, 0, 0], [0, 0, 0, 0]]], np.float32)).copy()
-    np.testing.assert_array_equal(policy.trim(np.array([[[50.0, 0, 0, 0], [0, 0, 0, 0]]], np.float32)), once)
+    first = np.zeros((1, 2, TRIMS), np.float32)
+    first[0, 0, 0] = MOST_TRIM
+    once = policy.trim(first).copy()
+    np.testing.assert_array_equal(policy.trim(20.0 * first), once)
     assert (once[0, 0] != quiet[0, 0]).any()
     np.testing.assert_array_equal(once[0, 1], quiet[0, 1], "the other's gains are as they were")
 
 
 def test_trims_by_hand():
     law = Gains(together=0.1, behind_m=1.0)
-    changed = trimmed(law, np.log(np.array([2.0, 3.0, 0.5, math.e**0.5], np.float32)))
-    assert changed == pytest.approx(law._replace(pull=0.1, together=0.3, push=5.0, behind_m=2.0), rel=1e-6)
-    assert trimmed(law, np.zeros(TRIMS, np.float32)) == law
+    trims = np.array([math.log(2.0), 1.5, math.log(0.5), 0.5, 0.0, -1.0], np.float32)
+    wanted = law._replace(pull=0.1, together=0.1 + 1.5 * 0.04, push=5.0, behind_m=2.0)
+    np.testing.assert_allclose(trimmed(law, trims), wanted, rtol=1e-6)
+    assert trimmed(law, -trims).together == pytest.approx(0.04), "a sum"
+    assert trimmed(law, -3.0 * trims).together == 0.0, "and never below none"
+    assert widened(Barrier(), trims) == Barrier(neighbour_m=6.0)
+    still = np.zeros(TRIMS, np.float32)
+    assert trimmed(law, still) == law
+    assert widened(Barrier(neighbour_m=3.0), still).neighbour_m == 3.0, "a law's own may be less than a trim's least"
 
 
 @pytest.mark.parametrize("overrides", [FEW, FEW | ROUGH], ids=["calm", "rough"])
@@ -135,14 +144,6 @@ def test_refusals_name_what_is_wrong(saved, tmp_path):
     save_checkpoint(tmp_path / "wrong" / WEIGHTS_FILE, wrong, actor(0.1))
     with pytest.raises(PolicyError, match="expected float32"):
         load_checkpoint(tmp_path / "wrong")
-
-
-@pytest.mark.needs("onnx")
-def test_it_is_not_exported(saved, tmp_path):
-    from uuv_marl.baselines.export import write_onnx
-
-    with pytest.raises(PolicyError, match="remembers, and its memory has no form in ONNX yet"):
-        write_onnx(saved(0.1), load_scenario("random_field"), tmp_path / "policy.onnx")
 
 
 @pytest.mark.needs("torch")

@@ -32,8 +32,12 @@ class Filtered(Policy):
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
         super().__init__(scenario, num_worlds)
         self.barrier = barrier
-        self._model, self._gain = Model.of(scenario), velocity_gain(scenario)
-        self._planes: Float64 = np.zeros((self.memory.disc.shape[2] + scenario.sonar.num_sectors, 3))
+        self.model = Model.of(scenario)
+        """What vehicles know of themselves."""
+        self.gain = velocity_gain(scenario)
+        """Force per velocity error [N s/m]."""
+        self.planes: Float64 = np.zeros((self.memory.disc.shape[2] + scenario.sonar.num_sectors, 3))
+        """Room for half-planes."""
 
     @property
     def changed(self) -> Int64:
@@ -50,7 +54,7 @@ class Filtered(Policy):
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Take what is perceived into what is remembered."""
-        listen(self.flat(percept), self.layout.offsets, worlds, self._model, self.memory)
+        listen(self.flat(percept), self.layout.offsets, worlds, self.model, self.memory)
 
     def acted(self, action: Float32, worlds: Bool) -> None:
         """Keep the action: the vehicle's next place is reckoned from it."""

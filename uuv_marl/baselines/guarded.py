@@ -51,8 +51,8 @@ class Guarded(Filtered):
         """The policy's actions of shape (world, vehicle, 2), changed where they are not safe."""
         self.inner.active = self.active
         action = self.inner.act(percept)
-        _guard(
-            self.active, self._model.own, self.barrier, self.limits, self._gain, self.memory, self._planes,
+        guard_all(
+            self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes,
             action,
         )  # fmt: skip
         self.clamps[...] = self.inner.clamps
@@ -85,7 +85,7 @@ def coming_velocity(w: int, i: int, action: Float32, own: Reckoning, kept: Surro
 
 
 @compiled
-def _guard(
+def guard_all(
     worlds: Bool, own: Reckoning, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, planes: Float64,
     action: Float32,
 ) -> None:  # fmt: skip

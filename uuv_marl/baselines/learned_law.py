@@ -20,8 +20,8 @@ class TrimmedLaw(Scout):
     def look(self, features: Float32) -> None:
         """Fill what an actor sees of what is remembered, shape (world, vehicle, ``RECALLED``)."""
         recall(
-            self.active, self._model.own.period_s, self._grown(), self.barrier, self.limits, self.memory,
-            self._planes, features,
+            self.active, self.scenario.swarm.num_vehicles, self.model.own.period_s, self.grown(), self.barrier,
+            self.limits, self.memory, self.planes, features,
         )  # fmt: skip
 
     def trim(self, output: Float32) -> Float32:

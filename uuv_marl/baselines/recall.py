@@ -9,7 +9,7 @@ from uuv_marl.baselines.features import put
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.neighbours import middle, noise_of
+from uuv_marl.baselines.memory.neighbours import age_of, middle, noise_of
 from uuv_marl.baselines.memory.pose import to_body, to_body_axes
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of
@@ -24,20 +24,21 @@ Bool = NDArray[np.bool_]
 
 NEIGHBOURS, SURFACES = 6, 4
 """So many of the nearest neighbours and obstacles are seen."""
-_OWN = 23
+_OWN = 25
 RECALLED = _OWN + 6 * NEIGHBOURS + 5 * SURFACES
 """Features of a vehicle."""
 
 
 @compiled
 def recall(
-    worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, kept: Surroundings, planes: Float64,
-    features: Float32,
+    worlds: Bool, num_vehicles: int, period: float, g: Gains, barrier: Barrier, limits: Limits, kept: Surroundings,
+    planes: Float64, features: Float32,
 ) -> None:  # fmt: skip
     """Fill the features of every vehicle: its motion, l(t), the hand-made law's wish, who and what is near.
 
     Args:
         worlds: those that run, shape (world,).
+        num_vehicles: of the swarm.
         period: between two decisions [s].
         g: gains of the hand-made law.
         barrier: margins and rates of the filter.
@@ -51,6 +52,7 @@ def recall(
             if worlds[w]:
                 features[w, i, :] = 0.0
                 if kept.begun[w, i] > 0.0:
+                    features[w, i, _OWN - 1] = 0.5 * math.sqrt(num_vehicles / NOMINAL_VEHICLES)
                     _own(w, i, period, g, barrier, limits, kept, planes, features[w, i])
                     _neighbours(w, i, kept, planes[:, 0], features[w, i])
                     _surfaces(w, i, barrier, kept, planes[:, 0], features[w, i])
@@ -98,7 +100,8 @@ def _own(
     c_x, c_y, heard = middle(w, i, kept)
     out[19], out[20] = to_body_axes(c_x / 32.0, c_y / 32.0, pose)
     out[21] = heard / kept.known.shape[2]
-    out[22] = 0.5 * math.sqrt(kept.known.shape[1] / NOMINAL_VEHICLES)
+    out[22] = 0.25 * min(kept.surprise[w, i], 4.0)
+    out[23] = min(age_of(w, i, kept), 2.0)
 
 
 @compiled

@@ -46,12 +46,16 @@ class Gains(NamedTuple):
     """How far behind a moving l(t) to go [m]: a swarm coasts on for about 2 m where l(t) stops."""
 
 
-TRIMS = 4
-"""Changes of a vehicle's gains that an actor decides on, see ``trimmed``."""
+TRIMS = 6
+"""Changes of a vehicle's numbers that an actor decides on: four gains (``trimmed``), how hard it steers (a factor), and
+the distance kept from neighbours (a sum)."""
 MOST_TRIM = 3.0
 """They are bounded here [1]. Assumed: a factor of 20 is more than any gain should change."""
-_TRIM_M = 2.0
-"""What 1 adds to ``behind_m`` [m]. Assumed: the way for which a swarm coasts on."""
+_TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 0.04, 2.0, 1.0
+"""What 1 adds to ``together`` [1/s], to ``behind_m`` [m] and to the distance kept from neighbours [m]. Assumed: as
+much as the pull, the way for which a swarm coasts on, and a share of a hull's length."""
+_LEAST_KEEP_M = 4.0
+"""Of that distance, the least [m]: hulls touch at less. Assumed."""
 
 
 class Scout(Filtered):
@@ -81,13 +85,13 @@ class Scout(Filtered):
     def _decided(self) -> Float32:
         """The actions, where ``_trims`` change the gains."""
         action = np.zeros((*self._trims.shape[:2], 2), np.float32)
-        _decide(
-            self.active, self._model.own.period_s, self._grown(), self.barrier, self.limits, self._gain, self.memory,
-            self._planes, self._trims, action,
+        decide_all(
+            self.active, self.model.own.period_s, self.grown(), self.barrier, self.limits, self.gain, self.memory,
+            self.planes, self._trims, action,
         )  # fmt: skip
         return action
 
-    def _grown(self) -> Gains:
+    def grown(self) -> Gains:
         """The gains for as many vehicles as the swarm has."""
         by, g = self.gains, self._growth
         return by._replace(
@@ -98,15 +102,30 @@ class Scout(Filtered):
 
 @compiled
 def trimmed(g: Gains, trims: Float32) -> Gains:
-    """Gains of one vehicle, changed: pull, push and together by factors, and how far behind l(t) it goes.
+    """Gains of one vehicle, changed: pull and push by factors, together and how far behind l(t) it goes by sums.
 
     Args:
         g: the law's.
-        trims: of pull, together, push and behind_m, shape (TRIMS,); 0 changes nothing.
+        trims: the first are of pull, together, push and behind_m, shape (TRIMS,); 0 changes nothing.
     """
     return Gains(
         g.pull * math.exp(trims[0]), g.push * math.exp(trims[2]), g.push_range, g.pull_at_rest, g.push_at_rest,
-        g.together * math.exp(trims[1]), g.behind_m + _TRIM_M * trims[3],
+        max(g.together + _TRIM_PER_S * trims[1], 0.0), g.behind_m + _TRIM_M * trims[3],
+    )  # fmt: skip
+
+
+@compiled
+def widened(by: Barrier, trims: Float32) -> Barrier:
+    """The filter of one vehicle, which keeps another distance from neighbours.
+
+    Args:
+        by: the law's.
+        trims: the last is of that distance, shape (TRIMS,); 0 changes nothing.
+    """
+    keep = by.neighbour_m if trims[5] == 0.0 else max(by.neighbour_m + _TRIM_KEEP_M * trims[5], _LEAST_KEEP_M)
+    return Barrier(
+        by.obstacle_m, by.gap_share, by.narrowest_m, by.obstacle_rate, keep, by.neighbour_rate, by.noise_margin,
+        by.share, by.horizon_m,
     )  # fmt: skip
 
 
@@ -171,7 +190,7 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
 
 
 @compiled
-def _decide(
+def decide_all(
     worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
     planes: Float64, trims: Float32, action: Float32,
 ) -> None:  # fmt: skip
@@ -192,7 +211,8 @@ def _decide(
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                w_x, w_y = wished(w, i, trimmed(g, trims[w, i]), kept)
+                trim = trims[w, i]
+                w_x, w_y = wished(w, i, trimmed(g, trim), kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
-                num = planes_of(w, i, period, barrier, kept, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)
+                num = planes_of(w, i, period, widened(barrier, trim), kept, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain * math.exp(trim[4]), limits, kept, action)

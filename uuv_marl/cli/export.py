@@ -1,4 +1,4 @@
-"""``uuv-marl export``: a learned policy for other runtimes."""
+"""``uuv-marl export``: a policy for other runtimes."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,13 +9,17 @@ from uuv_marl.cli.console import console, explained, extra
 
 
 def export(
-    policy: Annotated[str, typer.Argument(help="Checkpoint of a training: its file, or the folder that holds it.")],
+    policy: Annotated[
+        str, typer.Argument(help="A training's checkpoint (its file or folder), mappo, scout, or guarded:mappo.")
+    ],
     output: Annotated[Path, typer.Argument(help="ONNX file.", dir_okay=False)],
     scenario: Annotated[
-        str, typer.Option(help="Name or TOML file; the model keeps its sonar suite and vehicle.")
+        str, typer.Option(help="Name or TOML file; the model keeps its sonar suite, vehicle and decision period.")
     ] = "random_field",
 ) -> None:
-    """Write a learned policy as an ONNX model, from an agent's observation to its action. Needs the extra "onnx".
+    """Write a policy as an ONNX model, from an agent's observation to its action. Needs the extra "onnx".
+
+    What a policy remembers is inputs and outputs of the model: kept_... before a decision, next_... after it.
 
     Example: uuv-marl export runs/mappo/best policy.onnx
     """

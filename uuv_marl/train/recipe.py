@@ -31,7 +31,7 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
     periods_s: tuple[float, ...] = (0.1,)
     """Decision periods, as often as they are to come."""
     axes: tuple[str, ...] = ()
-    """Disturbances: axes of the robustness suite."""
+    """Disturbances: axes of the robustness suite. Its groups come equally often."""
     levels: tuple[int, ...] = (1, 2, 3, 4, 5)
     """Their levels."""
     number: int = pydantic.Field(1, ge=1)
@@ -41,16 +41,19 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
         """Fields of the scenario for each of ``number`` episodes."""
         rng = np.random.default_rng(seed)
         speed = load_scenario(scenario).trajectory.speed_mps
-        places = [(axis, level) for axis in known(self.axes) for level in self.levels if level in AXES[axis].levels]
+        groups: dict[str, list[str]] = {}
+        for axis in known(self.axes):
+            groups.setdefault(AXES[axis].group, []).append(axis)
         drawn: list[Mapping[str, object]] = []
         for _ in range(self.number):
             echo, disturbed = rng.random(2) < (self.surface, 1.0 - self.calm)
             changes = {**self.changes, "timing.decision_period_s": float(rng.choice(self.periods_s))}
             if echo:
                 changes["sonar.echo_reports"] = "surface"
-            if disturbed and places:
-                axis, level = places[rng.integers(len(places))]
-                changes |= AXES[axis].overrides(level, speed)
+            if disturbed and groups:
+                axes = groups[str(rng.choice(list(groups)))]
+                axis = AXES[str(rng.choice(axes))]
+                changes |= axis.overrides(int(rng.choice([k for k in axis.levels if k in self.levels])), speed)
             drawn.append(changes)
         return tuple(drawn)
 

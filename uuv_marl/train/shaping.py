@@ -40,6 +40,8 @@ class Weights(NamedTuple):
     """All vehicles pay this for each metre from the swarm's centre to l(t), up to 60 m."""
     team_s: float = 1e9
     """And the less, the longer l(t) still moves: by exp(-time left / team_s)."""
+    astray_m: float = 1e9
+    """A vehicle pays 1 where it is twice as far from l(t), nothing up to here, and at most 3 [m]."""
     late: float = 0.0
     """All vehicles pay this while l(t) rests and the swarm has not arrived; less, by up to two thirds, where the
     swarm's centre is within about 4 m of the end."""
@@ -61,6 +63,7 @@ def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
         - by.obstacle * near * near
         - by.spacing * close * close
         - by.effort * facts.effort
+        - np.clip(away / by.astray_m - 1.0, 0.0, 3.0)
     )
     if by.team or by.late:
         rate = rate - _shared(swarm, by)[:, None]

@@ -49,6 +49,16 @@ def noise_of(w: int, i: int, kept: Surroundings) -> float:
 
 
 @compiled
+def age_of(w: int, i: int, kept: Surroundings) -> float:
+    """Mean time since the latest new reading of each known neighbour [s], 0 where there is none."""
+    total, num = 0.0, 0
+    for k in range(kept.known.shape[2]):
+        if kept.known[w, i, k] > 0.0:
+            total, num = total + kept.since[w, i, k], num + 1
+    return total / max(num, 1)
+
+
+@compiled
 def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
     """The mean place of the known neighbours from the vehicle [m], those far away drawn in, and how many they are.
 

@@ -1,0 +1,137 @@
+"""Policies that remember as nodes: a ``Scan`` over the vehicles, in which what a vehicle remembers goes in and out.
+
+Memory, law and filter are the compiled functions that Python runs (``kernels``).
+"""
+
+import functools
+from collections.abc import Sequence
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from uuv_marl.baselines.export.graph import Value
+from uuv_marl.baselines.export.kernels import Translator
+from uuv_marl.baselines.export.memoryless import forward_nodes, learned_nodes
+from uuv_marl.baselines.export.numbers import Ref, view_of
+from uuv_marl.baselines.filtered import Filtered
+from uuv_marl.baselines.guarded import Guarded, guard_all
+from uuv_marl.baselines.learned import Learned
+from uuv_marl.baselines.learned_law import LearnedLaw
+from uuv_marl.baselines.memory import Surroundings, listen
+from uuv_marl.baselines.policy import PolicyError
+from uuv_marl.baselines.recall import RECALLED, recall
+from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Scout, decide_all
+from uuv_marl.extras import extra
+from uuv_marl.percept import PerceptLayout
+from uuv_marl.sim.views import Fields, Starts, fields
+
+with extra("onnx", "export to ONNX"):
+    from onnx import TensorProto, ValueInfoProto, helper
+
+KEPT, NEXT = "kept_", "next_"
+"""Before the name of what is remembered: as it was before the decision, and as it is after it."""
+_ONE = np.array([True])
+"""The worlds that go on: the only one."""
+
+
+class Remembered(NamedTuple):
+    """An array that a vehicle remembers, as input and output of the model."""
+
+    name: str
+    shape: tuple[int, ...]
+    """Of one vehicle's."""
+
+
+def remembered(policy: Filtered) -> Sequence[Remembered]:
+    """What the model of a policy remembers."""
+    memory: Surroundings = policy.memory
+    return [Remembered(name, array.shape[2:]) for name, array in memory._asdict().items()]
+
+
+def remembering_nodes(policy: Filtered) -> Translator:
+    """A graph from "observation" (vehicle, size) and what is remembered to "action" and what is remembered then.
+
+    Raises:
+        PolicyError: it has no form in ONNX.
+    """
+    g = Translator({fields: functools.partial(_fields, policy.layout)})
+    inputs = ["observation", *(KEPT + name for name, _ in remembered(policy))]
+    if isinstance(policy, Guarded):
+        if not isinstance(policy.inner, Learned):
+            raise PolicyError(
+                f"policy {policy.name!r}: inside the filter, ONNX has a form for networks without memory alone"
+            )
+        inputs.append(learned_nodes(g, policy.inner, Value(g, "observation")).name)
+    nodes, g.nodes = g.nodes, []
+    heads, tails = _vehicle(g, policy)
+    body = helper.make_graph(g.nodes, "vehicle", heads, tails)
+    g.nodes = nodes
+    outputs = ["action", *(NEXT + name for name, _ in remembered(policy))]
+    g.nodes.append(helper.make_node("Scan", inputs, outputs, "vehicles", body=body, num_scan_inputs=len(inputs)))
+    return g
+
+
+def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], list["ValueInfoProto"]]:
+    """Nodes of one vehicle's decision; its inputs and outputs."""
+    kept, size = remembered(policy), policy.layout.size
+    heads = [_info("row", TensorProto.FLOAT, (size,))]
+    heads += [_info(f"own_{name}", TensorProto.DOUBLE, shape) for name, shape in kept]
+    percept = (Value(g, "row") * policy.layout.scale).double()
+    memory = Surroundings(**{name: _array(g, Value(g, f"own_{name}"), shape) for name, shape in kept})
+    g.call(listen, _array(g, percept, (size,), single=True), policy.layout.offsets, _ONE, policy.model, memory)
+    if isinstance(policy, Guarded):
+        heads.append(_info("wish", TensorProto.FLOAT, (2,)))
+        action = _guarded(g, policy, memory)
+    elif isinstance(policy, Scout):
+        action = _by_law(g, policy, memory)
+    else:
+        raise PolicyError(f"policy {policy.name!r} has no form in ONNX")
+    g.tensors[cast(Any, memory.action).cells] = g.tensors[action.cells]
+    acted = Value(g, g.tensors[action.cells]).single().name
+    tails = [_info(acted, TensorProto.FLOAT, (2,))]
+    for (_, shape), ref in zip(kept, cast(Any, memory), strict=True):
+        own = Value(g, g.tensors[ref.cells]).shaped(*shape)
+        tails.append(_info(own.name, TensorProto.DOUBLE, shape))
+    return heads, tails
+
+
+def _guarded(g: Translator, policy: Guarded, memory: Surroundings) -> Ref:
+    """The action, shape (1, 1, 2), that the filter leaves of "wish"."""
+    action = _array(g, Value(g, "wish").double(), (2,), single=True)
+    by = policy.model.own, policy.barrier, policy.limits, policy.gain
+    g.call(guard_all, _ONE, *by, memory, g.zeros(policy.planes.shape), action)
+    return action
+
+
+def _by_law(g: Translator, policy: Scout, memory: Surroundings) -> Ref:
+    """The action, shape (1, 1, 2), of the law, whose gains a network may trim."""
+    by = policy.model.own.period_s, policy.grown(), policy.barrier, policy.limits
+    planes, trims = g.zeros(policy.planes.shape), g.zeros((1, 1, TRIMS), single=True)
+    if isinstance(policy, LearnedLaw):
+        features = g.zeros((1, 1, RECALLED), single=True)
+        g.call(recall, _ONE, policy.scenario.swarm.num_vehicles, *by, memory, planes, features)
+        seen = Value(g, g.tensors[features.cells]).single().shaped(1, RECALLED)
+        output = forward_nodes(g, seen, policy.checkpoint.layers)
+        bounds = (np.array(bound, np.float32) for bound in (-MOST_TRIM, MOST_TRIM))
+        trims = _array(g, g("Clip", output, *bounds).double(), (TRIMS,), single=True)
+    action = g.zeros((1, 1, 2), single=True)
+    g.call(decide_all, _ONE, *by, policy.gain, memory, planes, trims, action)
+    return action
+
+
+def _array(g: Translator, value: Value, shape: tuple[int, ...], single: bool = False) -> Any:
+    """A tensor of one vehicle as an array over one world and one vehicle."""
+    return g.array(value.shaped(-1).name, (1, 1, *shape), single)
+
+
+def _info(name: str, kind: int, shape: tuple[int, ...]) -> "ValueInfoProto":
+    return helper.make_tensor_value_info(name, kind, list(shape))
+
+
+def _fields(layout: PerceptLayout, flat: Ref, _at: Starts) -> Fields:
+    """``views.fields`` of one vehicle's percept."""
+    parts: dict[str, Any] = dict.fromkeys(Fields._fields, np.zeros((1, 1, 0)))
+    for row in layout.table:
+        if row.name in parts:
+            parts[row.name] = view_of(flat.cells, (1, 1, *row.shape), layout.starts[row.name])
+    return Fields(**parts)
