@@ -10,6 +10,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
 from uuv_marl.baselines.learned_law import TrimmedLaw
+from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains, trimmed, widened
@@ -22,6 +23,9 @@ ROUGH = {
     "noise.bearing_deg": 10.0, "noise.range_share": 0.2, "noise.false_echo_probability": 0.1, "current.speed_mps": 1.5,
     "latency.processing_s": 0.5, "noise.silence_probability": 0.1, "noise.silence_readings": 10,
 }  # fmt: skip
+
+
+LAG = {"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}
 
 
 def actor(scale, seed=0):
@@ -57,6 +61,27 @@ def test_an_actor_that_says_nothing_is_scout(saved):
     assert not np.array_equal(actions(saved(0.3)), actions("scout"))
 
 
+@pytest.mark.parametrize(
+    ("overrides", "least", "most"),
+    [
+        ({}, 0.0, 0.1),
+        (LAG, 0.95, 1.0),
+        ({"noise.bearing_deg": 2.0}, 0.8, 1.0),
+        ({"timing.decision_period_s": 0.5}, 0.25, 1.0),
+    ],
+    ids=["calm", "lag", "noise", "slow"],
+)
+def test_an_actor_has_its_say_where_vehicles_doubt(overrides, least, most):
+    scenario = granted("scout", load_scenario("random_field", num_vehicles=20, overrides=overrides))
+    swarm, policy, doubts = Swarm(scenario), make("scout", scenario), []
+    percept, decisions = swarm.reset(10_007), round(40.0 / scenario.timing.decision_period_s)
+    for k in range(decisions):
+        percept = swarm.step(policy.act(percept))
+        if k > decisions / 4:
+            doubts.append([doubt(0, i, policy.memory) for i in range(20)])
+    assert least <= np.mean(doubts) <= most
+
+
 def test_a_run_depends_on_its_seed_alone(saved):
     policy = saved(0.3)
     both = actions(policy, decisions=80, worlds=2)
@@ -75,6 +100,7 @@ def test_trims_are_bounded_factors_of_a_vehicle_s_own_gains():
     scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
     swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
     policy.hear(swarm.reset(0))
+    policy.memory.surprise[...] = 9.0
     quiet = policy.trim(np.zeros((1, 2, TRIMS), np.float32)).copy()
     first = np.zeros((1, 2, TRIMS), np.float32)
     first[0, 0, 0] = MOST_TRIM
@@ -86,15 +112,16 @@ def test_trims_are_bounded_factors_of_a_vehicle_s_own_gains():
 
 def test_trims_by_hand():
     law = Gains(together=0.1, behind_m=1.0)
-    trims = np.array([math.log(2.0), 1.5, math.log(0.5), 0.5, 0.0, -1.0], np.float32)
-    wanted = law._replace(pull=0.1, together=0.1 + 1.5 * 0.04, push=5.0, behind_m=2.0)
-    np.testing.assert_allclose(trimmed(law, trims), wanted, rtol=1e-6)
-    assert trimmed(law, -trims).together == pytest.approx(0.04), "a sum"
-    assert trimmed(law, -3.0 * trims).together == 0.0, "and never below none"
-    assert widened(Barrier(), trims) == Barrier(neighbour_m=6.0)
+    trims = np.array([math.log(2.0), 1.5, math.log(0.5), 0.5, -1.0, -1.0], np.float32)
+    wanted = law._replace(pull=0.1, together=0.1 + 1.5 * 0.04, push=5.0, behind_m=2.0, steering=math.exp(-2.0))
+    np.testing.assert_allclose(trimmed(law, trims, 1.0), wanted, rtol=1e-6)
+    np.testing.assert_allclose(trimmed(law, 4.0 * trims, 0.25), wanted, rtol=1e-6)
+    assert trimmed(law, -trims, 1.0).together == pytest.approx(0.04), "a sum"
+    assert trimmed(law, -3.0 * trims, 1.0).together == 0.0, "and never below none"
+    assert widened(Barrier(), trims, 1.0) == Barrier(neighbour_m=6.0)
     still = np.zeros(TRIMS, np.float32)
-    assert trimmed(law, still) == law
-    assert widened(Barrier(neighbour_m=3.0), still).neighbour_m == 3.0, "a law's own may be less than a trim's least"
+    assert trimmed(law, still, 1.0) == trimmed(law, trims, 0.0) == law
+    assert widened(Barrier(neighbour_m=3.0), still, 1.0).neighbour_m == 3.0, "a law's may be less than a trim's least"
 
 
 @pytest.mark.parametrize("overrides", [FEW, FEW | ROUGH], ids=["calm", "rough"])

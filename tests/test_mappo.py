@@ -273,6 +273,14 @@ def test_what_all_pay_for_their_centre_by_hand(place, at_rest):
     np.testing.assert_allclose(alone - all_pay, per_step * expected, rtol=1e-9)
 
 
+def test_who_is_astray_pays_by_hand(place):
+    swarm = place("tracking", [[0, 0, 0], [90.0, 0, 0], [400.0, 0, 0]])
+    swarm.facts.reference[0, :2] = 0.0
+    near, astray = shaped_reward(swarm, Weights()), shaped_reward(swarm, Weights(astray_m=60.0))
+    per_step = swarm.scenario.timing.decision_period_s / 0.5
+    np.testing.assert_allclose(near - astray, per_step * np.array([[0.0, 0.5, 3.0]]), rtol=1e-9)
+
+
 def test_moving_the_centre_is_paid_in_full():
     """One of n vehicles moves by 1 m towards where the centre should be: paid about 1 m, and not 1/n of it."""
     swarm = Swarm(load_scenario("tracking", num_vehicles=50))

@@ -114,6 +114,20 @@ def test_a_vehicle_knows_where_it_is_through_turns_and_rest(policy, period):
     assert seen.turn.max() < 1e-3
 
 
+def test_a_vehicle_notices_how_far_its_model_is_from_what_it_does():
+    surprises = []
+    for lag in (0.0, 0.2, 0.5):
+        overrides = {"actuators.thrust_lag_s": lag, "actuators.yaw_lag_s": lag}
+        scenario = granted("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
+        swarm, policy = Swarm(scenario), make("scout", scenario)
+        percept = swarm.reset(10_501)
+        for _ in range(200):
+            percept = swarm.step(policy.act(percept))
+        surprises.append(policy.memory.surprise.mean())
+    assert surprises[0] < 1e-5, "in still water the model is the vehicle"
+    assert 0.02 < surprises[1] < surprises[2]
+
+
 @pytest.mark.parametrize("echoes", ["centre", "surface"])
 def test_obstacles_are_known_within_centimetres_without_noise(echoes):
     seen = run({"sonar.echo_reports": echoes})

@@ -32,6 +32,8 @@ def test_a_recipe_draws_what_it_says():
     one, other = (load_recipe("memory").settings(seed) for seed in (0, 1))
     assert one == load_recipe("memory").settings(0)
     assert one.conditions != other.conditions
+    assert one.validation_conditions == other.validation_conditions
+    assert not any("random_field.legs" in changes for changes in one.validation_conditions), "of the set's own length"
     for conditions in (one.conditions, other.conditions):
         loaded = [load_scenario(one.scenario, overrides={**one.overrides, **changes}) for changes in conditions]
         calm = [scenario for scenario in loaded if not disturbances(scenario)]

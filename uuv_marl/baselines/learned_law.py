@@ -1,6 +1,7 @@
 """A learned policy with memory: a network trims the gains of the hand-made law, and the filter has the last word.
 
-Each vehicle has gains of its own at each decision. With a network that says nothing the policy is the law alone.
+Each vehicle has gains of its own at each decision. They change as far as it doubts (``memory.doubt``): in still water
+with exact echoes next to nothing. With a network that says nothing the policy is the law alone.
 """
 
 import numpy as np

@@ -164,7 +164,7 @@ class Policy:
             return self.active.copy()
         now, then, period = clock.time_s, self._time_s, self.scenario.timing.decision_period_s
         fresh = self.active & ((clock.episode != self._episode) | (now == 0.0) & (then > 0.0))
-        for array in self.memory:
+        for array in self.memory if fresh.any() else ():
             array[fresh] = 0
         then[fresh], self._episode[fresh] = np.nan, clock.episode[fresh]
         passed = now - then

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
@@ -44,16 +45,19 @@ class Gains(NamedTuple):
     a large swarm they are a small part of it. All go the same way, and the swarm is not pressed together."""
     behind_m: float = 0.0
     """How far behind a moving l(t) to go [m]: a swarm coasts on for about 2 m where l(t) stops."""
+    steering: float = 1.0
+    """Times the force by which velocities are made good [1]. Less is calmer, and bears actuators that lag."""
 
 
 TRIMS = 6
-"""Changes of a vehicle's numbers that an actor decides on: four gains (``trimmed``), how hard it steers (a factor), and
-the distance kept from neighbours (a sum)."""
+"""Changes of a vehicle's numbers that an actor decides on: five gains (``trimmed``), and the distance kept from
+neighbours (``widened``)."""
 MOST_TRIM = 3.0
 """They are bounded here [1]. Assumed: a factor of 20 is more than any gain should change."""
-_TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 0.04, 2.0, 1.0
-"""What 1 adds to ``together`` [1/s], to ``behind_m`` [m] and to the distance kept from neighbours [m]. Assumed: as
-much as the pull, the way for which a swarm coasts on, and a share of a hull's length."""
+_TRIM_STEERING, _TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 2.0, 0.04, 2.0, 1.0
+"""What 1 does: a factor of e^2 on steering, as a lag asks for a tenth; and what it adds to ``together`` [1/s], to
+``behind_m`` [m] and to the distance kept from neighbours [m]. Assumed: as much as the pull, the way for which a swarm
+coasts on, and a share of a hull's length."""
 _LEAST_KEEP_M = 4.0
 """Of that distance, the least [m]: hulls touch at less. Assumed."""
 
@@ -101,28 +105,33 @@ class Scout(Filtered):
 
 
 @compiled
-def trimmed(g: Gains, trims: Float32) -> Gains:
-    """Gains of one vehicle, changed: pull and push by factors, together and how far behind l(t) it goes by sums.
+def trimmed(g: Gains, trims: Float32, share: float) -> Gains:
+    """Gains of one vehicle, changed: pull, push and steering by factors, together and behind_m by sums.
 
     Args:
         g: the law's.
-        trims: the first are of pull, together, push and behind_m, shape (TRIMS,); 0 changes nothing.
+        trims: the first are of pull, together, push, behind_m and steering, shape (TRIMS,); 0 changes nothing.
+        share: of them that counts, 0 to 1.
     """
+    pull, push, steering = share * trims[0], share * trims[2], share * _TRIM_STEERING * trims[4]
+    together, behind_m = share * _TRIM_PER_S * trims[1], share * _TRIM_M * trims[3]
     return Gains(
-        g.pull * math.exp(trims[0]), g.push * math.exp(trims[2]), g.push_range, g.pull_at_rest, g.push_at_rest,
-        max(g.together + _TRIM_PER_S * trims[1], 0.0), g.behind_m + _TRIM_M * trims[3],
+        g.pull * math.exp(pull), g.push * math.exp(push), g.push_range, g.pull_at_rest, g.push_at_rest,
+        max(g.together + together, 0.0), g.behind_m + behind_m, g.steering * math.exp(steering),
     )  # fmt: skip
 
 
 @compiled
-def widened(by: Barrier, trims: Float32) -> Barrier:
+def widened(by: Barrier, trims: Float32, share: float) -> Barrier:
     """The filter of one vehicle, which keeps another distance from neighbours.
 
     Args:
         by: the law's.
         trims: the last is of that distance, shape (TRIMS,); 0 changes nothing.
+        share: of it that counts, 0 to 1.
     """
-    keep = by.neighbour_m if trims[5] == 0.0 else max(by.neighbour_m + _TRIM_KEEP_M * trims[5], _LEAST_KEEP_M)
+    more = share * _TRIM_KEEP_M * trims[5]
+    keep = by.neighbour_m if more == 0.0 else max(by.neighbour_m + more, _LEAST_KEEP_M)
     return Barrier(
         by.obstacle_m, by.gap_share, by.narrowest_m, by.obstacle_rate, keep, by.neighbour_rate, by.noise_margin,
         by.share, by.horizon_m,
@@ -205,14 +214,16 @@ def decide_all(
         gain: force per velocity error [N s/m].
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
-        trims: changes of the gains, see ``trimmed``, shape (world, vehicle, TRIMS).
+        trims: changes of the law, see ``trimmed`` and ``widened``, shape (world, vehicle, TRIMS). As much of them
+            counts as a vehicle doubts.
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                trim = trims[w, i]
-                w_x, w_y = wished(w, i, trimmed(g, trim), kept)
+                trim, share = trims[w, i], doubt(w, i, kept)
+                own = trimmed(g, trim, share)
+                w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
-                num = planes_of(w, i, period, widened(barrier, trim), kept, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain * math.exp(trim[4]), limits, kept, action)
+                num = planes_of(w, i, period, widened(barrier, trim, share), kept, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain * own.steering, limits, kept, action)

@@ -1,7 +1,7 @@
 """Recipes: files that say all of a training, so that one command gives a policy's like again."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,13 @@ from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.robustness.axes import AXES, known
 from uuv_marl.train.acting import Sees
+from uuv_marl.train.group import Conditions
 from uuv_marl.train.mappo import Hyperparameters
 from uuv_marl.train.shaping import OVERRIDES, Weights
 from uuv_marl.train.training import Settings
+
+_VALIDATION_DRAW = 2**31
+"""Seed of what is drawn for validation."""
 
 
 class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
@@ -36,26 +40,33 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
     """Their levels."""
     number: int = pydantic.Field(1, ge=1)
     """So many different ones are drawn; then they come again."""
+    validated: int = pydantic.Field(0, ge=0)
+    """So many others are drawn for validation, the same for every seed of a training."""
 
-    def draw(self, scenario: str, seed: int) -> tuple[Mapping[str, object], ...]:
+    def draw(self, scenario: str, seed: int) -> Conditions:
         """Fields of the scenario for each of ``number`` episodes."""
+        return tuple(self._drawn(scenario, self.number, self.changes, seed))
+
+    def draw_validated(self, scenario: str) -> Conditions:
+        """The same for validation, without ``changes``."""
+        return tuple(self._drawn(scenario, self.validated, {}, _VALIDATION_DRAW))
+
+    def _drawn(self, scenario: str, number: int, base: dict[str, Any], seed: int) -> Iterator[Mapping[str, object]]:
         rng = np.random.default_rng(seed)
         speed = load_scenario(scenario).trajectory.speed_mps
         groups: dict[str, list[str]] = {}
         for axis in known(self.axes):
             groups.setdefault(AXES[axis].group, []).append(axis)
-        drawn: list[Mapping[str, object]] = []
-        for _ in range(self.number):
+        for _ in range(number):
             echo, disturbed = rng.random(2) < (self.surface, 1.0 - self.calm)
-            changes = {**self.changes, "timing.decision_period_s": float(rng.choice(self.periods_s))}
+            changes = {**base, "timing.decision_period_s": float(rng.choice(self.periods_s))}
             if echo:
                 changes["sonar.echo_reports"] = "surface"
             if disturbed and groups:
                 axes = groups[str(rng.choice(list(groups)))]
                 axis = AXES[str(rng.choice(axes))]
                 changes |= axis.overrides(int(rng.choice([k for k in axis.levels if k in self.levels])), speed)
-            drawn.append(changes)
-        return tuple(drawn)
+            yield changes
 
 
 class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
@@ -90,6 +101,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
             weights=Weights(**self.weights),
             algorithm=Hyperparameters(**numbers),
             conditions=self.episodes.draw(self.scenario, seed) if self.episodes else (),
+            validation_conditions=self.episodes.draw_validated(self.scenario) if self.episodes else (),
         )
 
 

@@ -59,7 +59,7 @@ def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
     close = np.clip(1.0 - facts.spacing / by.spacing_m, 0.0, 1.0)
     rate = (
         -np.minimum(away, 300.0) / by.distance_m
-        + by.centre * np.clip(lead(swarm), -100.0, 100.0)
+        + (by.centre * np.clip(lead(swarm), -100.0, 100.0) if by.centre else 0.0)
         - by.obstacle * near * near
         - by.spacing * close * close
         - by.effort * facts.effort

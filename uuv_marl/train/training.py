@@ -99,6 +99,8 @@ class Settings:
     """Iterations; a multiple of ``checkpoint_every`` wastes least where a training is cut off."""
     validation: Sizes = ()
     """Vehicles and episodes of each size. If empty: those of ``MIXED_VALIDATION``, or four of each size trained on."""
+    validation_conditions: Conditions = ()
+    """Fields of the scenario of further validation episodes."""
 
     def __post_init__(self) -> None:
         n = self.load().swarm.num_vehicles
@@ -270,7 +272,8 @@ def train(
         if record.agent_steps >= until:
             return
         sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in settings.sizes)
-        say(f"Training on swarms of {sizes}; {conditions(scenario)}.")
+        own = f"{len(settings.conditions)} conditions, an episode each" if settings.conditions else conditions(scenario)
+        say(f"Training on swarms of {sizes}; {own}.")
         torch.set_num_threads(1)  # sums in another order give other bits
         trainer = Trainer(settings, device)
         if folder.checkpoint:
@@ -295,7 +298,9 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
     started, settings = time.perf_counter(), trainer.settings
     candidate, best = output / "candidate", output / "best"
     trainer.save_policy(candidate, record)
-    result: ValidationResult = validate(candidate, settings.load_for_validation(), settings.validation)
+    result: ValidationResult = validate(
+        candidate, settings.load_for_validation(), settings.validation, settings.validation_conditions
+    )
     better = record.best is None or result.score > record.best
     record = record._replace(
         seconds=record.seconds + time.perf_counter() - started,

@@ -9,6 +9,7 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.env import TRAINING_SEEDS
+from uuv_marl.train.group import Conditions
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
 """The first of the validation seeds: up to 999,999, which no training uses."""
@@ -34,20 +35,29 @@ class ValidationResult(NamedTuple):
     """Of the worst episode."""
 
 
-def validate(policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]]) -> ValidationResult:
+def validate(
+    policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]], conditions: Conditions = ()
+) -> ValidationResult:
     """Run a checkpoint on a scenario's validation seeds.
 
     Args:
         policy: the checkpoint.
         scenario: with any number of vehicles.
         sizes: number of vehicles, and of episodes with so many.
+        conditions: fields of the scenario of further episodes, each with as many vehicles as the scenario has.
     """
     metrics: list[Metrics] = []
     for n, count in sizes:
         seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + count)
-        events = evaluate(granted(str(policy), load_scenario(scenario, num_vehicles=n)), str(policy), seeds)
-        metrics += [event.metrics for event in events if isinstance(event, Run)]
+        metrics += _run(policy, load_scenario(scenario, num_vehicles=n), seeds)
+    for k, changes in enumerate(conditions):
+        metrics += _run(policy, load_scenario(scenario, overrides=changes), [VALIDATION_SEEDS + 1000 + k])
     return validation_result(metrics)
+
+
+def _run(policy: Path, scenario: Scenario, seeds: Sequence[int]) -> list[Metrics]:
+    events = evaluate(granted(str(policy), scenario), str(policy), seeds)
+    return [event.metrics for event in events if isinstance(event, Run)]
 
 
 def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:

@@ -26,6 +26,8 @@ FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)
 """A vector to l(t) that is longer is cut, and no fix [m]."""
 _TURN_TOLERANCE = 0.001
 """By which compass and dead reckoning may differ on a leg, beside what the yaw rate's error makes of it [rad]."""
+_ARM_M = 1.0
+"""Yaw rates count as the velocity that they give so far from the axis [m]. Assumed: about half a hull."""
 _SURPRISE_S = 2.0
 """What counts as of late [s]. Assumed: longer than a turn, shorter than a leg."""
 
@@ -136,7 +138,7 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
     speed, half = math.hypot(v_x, v_y), 0.5 * own.period_s
     x, y, psi, u, v, r = reckoned(motion, kept.action[w, i], own)
     wrong = see.yaw_rate[w, i, 0] - r
-    off = math.hypot(see.velocity[w, i, 0] - u, see.velocity[w, i, 1] - v)
+    off = math.hypot(see.velocity[w, i, 0] - u, see.velocity[w, i, 1] - v) + _ARM_M * abs(wrong)
     kept.surprise[w, i] += min(own.period_s / _SURPRISE_S, 1.0) * (off - kept.surprise[w, i])
     turn_c, turn_s = cos_sin(psi + half * wrong)
     c, s = to_map_axes(turn_c, turn_s, pose)

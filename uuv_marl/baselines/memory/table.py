@@ -22,7 +22,7 @@ class Surroundings(NamedTuple):
     motion: Annotated[Float64, "world vehicle 3", "Own velocity, body frame [m/s], and yaw rate [rad/s]."]
     action: Annotated[Float64, "world vehicle 2", "Own latest action: shares of full thrust and torque."]
     surprise: Annotated[
-        Float64, "world vehicle", "How far its velocity is from what its model of itself says of it, of late [m/s]."
+        Float64, "world vehicle", "How far its velocity is from what its model says, of late, yaw rate included [m/s]."
     ]
     reference: Annotated[Float64, "world vehicle 4", "Place of l(t) [m], unit vector of its leg, 0 where it rests."]
     reference_speed: Annotated[Float64, "world vehicle", "Speed of l(t) [m/s]."]

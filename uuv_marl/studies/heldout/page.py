@@ -98,12 +98,13 @@ def _guarded(episodes: Sequence[Episode]) -> str:
                     name, held.name, f"{len(guarded)}",
                     ", ".join(f"{sum(e.arrived for e in es)}" for es in both),
                     ", ".join(f"{sum(e.collisions > 0 for e in es)}" for es in both),
+                    ", ".join(f"{sum(e.succeeded for e in es)}" for es in both),
                     ", ".join(f"{np.mean([e.time_s for e in es]):.1f} s" for es in both),
                     f"{later(guarded, alone):+.1f} s",
                 ))  # fmt: skip
     headers = (
         "policy", "set", "episodes", "arrived: alone, guarded", "collided: alone, guarded",
-        "mean time, or limit: alone, guarded", "later by",
+        "arrived without a collision: alone, guarded", "mean time, or limit: alone, guarded", "later by",
     )  # fmt: skip
     return markdown_table(headers, rows) if rows else "No guarded policy was run.\n"
 

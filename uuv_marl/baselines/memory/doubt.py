@@ -1,0 +1,28 @@
+"""How far what a vehicle meets is from what its model and its sonar should give: 0 in still water with exact echoes."""
+
+from uuv_marl.baselines.memory.neighbours import age_of, noise_of
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.sim.compiled import compiled
+
+SURPRISE_MPS = 0.25
+"""So far from its model, a vehicle doubts all [m/s]. Assumed: a lag of 0.1 s makes three times as much, masses that are
+off by 20 % less than half."""
+NOISE = 0.02
+"""So large errors of neighbours' places over their range do the same [1]. Assumed: those of 2 degrees. Exact echoes
+make none, but at slow decisions, when neighbours are not where they were expected."""
+USUAL_AGE_S, OLD_S = 0.15, 0.2
+"""So old are readings on the mean where nothing is wrong; so much more does the same [s]. Assumed: measured in still
+water, where those that are heard no more are kept for a while."""
+
+
+@compiled
+def doubt(w: int, i: int, kept: Surroundings) -> float:
+    """From 0, all is as expected, to 1.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        kept: what is remembered.
+    """
+    old = max(age_of(w, i, kept) - USUAL_AGE_S, 0.0)
+    return min(kept.surprise[w, i] / SURPRISE_MPS + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)
