@@ -37,9 +37,9 @@ def test_a_recipe_draws_what_it_says():
     for conditions in (one.conditions, other.conditions):
         loaded = [load_scenario(one.scenario, overrides={**one.overrides, **changes}) for changes in conditions]
         calm = [scenario for scenario in loaded if not disturbances(scenario)]
-        assert 0.3 < len(calm) / len(loaded) < 0.7
+        assert 0.02 < len(calm) / len(loaded) < 0.25
         assert {scenario.sonar.echo_reports for scenario in loaded} == {"centre", "surface"}
-        assert {scenario.timing.decision_period_s for scenario in loaded} == {0.1, 0.5}
+        assert {scenario.timing.decision_period_s for scenario in loaded} == {0.1, 0.2, 0.5}
 
 
 def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
