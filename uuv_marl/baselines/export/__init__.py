@@ -58,6 +58,7 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
             "of a training (uuv-marl train mappo), scout, or guarded: before a learned policy without memory"
         )
     model = _model(made, graph)
+    onnx.checker.check_model(model, full_check=True)  # pyright: ignore[reportUnknownMemberType] - of a path
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(model.SerializeToString())

@@ -1,6 +1,7 @@
 """An ONNX graph that formulas write: nodes and constants in the order in which they are made."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import contextlib
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ class Graph:
 
         Args:
             operator: of ONNX.
-            inputs: values, arrays, or numbers, which become double constants.
+            inputs: values, arrays, or numbers, which become constants.
             name: of the output; made up where empty.
             attributes: of the operator.
         """
@@ -34,6 +35,15 @@ class Graph:
         values = [each if isinstance(each, Value) else self.constant(each) for each in inputs]
         self.nodes.append(helper.make_node(operator, [value.name for value in values], [name], name, **attributes))
         return Value(self, name)
+
+    @contextlib.contextmanager
+    def within(self, nodes: "list[onnx.NodeProto]") -> Generator[None]:
+        """What is made here goes into these nodes: those of a graph within this one."""
+        outer, self.nodes = self.nodes, nodes
+        try:
+            yield
+        finally:
+            self.nodes = outer
 
     def split(self, value: "Value", sizes: Sequence[int]) -> "list[Value]":
         """Consecutive columns of a value (vehicle, sum of sizes)."""
@@ -53,7 +63,7 @@ class Graph:
         return [constant for constant in self.constants if constant.name in names]
 
     def constant(self, value: NDArray[Any] | float) -> "Value":
-        """An array, or a number, which becomes a double."""
+        """An array or a number: double, or int64 where it is whole."""
         name = self.fresh("constant")
         self.constants.append(numpy_helper.from_array(np.asarray(value), name))
         return Value(self, name)

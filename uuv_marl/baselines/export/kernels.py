@@ -1,8 +1,18 @@
 """Compiled functions as ONNX nodes: the source that Numba compiles is read, and every number it computes is a node.
 
 So memory, law and filter have one definition. A branch whose condition is known when the model is written leaves no
-node; other branches become ``If``, loops ``Loop``, and calls are written out. What lies outside the part of Python that
-our compiled functions use raises ``KernelError``.
+node; other branches become ``If``, loops ``Loop``, and calls are written out. Of
+
+    def nearest(away, num):
+        best, least = -1, math.inf
+        for k in range(num):
+            if away[k] < least:
+                best, least = k, away[k]
+        return best
+
+``Translator.call`` makes a ``Loop`` with two numbers that go from round to round, best and least, and in its body a
+``Gather``, a ``Less``, and an ``If`` that gives both anew. What lies outside the part of Python that our compiled
+functions use raises ``KernelError``.
 """
 
 import ast
@@ -36,8 +46,8 @@ with extra("onnx", "export to ONNX"):
     from onnx import helper
 
 _Names = dict[str, Any]
-"""Local names of a function, and how it is left: these, which no name can be."""
-_RETURNED, _RESULT, _BROKEN, _CONTINUED = "return", "result", "break", "continue"
+"""Local names of a function, and how it is left, under keys that are no names:"""
+_RETURNED, _RESULT, _BROKEN, _CONTINUED, _PART = "has returned", "its result", "has broken", "has continued", "a part"
 _ENDS = (_RETURNED, _BROKEN, _CONTINUED)
 _ARITHMETIC: Mapping[type, str] = {ast.Add: "Add", ast.Sub: "Sub", ast.Mult: "Mul", ast.Div: "Div"}
 _COMPARISON: Mapping[type, str] = {
@@ -81,31 +91,49 @@ class Translator(Numbers, ast.NodeVisitor):
         super().__init__()
         self._replaced = replaced
         self._names: _Names = {}
-        self._globals: Mapping[str, Any] = {}
+        self._function: Any = None
 
     def call(self, function: Any, *args: Any) -> Any:
         """What a compiled function returns for these arguments. Raises KernelError where it has no translation."""
         if function in self._replaced:
             return self._replaced[function](*args)
-        plain = getattr(function, "py_func", function)
+        plain: Any = getattr(function, "py_func", function)
         if hasattr(plain, "_fields"):
             return plain(*args)
         if not inspect.isfunction(plain):
             return self.function(plain, args)
-        tree, outer = _source(plain), (self._names, self._globals)
-        names = [arg.arg for arg in tree.args.args]
-        self._names, self._globals = dict(zip(names, args, strict=True)), plain.__globals__
+        tree, outer = _source(plain), (self._names, self._function)
+        given = inspect.signature(plain).bind(*args)
+        given.apply_defaults()
+        self._names, self._function = dict(given.arguments), plain
         try:
             self._block(tree.body)
-            return self._names.get(_RESULT)
-        except KernelError as error:
-            raise error if "function " in str(error) else KernelError(f"function {plain.__name__}: {error}") from None
+            return self._result(tree)
         finally:
-            self._names, self._globals = outer
+            self._names, self._function = outer
+
+    def _result(self, tree: ast.FunctionDef) -> Any:
+        """What the function returns, whose body has been written."""
+        result, ways = self._names.get(_RESULT), [node for node in ast.walk(tree) if isinstance(node, ast.Return)]
+        if any(way.value for way in ways) and not _returns(tree.body):
+            raise KernelError(f"function {tree.name} may end without a result")
+        if len(ways) > 1 and "s" in _kinds(result):
+            raise KernelError(f"function {tree.name} returns single precision, and may return double elsewhere")
+        return result
+
+    def visit(self, node: ast.AST) -> Any:
+        """The value of a node; whatever goes wrong says where."""
+        try:
+            return super().visit(node)
+        except _PlacedError:
+            raise
+        except Exception as error:
+            where = f"line {getattr(node, 'lineno', '?')} of {inspect.getsourcefile(self._function)}"
+            raise _PlacedError(f"function {self._function.__name__}, {where}: {error}") from error
 
     def generic_visit(self, node: ast.AST) -> Any:
         """Refuse what has no method here."""
-        raise KernelError(f"{type(node).__name__} in line {getattr(node, 'lineno', '?')} has no translation")
+        raise KernelError(f"{type(node).__name__} has no translation")
 
     # Statements
 
@@ -142,11 +170,17 @@ class Translator(Numbers, ast.NodeVisitor):
 
     def visit_If(self, node: ast.If) -> None:
         """A branch."""
-        test = self.visit(node.test)
+        test = self._truth(self.visit(node.test))
         if isinstance(test, Scalar):
-            self._branch(self.scalar(test, "b"), node.body, node.orelse)
+            self._branch(test, node.body, node.orelse)
         else:
             self._block(node.body if test else node.orelse)
+
+    def _truth(self, test: Any) -> Any:
+        """What a condition says."""
+        if kind_of(test) != "b" or not (is_known(test) or isinstance(test, Scalar)):
+            raise KernelError("a condition must be a comparison, or true or false")
+        return test
 
     def visit_Return(self, node: ast.Return) -> None:
         """The end of a function."""
@@ -169,11 +203,12 @@ class Translator(Numbers, ast.NodeVisitor):
 
     def _way(self, statements: Sequence[ast.stmt], changes: _Names, tensors: Mapping[Cells, str]) -> _Way:
         """Statements as a graph of their own, in which some names and arrays are others."""
-        outer = self.nodes, self._names, self.tensors
-        self.nodes, self._names, self.tensors = [], {**self._names, **changes}, {**self.tensors, **tensors}
-        self._block(statements)
-        way = _Way(self.nodes, self._names, self.tensors)
-        self.nodes, self._names, self.tensors = outer
+        outer, nodes = (self._names, self.tensors), list[onnx.NodeProto]()
+        self._names, self.tensors = {**self._names, **changes}, {**self.tensors, **tensors}
+        with self.within(nodes):
+            self._block(statements)
+        way = _Way(nodes, self._names, self.tensors)
+        self._names, self.tensors = outer
         return way
 
     def _branch(
@@ -198,7 +233,7 @@ class Translator(Numbers, ast.NodeVisitor):
     def _joined_names(self, ways: tuple[_Way, _Way], doors: _Doors) -> _Names:
         """Names after two ways; one that has a value on one of them only has none."""
         joined: _Names = {}
-        for name in ways[0].names.keys() | ways[1].names.keys():
+        for name in {**ways[0].names, **ways[1].names}:  # in order: the same file each time
             a, b = (way.names.get(name, False if name in _ENDS else None) for way in ways)
             if name == _RESULT:
                 a, b = (mapped(_zero, b) if a is None else a), (mapped(_zero, a) if b is None else b)
@@ -210,15 +245,14 @@ class Translator(Numbers, ast.NodeVisitor):
         """What is a on one way, and b on the other."""
         if a is b or (is_known(a) and is_known(b) and kind_of(a) == kind_of(b) and a == b):
             return a
-        if isinstance(a, Ref) and isinstance(b, Ref) and a.cells is b.cells and a.shape == b.shape:
+        if isinstance(a, Ref) and isinstance(b, Ref) and (a.cells, a.shape, a.strides) == (b.cells, b.shape, b.strides):
             return Ref(a.cells, self._joined(ways, doors, a.offset, b.offset), a.shape, a.strides)
         if isinstance(a, Ref) or isinstance(b, Ref):
             raise KernelError("a name stands for one of two arrays")
         kind, inner = wider(a, b), list[str]()
         for value, way in zip((a, b), ways, strict=True):
-            outer, self.nodes = self.nodes, way.nodes
-            inner.append(self.scalar(value, kind).name)
-            self.nodes = outer
+            with self.within(way.nodes):
+                inner.append(self.scalar(value, kind).name)
         return Scalar(_out(ways, doors, inner, kind, self.fresh), kind)
 
     # Loops
@@ -226,9 +260,10 @@ class Translator(Numbers, ast.NodeVisitor):
     def visit_For(self, node: ast.For) -> None:
         """A loop over a range."""
         call = node.iter
-        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"):
-            self.generic_visit(call)
-        bounds = [self.visit(arg) for arg in cast(ast.Call, call).args]
+        ranged = isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"
+        bounds = [self.visit(arg) for arg in call.args] if isinstance(call, ast.Call) and ranged else []
+        if not 1 <= len(bounds) <= 2 or node.orelse or not isinstance(node.target, ast.Name):
+            raise KernelError("a loop must run over range(end) or range(first, end), and have no else")
         first, end = (0, bounds[0]) if len(bounds) == 1 else bounds
         trips = self.binary("Sub", end, first)
         ends = {name: self._names.pop(name) for name in (_BROKEN, _CONTINUED) if name in self._names}
@@ -243,10 +278,14 @@ class Translator(Numbers, ast.NodeVisitor):
         self._names |= ends
 
     def _loop(self, it: ast.For, first: Any, trips: Any) -> None:
-        """A loop that runs more than once, or nobody knows how often: written until it is known what it changes."""
+        """A loop that runs more than once, or nobody knows how often.
+
+        Its body is written again until it is known which arrays it changes, and which numbers become doubles in it.
+        """
         target = cast(ast.Name, it.target).id
         stored = {node.id for node in ast.walk(it) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-        begins = {name: self._names[name] for name in sorted(stored & self._names.keys() - {target})}
+        inner = {cast(ast.Name, node.target).id for node in ast.walk(it) if isinstance(node, ast.For)}
+        begins = {name: self._names[name] for name in sorted(stored & self._names.keys() - inner)}
         changed: list[Cells] = []
         while True:
             count = Scalar(self.fresh("round"), "i")
@@ -267,9 +306,9 @@ class Translator(Numbers, ast.NodeVisitor):
 
     def _round(self, it: ast.For, count: Scalar, first: Any, heads: _Names, given: Mapping[Cells, str]) -> _Way:
         """The body of a loop."""
-        outer, self.nodes = self.nodes, []
-        number = self.binary("Add", count, first)
-        before, self.nodes = self.nodes, outer
+        before: list[onnx.NodeProto] = []
+        with self.within(before):
+            number = self.binary("Add", count, first)
         way = self._way(it.body, {**heads, cast(ast.Name, it.target).id: number}, given)
         return way._replace(nodes=[*before, *way.nodes])
 
@@ -285,10 +324,9 @@ class Translator(Numbers, ast.NodeVisitor):
             carried: names, what they stand for before, and in the body's inputs.
             given: tensors of arrays, as the body's inputs.
         """
-        outer, self.nodes = self.nodes, way.nodes
-        stop = self.either(way.names.get(_BROKEN, False), way.names.get(_RETURNED, False))
-        on = self.emit("Identity", self.scalar(self.no(stop), "b").name)
-        self.nodes = outer
+        with self.within(way.nodes):
+            stop = self.either(way.names.get(_BROKEN, False), way.names.get(_RETURNED, False))
+            on = self.emit("Identity", self.scalar(self.no(stop), "b").name)
         doors = _Doors(tails=([_info(on, "b")],))
         doors.heads += [_info(count.name, "i"), _info(self.fresh("on"), "b")]
 
@@ -297,9 +335,8 @@ class Translator(Numbers, ast.NodeVisitor):
                 return None
             doors.heads.append(_info(head.name, head.kind))
             doors.starts.append(self.scalar(begin, head.kind).name)
-            outer, self.nodes = self.nodes, way.nodes
-            inner = self.scalar(tail, head.kind).name
-            self.nodes = outer
+            with self.within(way.nodes):
+                inner = self.scalar(tail, head.kind).name
             return Scalar(_out([way], doors, [inner], head.kind, self.fresh), head.kind)
 
         for name, begin, head in carried:
@@ -328,14 +365,22 @@ class Translator(Numbers, ast.NodeVisitor):
 
     def visit_Name(self, node: ast.Name) -> Any:
         """A local, a global or one of Python's own."""
-        for names in (self._names, self._globals, vars(builtins)):
+        code = self._function.__code__
+        if node.id in self._names:
+            return self._names[node.id]
+        if node.id in (*code.co_varnames, *code.co_cellvars, *code.co_freevars):
+            raise KernelError(f"{node.id} has a value on some ways only, or is of a function around")
+        for names in (self._function.__globals__, vars(builtins)):
             if node.id in names:
                 return names[node.id]
-        raise KernelError(f"{node.id} in line {node.lineno} has a value on some ways only")
+        raise KernelError(f"{node.id} is unknown")
 
     def visit_Attribute(self, node: ast.Attribute) -> Any:
         """A part of a named tuple, a module, or the shape of an array."""
-        return getattr(self.visit(node.value), node.attr)
+        value = self.visit(node.value)
+        if isinstance(value, Scalar) or (isinstance(value, Ref) and node.attr != "shape"):
+            raise KernelError(f"of an array only the shape can be asked for, not {node.attr}")
+        return getattr(value, node.attr)
 
     def visit_Subscript(self, node: ast.Subscript) -> Any:
         """An entry or a view."""
@@ -346,7 +391,7 @@ class Translator(Numbers, ast.NodeVisitor):
 
     def visit_Slice(self, node: ast.Slice) -> slice:
         """From an entry to another."""
-        return slice(*(None if end is None else self.visit(end) for end in (node.lower, node.upper)))
+        return slice(*(None if end is None else self.visit(end) for end in (node.lower, node.upper, node.step)))
 
     def visit_Tuple(self, node: ast.Tuple) -> tuple[Any, ...]:
         """Several values."""
@@ -380,21 +425,29 @@ class Translator(Numbers, ast.NodeVisitor):
         return result
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Any:
-        """All parts are computed, as none has an effect; one that is known may end node, as it would in Python."""
+        """Whether all are so, or one; a part is computed only where those before leave it open, as in Python."""
         every = isinstance(node.op, ast.And)
         result: Any = every
         for part in node.values:
-            result = (self.both if every else self.either)(result, self.visit(part))
             if is_known(result) and bool(result) != every:
-                break
+                return result
+            if isinstance(result, Scalar) and _may_fail(part):
+                own, known = [_kept(part)], [_kept(ast.copy_location(ast.Constant(not every), part))]
+                self._branch(result, own if every else known, known if every else own)
+                result = self._truth(self._names.pop(_PART))
+            else:
+                result = (self.both if every else self.either)(result, self._truth(self.visit(part)))
         return result
 
     def visit_IfExp(self, node: ast.IfExp) -> Any:
-        """One of two numbers; both are computed where nobody knows which."""
-        test = self.visit(node.test)
-        if isinstance(test, Scalar):
-            return self.chosen(self.scalar(test, "b"), self.visit(node.body), self.visit(node.orelse))
-        return self.visit(node.body if test else node.orelse)
+        """One of two values."""
+        test = self._truth(self.visit(node.test))
+        if not isinstance(test, Scalar):
+            return self.visit(node.body if test else node.orelse)
+        if not (_may_fail(node.body) or _may_fail(node.orelse)):
+            return self.chosen(test, self.visit(node.body), self.visit(node.orelse))
+        self._branch(test, [_kept(node.body)], [_kept(node.orelse)])
+        return self._names.pop(_PART)
 
     def visit_Call(self, node: ast.Call) -> Any:
         """A call, written out."""
@@ -407,11 +460,46 @@ class Translator(Numbers, ast.NodeVisitor):
         return self.call(function, *args)
 
 
+class _PlacedError(KernelError):
+    """One that says where."""
+
+
 @functools.cache
 def _source(function: Any) -> ast.FunctionDef:
-    """A function's syntax tree."""
+    """A function's syntax tree, with the lines of its file."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-    return cast(ast.FunctionDef, tree.body[0])
+    return cast(ast.FunctionDef, ast.increment_lineno(tree, function.__code__.co_firstlineno - 1).body[0])
+
+
+def _returns(body: Sequence[ast.stmt]) -> bool:
+    """Whether statements can't end without a return."""
+    last = body[-1] if body else None
+    if isinstance(last, ast.If):
+        return _returns(last.body) and _returns(last.orelse)
+    return isinstance(last, ast.Return)
+
+
+def _may_fail(part: ast.expr) -> bool:
+    """Whether computing it in vain could fail, write to an array or take long."""
+    return any(isinstance(node, (ast.Call, ast.Subscript)) for node in ast.walk(part))
+
+
+def _kept(part: ast.expr) -> ast.Assign:
+    """The statement that keeps a value under a name that none is."""
+    name = ast.copy_location(ast.Name(_PART, ast.Store()), part)
+    return ast.copy_location(ast.Assign([name], part), part)
+
+
+def _kinds(result: Any) -> list[str]:
+    """Kinds of the numbers of a result that is known only when the model runs."""
+    found: list[str] = []
+
+    def note(part: Any) -> None:
+        if isinstance(part, Scalar):
+            found.append(part.kind)
+
+    mapped(note, result)
+    return found
 
 
 def _info(name: str, kind: str, size: int | None = None) -> onnx.ValueInfoProto:

@@ -1,7 +1,8 @@
 """Numbers and arrays of compiled functions as nodes of an ONNX graph.
 
-What is known when the model is written is a number of Python and stays one; the rest is a ``Scalar``. An array is a
-tensor with one axis; each write to it makes a new one.
+There are two times: what is known when the model is written is a number of Python and leaves no node; what is known
+only when the model runs is a ``Scalar``, the name of a tensor. An array is a tensor with one axis; each write to it
+makes a new one.
 """
 
 import functools
@@ -22,12 +23,19 @@ with extra("onnx", "export to ONNX"):
 TYPES = {"f": TensorProto.DOUBLE, "s": TensorProto.FLOAT, "i": TensorProto.INT64, "b": TensorProto.BOOL}
 """ONNX's type of each kind of number: double, single, whole, true or false."""
 _DTYPES = {"f": np.float64, "s": np.float32, "i": np.int64, "b": np.bool_}
-_ROOTS: Mapping[Any, str] = {math.sqrt: "Sqrt", np.sqrt: "Sqrt", math.exp: "Exp", math.floor: "Floor"}
+_OF_ONE: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
+    math.sqrt: ("Sqrt", np.sqrt), np.sqrt: ("Sqrt", np.sqrt), math.exp: ("Exp", np.exp),
+    math.floor: ("Floor", np.floor), abs: ("Abs", abs), float: ("", float),
+}  # fmt: skip
+"""Functions of one number: the operator, and what computes it now."""
+_OF_TWO: Mapping[Any, tuple[str, Callable[[Any, Any], Any]]] = {
+    min: ("Min", min), max: ("Max", max), math.hypot: ("", math.hypot), math.copysign: ("", math.copysign),
+}  # fmt: skip
 _KNOWN: Mapping[str, Callable[[Any, Any], Any]] = {
     "Add": lambda a, b: a + b,
     "Sub": lambda a, b: a - b,
     "Mul": lambda a, b: a * b,
-    "Div": lambda a, b: a / b,
+    "Div": lambda a, b: float(np.divide(a, b, dtype=np.float64)),
     "Less": lambda a, b: a < b,
     "LessOrEqual": lambda a, b: a <= b,
     "Greater": lambda a, b: a > b,
@@ -76,8 +84,8 @@ def view_of(cells: Cells, shape: tuple[int, ...], first: int = 0) -> Ref:
 
 
 def is_known(value: Any) -> TypeGuard[float]:
-    """Whether it is a number of Python."""
-    return isinstance(value, (bool, int, float, np.number, np.bool_))
+    """Whether it is a number of Python, or a double of NumPy."""
+    return isinstance(value, (bool, int, float, np.integer, np.bool_))
 
 
 def kind_of(value: Any) -> str:
@@ -112,6 +120,14 @@ def mapped(function: Callable[..., Any], *values: Any) -> Any:
     return form(*parts) if hasattr(form, "_fields") else tuple(parts)
 
 
+def _ends(part: Any, length: int) -> tuple[int, int]:
+    """Where a slice of an axis begins and ends."""
+    if not all(end is None or is_known(end) for end in (part.start, part.stop)) or part.step is not None:
+        raise KernelError("a slice must have known ends and no step")
+    start, stop, _ = part.indices(length)
+    return start, max(start, stop)
+
+
 class Numbers(Graph):
     """A graph with arithmetic of numbers, and arrays that can be written to."""
 
@@ -119,7 +135,7 @@ class Numbers(Graph):
         super().__init__()
         self.tensors: dict[Cells, str] = {}
         """The tensor that holds each array now."""
-        self._scalars: dict[tuple[str, str], Scalar] = {}
+        self._scalars: dict[tuple[str, bytes], Scalar] = {}
         self._fixed: dict[int, tuple[NDArray[Any], Ref]] = {}
         self._fixed_tensors: dict[Cells, str] = {}
 
@@ -145,33 +161,37 @@ class Numbers(Graph):
             return cast(Any, array)[index[0]]
         if isinstance(array, np.ndarray):
             fixed = cast(NDArray[Any], array)
+            ref = self._fixed_array(fixed)
             if len(index) == fixed.ndim and all(map(is_known, index)):
+                self.view(ref, index)  # refuses what lies outside
                 return fixed[tuple(index)].item()
-            array = self._fixed_array(fixed)
+            array = ref
         ref = self.view(array, index)
         return ref if ref.shape else self._load(ref)
 
     def _fixed_array(self, array: NDArray[Any]) -> Ref:
         """A constant array as one whose entries can be taken when the model runs."""
-        if array.dtype != np.float64:
+        if array.dtype.char not in "d?":
             raise KernelError(f"an array of {array.dtype} has no translation")
         if id(array) not in self._fixed:
             ref = view_of(Cells(array.size), array.shape)
             self._fixed[id(array)] = array, ref
-            self._fixed_tensors[ref.cells] = self.constant(np.ascontiguousarray(array).ravel()).name
+            self._fixed_tensors[ref.cells] = self.constant(np.ascontiguousarray(array, np.float64).ravel()).name
         return self._fixed[id(array)][1]
 
     def view(self, ref: Ref, index: Sequence[Any]) -> Ref:
-        """A part of an array, for numbers and slices."""
+        """A part of an array, for numbers and slices. Numbers known only when the model runs must lie inside."""
         offset, shape, strides = ref.offset, list[int](), list[int]()
         every = [*index, *([slice(None)] * (len(ref.shape) - len(index)))]
         for own, length, stride in zip(every, ref.shape, ref.strides, strict=True):
             if isinstance(own, slice):
-                start, stop, _ = own.indices(length)
+                start, stop = _ends(own, length)
                 offset = self.binary("Add", offset, start * stride)
                 shape.append(stop - start)
                 strides.append(stride)
             else:
+                if kind_of(own) != "i" or (is_known(own) and not 0 <= own < length):
+                    raise KernelError(f"index {own} does not lie in an axis of length {length}")
                 offset = self.binary("Add", offset, self.binary("Mul", own, stride))
         return Ref(ref.cells, offset, tuple(shape), tuple(strides))
 
@@ -203,8 +223,10 @@ class Numbers(Graph):
         kind = kind or kind_of(value)
         if isinstance(value, Scalar):
             return value if value.kind == kind else Scalar(self.emit("Cast", value.name, to=TYPES[kind]), kind)
+        if not is_known(value):
+            raise KernelError(f"{value!r} is no number")
         number = np.array(value, _DTYPES[kind])
-        key = kind, repr(number)
+        key = kind, number.tobytes()
         if key not in self._scalars:
             self._scalars[key] = Scalar(self.constant(number).name, kind)
         return self._scalars[key]
@@ -216,12 +238,15 @@ class Numbers(Graph):
     def binary(self, name: str, a: Any, b: Any) -> Any:
         """Add, Sub, Mul or Div."""
         if is_known(a) and is_known(b):
-            return _KNOWN[name](a, b)
+            with np.errstate(all="ignore"):
+                return _KNOWN[name](a, b)
         neutral = {"Add": 0, "Mul": 1}.get(name)
         for one, other in ((a, b), (b, a)):
-            if neutral is not None and kind_of(one) == "i" and one == neutral:
+            if neutral is not None and one == neutral and kind_of(one) == kind_of(other) == "i":
                 return other
         kind = wider(a, b)
+        if kind == "b":
+            raise KernelError("whether something is so is no number to compute with")
         return self.operation(name, "f" if name == "Div" and kind in "ib" else kind, a, b)
 
     def compared(self, name: str, a: Any, b: Any) -> Any:
@@ -256,33 +281,43 @@ class Numbers(Graph):
 
     def function(self, function: Any, args: Sequence[Any]) -> Any:
         """What one of Python's functions of numbers gives."""
-        if all(map(is_known, args)):
-            return function(*args)
-        if function in _ROOTS:
-            return self.operation(_ROOTS[function], "s" if kind_of(args[0]) == "s" else "f", args[0])
-        named: Any = {abs: self._absolute, float: self._real, math.hypot: self._hypot, math.copysign: self._signed}
-        if function in named:
-            return named[function](*args)
-        if function in (min, max):
-            return functools.reduce(functools.partial(self._extreme, "Min" if function is min else "Max"), args)
-        raise KernelError(f"{function} has no translation")
+        if function in _OF_ONE and len(args) == 1:
+            operator, known = _OF_ONE[function]
+            return self._now(known, args) if is_known(args[0]) else self._of_one(function, operator, args[0])
+        if function not in _OF_TWO or len(args) < 2:
+            raise KernelError(f"{function} of {len(args)} has no translation")
+        return functools.reduce(functools.partial(self._of_two, function), args)
 
-    def _absolute(self, x: Scalar) -> Scalar:
-        return self.operation("Abs", x.kind, x)
+    def _now(self, known: Callable[..., Any], args: Sequence[float]) -> Any:
+        """A function of known numbers, which raises nothing, as in compiled code."""
+        with np.errstate(all="ignore"):
+            result = known(*args)
+        return int(result) if known is np.floor else getattr(result, "item", lambda: result)()
 
-    def _real(self, x: Scalar) -> Scalar:
-        return x if x.kind in "fs" else self.scalar(x, "f")
+    def _of_one(self, function: Any, operator: str, x: Scalar) -> Scalar:
+        if function is abs:
+            return self.operation(operator, x.kind, x)
+        kind = "s" if x.kind == "s" else "f"
+        if function is float:  # Numba leaves single precision as it is
+            return self.scalar(x, kind)
+        result = self.operation(operator, kind, x)
+        return self.scalar(result, "i") if function is math.floor else result
 
-    def _extreme(self, name: str, a: Any, b: Any) -> Any:
+    def _of_two(self, function: Any, a: Any, b: Any) -> Any:
+        operator, known = _OF_TWO[function]
         if is_known(a) and is_known(b):
-            return min(a, b) if name == "Min" else max(a, b)
-        return self.operation(name, wider(a, b), a, b)
+            return self._now(known, (a, b))
+        if function is math.hypot:
+            return self._hypot(a, b)
+        return self._signed(a, b) if function is math.copysign else self.operation(operator, wider(a, b), a, b)
 
     def _hypot(self, a: Any, b: Any) -> Scalar:
+        """The root of the squares' sum: above 1e154 it overflows, which lengths in metres never reach."""
         squares = (self.binary("Mul", x, x) for x in (self.scalar(a, "f"), self.scalar(b, "f")))
         length = self.operation("Sqrt", "f", self.binary("Add", *squares))
         return self.scalar(length, "s") if wider(a, b) == "s" else length
 
     def _signed(self, size: Any, sign: Any) -> Any:
+        """A size with a sign; that of -0.0 counts as plus."""
         size = self.scalar(self.function(abs, [size]), "f")
         return self.chosen(self.scalar(self.compared("Less", sign, 0.0)), self.operation("Neg", "f", size), size)

@@ -26,7 +26,7 @@ from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.views import Fields, Starts, fields
 
 with extra("onnx", "export to ONNX"):
-    from onnx import TensorProto, ValueInfoProto, helper
+    from onnx import NodeProto, TensorProto, ValueInfoProto, helper
 
 KEPT, NEXT = "kept_", "next_"
 """Before the name of what is remembered: as it was before the decision, and as it is after it."""
@@ -62,10 +62,10 @@ def remembering_nodes(policy: Filtered) -> Translator:
                 f"policy {policy.name!r}: inside the filter, ONNX has a form for networks without memory alone"
             )
         inputs.append(learned_nodes(g, policy.inner, Value(g, "observation")).name)
-    nodes, g.nodes = g.nodes, []
-    heads, tails = _vehicle(g, policy)
-    body = helper.make_graph(g.nodes, "vehicle", heads, tails)
-    g.nodes = nodes
+    nodes: list[NodeProto] = []
+    with g.within(nodes):
+        heads, tails = _vehicle(g, policy)
+    body = helper.make_graph(nodes, "vehicle", heads, tails)
     outputs = ["action", *(NEXT + name for name, _ in remembered(policy))]
     g.nodes.append(helper.make_node("Scan", inputs, outputs, "vehicles", body=body, num_scan_inputs=len(inputs)))
     return g
@@ -82,7 +82,7 @@ def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], l
     if isinstance(policy, Guarded):
         heads.append(_info("wish", TensorProto.FLOAT, (2,)))
         action = _guarded(g, policy, memory)
-    elif isinstance(policy, Scout):
+    elif isinstance(policy, Scout) and type(policy) in (Scout, LearnedLaw):
         action = _by_law(g, policy, memory)
     else:
         raise PolicyError(f"policy {policy.name!r} has no form in ONNX")

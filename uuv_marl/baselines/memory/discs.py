@@ -153,7 +153,7 @@ def surface_point(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors) -
     """
     x, y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
     if not sectors.centres:
-        return x, y
+        return 1.0 * x, 1.0 * y  # double, as the other ways out
     away, reach = math.hypot(x, y), float(see.echo_range[w, i, a])
     if away < 1e-6:
         return 0.0, 0.0
