@@ -16,21 +16,18 @@ functions use raises ``KernelError``.
 """
 
 import ast
-import builtins
 import functools
-import inspect
-import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from uuv_marl.baselines.export.expressions import BROKEN, CONTINUED, RESULT, RETURNED, Expressions, Names
 from uuv_marl.baselines.export.numbers import (
     TYPES,
     Cells,
     KernelError,
-    Numbers,
     Ref,
     Scalar,
     is_known,
@@ -38,29 +35,22 @@ from uuv_marl.baselines.export.numbers import (
     known_as,
     mapped,
     wider,
-)  # fmt: skip
+)
 from uuv_marl.extras import extra
 
 with extra("onnx", "export to ONNX"):
     import onnx
     from onnx import helper
 
-_Names = dict[str, Any]
-"""Local names of a function, and how it is left, under keys that are no names:"""
-_RETURNED, _RESULT, _BROKEN, _CONTINUED, _PART = "has returned", "its result", "has broken", "has continued", "a part"
-_ENDS = (_RETURNED, _BROKEN, _CONTINUED)
-_ARITHMETIC: Mapping[type, str] = {ast.Add: "Add", ast.Sub: "Sub", ast.Mult: "Mul", ast.Div: "Div"}
-_COMPARISON: Mapping[type, str] = {
-    ast.Lt: "Less", ast.LtE: "LessOrEqual", ast.Gt: "Greater", ast.GtE: "GreaterOrEqual", ast.Eq: "Equal",
-    ast.NotEq: "Equal",
-}  # fmt: skip
+_ENDS = (RETURNED, BROKEN, CONTINUED)
+"""Ways out of statements."""
 
 
 class _Way(NamedTuple):
     """Some statements, written as a graph of their own."""
 
     nodes: list[onnx.NodeProto]
-    names: _Names
+    names: Names
     """After them."""
     tensors: dict[Cells, str]
     """After them."""
@@ -80,60 +70,8 @@ class _Doors:
     """What its outputs are called outside."""
 
 
-class Translator(Numbers, ast.NodeVisitor):
-    """Writes calls of compiled functions as nodes.
-
-    Args:
-        replaced: functions that are not read, with what is called in their place.
-    """
-
-    def __init__(self, replaced: Mapping[Any, Callable[..., Any]]) -> None:
-        super().__init__()
-        self._replaced = replaced
-        self._names: _Names = {}
-        self._function: Any = None
-
-    def call(self, function: Any, *args: Any) -> Any:
-        """What a compiled function returns for these arguments. Raises KernelError where it has no translation."""
-        if function in self._replaced:
-            return self._replaced[function](*args)
-        plain: Any = getattr(function, "py_func", function)
-        if hasattr(plain, "_fields"):
-            return plain(*args)
-        if not inspect.isfunction(plain):
-            return self.function(plain, args)
-        tree, outer = _source(plain), (self._names, self._function)
-        given = inspect.signature(plain).bind(*args)
-        given.apply_defaults()
-        self._names, self._function = dict(given.arguments), plain
-        try:
-            self._block(tree.body)
-            return self._result(tree)
-        finally:
-            self._names, self._function = outer
-
-    def _result(self, tree: ast.FunctionDef) -> Any:
-        """What the function returns, whose body has been written."""
-        result, ways = self._names.get(_RESULT), [node for node in ast.walk(tree) if isinstance(node, ast.Return)]
-        if any(way.value for way in ways) and not _returns(tree.body):
-            raise KernelError(f"function {tree.name} may end without a result")
-        if len(ways) > 1 and "s" in _kinds(result):
-            raise KernelError(f"function {tree.name} returns single precision, and may return double elsewhere")
-        return result
-
-    def visit(self, node: ast.AST) -> Any:
-        """The value of a node; whatever goes wrong says where."""
-        try:
-            return super().visit(node)
-        except _PlacedError:
-            raise
-        except Exception as error:
-            where = f"line {getattr(node, 'lineno', '?')} of {inspect.getsourcefile(self._function)}"
-            raise _PlacedError(f"function {self._function.__name__}, {where}: {error}") from error
-
-    def generic_visit(self, node: ast.AST) -> Any:
-        """Refuse what has no method here."""
-        raise KernelError(f"{type(node).__name__} has no translation")
+class Translator(Expressions, ast.NodeVisitor):
+    """Writes calls of compiled functions as nodes: ``call``."""
 
     # Statements
 
@@ -176,24 +114,18 @@ class Translator(Numbers, ast.NodeVisitor):
         else:
             self._block(node.body if test else node.orelse)
 
-    def _truth(self, test: Any) -> Any:
-        """What a condition says."""
-        if kind_of(test) != "b" or not (is_known(test) or isinstance(test, Scalar)):
-            raise KernelError("a condition must be a comparison, or true or false")
-        return test
-
     def visit_Return(self, node: ast.Return) -> None:
         """The end of a function."""
-        self._names[_RESULT] = None if node.value is None else self.visit(node.value)
-        self._names[_RETURNED] = True
+        self._names[RESULT] = None if node.value is None else self.visit(node.value)
+        self._names[RETURNED] = True
 
     def visit_Break(self, node: ast.Break) -> None:  # noqa: ARG002 - as visitors are called
         """The end of a loop."""
-        self._names[_BROKEN] = True
+        self._names[BROKEN] = True
 
     def visit_Continue(self, node: ast.Continue) -> None:  # noqa: ARG002 - as visitors are called
         """The end of a round."""
-        self._names[_CONTINUED] = True
+        self._names[CONTINUED] = True
 
     def visit_Expr(self, node: ast.Expr) -> None:
         """A call for its effect, or a docstring."""
@@ -201,7 +133,7 @@ class Translator(Numbers, ast.NodeVisitor):
 
     # Branches
 
-    def _way(self, statements: Sequence[ast.stmt], changes: _Names, tensors: Mapping[Cells, str]) -> _Way:
+    def _way(self, statements: Sequence[ast.stmt], changes: Names, tensors: Mapping[Cells, str]) -> _Way:
         """Statements as a graph of their own, in which some names and arrays are others."""
         outer, nodes = (self._names, self.tensors), list[onnx.NodeProto]()
         self._names, self.tensors = {**self._names, **changes}, {**self.tensors, **tensors}
@@ -230,12 +162,12 @@ class Translator(Numbers, ast.NodeVisitor):
             node = helper.make_node("If", [condition.name], doors.outputs, then_branch=graphs[0], else_branch=graphs[1])
             self.nodes.append(node)
 
-    def _joined_names(self, ways: tuple[_Way, _Way], doors: _Doors) -> _Names:
+    def _joined_names(self, ways: tuple[_Way, _Way], doors: _Doors) -> Names:
         """Names after two ways; one that has a value on one of them only has none."""
-        joined: _Names = {}
+        joined: Names = {}
         for name in {**ways[0].names, **ways[1].names}:  # in order: the same file each time
             a, b = (way.names.get(name, False if name in _ENDS else None) for way in ways)
-            if name == _RESULT:
+            if name == RESULT:
                 a, b = (mapped(_zero, b) if a is None else a), (mapped(_zero, a) if b is None else b)
             if (a is None) == (b is None):
                 joined[name] = mapped(functools.partial(self._joined, ways, doors), a, b)
@@ -266,14 +198,14 @@ class Translator(Numbers, ast.NodeVisitor):
             raise KernelError("a loop must run over range(end) or range(first, end), and have no else")
         first, end = (0, bounds[0]) if len(bounds) == 1 else bounds
         trips = self.binary("Sub", end, first)
-        ends = {name: self._names.pop(name) for name in (_BROKEN, _CONTINUED) if name in self._names}
+        ends = {name: self._names.pop(name) for name in (BROKEN, CONTINUED) if name in self._names}
         if is_known(trips) and trips <= 1:
             for _ in range(int(trips)):
                 self._assign(node.target, first)
                 self._block(node.body)
         else:
             self._loop(node, first, trips)
-        for name in (_BROKEN, _CONTINUED):
+        for name in (BROKEN, CONTINUED):
             self._names.pop(name, None)
         self._names |= ends
 
@@ -299,12 +231,12 @@ class Translator(Numbers, ast.NodeVisitor):
                 break
             begins, changed = wide, changed + new
         del self._names[target]
-        if way.names.get(_RETURNED, False) is not False:
-            begins |= {_RETURNED: False, _RESULT: mapped(_zero, way.names[_RESULT])}
-            heads |= {name: mapped(self._head, begins[name]) for name in (_RETURNED, _RESULT)}
+        if way.names.get(RETURNED, False) is not False:
+            begins |= {RETURNED: False, RESULT: mapped(_zero, way.names[RESULT])}
+            heads |= {name: mapped(self._head, begins[name]) for name in (RETURNED, RESULT)}
         self._close(way, count, trips, [(name, begins[name], heads[name]) for name in begins], given)
 
-    def _round(self, it: ast.For, count: Scalar, first: Any, heads: _Names, given: Mapping[Cells, str]) -> _Way:
+    def _round(self, it: ast.For, count: Scalar, first: Any, heads: Names, given: Mapping[Cells, str]) -> _Way:
         """The body of a loop."""
         before: list[onnx.NodeProto] = []
         with self.within(before):
@@ -325,7 +257,7 @@ class Translator(Numbers, ast.NodeVisitor):
             given: tensors of arrays, as the body's inputs.
         """
         with self.within(way.nodes):
-            stop = self.either(way.names.get(_BROKEN, False), way.names.get(_RETURNED, False))
+            stop = self.either(way.names.get(BROKEN, False), way.names.get(RETURNED, False))
             on = self.emit("Identity", self.scalar(self.no(stop), "b").name)
         doors = _Doors(tails=([_info(on, "b")],))
         doors.heads += [_info(count.name, "i"), _info(self.fresh("on"), "b")]
@@ -356,150 +288,6 @@ class Translator(Numbers, ast.NodeVisitor):
         if isinstance(value, Ref):
             raise KernelError("a name stands for another array in each round")
         return None if value is None else Scalar(self.fresh("head"), kind_of(value))
-
-    # Expressions
-
-    def visit_Constant(self, node: ast.Constant) -> Any:
-        """A number."""
-        return node.value
-
-    def visit_Name(self, node: ast.Name) -> Any:
-        """A local, a global or one of Python's own."""
-        code = self._function.__code__
-        if node.id in self._names:
-            return self._names[node.id]
-        if node.id in (*code.co_varnames, *code.co_cellvars, *code.co_freevars):
-            raise KernelError(f"{node.id} has a value on some ways only, or is of a function around")
-        for names in (self._function.__globals__, vars(builtins)):
-            if node.id in names:
-                return names[node.id]
-        raise KernelError(f"{node.id} is unknown")
-
-    def visit_Attribute(self, node: ast.Attribute) -> Any:
-        """A part of a named tuple, a module, or the shape of an array."""
-        value = self.visit(node.value)
-        if isinstance(value, Scalar) or (isinstance(value, Ref) and node.attr != "shape"):
-            raise KernelError(f"of an array only the shape can be asked for, not {node.attr}")
-        return getattr(value, node.attr)
-
-    def visit_Subscript(self, node: ast.Subscript) -> Any:
-        """An entry or a view."""
-        return self.at(self.visit(node.value), self._index(node.slice))
-
-    def _index(self, it: ast.expr) -> Sequence[Any]:
-        return [self.visit(part) for part in (it.elts if isinstance(it, ast.Tuple) else (it,))]
-
-    def visit_Slice(self, node: ast.Slice) -> slice:
-        """From an entry to another."""
-        return slice(*(None if end is None else self.visit(end) for end in (node.lower, node.upper, node.step)))
-
-    def visit_Tuple(self, node: ast.Tuple) -> tuple[Any, ...]:
-        """Several values."""
-        return tuple(self.visit(part) for part in node.elts)
-
-    def visit_BinOp(self, node: ast.BinOp) -> Any:
-        """A sum, difference, product or quotient."""
-        return self._computed(node.op, self.visit(node.left), self.visit(node.right))
-
-    def _computed(self, by: ast.operator, a: Any, b: Any) -> Any:
-        return self.binary(_ARITHMETIC[type(by)], a, b) if type(by) in _ARITHMETIC else self.generic_visit(by)
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
-        """A number with the other sign, or whether something is not so."""
-        value = self.visit(node.operand)
-        if isinstance(node.op, ast.Not):
-            return self.no(value)
-        if not isinstance(node.op, ast.USub):
-            self.generic_visit(node.op)
-        return -value if is_known(value) else self.operation("Neg", value.kind, value)
-
-    def visit_Compare(self, node: ast.Compare) -> Any:
-        """Comparisons, of which all must be so."""
-        values = [self.visit(part) for part in (node.left, *node.comparators)]
-        result: Any = True
-        for op, a, b in zip(node.ops, values, values[1:], strict=False):
-            if type(op) not in _COMPARISON:
-                self.generic_visit(op)
-            one = self.compared(_COMPARISON[type(op)], a, b)
-            result = self.both(result, self.no(one) if isinstance(op, ast.NotEq) else one)
-        return result
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> Any:
-        """Whether all are so, or one; a part is computed only where those before leave it open, as in Python."""
-        every = isinstance(node.op, ast.And)
-        result: Any = every
-        for part in node.values:
-            if is_known(result) and bool(result) != every:
-                return result
-            if isinstance(result, Scalar) and _may_fail(part):
-                own, known = [_kept(part)], [_kept(ast.copy_location(ast.Constant(not every), part))]
-                self._branch(result, own if every else known, known if every else own)
-                result = self._truth(self._names.pop(_PART))
-            else:
-                result = (self.both if every else self.either)(result, self._truth(self.visit(part)))
-        return result
-
-    def visit_IfExp(self, node: ast.IfExp) -> Any:
-        """One of two values."""
-        test = self._truth(self.visit(node.test))
-        if not isinstance(test, Scalar):
-            return self.visit(node.body if test else node.orelse)
-        if not (_may_fail(node.body) or _may_fail(node.orelse)):
-            return self.chosen(test, self.visit(node.body), self.visit(node.orelse))
-        self._branch(test, [_kept(node.body)], [_kept(node.orelse)])
-        return self._names.pop(_PART)
-
-    def visit_Call(self, node: ast.Call) -> Any:
-        """A call, written out."""
-        function = self.visit(node.func)
-        args: list[Any] = [self.visit(arg) for arg in node.args]
-        named = {word.arg: self.visit(word.value) for word in node.keywords}
-        if named:
-            names = list(inspect.signature(getattr(function, "py_func", function)).parameters)
-            args += [named[name] for name in names[len(args) :]]
-        return self.call(function, *args)
-
-
-class _PlacedError(KernelError):
-    """One that says where."""
-
-
-@functools.cache
-def _source(function: Any) -> ast.FunctionDef:
-    """A function's syntax tree, with the lines of its file."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-    return cast(ast.FunctionDef, ast.increment_lineno(tree, function.__code__.co_firstlineno - 1).body[0])
-
-
-def _returns(body: Sequence[ast.stmt]) -> bool:
-    """Whether statements can't end without a return."""
-    last = body[-1] if body else None
-    if isinstance(last, ast.If):
-        return _returns(last.body) and _returns(last.orelse)
-    return isinstance(last, ast.Return)
-
-
-def _may_fail(part: ast.expr) -> bool:
-    """Whether computing it in vain could fail, write to an array or take long."""
-    return any(isinstance(node, (ast.Call, ast.Subscript)) for node in ast.walk(part))
-
-
-def _kept(part: ast.expr) -> ast.Assign:
-    """The statement that keeps a value under a name that none is."""
-    name = ast.copy_location(ast.Name(_PART, ast.Store()), part)
-    return ast.copy_location(ast.Assign([name], part), part)
-
-
-def _kinds(result: Any) -> list[str]:
-    """Kinds of the numbers of a result that is known only when the model runs."""
-    found: list[str] = []
-
-    def note(part: Any) -> None:
-        if isinstance(part, Scalar):
-            found.append(part.kind)
-
-    mapped(note, result)
-    return found
 
 
 def _info(name: str, kind: str, size: int | None = None) -> onnx.ValueInfoProto:
