@@ -71,11 +71,12 @@ def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
         assert made == [(t["timing.decision_period_s"], t.get("sonar.echo_reports", "centre")) for t in told]
 
 
-def test_a_recipe_resumes_bit_for_bit(tmp_path):
+@pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
+def test_a_recipe_resumes_bit_for_bit(algorithm, tmp_path):
     from uuv_marl.train import training as trainings
     from uuv_marl.train.recipe import load_recipe
 
-    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(3)
+    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(3, algorithm)
     settings = dataclasses.replace(settings, checkpoint_every=1)
     list(trainings.train(tmp_path / "whole", settings))
     stopped = iter([False, True])
@@ -101,17 +102,6 @@ def test_bad_recipes_are_refused_by_name(tmp_path, changes, told):
 
     with pytest.raises(ResultsError, match=told):
         load_recipe(recipe(tmp_path / "bad.toml", **changes))
-
-
-def test_conditions_are_refused_where_worlds_draw_their_own_seeds(tmp_path):
-    from uuv_marl.train import ppo
-    from uuv_marl.train.group import Problem
-    from uuv_marl.train.recipe import load_recipe
-
-    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(0)
-    problem = Problem(settings.load(), settings.sizes, settings.weights, conditions=settings.conditions)
-    with pytest.raises(ValueError, match=r"conditions \(12\) are for MAPPO alone"):
-        ppo.Hyperparameters().begin(problem, 0)
 
 
 def test_the_command_trains_what_a_recipe_says_and_nothing_else_beside_it(tmp_path):

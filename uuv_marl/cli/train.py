@@ -32,6 +32,8 @@ from uuv_marl.cli.train_options import (
     whole_numbers,
 )
 
+_BESIDE_RECIPE = ("seed", "steps", "device", "output", "resume")
+"""Options that a recipe leaves open."""
 app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
 
 
@@ -80,7 +82,7 @@ def train_mappo(
         with extra("train", "training with MAPPO"):
             from uuv_marl.train.mappo import Hyperparameters
 
-        alone(context, "recipe", ("seed", "steps", "device", "output", "resume"))
+        alone(context, "recipe", _BESIDE_RECIPE)
         if recipe is not None:
             from uuv_marl.train.recipe import load_recipe
 
@@ -97,6 +99,8 @@ def train_mappo(
 
 @app.command("ppo", cls=Command)
 def train_ppo(
+    context: typer.Context,
+    recipe: Recipe = None,
     scenario: Scenario = "random_field",
     num_vehicles: Vehicles = None,
     sizes: Sizes = None,
@@ -122,6 +126,12 @@ def train_ppo(
         with extra("train", "training with Stable-Baselines3"):
             from uuv_marl.train.ppo import Hyperparameters
 
+        alone(context, "recipe", _BESIDE_RECIPE)
+        if recipe is not None:
+            from uuv_marl.train.recipe import load_recipe
+
+            _train(output, resume, load_recipe(recipe).settings(seed, "ppo"), steps, device)
+            return
         units = whole_numbers("--network", network)
         algorithm = replace(Hyperparameters(), hidden=units or Hyperparameters.hidden)
         task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed, start)

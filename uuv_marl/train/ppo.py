@@ -140,13 +140,16 @@ class Ppo:
         """The worlds, for ``put_back``."""
         starts = self.model._last_episode_starts
         assert starts is not None  # noqa: S101
-        return {**self._vec_env.env.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
+        kept = {**self._vec_env.env.snapshot(), "starts": starts.copy(), "discounted": self._env.returns.copy()}
+        following = self._vec_env.next_seed
+        return kept if following is None else {**kept, "next_seed": np.array(following)}
 
     def put_back(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a ``snapshot``."""
         model: Any = self.model
         self._vec_env.env.restore(snapshot)
-        self._vec_env.seed()  # or the next worlds that end would start from the seeds of a new training
+        following = snapshot.get("next_seed")  # not those of a new training
+        self._vec_env.seed(None if following is None else int(following))
         self._env.returns[...] = snapshot["discounted"]
         model._last_obs, model._last_episode_starts = self._vec_env.observation.copy(), snapshot["starts"] > 0
 

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pydantic
@@ -13,12 +13,14 @@ from uuv_marl.baselines.scout import Gains
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.robustness.axes import AXES, known
+from uuv_marl.train import ppo
 from uuv_marl.train.acting import Sees
 from uuv_marl.train.group import Conditions
 from uuv_marl.train.mappo import Hyperparameters
 from uuv_marl.train.shaping import OVERRIDES, Weights
 from uuv_marl.train.training import Settings
 
+Algorithm = Literal["mappo", "ppo"]
 _VALIDATION_DRAW = 2**31
 """Seed of what is drawn for validation."""
 
@@ -85,21 +87,21 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     law: dict[str, float] = {}
     weights: dict[str, float] = {}
     mappo: dict[str, Any] = {}
+    ppo: dict[str, Any] = {}
     episodes: Episodes | None = None
 
-    def settings(self, seed: int) -> Settings:
+    def settings(self, seed: int, algorithm: Algorithm = "mappo") -> Settings:
         """The settings of a training, whose seed draws the episodes' conditions too."""
         taken = {name: getattr(self, name) for name in _TAKEN}
-        numbers: dict[str, Any] = {
-            k: tuple(value) if isinstance(value, list) else value for k, value in self.mappo.items()
-        }
+        told, kind = (self.mappo, Hyperparameters) if algorithm == "mappo" else (self.ppo, ppo.Hyperparameters)
+        numbers: dict[str, Any] = {k: tuple(value) if isinstance(value, list) else value for k, value in told.items()}
         return Settings(
             **taken,
             seed=seed,
             overrides={**OVERRIDES, **self.overrides},
             law=Gains(**self.law),
             weights=Weights(**self.weights),
-            algorithm=Hyperparameters(**numbers),
+            algorithm=kind(**numbers),
             conditions=self.episodes.draw(self.scenario, seed) if self.episodes else (),
             validation_conditions=self.episodes.draw_validated(self.scenario) if self.episodes else (),
         )
@@ -129,7 +131,8 @@ def load_recipe(name: str) -> Recipe:
         ) from None
     try:
         recipe = Recipe(**tomllib.loads(text))
-        recipe.settings(0)
+        for algorithm in get_args(Algorithm):
+            recipe.settings(0, algorithm)
     except (pydantic.ValidationError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
         raise ResultsError(f"recipe {name!r} can't be used: {error}") from None
     return recipe

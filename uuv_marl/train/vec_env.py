@@ -11,7 +11,7 @@ from uuv_marl.envs.sb3 import SharedEnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.sim.arrays import Float32
 from uuv_marl.train.acting import ACTING
-from uuv_marl.train.env import TrainingEnv
+from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv
 from uuv_marl.train.group import Problem
 
 with extra("train", "training with Stable-Baselines3"):
@@ -22,18 +22,14 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
     """Rows of a ``TrainingEnv``: features of the actor in, its output out, as ``Acting`` takes it.
 
     Args:
-        problem: what is trained on, without conditions: worlds go on with streams of their own here.
-
-    Raises:
-        ValueError: the problem has conditions.
+        problem: what is trained on. Worlds go on with streams of their own; where it has conditions, they are made anew
+            for each episode, and start from the next seed.
     """
 
     def __init__(self, problem: Problem) -> None:
-        if problem.conditions:
-            raise ValueError(
-                f"conditions ({len(problem.conditions)}) are for MAPPO alone; train with it, or without them"
-            )
-        self._next_seed: int | None = None
+        self._counts = bool(problem.conditions)
+        self.next_seed: int | None = TRAINING_SEEDS[0] if self._counts else None
+        """Of the next world that starts; None where worlds go on with their own streams."""
         self.env = TrainingEnv(problem, self._draw)
         self.reward_sum = 0.0
         """Mean reward of the rows, summed over the steps so far."""
@@ -43,10 +39,13 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
 
     def _draw(self, num: int) -> Sequence[int] | None:
         """Counted on through all swarms at a reset after ``seed``; later each world goes on with its own stream."""
-        if self._next_seed is None:
+        if self.next_seed is None:
             return None
-        first, self._next_seed = self._next_seed, self._next_seed + num
-        return range(first, first + num)
+        first, self.next_seed = self.next_seed, self.next_seed + num
+        if not self._counts:
+            return range(first, first + num)
+        low, high = TRAINING_SEEDS
+        return [low + (seed - low) % (high - low) for seed in range(first, first + num)]
 
     @property
     def observation(self) -> Float32:
@@ -55,13 +54,14 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """For the next reset: worlds are counted on through all swarms, and world w starts from ``seed + w``."""
-        self._next_seed = seed
+        self.next_seed = seed
         return [seed] * self.num_envs
 
     def reset(self) -> Float32:
         """Start all worlds; shape (row, feature)."""
         self.env.reset()
-        self._next_seed = None
+        if not self._counts:
+            self.next_seed = None
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return self.observation
 
