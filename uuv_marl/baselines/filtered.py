@@ -31,7 +31,7 @@ class Filtered(Policy):
 
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
         super().__init__(scenario, num_worlds)
-        self.barrier = barrier
+        self.barrier = Barrier(*map(float, barrier))
         self.model = Model.of(scenario)
         """What vehicles know of themselves."""
         self.gain = velocity_gain(scenario)

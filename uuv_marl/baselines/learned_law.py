@@ -9,14 +9,16 @@ import numpy as np
 from uuv_marl.baselines.checkpoint import Checkpoint
 from uuv_marl.baselines.learned import forward, need_same
 from uuv_marl.baselines.recall import RECALLED, recall
-from uuv_marl.baselines.scout import MOST_TRIM, Scout
+from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Scout
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
 
 
 class TrimmedLaw(Scout):
-    """``scout``'s law, whose gains an actor trims. Arguments as for ``Scout``."""
+    """``scout``'s law, which an actor trims. Arguments as for ``Scout``."""
+
+    num_trims = TRIMS
 
     def look(self, features: Float32) -> None:
         """Fill what an actor sees of what is remembered, shape (world, vehicle, ``RECALLED``)."""

@@ -59,7 +59,7 @@ _TRIM_STEERING, _TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 2.0, 0.04, 2.0, 1.0
 ``behind_m`` [m] and to the distance kept from neighbours [m]. Assumed: as much as the pull, the way for which a swarm
 coasts on, and a share of a hull's length."""
 _LEAST_KEEP_M = 4.0
-"""Of that distance, the least [m]: hulls touch at less. Assumed."""
+"""Of that distance, the least [m]. Assumed: twice that at which hulls of 1 m touch."""
 
 
 class Scout(Filtered):
@@ -73,6 +73,8 @@ class Scout(Filtered):
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
+    num_trims: ClassVar[int] = 0
+    """Changes of each vehicle's numbers."""
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
@@ -80,7 +82,7 @@ class Scout(Filtered):
         super().__init__(scenario, num_worlds, barrier or Barrier())
         self.gains = gains or Gains()
         self._growth = growth(scenario.swarm.num_vehicles)
-        self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, TRIMS), np.float32)
+        self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, self.num_trims), np.float32)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2)."""
@@ -96,8 +98,8 @@ class Scout(Filtered):
         return action
 
     def grown(self) -> Gains:
-        """The gains for as many vehicles as the swarm has."""
-        by, g = self.gains, self._growth
+        """The gains for as many vehicles as the swarm has, all float: else compiled code would be made anew."""
+        by, g = Gains(*map(float, self.gains)), self._growth
         return by._replace(
             pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
             together=by.together / g**3,
@@ -214,16 +216,18 @@ def decide_all(
         gain: force per velocity error [N s/m].
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
-        trims: changes of the law, see ``trimmed`` and ``widened``, shape (world, vehicle, TRIMS). As much of them
-            counts as a vehicle doubts.
+        trims: changes of the law, see ``trimmed`` and ``widened``, shape (world, vehicle, TRIMS), of which as much
+            counts as a vehicle doubts; or (world, vehicle, 0) for none.
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                trim, share = trims[w, i], doubt(w, i, kept)
-                own = trimmed(g, trim, share)
+                own, keep = g, barrier
+                if trims.shape[2] > 0:
+                    share = doubt(w, i, kept)
+                    own, keep = trimmed(g, trims[w, i], share), widened(barrier, trims[w, i], share)
                 w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
-                num = planes_of(w, i, period, widened(barrier, trim, share), kept, planes)
+                num = planes_of(w, i, period, keep, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain * own.steering, limits, kept, action)

@@ -106,7 +106,7 @@ def _guarded(g: Translator, policy: Guarded, memory: Surroundings) -> Ref:
 def _by_law(g: Translator, policy: Scout, memory: Surroundings) -> Ref:
     """The action, shape (1, 1, 2), of the law, whose gains a network may trim."""
     by = policy.model.own.period_s, policy.grown(), policy.barrier, policy.limits
-    planes, trims = g.zeros(policy.planes.shape), g.zeros((1, 1, TRIMS), single=True)
+    planes, trims = g.zeros(policy.planes.shape), g.zeros((1, 1, policy.num_trims), single=True)
     if isinstance(policy, LearnedLaw):
         features = g.zeros((1, 1, RECALLED), single=True)
         g.call(recall, _ONE, policy.scenario.swarm.num_vehicles, *by, memory, planes, features)
