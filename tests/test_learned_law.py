@@ -25,6 +25,7 @@ ROUGH = {
 }  # fmt: skip
 
 
+SILENT = {"noise.silence_probability": 0.1, "noise.silence_readings": 10}
 LAG = {"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}
 
 
@@ -78,8 +79,21 @@ def test_an_actor_has_its_say_where_vehicles_doubt(overrides, least, most):
     for k in range(decisions):
         percept = swarm.step(policy.act(percept))
         if k > decisions / 4:
-            doubts.append([doubt(0, i, policy.memory) for i in range(20)])
+            doubts.append([doubt(0, i, policy.memory)[1] for i in range(20)])
     assert least <= np.mean(doubts) <= most
+
+
+def test_old_readings_do_not_make_a_vehicle_steer_softly(saved):
+    """Of its own motion it is sure, where the sonar falls silent for a second at a time."""
+    scenario = granted("scout", load_scenario("random_field", num_vehicles=20, overrides=SILENT))
+    swarm, policy, doubts = Swarm(scenario), make("scout", scenario), []
+    percept = swarm.reset(10_007)
+    for _ in range(300):
+        percept = swarm.step(policy.act(percept))
+        doubts.append([doubt(0, i, policy.memory) for i in range(20)])
+    moves, whole = np.mean(doubts, axis=(0, 1))
+    assert moves < 0.2
+    assert whole > 0.4
 
 
 def test_a_run_depends_on_its_seed_alone(saved):
@@ -114,13 +128,14 @@ def test_trims_by_hand():
     law = Gains(together=0.1, behind_m=1.0)
     trims = np.array([math.log(2.0), 1.5, math.log(0.5), 0.5, -1.0, -1.0], np.float32)
     wanted = law._replace(pull=0.1, together=0.1 + 1.5 * 0.04, push=5.0, behind_m=2.0, steering=math.exp(-2.0))
-    np.testing.assert_allclose(trimmed(law, trims, 1.0), wanted, rtol=1e-6)
-    np.testing.assert_allclose(trimmed(law, 4.0 * trims, 0.25), wanted, rtol=1e-6)
-    assert trimmed(law, -trims, 1.0).together == pytest.approx(0.04), "a sum"
-    assert trimmed(law, -3.0 * trims, 1.0).together == 0.0, "and never below none"
+    np.testing.assert_allclose(trimmed(law, trims, 1.0, 1.0), wanted, rtol=1e-6)
+    np.testing.assert_allclose(trimmed(law, 4.0 * trims, 0.25, 0.25), wanted, rtol=1e-6)
+    assert trimmed(law, -trims, 1.0, 0.0).together == pytest.approx(0.04), "a sum"
+    assert trimmed(law, -3.0 * trims, 1.0, 0.0).together == 0.0, "and never below none"
     assert widened(Barrier(), trims, 1.0) == Barrier(neighbour_m=6.0)
     still = np.zeros(TRIMS, np.float32)
-    assert trimmed(law, still, 1.0) == trimmed(law, trims, 0.0) == law
+    assert trimmed(law, still, 1.0, 1.0) == trimmed(law, trims, 0.0, 0.0) == law
+    assert trimmed(law, trims, 1.0, 0.0).steering == 1.0, "what is heard badly is no reason to steer softly"
     assert widened(Barrier(neighbour_m=3.0), still, 1.0).neighbour_m == 3.0, "a law's may be less than a trim's least"
 
 

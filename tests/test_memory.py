@@ -8,6 +8,7 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
@@ -274,6 +275,24 @@ def test_a_neighbour_in_two_overlapping_sub_sectors_is_one():
     for _ in range(5):
         percept = swarm.step(policy.act(percept))
     assert (policy.memory.known[0] > 0).sum(axis=1).tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("kept_s", [1.0, 2.0, 3.0])
+def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(kept_s):
+    """Two vehicles at rest, beside each other; then one is gone."""
+    scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
+    swarm, policy = Swarm(scenario), make("scout", scenario, kept_s=kept_s)
+    swarm.reset(0)
+    swarm.state.eta[0, 1, :2] = swarm.state.eta[0, 0, :2] + 20.0
+    policy.act(swarm.observe())
+    assert policy.memory.known[0, 0].any()
+    swarm.state.eta[0, 1, :2] = 1e4
+    silent_s = 0.0
+    while policy.memory.known[0, 0].any() and silent_s < 10.0:
+        policy.act(swarm.step(np.zeros((1, 2, 2), np.float32)))
+        silent_s += scenario.timing.decision_period_s
+    assert kept_s < silent_s < kept_s + 0.15
+    assert age_of(0, 0, policy.memory) == 0.0, "and says nothing of the sonar by then"
 
 
 def test_one_world_is_forgotten_and_another_does_not_count():

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory import Model, Surroundings, listen
+from uuv_marl.baselines.memory.neighbours import KEPT_S
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.steering import velocity_gain
@@ -52,9 +53,14 @@ class Filtered(Policy):
     def _times(self, what: int) -> Int64:
         return (self.memory.counted + self.memory.filtered)[..., what].sum(axis=1).astype(np.int64)
 
+    @property
+    def kept_s(self) -> float:
+        """For how long a neighbour is remembered that is heard no more [s]."""
+        return KEPT_S
+
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Take what is perceived into what is remembered."""
-        listen(self.flat(percept), self.layout.offsets, worlds, self.model, self.memory)
+        listen(self.flat(percept), self.layout.offsets, worlds, self.model, self.kept_s, self.memory)
 
     def acted(self, action: Float32, worlds: Bool) -> None:
         """Keep the action: the vehicle's next place is reckoned from it."""

@@ -103,7 +103,7 @@ def _own(
     out[21] = heard / kept.known.shape[2]
     out[22] = min(kept.surprise[w, i], 2.0)
     out[23] = min(age_of(w, i, kept), 2.0)
-    out[24] = doubt(w, i, kept)
+    _, out[24] = doubt(w, i, kept)
 
 
 @compiled

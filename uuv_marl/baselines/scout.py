@@ -14,7 +14,7 @@ from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import doubt
-from uuv_marl.baselines.memory.neighbours import middle
+from uuv_marl.baselines.memory.neighbours import KEPT_S, middle
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
 from uuv_marl.percept import Percept
@@ -28,7 +28,7 @@ Bool = NDArray[np.bool_]
 
 
 class Gains(NamedTuple):
-    """Of the wished velocity. One set for all scenarios, swarm sizes, echoes and decision periods."""
+    """Of the wished velocity and of memory. One set for all scenarios, swarm sizes, echoes and decision periods."""
 
     pull: float = 0.05
     """To l(t) [1/s], for up to 54 vehicles; divided by g = sqrt(n / 54) for more, which are spread farther."""
@@ -47,6 +47,8 @@ class Gains(NamedTuple):
     """How far behind a moving l(t) to go [m]: a swarm coasts on for about 2 m where l(t) stops."""
     steering: float = 1.0
     """Times the force by which velocities are made good [1]. Less is calmer, and bears actuators that lag."""
+    kept_s: float = KEPT_S
+    """For how long a neighbour is remembered that is heard no more [s]."""
 
 
 TRIMS = 6
@@ -84,6 +86,11 @@ class Scout(Filtered):
         self._growth = growth(scenario.swarm.num_vehicles)
         self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, self.num_trims), np.float32)
 
+    @property
+    def kept_s(self) -> float:
+        """For how long a neighbour is remembered that is heard no more [s]."""
+        return float(self.gains.kept_s)
+
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2)."""
         return self._decided()
@@ -107,19 +114,20 @@ class Scout(Filtered):
 
 
 @compiled
-def trimmed(g: Gains, trims: Float32, share: float) -> Gains:
+def trimmed(g: Gains, trims: Float32, share: float, moves: float) -> Gains:
     """Gains of one vehicle, changed: pull, push and steering by factors, together and behind_m by sums.
 
     Args:
         g: the law's.
         trims: the first are of pull, together, push, behind_m and steering, shape (TRIMS,); 0 changes nothing.
         share: of them that counts, 0 to 1.
+        moves: of that of steering, 0 to 1.
     """
-    pull, push, steering = share * trims[0], share * trims[2], share * _TRIM_STEERING * trims[4]
+    pull, push, steering = share * trims[0], share * trims[2], moves * _TRIM_STEERING * trims[4]
     together, behind_m = share * _TRIM_PER_S * trims[1], share * _TRIM_M * trims[3]
     return Gains(
         g.pull * math.exp(pull), g.push * math.exp(push), g.push_range, g.pull_at_rest, g.push_at_rest,
-        max(g.together + together, 0.0), g.behind_m + behind_m, g.steering * math.exp(steering),
+        max(g.together + together, 0.0), g.behind_m + behind_m, g.steering * math.exp(steering), g.kept_s,
     )  # fmt: skip
 
 
@@ -217,7 +225,7 @@ def decide_all(
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
         trims: changes of the law, see ``trimmed`` and ``widened``, shape (world, vehicle, TRIMS), of which as much
-            counts as a vehicle doubts; or (world, vehicle, 0) for none.
+            counts as a vehicle doubts (of steering: how it moves); or (world, vehicle, 0) for none.
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
     for w in range(action.shape[0]):
@@ -225,8 +233,8 @@ def decide_all(
             if worlds[w] and kept.begun[w, i] > 0.0:
                 own, keep = g, barrier
                 if trims.shape[2] > 0:
-                    share = doubt(w, i, kept)
-                    own, keep = trimmed(g, trims[w, i], share), widened(barrier, trims[w, i], share)
+                    moves, share = doubt(w, i, kept)
+                    own, keep = trimmed(g, trims[w, i], share, moves), widened(barrier, trims[w, i], share)
                 w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, keep, kept, planes)

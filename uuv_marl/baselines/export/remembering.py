@@ -78,7 +78,15 @@ def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], l
     heads += [_info(f"own_{name}", TensorProto.DOUBLE, shape) for name, shape in kept]
     percept = (Value(g, "row") * policy.layout.scale).double()
     memory = Surroundings(**{name: _array(g, Value(g, f"own_{name}"), shape) for name, shape in kept})
-    g.call(listen, _array(g, percept, (size,), single=True), policy.layout.offsets, _ONE, policy.model, memory)
+    g.call(
+        listen,
+        _array(g, percept, (size,), single=True),
+        policy.layout.offsets,
+        _ONE,
+        policy.model,
+        policy.kept_s,
+        memory,
+    )
     if isinstance(policy, Guarded):
         heads.append(_info("wish", TensorProto.FLOAT, (2,)))
         action = _guarded(g, policy, memory)

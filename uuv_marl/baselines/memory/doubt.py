@@ -16,8 +16,8 @@ means are below 0.12 s, of neighbours that are heard no more and kept for a whil
 
 
 @compiled
-def doubt(w: int, i: int, kept: Surroundings) -> float:
-    """From 0, all is as expected, to 1.
+def doubt(w: int, i: int, kept: Surroundings) -> tuple[float, float]:
+    """Of how it moves, and of all: from 0, as expected, to 1.
 
     Args:
         w: index of the world.
@@ -25,4 +25,5 @@ def doubt(w: int, i: int, kept: Surroundings) -> float:
         kept: what is remembered.
     """
     old = max(age_of(w, i, kept) - USUAL_AGE_S, 0.0)
-    return min(kept.surprise[w, i] / SURPRISE_MPS + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)
+    moves = kept.surprise[w, i] / SURPRISE_MPS
+    return min(moves, 1.0), min(moves + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)

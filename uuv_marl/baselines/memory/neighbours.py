@@ -16,7 +16,9 @@ MANOEUVRES = 0.005
 LEAST_ERROR = 0.0002
 """The sonar's is never taken for smaller than this [1]."""
 KEPT_S = 1.0
-"""A neighbour that is heard no more is kept for so long [s]."""
+"""A neighbour that is heard no more is kept for so long where nothing else is said [s]."""
+_FRESH_S = 1.0
+"""Neighbours that were heard longer ago do not count in the mean age of readings [s]: they may have gone."""
 _SAME_M = 1e-3
 """A reading that has not moved by this is the one before, of a sonar that reads more seldom than decisions are made."""
 _STALE_S = 2.0
@@ -50,10 +52,10 @@ def noise_of(w: int, i: int, kept: Surroundings) -> float:
 
 @compiled
 def age_of(w: int, i: int, kept: Surroundings) -> float:
-    """Mean time since the latest new reading of each known neighbour [s], 0 where there is none."""
+    """Mean time since the latest new reading of each neighbour heard of late [s], 0 where there is none."""
     total, num = 0.0, 0
     for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] > 0.0:
+        if kept.known[w, i, k] > 0.0 and kept.since[w, i, k] <= _FRESH_S:
             total, num = total + kept.since[w, i, k], num + 1
     return total / max(num, 1)
 
@@ -80,7 +82,7 @@ def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
 
 
 @compiled
-def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> None:
+def listen(w: int, i: int, see: Fields, period: float, kept_s: float, kept: Surroundings) -> None:
     """Take the neighbours that a vehicle hears into those it knows.
 
     Args:
@@ -88,6 +90,7 @@ def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> No
         i: index of the vehicle.
         see: the fields of percepts, of all worlds.
         period: since the percept before [s].
+        kept_s: for how long a neighbour is kept that is heard no more [s].
         kept: what is remembered; the neighbours are brought up to date.
     """
     known, since, place, velocity = kept.known[w, i], kept.since[w, i], kept.place[w, i], kept.velocity[w, i]
@@ -109,7 +112,7 @@ def listen(w: int, i: int, see: Fields, period: float, kept: Surroundings) -> No
                 _meet(w, i, x, y, kept)
     for k in range(known.shape[0]):
         if known[k] < 0.0:
-            known[k] = 0.0 if since[k] > KEPT_S else -known[k]
+            known[k] = 0.0 if since[k] > kept_s else -known[k]
 
 
 @compiled

@@ -41,7 +41,7 @@ def is_lost(row: Float32) -> bool:
 
 
 @compiled
-def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept: Surroundings) -> None:
+def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept_s: float, kept: Surroundings) -> None:
     """Take what every vehicle perceives into what it remembers. Once for every decision.
 
     Args:
@@ -49,6 +49,7 @@ def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept: Surround
         at: first index of every field in a flat percept.
         worlds: those that have gone on, shape (world,).
         model: what vehicles know of themselves.
+        kept_s: for how long they remember a neighbour that they hear no more [s].
         kept: what they remember; brought up to date.
     """
     see = fields(flat, at)
@@ -66,4 +67,4 @@ def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept: Surround
                 pose.move(w, i, see, model.own, kept)
             pose.keep_motion(w, i, see, kept)
             discs.listen(w, i, see, model.sectors, kept)
-            neighbours.listen(w, i, see, model.own.period_s, kept)
+            neighbours.listen(w, i, see, model.own.period_s, kept_s, kept)
