@@ -33,7 +33,7 @@ def episode(**changes):
 
 def test_seeds_are_held_out_and_sets_are_told_apart():
     assert len({held.name for held in SETS}) == len(SETS)
-    assert LEADING == ("scout", "mappo")
+    assert LEADING == ("scout", "scout_plus", "mappo")
     for held in SETS:
         cases = held.cases(["a", "b"], None)
         assert {case.load().name for case in cases} == {held.scenario}
@@ -73,12 +73,15 @@ def test_targets_by_hand():
     assert not met([many[0]._replace(task_time_s=None, seed=6000), *lost], many, "at least 99%")
     assert met(many, many, "no collision")
     assert not met([*many[1:], episode(collisions=1)], many, "no collision")
-    single = [e._replace(set="single_obstacle", task_time_s=100.9) for e in many]
+    single = [e._replace(set="single_obstacle", task_time_s=100.4) for e in many]
     assert met(single, [], "that of l(t)")
-    assert not met([e._replace(task_time_s=101.1) for e in single], [], "that of l(t)")
+    assert not met([e._replace(task_time_s=100.6) for e in single], [], "that of l(t)")
     assert met(single, [], "12.63")
     assert not met([*single[1:], single[0]._replace(min_obstacle_distance_m=12.6)], [], "12.63")
     assert not met([*single[1:], single[0]._replace(min_spacing_m=5.9)], [], "spacing")
+    tuned = [e._replace(policy="bio_inspired_plus", effort=0.6) for e in single]
+    assert met(single, tuned, "effort")
+    assert not met([e._replace(effort=0.7) for e in single], tuned, "effort")
 
 
 def test_a_thousand_episodes_bound_the_share_of_collisions_and_compare_times():

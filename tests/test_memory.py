@@ -4,11 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import age_of
+from uuv_marl.baselines.memory.response import follow, remains
 from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
@@ -115,18 +118,49 @@ def test_a_vehicle_knows_where_it_is_through_turns_and_rest(policy, period):
     assert seen.turn.max() < 1e-3
 
 
-def test_a_vehicle_notices_how_far_its_model_is_from_what_it_does():
-    surprises = []
-    for lag in (0.0, 0.2, 0.5):
-        overrides = {"actuators.thrust_lag_s": lag, "actuators.yaw_lag_s": lag}
-        scenario = granted("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
-        swarm, policy = Swarm(scenario), make("scout", scenario)
-        percept = swarm.reset(10_501)
-        for _ in range(200):
-            percept = swarm.step(policy.act(percept))
-        surprises.append(policy.memory.surprise.mean())
-    assert surprises[0] < 1e-5, "in still water the model is the vehicle"
-    assert 0.02 < surprises[1] < surprises[2]
+@given(a=st.floats(0.0, 0.99), share=st.floats(0.2, 1.0), drift=st.floats(-0.2, 0.2), seed=st.integers(0, 99))
+def test_what_remains_is_found_from_any_actions(a, share, drift, seed):
+    """f = s c + a (f - s c) + b, for random actions c: a itself where s is 1, more where less than all comes."""
+    kept, (rng, acted) = room(), (np.random.default_rng(seed), 0.0)
+    for asked in rng.uniform(-1.0, 1.0, 400):
+        acted = share * asked + a * (acted - share * asked)
+        follow(0, 0, 1, asked, acted + drift - asked, 0.01, kept)
+    found = remains(0, 0, 1, kept)
+    if share == 1.0:
+        assert found == pytest.approx(a, abs=1e-3)
+    assert found >= a - 1e-3
+    assert remains(0, 0, 0, kept) == 0.0, "the other component"
+
+
+def room():
+    """What one vehicle remembers of nothing."""
+    scenario = granted("scout", load_scenario("tracking", num_vehicles=1))
+    return make("scout", scenario).memory
+
+
+@pytest.mark.parametrize(
+    ("overrides", "surge", "yaw"),
+    [
+        ({}, (0.0, 0.01), (0.0, 0.01)),
+        ({"current.speed_mps": 1.0}, (0.0, 0.1), (0.0, 0.05)),
+        ({"noise.bearing_deg": 5.0, "noise.range_share": 0.1}, (0.0, 0.01), (0.0, 0.01)),
+        ({"actuators.yaw_authority": 0.33}, (0.0, 0.05), (0.5, 0.9)),
+        ({"actuators.yaw_lag_s": 0.2}, (0.0, 0.3), (0.4, 0.7)),
+        ({"actuators.thrust_lag_s": 0.2}, (0.3, 1.0), (0.0, 0.1)),
+    ],
+    ids=["calm", "current", "noise", "authority", "yaw lag", "thrust lag"],
+)
+@pytest.mark.parametrize("steering", [1.0, 0.2])
+def test_a_vehicle_knows_how_its_actuators_follow_however_it_steers(overrides, surge, yaw, steering):
+    scenario = granted("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
+    swarm, policy = Swarm(scenario), make("scout", scenario, steering=steering)
+    percept, found = swarm.reset(10_501), []
+    for k in range(200):
+        percept = swarm.step(policy.act(percept))
+        if k > 100:
+            found.append([[remains(0, i, axis, policy.memory) for axis in (0, 1)] for i in range(6)])
+    for (least, most), value in zip((surge, yaw), np.mean(found, axis=(0, 1)), strict=True):
+        assert least <= value <= most
 
 
 @pytest.mark.parametrize("echoes", ["centre", "surface"])

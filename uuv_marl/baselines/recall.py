@@ -12,6 +12,7 @@ from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.neighbours import age_of, middle, noise_of
 from uuv_marl.baselines.memory.pose import to_body, to_body_axes
+from uuv_marl.baselines.memory.response import remains
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of
 from uuv_marl.baselines.scout import Gains, modulated, wished
@@ -25,7 +26,7 @@ Bool = NDArray[np.bool_]
 
 NEIGHBOURS, SURFACES = 6, 4
 """So many of the nearest neighbours and obstacles are seen."""
-_OWN = 26
+_OWN = 27
 RECALLED = _OWN + 6 * NEIGHBOURS + 5 * SURFACES
 """Features of a vehicle."""
 
@@ -101,9 +102,9 @@ def _own(
     c_x, c_y, heard = middle(w, i, kept)
     out[19], out[20] = to_body_axes(c_x / 32.0, c_y / 32.0, pose)
     out[21] = heard / kept.known.shape[2]
-    out[22] = min(kept.surprise[w, i], 2.0)
-    out[23] = min(age_of(w, i, kept), 2.0)
-    _, out[24] = doubt(w, i, kept)
+    out[22], out[23] = remains(w, i, 0, kept), remains(w, i, 1, kept)
+    out[24] = min(age_of(w, i, kept), 2.0)
+    _, out[25] = doubt(w, i, kept)
 
 
 @compiled

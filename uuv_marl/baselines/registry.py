@@ -21,7 +21,7 @@ from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.pull import Pull
 from uuv_marl.baselines.safety import GUARD, Barrier
-from uuv_marl.baselines.scout import Scout
+from uuv_marl.baselines.scout import Scout, ScoutPlus
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
 from uuv_marl.modules import named_object
@@ -37,6 +37,7 @@ POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
     "bio_inspired_plus": BioInspiredPlus,
     "scout": Scout,
+    "scout_plus": ScoutPlus,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,

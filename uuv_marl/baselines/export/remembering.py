@@ -20,7 +20,7 @@ from uuv_marl.baselines.learned_law import LearnedLaw
 from uuv_marl.baselines.memory import Surroundings, listen
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.recall import RECALLED, recall
-from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Scout, decide_all
+from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Scout, ScoutPlus, decide_all
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.views import Fields, Starts, fields
@@ -78,19 +78,12 @@ def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], l
     heads += [_info(f"own_{name}", TensorProto.DOUBLE, shape) for name, shape in kept]
     percept = (Value(g, "row") * policy.layout.scale).double()
     memory = Surroundings(**{name: _array(g, Value(g, f"own_{name}"), shape) for name, shape in kept})
-    g.call(
-        listen,
-        _array(g, percept, (size,), single=True),
-        policy.layout.offsets,
-        _ONE,
-        policy.model,
-        policy.kept_s,
-        memory,
-    )
+    knows = policy.layout.offsets, _ONE, policy.model, policy.kept_s
+    g.call(listen, _array(g, percept, (size,), single=True), *knows, memory)
     if isinstance(policy, Guarded):
         heads.append(_info("wish", TensorProto.FLOAT, (2,)))
         action = _guarded(g, policy, memory)
-    elif isinstance(policy, Scout) and type(policy) in (Scout, LearnedLaw):
+    elif isinstance(policy, Scout) and type(policy) in (Scout, ScoutPlus, LearnedLaw):
         action = _by_law(g, policy, memory)
     else:
         raise PolicyError(f"policy {policy.name!r} has no form in ONNX")

@@ -1,12 +1,12 @@
 """How far what a vehicle meets is from what its model and its sonar should give: 0 in still water with exact echoes."""
 
 from uuv_marl.baselines.memory.neighbours import age_of, noise_of
+from uuv_marl.baselines.memory.response import remains
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.sim.compiled import compiled
 
-SURPRISE_MPS = 0.25
-"""So far from its model, a vehicle doubts all [m/s]. Assumed: a lag of 0.1 s makes about three times as much, masses,
-added masses, drag and thrust that are off by 20 % less than half (median over vehicles and time)."""
+REMAINS = 0.4
+"""Where so much remains of what is asked of thrust or torque, a vehicle doubts all [1]."""
 NOISE = 0.02
 """So large errors of neighbours' places over their range do the same [1]. Assumed: those of 2 degrees. Exact echoes
 make none, but at slow decisions, when neighbours are not where they were expected."""
@@ -25,5 +25,5 @@ def doubt(w: int, i: int, kept: Surroundings) -> tuple[float, float]:
         kept: what is remembered.
     """
     old = max(age_of(w, i, kept) - USUAL_AGE_S, 0.0)
-    moves = kept.surprise[w, i] / SURPRISE_MPS
+    moves = max(remains(w, i, 0, kept), remains(w, i, 1, kept)) / REMAINS
     return min(moves, 1.0), min(moves + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)

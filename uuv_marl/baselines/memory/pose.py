@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.memory.response import follow
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.compiled import compiled
@@ -22,14 +23,12 @@ Float64 = NDArray[np.float64]
 
 _MOVES_MPS = 0.005
 """l(t) moves if it is faster; scenarios know no speed below 0.01 m/s."""
+_TENTH = 0.1
+"""Of full thrust and torque: so much, since a vehicle that turns further has another direction at the end."""
 FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)
 """A vector to l(t) that is longer is cut, and no fix [m]."""
 _TURN_TOLERANCE = 0.001
 """By which compass and dead reckoning may differ on a leg, beside what the yaw rate's error makes of it [rad]."""
-_ARM_M = 1.0
-"""Yaw rates count as the velocity that they give so far from the axis [m]. Assumed: about half a hull."""
-_SURPRISE_S = 2.0
-"""What counts as of late [s]. Assumed: longer than a turn, shorter than a leg."""
 
 
 class Reckoning(NamedTuple):
@@ -44,15 +43,21 @@ class Reckoning(NamedTuple):
     """Time of one of them [s]."""
     period_s: float
     """Between two decisions [s]."""
+    surge: float
+    """Velocity that thrust gives in that time from rest, over its share [m/s]."""
+    yaw: float
+    """Yaw rate that torque gives so [rad/s]."""
 
     @staticmethod
     def of(scenario: Scenario) -> "Reckoning":
         """That of a scenario's vehicle, undisturbed."""
-        timing = scenario.timing
-        return Reckoning(
+        timing, still = scenario.timing, np.zeros(3)
+        own = Reckoning(
             plant(scenario), timing.holds_per_decision, timing.steps_per_hold, timing.integration_step_s,
-            timing.decision_period_s,
+            timing.decision_period_s, 1.0, 1.0,
         )  # fmt: skip
+        surge = reckoned(still, np.array([_TENTH, 0.0]), own)[3] / _TENTH
+        return own._replace(surge=surge, yaw=reckoned(still, np.array([0.0, _TENTH]), own)[5] / _TENTH)
 
 
 @compiled
@@ -138,8 +143,8 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
     speed, half = math.hypot(v_x, v_y), 0.5 * own.period_s
     x, y, psi, u, v, r = reckoned(motion, kept.action[w, i], own)
     wrong = see.yaw_rate[w, i, 0] - r
-    off = math.hypot(see.velocity[w, i, 0] - u, see.velocity[w, i, 1] - v) + _ARM_M * abs(wrong)
-    kept.surprise[w, i] += min(own.period_s / _SURPRISE_S, 1.0) * (off - kept.surprise[w, i])
+    follow(w, i, 0, kept.action[w, i, 0], (see.velocity[w, i, 0] - u) / own.surge, own.period_s, kept)
+    follow(w, i, 1, kept.action[w, i, 1], wrong / own.yaw, own.period_s, kept)
     turn_c, turn_s = cos_sin(psi + half * wrong)
     c, s = to_map_axes(turn_c, turn_s, pose)
     moves, moved = speed > _MOVES_MPS, math.hypot(at[2], at[3]) > 0.0

@@ -21,8 +21,8 @@ class Surroundings(NamedTuple):
     pose: Annotated[Float64, "world vehicle 4", "Own place in the map [m], cosine and sine of the heading in it."]
     motion: Annotated[Float64, "world vehicle 3", "Own velocity, body frame [m/s], and yaw rate [rad/s]."]
     action: Annotated[Float64, "world vehicle 2", "Own latest action: shares of full thrust and torque."]
-    surprise: Annotated[
-        Float64, "world vehicle", "How far its velocity is from what its model says, of late, yaw rate included [m/s]."
+    response: Annotated[
+        Float64, "world vehicle 2 5", "How its thrust and its torque follow its actions: see ``memory.response``."
     ]
     reference: Annotated[Float64, "world vehicle 4", "Place of l(t) [m], unit vector of its leg, 0 where it rests."]
     reference_speed: Annotated[Float64, "world vehicle", "Speed of l(t) [m/s]."]
