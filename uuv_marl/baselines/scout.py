@@ -61,8 +61,8 @@ TRIMS = 6
 neighbours (``widened``)."""
 MOST_TRIM = 3.0
 """They are bounded here [1]. Assumed: a factor of 20 is more than any gain should change."""
-_TRIM_STEERING, _TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 2.0, 0.04, 2.0, 1.0
-"""What 1 does: a factor of e^2 on steering, as a lag asks for a tenth; and what it adds to ``together`` [1/s], to
+_TRIM_STEERING, _TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 4.0, 0.04, 2.0, 1.0
+"""What 1 does: a factor of e^4 on steering, as a long lag asks for a tenth; and what it adds to ``together`` [1/s], to
 ``behind_m`` [m] and to the distance kept from neighbours [m]. Assumed: as much as the pull, the way for which a swarm
 coasts on, and a share of a hull's length."""
 
@@ -129,18 +129,18 @@ class ScoutPlus(Scout):
 
 
 @compiled
-def trimmed(g: Gains, trims: Float32, share: float, moves: float) -> Gains:
+def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
     """Gains of one vehicle, changed: pull, push and steering by factors, together and behind_m by sums.
 
-    Steering is never harder than the law's.
+    Steering is never harder than the law's, and pushes are never weaker.
 
     Args:
         g: the law's.
         trims: the first are of pull, together, push, behind_m and steering, shape (TRIMS,); 0 changes nothing.
         share: of them that counts, 0 to 1.
-        moves: of that of steering, 0 to 1.
+        lags: of that of steering, 0 to 1.
     """
-    pull, push, steering = share * trims[0], share * trims[2], moves * _TRIM_STEERING * min(trims[4], 0.0)
+    pull, push, steering = share * trims[0], share * max(trims[2], 0.0), lags * _TRIM_STEERING * min(trims[4], 0.0)
     together, behind_m = share * _TRIM_PER_S * trims[1], share * _TRIM_M * trims[3]
     return Gains(
         g.pull * math.exp(pull), g.push * math.exp(push), g.push_range, g.pull_at_rest, g.push_at_rest,
@@ -241,7 +241,7 @@ def decide_all(
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
         trims: changes of the law, see ``trimmed`` and ``widened``, shape (world, vehicle, TRIMS), of which as much
-            counts as a vehicle doubts (of steering: how it moves); or (world, vehicle, 0) for none.
+            counts as a vehicle doubts (of steering: as its actuators lag); or (world, vehicle, 0) for none.
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
     for w in range(action.shape[0]):
@@ -249,8 +249,8 @@ def decide_all(
             if worlds[w] and kept.begun[w, i] > 0.0:
                 own, keep = g, barrier
                 if trims.shape[2] > 0:
-                    moves, share = doubt(w, i, kept)
-                    own, keep = trimmed(g, trims[w, i], share, moves), widened(barrier, trims[w, i], share)
+                    lags, share = doubt(w, i, kept)
+                    own, keep = trimmed(g, trims[w, i], share, lags), widened(barrier, trims[w, i], share)
                 w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, keep, kept, planes)

@@ -6,7 +6,7 @@ from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.sim.compiled import compiled
 
 REMAINS = 0.4
-"""Where so much remains of what is asked of thrust or torque, a vehicle doubts all [1]."""
+"""Where so much remains of what is asked of thrust or torque, a vehicle doubts all [1]. Assumed."""
 NOISE = 0.02
 """So large errors of neighbours' places over their range do the same [1]. Assumed: those of 2 degrees. Exact echoes
 make none, but at slow decisions, when neighbours are not where they were expected."""
@@ -17,7 +17,9 @@ means are below 0.12 s, of neighbours that are heard no more and kept for a whil
 
 @compiled
 def doubt(w: int, i: int, kept: Surroundings) -> tuple[float, float]:
-    """Of how it moves, and of all: from 0, as expected, to 1.
+    """Whether its actuators lag, and of all: from 0, as expected, to 1.
+
+    A lag delays thrust and torque, a fault or little authority touches one of them.
 
     Args:
         w: index of the world.
@@ -25,5 +27,6 @@ def doubt(w: int, i: int, kept: Surroundings) -> tuple[float, float]:
         kept: what is remembered.
     """
     old = max(age_of(w, i, kept) - USUAL_AGE_S, 0.0)
-    moves = max(remains(w, i, 0, kept), remains(w, i, 1, kept)) / REMAINS
-    return min(moves, 1.0), min(moves + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)
+    thrust, torque = remains(w, i, 0, kept), remains(w, i, 1, kept)
+    moves = max(thrust, torque) / REMAINS
+    return min(thrust, torque), min(moves + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)
