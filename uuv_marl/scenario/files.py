@@ -73,7 +73,7 @@ def show_vehicle(name: str) -> str:
             table: Any = document[section]
             for field, value in fields.items():
                 if f"{section}.{field}" in changed:
-                    item: Any = tomlkit.item(value)  # pyright: ignore[reportUnknownMemberType]
+                    item = cast(Any, tomlkit).item(value)
                     table[field] = item.comment(changed[f"{section}.{field}"].lstrip("# "))
         document["vehicle"]["name"] = file.data["vehicle"]["name"]  # pyright: ignore[reportIndexIssue] - a table
     return tomlkit.dumps(document).rstrip("\n") + "\n"  # pyright: ignore[reportUnknownMemberType]

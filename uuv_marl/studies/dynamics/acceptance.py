@@ -63,7 +63,7 @@ class Measured(NamedTuple):
     step_s: float
     """The longest integration step of ``STEPS_S`` with which the vehicle is accepted."""
     step_error_m: float
-    """Of the place after 60 s of that turn from rest, with that step."""
+    """Of the place after 60 s from rest with that step, at full thrust and rudder; thrust and torque alike without."""
 
 
 def alone(vehicle: str, **overrides: object) -> Scenario:
@@ -115,7 +115,8 @@ def measured(vehicle: str) -> Measured:
     fine = alone(vehicle).model_copy(
         update={"timing": scenario.timing.model_copy(update={"integration_step_s": step_s / _FINER})}
     )
-    places = [_last(each, _turn(each), TURN_S)[:2] for each in (scenario, fine)]
+    action = (1.0, 1.0) if scenario.actuators.kind == "rudder" else (0.5, 0.5)
+    places = [_last(each, action, TURN_S)[:2] for each in (scenario, fine)]
     return Measured(
         top_mps=top_mps, turn_mps=radius_m * math.radians(turn_dps), turn_dps=turn_dps, turn_radius_m=radius_m,
         coast_m=coast_m, coast_s=coast_s, step_s=step_s, step_error_m=math.dist(*places),
