@@ -150,6 +150,7 @@ BAD = [
         r"trajectory.speed_mps = 6 is more than the 5.14 m/s .*max_force_n = 3000",
     ),
     (RUDDER | {"actuators.N_uud": 9e5}, "max_force_n = 3000 and rudder_max_deg = 20; use at most"),
+    (RUDDER | {"actuators.Y_uud": 3e4}, "max_force_n = 3000 and rudder_max_deg = 20; "),  # the trial's own finding
     ({"actuators.max_astern_n": -1.0}, "actuators.max_astern_n must lie within 0 to 1,000,000, got -1"),
     ({"vehicle.Y_r": 500.0}, "lets linear damping add energy"),
     ({"vehicle.Y_rr": 1000.0}, "lets quadratic damping add energy"),

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
-from uuv_marl.scenario import ScenarioError
+from uuv_marl.scenario import ScenarioError, vehicle_checks
 from uuv_marl.sim import vehicle
 from uuv_marl.sim.vehicle import STILL, plant
 
@@ -289,3 +289,22 @@ def sway_yaw(u, damping=0.0, h=1e-6):
     rate = lambda v, r: np.array(vehicle.acceleration((u, v, r), (0.0, -damping * r), p)[1:])  # noqa: E731
     columns = [(rate(*(h * e)) - rate(*(-h * e))) / (2 * h) for e in np.eye(2)]
     return np.linalg.eigvals(np.stack(columns, axis=1)).real
+
+
+@pytest.mark.parametrize("munk", [True, False])
+def test_the_trial_of_a_step_has_the_engine_s_equations(munk):
+    scenario = load_scenario("tracking", overrides=COUPLED | LIFT | {"vehicle.munk_moment": munk})
+    p = plant(scenario)
+    for nu in np.random.default_rng(0).uniform(-5.0, 5.0, (50, 3)):
+        products = np.outer(nu, [1.0, *nu, *abs(nu)]).ravel()
+        there = vehicle_checks._resistance(scenario.vehicle) @ products
+        here = -np.array(vehicle.coriolis(nu, p)) - np.array(vehicle.damping(nu, p))
+        np.testing.assert_allclose(there, here, rtol=1e-12, atol=1e-9)
+
+
+def test_the_damping_rate_of_a_step_counts_lift():
+    scenario = load_scenario("tracking")
+    lifted = scenario.vehicle.model_copy(update={"Y_uv": -1200.0})
+    u = vehicle_checks.top_speed(lifted, scenario.actuators)
+    rate = vehicle_checks._damping_rate(lifted, scenario.actuators, 4.0)
+    assert rate == pytest.approx((100.0 + (400.0 + 1200.0) * u) / 265.0)

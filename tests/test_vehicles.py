@@ -270,6 +270,7 @@ def test_the_command_lists_the_catalogue_and_shows_one():
     row = next(line for line in listed.output.splitlines() if "remus100+munk_on" in line)
     assert "5.8 m" in row
     assert "2.59" in row
+    assert "variant: munk_moment = true" in row
     shown = CliRunner().invoke(app, ["vehicles", "--show", "lauv"])
     assert shown.output == show_vehicle("lauv") + "\n"
     wrong = CliRunner().invoke(app, ["vehicles", "--show", "remus"])

@@ -42,7 +42,7 @@ def vehicles(
         if show is not None:
             _print_toml(show_vehicle(show))
             return
-        from uuv_marl.studies.dynamics.acceptance import alone, every, turn
+        from uuv_marl.studies.dynamics.acceptance import alone, changes, every, turn
 
         table = Table("name", "length [m]", "mass [kg]", "top speed [m/s]", "turn", "source")
         for name in every():
@@ -51,7 +51,8 @@ def vehicles(
             top, rate, radius = turn(scenario)
             how = f"{rate:.0f} deg/s" + (f", radius {radius:.1f} m" if radius > 0.01 else " on the spot")
             length = "–" if hull.length_m is None else f"{hull.length_m:g}"
-            table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, hull.source)
+            source = f"variant: {', '.join(changes(name))}" if "+" in name else hull.source
+            table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, source)
         console.print(table)
 
 

@@ -3,6 +3,7 @@
 A vehicle is alone in still water. Its lags count. It is integrated with the longest step that is accepted for it.
 """
 
+import json
 import math
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario import Scenario, load_scenario, variant_names, vehicle_names
+from uuv_marl.scenario import Scenario, load_scenario, load_vehicle, variant_names, vehicle_names
 from uuv_marl.sim.formulas import Row, actuators, advance, derivative, lagging
 from uuv_marl.sim.sea.actuation import actuation
 from uuv_marl.sim.vehicle import STILL, plant
@@ -171,6 +172,17 @@ def sway_yaw(scenario: Scenario, speed_mps: float) -> NDArray[np.complex128]:
 def every() -> list[str]:
     """All vehicles of the catalogue, each followed by its variants."""
     return [name for one in vehicle_names() for name in (one, *(f"{one}+{variant}" for variant in variant_names(one)))]
+
+
+def changes(vehicle: str) -> list[str]:
+    """``field = value`` of what the variants in a vehicle's name change."""
+    plain, now = load_vehicle(vehicle.partition("+")[0]), load_vehicle(vehicle)
+    return [
+        f"{field} = {value if isinstance(value, str) else json.dumps(value)}"
+        for section, fields in now.items()
+        for field, value in fields.items()
+        if value != plain[section][field] and field != "name"
+    ]
 
 
 @cache
