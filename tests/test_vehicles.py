@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.cli import app
+from uuv_marl.replay.traces import from_folder
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, variant_names, vehicle_names
 from uuv_marl.scenario.files import _VEHICLES
 from uuv_marl.sim.swarm import Swarm
@@ -276,3 +277,13 @@ def test_the_command_lists_the_catalogue_and_shows_one():
     wrong = CliRunner().invoke(app, ["vehicles", "--show", "remus"])
     assert wrong.exit_code != 0
     assert "did you mean 'remus100'" in wrong.output
+
+
+def test_a_benchmark_of_a_torpedo_says_that_it_has_no_inner_loop_and_can_be_replayed(tmp_path):
+    torpedo = ["vehicle=lauv", "trajectory.speed_mps=1.5", "start.speed_max_mps=1.5", "time_limit.factor=0.05"]
+    command = ["benchmark", "--scenario", "starter", "--policy", "bio_inspired_plus", "--seeds", "1", "--output"]
+    run = CliRunner().invoke(app, [*command, str(tmp_path / "run"), *(f"--set={change}" for change in torpedo)])
+    assert run.exit_code == 0, run.output
+    assert "yaw damping" not in (tmp_path / "run" / "table.md").read_text()
+    recording = from_folder(tmp_path / "run", None, None, 0)
+    assert np.isfinite(recording.position[-1]).all()
