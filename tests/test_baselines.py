@@ -346,3 +346,21 @@ def test_a_policy_that_decides_nothing_is_refused_when_it_is_made():
 
     with pytest.raises(PolicyError, match=r"policy 'Nothing' must define decide\(percept\)"):
         Nothing(load_scenario("starter"))
+
+
+@pytest.mark.parametrize(
+    ("change", "damping"),
+    [
+        ({}, 600.0),
+        ({"actuators.max_torque_nm": 30.0, "vehicle.N_r": 5.0}, 6.0),
+        ({"actuators.kind": "rudder", "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0}, 0.0),
+    ],
+    ids=["as declared", "a hundredth of the torque", "rudder"],
+)
+@pytest.mark.parametrize("name", ["scout", "mappo"])
+def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, damping):
+    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=3, overrides=change))
+    assert scenario.actuators.yaw_damping_nms == pytest.approx(damping, rel=1e-12)
+    any_vehicle = {"any_vehicle": True} if name == "mappo" else {}
+    percept = Swarm(scenario).reset(0)
+    assert np.isfinite(make(name, scenario, **any_vehicle).act(percept)).all()

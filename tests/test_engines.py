@@ -45,6 +45,10 @@ OVERLAPPING = [
 
 COUPLED = {"vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0, "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0,
            "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0}  # fmt: skip
+LIFT = {"vehicle.Y_uv": -60.0, "vehicle.Y_ur": 20.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "vehicle.N_vv": -9.0}
+ASTERN = {"actuators.max_astern_n": 700.0, "vehicle.munk_moment": False}
+RUDDER = {"actuators.kind": "rudder", "actuators.Y_uud": 60.0, "actuators.N_uud": -40.0,
+          "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
 HIDING = {"sonar.obstacles_hide_vehicles": True}
 CORNERS = {"trajectory.waypoints_m": [[0.0, 0.0], [4.0, 0.0], [4.0, 8.0]]}  # at 1 s and 3 s
 FATAL = {"contact.ends_vehicle": True}
@@ -96,6 +100,11 @@ EPISODES = {
     "late and wrong sonar": ("random_field", {"overrides": {**SEA, **SONAR}}, ""),
     "late and wrong sonar, five holds": ("starter", {"overrides": {**SONAR, **FINE}}, "arrival"),
     "raw readings at each hold": ("multi_obstacle", {"num_vehicles": 9, "overrides": RAW}, ""),
+    "five holds, lift, rudder": ("starter", {"overrides": {**FINE, **COUPLED, **LIFT, **RUDDER}}, "arrival"),
+    "five holds, lift, less astern, no Munk moment": (
+        "starter", {"overrides": {**FINE, **COUPLED, **LIFT, **ASTERN, **DAMPED}}, "arrival"
+    ),
+    "the sea, lift, rudder that lags": ("random_field", {"overrides": {**SEA, **LIFT, **RUDDER}}, "lost"),
     "five holds, coupled, damped": ("starter", {"overrides": {**FINE, **COUPLED, **DAMPED}}, "arrival"),
 }  # fmt: skip
 """Scenario, changes, and what must happen beside echoes and contacts."""
@@ -271,6 +280,9 @@ CLOCKS = {
     "five holds of fine steps": FINE,
     "yaw damping": {"timing.decision_period_s": 0.5, **DAMPED},
     "coupled": {"timing.decision_period_s": 0.5, **COUPLED},
+    "lift, less astern": {"timing.decision_period_s": 0.5, **COUPLED, **LIFT, **ASTERN},
+    "nothing astern": {"timing.decision_period_s": 0.5, "actuators.max_astern_n": 0.0},
+    "lift, rudder": {"timing.decision_period_s": 0.5, **COUPLED, **LIFT, **RUDDER},
 }
 
 

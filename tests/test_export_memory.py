@@ -32,6 +32,11 @@ ROUGH = CALM | {
     "sonar.echo_reports": "surface", "noise.bearing_deg": 2.0, "noise.range_share": 0.02, "current.speed_mps": 0.5,
     "noise.silence_probability": 0.05, "noise.silence_readings": 5, "timing.decision_period_s": 0.2,
 }  # fmt: skip
+TORPEDO = CALM | {
+    "vehicle.Y_uv": -60.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "actuators.max_astern_n": 100.0,
+    "timing.decision_period_s": 0.2,
+}  # fmt: skip
+RUDDER = TORPEDO | {"actuators.kind": "rudder", "actuators.N_uud": -90.0, "actuators.rudder_max_deg": 20.0}
 
 
 def opened(path):
@@ -69,8 +74,15 @@ def of_memory(folder, scale):
     return str(folder)
 
 
-@pytest.mark.parametrize("overrides", [CALM, ROUGH], ids=["calm", "rough"])
-@pytest.mark.parametrize("name", ["scout", "memory", "guarded:mappo"])
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        *((name, overrides) for name in ("scout", "memory", "guarded:mappo") for overrides in (CALM, ROUGH)),
+        ("scout", TORPEDO),
+        ("scout", RUDDER),
+    ],
+    ids=[*(f"{name}-{sea}" for name in ("scout", "memory", "mappo") for sea in ("calm", "rough")), "lift", "rudder"],
+)
 def test_it_remembers_and_acts_as_the_policy_does(name, overrides, tmp_path):
     """Not once in step with the policy: its own memory from the beginning."""
     policy = of_memory(tmp_path, 0.3) if name == "memory" else name

@@ -110,6 +110,10 @@ def test_overrides_from_the_command_line(text, expected):
 
 CYCLE = {}
 CYCLE["again"] = CYCLE
+SUMS = {"vehicle.Y_uv": -28.6, "vehicle.Y_ur": 5.22, "vehicle.N_uv": -24.0, "vehicle.N_ur": -2.0}
+"""Prestero's: the added masses' Coriolis terms are in them already."""
+LIFT = {"vehicle.Y_uv": -2000.0, "vehicle.N_ur": -900.0}
+RUDDER = {"actuators.kind": "rudder", "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0}
 BAD = [
     ({"sonar.arrays.bow.range_m": -3}, r"sonar.arrays.bow.range_m must lie within 0.001 to 4,096, got -3"),
     ({"vehicle.m_kg": float("nan")}, "vehicle.m_kg must lie within 0.001 to 1,000,000, got nan"),
@@ -132,6 +136,22 @@ BAD = [
     ({"vehicle.N_r": 2500.0}, "timing.integration_step_s = 0.1 is too long"),
     ({"actuators.yaw_damping_nms": 2000.0}, "actuators.yaw_damping_nms = 2000 is unstable .* use less than 1600"),
     ({"vehicle.x_G_m": 1.0}, "not positive definite"),
+    ({"vehicle.N_vv": -900.0}, "vehicle.N_vv = -900 lets quadratic damping add energy; lower its size, or raise"),
+    ({"vehicle.Y_vv": 0.0, "vehicle.N_vv": 1.0}, "vehicle.N_vv = 1 lets quadratic damping add energy"),
+    ({"vehicle.Y_uv": 5.0}, "vehicle.Y_uv = 5, .* are a lift that adds energy to sway and yaw; keep"),
+    (SUMS, "N_uv = -24 and N_ur = -2 are a lift that adds energy .* give the lift's part alone"),
+    (LIFT, "timing.integration_step_s = 0.1 is too long for this vehicle"),
+    ({"actuators.N_uud": 3.0}, "actuators.N_uud = 3 is a rudder's, and actuators.kind is 'force_torque'; set it to 0"),
+    ({"actuators.kind": "rudder"}, "actuators.N_uud must not be 0 where actuators.kind is 'rudder'"),
+    ({"actuators.kind": "rudder", "actuators.N_uud": 3.0}, "actuators.rudder_max_deg must not be 0 where"),
+    (RUDDER | {"actuators.yaw_damping_nms": 6.0}, "yaw_damping_nms must be 0 where .*'rudder', got 6: a rudder has no"),
+    (
+        RUDDER | {"trajectory.speed_mps": 6.0},
+        r"trajectory.speed_mps = 6 is more than the 5.14 m/s .*max_force_n = 3000",
+    ),
+    (RUDDER | {"actuators.N_uud": 9e5}, "max_force_n = 3000 and rudder_max_deg = 20; use at most"),
+    (RUDDER | {"actuators.Y_uud": 3e4}, "max_force_n = 3000 and rudder_max_deg = 20; "),  # the trial's own finding
+    ({"actuators.max_astern_n": -1.0}, "actuators.max_astern_n must lie within 0 to 1,000,000, got -1"),
     ({"vehicle.Y_r": 500.0}, "lets linear damping add energy"),
     ({"vehicle.Y_rr": 1000.0}, "lets quadratic damping add energy"),
     ({"timing.decision_period_s": 0.15}, "timing.decision_period_s must be a whole multiple"),

@@ -12,6 +12,8 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, check, rows
 from uuv_marl.sim.workspace import Cells, Columns, Listener, Workspace, scratch, workspace
 
+RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
+          "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
 SIZES = {"world": 2, "vehicle": 5, "point": 3, "obstacle": 4, "loss": 1, "sector": 21, "radius": 4, "entry": 98}
 LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5}
 
@@ -72,6 +74,8 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
         ("multi_obstacle", {"num_vehicles": 300}),
         ("lossy", {"overrides": {"sonar.channels": ["compass", "link"]}}),
         ("random_field", {"overrides": {"vehicle.m_kg": 250.0, "contact.ends_vehicle": True}}),
+        ("starter", {"overrides": RUDDER}),
+        ("starter", {"overrides": {**RUDDER, "actuators.yaw_lag_s": 0.2}}),
         ("starter", {"overrides": {"current.eddies": 8, "current.eddy_speed_mps": 0.5}}),
         ("random_field", {"overrides": {"sonar.channels": ["age"], "faults": [{"kind": "yaw", "share": 0.5}]}}),
     ]

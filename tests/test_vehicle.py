@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
-from uuv_marl.scenario import ScenarioError
+from uuv_marl.scenario import ScenarioError, vehicle_checks
 from uuv_marl.sim import vehicle
 from uuv_marl.sim.vehicle import STILL, plant
 
@@ -21,8 +21,16 @@ COUPLED = {
     "vehicle.Y_rr": 15.0,
     "vehicle.N_rv": -40.0,
 }
+LIFT = {"vehicle.Y_uv": -60.0, "vehicle.Y_ur": 20.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "vehicle.N_vv": -9.0}
+RUDDER = {
+    "actuators.kind": "rudder",
+    "actuators.Y_uud": 60.0,
+    "actuators.N_uud": -40.0,
+    "actuators.rudder_max_deg": 20.0,
+}
 PLAIN = plant(load_scenario("tracking"))
 FULL = plant(load_scenario("tracking", overrides=COUPLED))
+TORPEDO = plant(load_scenario("tracking", overrides=LIFT | RUDDER))
 
 
 @st.composite
@@ -46,6 +54,7 @@ def matrices(scenario, nu):
     """M, C and D of Eq. 3-4, written as the paper prints them."""
     p, (u, v, r) = scenario.vehicle, nu
     m, x_g = p.m_kg, p.x_G_m
+    on = 1.0 if p.munk_moment else 0.0
     m_rb = np.array([[m, 0, 0], [0, m, m * x_g], [0, m * x_g, p.I_z_kgm2]])
     m_a = -np.array([[p.X_udot_kg, 0, 0], [0, p.Y_vdot_kg, p.Y_rdot_kgm], [0, p.Y_rdot_kgm, p.N_rdot_kgm2]])
     a, b = m * (x_g * r + v), m * u
@@ -57,10 +66,11 @@ def matrices(scenario, nu):
         [
             [p.X_uu * abs(u), 0, 0],
             [0, p.Y_vv * abs(v), -p.Y_rr * abs(r)],
-            [0, -p.N_rv * abs(r), p.N_rr * abs(r)],
+            [0, -p.N_rv * abs(r) - p.N_vv * abs(v), p.N_rr * abs(r)],
         ]
     )
-    return m_rb + m_a, c_rb + c_a, d_l + d_nl
+    lift = max(u, 0.0) * np.array([[0, 0, 0], [0, p.Y_uv, p.Y_ur], [0, p.N_uv, p.N_ur]])
+    return m_rb + m_a, c_rb + on * c_a, d_l + d_nl - lift
 
 
 @given(speed, speed, speed, st.floats(-3000, 3000), st.floats(-3000, 3000))
@@ -70,6 +80,86 @@ def test_acceleration_is_equation_2_with_all_its_terms(u, v, r, tau_u, tau_r):
     m, c, d = matrices(scenario, nu)
     expected = np.linalg.solve(m, np.array([tau_u, 0.0, tau_r]) - c @ nu - d @ nu)
     np.testing.assert_allclose(vehicle.acceleration((u, v, r), (tau_u, tau_r), FULL), expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("munk", [True, False])
+@given(speed, speed, speed, st.floats(-3000, 3000), st.floats(-0.5, 0.5))
+def test_lift_rudder_and_the_munk_moment_enter_equation_2(munk, u, v, r, thrust, angle):
+    """The rudder's coefficients are Fossen's: an angle that is positive there turns to port."""
+    scenario = load_scenario("tracking", overrides=COUPLED | LIFT | RUDDER | {"vehicle.munk_moment": munk})
+    nu, act = np.array([u, v, r]), scenario.actuators
+    m, c, d = matrices(scenario, nu)
+    fin = np.array([0.0, act.Y_uud, act.N_uud]) * max(u, 0.0) ** 2 * -angle
+    expected = np.linalg.solve(m, np.array([thrust, 0.0, 0.0]) + fin - c @ nu - d @ nu)
+    got = vehicle.acceleration((u, v, r), (thrust, angle), plant(scenario))
+    np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9)
+
+
+zeros_too = st.one_of(speed, st.sampled_from([0.0, -0.0]))
+
+
+@given(zeros_too, zeros_too, zeros_too, zeros_too, zeros_too)
+def test_without_lift_and_rudder_no_bit_differs_from_the_papers_equation(u, v, r, tau_u, tau_r):
+    p = PLAIN
+    a, b = p.m * (p.x_G * r + v) - p.Y_vdot * v - p.Y_rdot * r, p.m * u - p.X_udot * u
+    f_u = tau_u - -a * r - (p.X_u + p.X_uu * abs(u)) * u
+    f_v = -(b * r) - ((p.Y_v + p.Y_vv * abs(v)) * v - (p.Y_r + p.Y_rr * abs(r)) * r)
+    f_r = tau_r - (a * u - b * v) - (-(p.N_v + p.N_rv * abs(r)) * v + (p.N_r + p.N_rr * abs(r)) * r)
+    expected = (p.inverse_11 * f_u, p.inverse_22 * f_v + p.inverse_23 * f_r, p.inverse_23 * f_v + p.inverse_33 * f_r)
+    got = vehicle.acceleration((u, v, r), (tau_u, tau_r), p)
+    assert [value.hex() for value in got] == [value.hex() for value in expected]
+
+
+@given(speed, speed, speed)
+def test_lift_takes_energy_from_sway_and_yaw(u, v, r):
+    with_lift, without = (vehicle.damping((u, v, r), p) for p in (TORPEDO, PLAIN._replace(N_vv=TORPEDO.N_vv)))
+    taken = v * (with_lift[1] - without[1]) + r * (with_lift[2] - without[2])
+    assert taken >= -1e-9
+    assert with_lift[0] == without[0]
+    if u <= 0.0:
+        assert with_lift == without
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_positive_action_turns_to_starboard_whatever_sign_the_source_has(sign):
+    change = {"actuators.Y_uud": sign * 60.0, "actuators.N_uud": sign * -40.0}
+    p = plant(load_scenario("tracking", overrides=RUDDER | change))
+    state = (0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    for _ in range(20):
+        state = vehicle.advance(state, vehicle.actuators(0.3, 1.0, state[5], p), STILL, 0.1, p)
+    assert state[5] > 0.0
+    assert state[1] > 0.0, "to starboard"
+    assert vehicle.actuators(0.3, 1.0, 0.5, p) == (900.0, math.radians(20.0))
+
+
+def test_a_rudder_without_flow_from_ahead_does_nothing():
+    for u in (0.0, -1.0):
+        idle, turned = (vehicle.acceleration((u, 0.0, 0.0), (0.0, angle), TORPEDO) for angle in (0.0, 0.3))
+        assert idle == turned
+
+
+@given(st.floats(-50, 50), st.floats(-50, 50))
+def test_with_a_rudder_each_number_of_an_action_has_its_own_limit(x, y):
+    assert vehicle.limited(x, y, TORPEDO) == (min(max(x, -1.0), 1.0), min(max(y, -1.0), 1.0))
+    assert vehicle.limited(x, y, PLAIN) == vehicle.project(x, y)
+    assert vehicle.held(0.8, -0.9, 1.3, TORPEDO) == (0.8, -0.9)
+    assert vehicle.effort(0.8, -0.9, TORPEDO) == pytest.approx(0.81)
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-7, 7), st.sampled_from([0.0, 500.0]))
+def test_a_held_force_is_cut_where_astern_there_is_less(a_x, a_y, turn, astern):
+    p = PLAIN._replace(max_force=2000.0, max_astern=astern)
+
+    def force(a):
+        return np.array([a[0] * (p.max_force if a[0] >= 0.0 else astern), a[1] * p.max_torque / p.lever_arm])
+
+    b = vehicle.turned(a_x, a_y, turn, p)
+    c, s = math.cos(turn), math.sin(turn)
+    wanted = np.array([[c, s], [-s, c]]) @ force((a_x, a_y))
+    if astern == 0.0:
+        wanted[0] = max(wanted[0], 0.0)
+    np.testing.assert_allclose(force(b), wanted, atol=1e-9)
+    assert vehicle.actuators(a_x, a_y, 0.0, p)[0] == force((a_x, a_y))[0]
 
 
 @given(speed, speed, speed, plants())
@@ -156,7 +246,7 @@ def test_yaw_damping_opposes_the_turn_within_the_torque_limit(a_y, r):
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-7, 7))
 def test_a_held_force_keeps_its_direction_in_the_world(a_x, a_y, turn):
-    p = PLAIN._replace(max_force=2000.0, max_torque=900.0, lever_arm=0.5)
+    p = PLAIN._replace(max_force=2000.0, max_astern=2000.0, max_torque=900.0, lever_arm=0.5)
     b_x, b_y = vehicle.turned(a_x, a_y, turn, p)
     before = np.array([a_x * p.max_force, a_y * p.max_torque / p.lever_arm])
     after = np.array([b_x * p.max_force, b_y * p.max_torque / p.lever_arm])
@@ -199,3 +289,22 @@ def sway_yaw(u, damping=0.0, h=1e-6):
     rate = lambda v, r: np.array(vehicle.acceleration((u, v, r), (0.0, -damping * r), p)[1:])  # noqa: E731
     columns = [(rate(*(h * e)) - rate(*(-h * e))) / (2 * h) for e in np.eye(2)]
     return np.linalg.eigvals(np.stack(columns, axis=1)).real
+
+
+@pytest.mark.parametrize("munk", [True, False])
+def test_the_trial_of_a_step_has_the_engine_s_equations(munk):
+    scenario = load_scenario("tracking", overrides=COUPLED | LIFT | {"vehicle.munk_moment": munk})
+    p = plant(scenario)
+    for nu in np.random.default_rng(0).uniform(-5.0, 5.0, (50, 3)):
+        products = np.outer(nu, [1.0, *nu, *abs(nu)]).ravel()
+        there = vehicle_checks._resistance(scenario.vehicle) @ products
+        here = -np.array(vehicle.coriolis(nu, p)) - np.array(vehicle.damping(nu, p))
+        np.testing.assert_allclose(there, here, rtol=1e-12, atol=1e-9)
+
+
+def test_the_damping_rate_of_a_step_counts_lift():
+    scenario = load_scenario("tracking")
+    lifted = scenario.vehicle.model_copy(update={"Y_uv": -1200.0})
+    u = vehicle_checks.top_speed(lifted, scenario.actuators)
+    rate = vehicle_checks._damping_rate(lifted, scenario.actuators, 4.0)
+    assert rate == pytest.approx((100.0 + (400.0 + 1200.0) * u) / 265.0)

@@ -1,6 +1,7 @@
 """Write the tables between ``<!-- name -->`` and ``<!-- /name -->`` of README.md and docs from the code and results."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import uuv_marl
@@ -10,9 +11,10 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
+from uuv_marl.studies.dynamics import acceptance
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ROOT / "README.md", ROOT / "docs" / "environment.md", ROOT / "docs" / "scenarios.md"
+PAGES = tuple(ROOT / page for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md"))
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
 
@@ -20,6 +22,11 @@ RESULTS = ROOT / "docs" / "results.md"
 def table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
     """A Markdown table."""
     return markdown_table(head, lines).rstrip("\n")
+
+
+def rows(lines: Sequence[Sequence[str]]) -> str:
+    """The same of rows of which the first is the head."""
+    return table(tuple(lines[0]), [tuple(line) for line in lines[1:]])
 
 
 def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:
@@ -88,6 +95,9 @@ TABLES = filled() | {
     "observation": fields(PerceptLayout.of(load_scenario("single_obstacle")).table),
     "channels": channels(),
     "state": fields(state_table(load_scenario("single_obstacle"))),
+    "vehicles": rows(acceptance.measures()),
+    "figures": rows(acceptance.figures()),
+    "stability": rows(acceptance.stability()),
     "history": table(("version", "what changed"), list(uuv_swarm_v0.HISTORY.items())),
 }
 """The tables by the names of their marks."""

@@ -36,6 +36,11 @@ class Trained:
         """Inner loop that it was trained with [N m s]."""
         return self.checkpoint.card.yaw_damping_nms
 
+    @property
+    def full_torque_nm(self) -> float:
+        """Full torque of the vehicle that it was trained on [N m]."""
+        return self.checkpoint.card.full_torque_nm
+
     def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedLaw:
         """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
         kind = LearnedLaw if self.checkpoint.card.features == "memory" else Learned

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import replacing
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.baselines.features import BARRIER, num_features
-from uuv_marl.baselines.policy import PolicyError
+from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import TRIMS
 from uuv_marl.baselines.scout import Gains as Law
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
+from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.sim.arrays import Float32
 
 Row = tuple[str, int, str, float]
@@ -38,6 +39,10 @@ _MOST_WEIGHT = 1e6
 """Larger weights are no result of training, and overflow in single precision."""
 _NOT_THE_VEHICLE = {
     "vehicle.name",
+    "vehicle.length_m",
+    "vehicle.cruise_mps",
+    "vehicle.max_mps",
+    "vehicle.source",
     "actuators.yaw_damping_nms",
     "actuators.thrust_lag_s",
     "actuators.yaw_lag_s",
@@ -47,14 +52,25 @@ _FIRST_VEHICLE = "literature_185"
 """The vehicle of version 0.1.0, which wrote checkpoints without saying so."""
 
 
-def vehicle_of(scenario: Scenario) -> dict[str, float]:
-    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare, and disturbances."""
+def vehicle_of(scenario: Scenario) -> dict[str, float | str]:
+    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare, and disturbances.
+
+    What a vehicle's file may leave out is there where it has another value than without: checkpoints of hulls without
+    lift and rudder say nothing of them.
+    """
     return _numbers({"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()})
 
 
-def _numbers(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+def _numbers(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, float | str]:
+    usual = {
+        f"{section}.{name}": field.default
+        for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
+        for name, field in model.model_fields.items()
+        if not field.is_required()
+    }
     every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
-    return {field: every[field] for field in every if field not in _NOT_THE_VEHICLE}
+    kept = {field: value for field, value in every.items() if field not in usual or value != usual[field]}
+    return {field: value for field, value in kept.items() if field not in _NOT_THE_VEHICLE}
 
 
 def _all_gains(gains: Any) -> Any:
@@ -86,10 +102,15 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """Gains of the hand-made law that an actor with memory trims."""
     safety: Barrier = Barrier()
     """Margins and rates of the filter around it."""
-    vehicle: dict[str, float] = pydantic.Field(default_factory=lambda: _numbers(load_vehicle(_FIRST_VEHICLE)))
+    vehicle: dict[str, float | str] = pydantic.Field(default_factory=lambda: _numbers(load_vehicle(_FIRST_VEHICLE)))
     """Hull and actuators that it was trained on, by field of the scenario."""
     training: dict[str, Any] = {}
     """How it came about: settings, versions, agent-steps, validation."""
+
+    @property
+    def full_torque_nm(self) -> float:
+        """Full torque of that vehicle [N m]."""
+        return float(self.vehicle.get("actuators.max_torque_nm", Policy.full_torque_nm))
 
 
 class Layer(NamedTuple):

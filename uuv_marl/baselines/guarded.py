@@ -41,6 +41,7 @@ class Guarded(Filtered):
         self.inner = inner
         self.name = f"guarded:{inner.name}"
         self.channels, self.yaw_damping_nms = inner.channels, inner.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
+        self.full_torque_nm = inner.full_torque_nm  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds, barrier)
 
     def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:

@@ -52,6 +52,7 @@ class LearnedLaw(TrimmedLaw):
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
         self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
+        self.full_torque_nm = card.full_torque_nm  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
         super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety)
         need_same(self, card, any_vehicle)
         self._features = np.zeros((*self._trims.shape[:2], RECALLED), np.float32)

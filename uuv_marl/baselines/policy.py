@@ -40,6 +40,21 @@ class Limits(NamedTuple):
         )  # fmt: skip
 
 
+def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenario) -> float:
+    """The inner loop that a policy gets on a scenario's vehicle [N m s]: what it declares, scaled with full torque.
+
+    So it takes all torque at the same yaw rate, whatever the vehicle. A rudder has no torque of its own, and no such
+    loop: 0.
+
+    Args:
+        declared_nms: the policy's ``yaw_damping_nms``.
+        full_torque_nm: of the vehicle that it declares it for [N m].
+        scenario: gives the vehicle.
+    """
+    actuators = scenario.actuators
+    return 0.0 if actuators.kind == "rudder" else declared_nms * (actuators.max_torque_nm / full_torque_nm)
+
+
 class Policy:
     """Maps the percepts of any number of worlds to actions.
 
@@ -61,7 +76,9 @@ class Policy:
     """Channels needed beyond the percept, of ``uuv_marl.percept.CHANNELS``. ``modem`` can stand in for ``link``: then
     the link's fields lie where ``at`` says, and ``percept["link_velocity"]`` is not there."""
     yaw_damping_nms: ClassVar[float] = 0.0
-    """Inner loop that the policy was designed with [N m s]."""
+    """Inner loop that the policy was designed with [N m s], on a vehicle of ``full_torque_nm``: ``inner_loop_nms``."""
+    full_torque_nm: ClassVar[float] = 3000.0
+    """Full torque of that vehicle [N m], ``literature_185`` where nothing else is said."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.name: str = getattr(self, "name", type(self).__name__)
@@ -73,8 +90,9 @@ class Policy:
         needs: list[str] = []
         if missing:
             needs.append(f"the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)} (sonar.channels)")
-        if scenario.actuators.yaw_damping_nms != self.yaw_damping_nms:
-            needs.append(f"a yaw damping of {self.yaw_damping_nms:g} N m s (actuators.yaw_damping_nms)")
+        damping = inner_loop_nms(self.yaw_damping_nms, self.full_torque_nm, scenario)
+        if scenario.actuators.yaw_damping_nms != damping:
+            needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
         if needs:
             raise PolicyError(
                 f"{self.name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "

@@ -18,7 +18,7 @@ from uuv_marl.baselines.floors import Idle, Random
 from uuv_marl.baselines.guarded import Guarded
 from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.orca import OrcaInformed
-from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms
 from uuv_marl.baselines.pull import Pull
 from uuv_marl.baselines.safety import GUARD, Barrier
 from uuv_marl.baselines.scout import Scout, ScoutPlus
@@ -151,7 +151,7 @@ def _kind(name: str) -> Kind:
 
 
 def granted(name: str, scenario: Scenario) -> Scenario:
-    """The scenario with the channels and the inner loop that a policy declares, and no others.
+    """The scenario with the channels that a policy declares, and its inner loop (``inner_loop_nms``), and no others.
 
     A scenario that grants ``modem`` grants it in place of ``link``, which is an oracle; but not to a policy that
     declares both, nor to a trained one, which knows what it was trained on alone.
@@ -163,7 +163,7 @@ def granted(name: str, scenario: Scenario) -> Scenario:
         scenario,
         overrides={
             "sonar.channels": [told if channel == "link" else channel for channel in policy.channels],
-            "actuators.yaw_damping_nms": policy.yaw_damping_nms,
+            "actuators.yaw_damping_nms": inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario),
         },
     )
 

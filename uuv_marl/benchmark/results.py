@@ -21,6 +21,7 @@ from typing_extensions import TypedDict
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
 from uuv_marl.baselines.actors import Trained
+from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
@@ -51,6 +52,7 @@ class Knowledge(TypedDict):
 
     channels: list[str]
     yaw_damping_nms: float
+    """Of its inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
     source: str | None
 
 
@@ -246,7 +248,8 @@ def knowledge(policy: str) -> Knowledge:
     else:
         file = inspect.getsourcefile(made) if ":" in policy else None
         source = _hash(Path(file).read_bytes()) if file else None
-    return Knowledge(channels=list(made.channels), yaw_damping_nms=made.yaw_damping_nms, source=source)
+    damping = made.yaw_damping_nms * (Policy.full_torque_nm / made.full_torque_nm)
+    return Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
 
 
 def source_fingerprint() -> str:

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
+from uuv_marl.baselines.policy import Policy, inner_loop_nms
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import Knowledge, Results, Row
 from uuv_marl.scenario import differences
@@ -110,7 +111,9 @@ def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Seq
         runs = results.select(scenario, policy, seeds)
         if runs:
             paper = PAPER.get((scenario, policy)) if as_in_paper else None
-            rows.append(_cells(policy, results.policies[policy], runs, paper))
+            known = results.policies[policy]
+            damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, results.scenarios[scenario])
+            rows.append(_cells(policy, {**known, "yaw_damping_nms": damping}, runs, paper))
     return rows
 
 
@@ -119,7 +122,7 @@ def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigur
 
     Args:
         policy: its name.
-        known: what it has beyond the percept.
+        known: what it has beyond the percept, on the scenario's vehicle.
         runs: its runs, at least one.
         paper: what the paper says of it, if anything.
     """

@@ -18,7 +18,7 @@ app = typer.Typer(
 )
 for command in (
     benchmark.benchmark, robustness.robustness, replay.replay, studies.heldout, studies.reproduce, lists.scenarios,
-    lists.policies, benchmark.tune, export.export, studies.identify,
+    lists.vehicles, lists.policies, benchmark.tune, export.export, studies.identify,
 ):  # fmt: skip
     app.command()(command)
 app.add_typer(train.app, name="train")

@@ -1,4 +1,4 @@
-"""``uuv-marl scenarios`` and ``uuv-marl policies``: what there is."""
+"""``uuv-marl scenarios``, ``uuv-marl vehicles`` and ``uuv-marl policies``: what there is."""
 
 from typing import Annotated
 
@@ -20,19 +20,49 @@ def scenarios(
         from uuv_marl.scenario import show as show_scenario
 
         if show is not None:
-            text = show_scenario(show)
-            console.print(
-                Syntax(text, "toml", background_color="default") if console.is_terminal else text,
-                markup=False,
-                highlight=False,
-                soft_wrap=True,
-            )
+            _print_toml(show_scenario(show))
             return
         table = Table("name", "version", "what", "source")
         for name in scenario_names():
             loaded = load_scenario(name)
             table.add_row(name, str(loaded.version), loaded.title, loaded.source)
         console.print(table)
+
+
+def vehicles(
+    show: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Print one's file, with the source of every number: lauv, remus100+munk_on."),
+    ] = None,
+) -> None:
+    """List the vehicles and how they move, or show one. ``--set vehicle=NAME`` takes one in any command."""
+    with explained():
+        from uuv_marl.scenario import show_vehicle
+
+        if show is not None:
+            _print_toml(show_vehicle(show))
+            return
+        from uuv_marl.studies.dynamics.acceptance import alone, changes, every, turn
+
+        table = Table("name", "length [m]", "mass [kg]", "top speed [m/s]", "turn", "source")
+        for name in every():
+            scenario = alone(name)
+            hull = scenario.vehicle
+            top, rate, radius = turn(scenario)
+            how = f"{rate:.0f} deg/s" + (f", radius {radius:.1f} m" if radius > 0.01 else " on the spot")
+            length = "–" if hull.length_m is None else f"{hull.length_m:g}"
+            source = f"variant: {', '.join(changes(name))}" if "+" in name else hull.source
+            table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, source)
+        console.print(table)
+
+
+def _print_toml(text: str) -> None:
+    console.print(
+        Syntax(text, "toml", background_color="default") if console.is_terminal else text,
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )
 
 
 def policies() -> None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
+from uuv_marl.baselines.policy import Policy, inner_loop_nms
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import FILE, Content, load_trace, read_content, trace_path
 from uuv_marl.errors import ReplayError
@@ -181,9 +182,9 @@ def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
             f"{first['msg']}); run the benchmark again"
         ) from None
     known = saved.content["policies"][policy]
+    damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, scenario)
     return load_scenario(
-        scenario,
-        overrides={"sonar.channels": known["channels"], "actuators.yaw_damping_nms": known["yaw_damping_nms"]},
+        scenario, overrides={"sonar.channels": known["channels"], "actuators.yaw_damping_nms": damping}
     )
 
 

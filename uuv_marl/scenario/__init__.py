@@ -14,7 +14,9 @@ from uuv_marl.scenario.files import (
     parse_override,
     scenario_names,
     show,
+    show_vehicle,
     to_toml,
+    variant_names,
     vehicle_names,
 )
 from uuv_marl.scenario.scenario import Scenario
@@ -23,5 +25,5 @@ from uuv_marl.scenario.sections import growth
 __all__ = [
     "IDEAL", "MAX_RANGE_M", "Scenario", "ScenarioError", "conditions", "differences", "disturbances",
     "growth", "hears_ideally", "load_scenario", "load_vehicle",
-    "parse_override", "scenario_names", "show", "to_toml", "vehicle_names",
+    "parse_override", "scenario_names", "show", "show_vehicle", "to_toml", "variant_names", "vehicle_names",
 ]  # fmt: skip

@@ -14,7 +14,7 @@ from tomlkit.container import Container
 from tomlkit.items import AbstractTable
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario.hardware import Vehicle
+from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.messages import explain, short, shown
 from uuv_marl.scenario.scenario import Scenario
 
@@ -22,6 +22,13 @@ _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
 _VEHICLES = _FOLDER / "vehicles"
 _MAX_BYTES = 1_000_000
+_GIVEN = {"vehicle": set(Vehicle.model_fields), "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"}}
+_OPTIONAL: dict[str, dict[str, Any]] = {
+    section: {name: field.default for name, field in model.model_fields.items() if not field.is_required()}
+    for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
+}
+_OPTIONAL["actuators"] |= {"thrust_lag_s": 0.0, "yaw_lag_s": 0.0}
+"""What a vehicle's file may leave out, and what it is then, whatever vehicle there was before."""
 
 
 def scenario_names() -> list[str]:
@@ -35,12 +42,41 @@ def vehicle_names() -> list[str]:
 
 
 def load_vehicle(name: str) -> dict[str, dict[str, Any]]:
-    """A vehicle's sections ``vehicle`` and ``actuators``, by name or TOML file.
+    """A vehicle's sections ``vehicle`` and ``actuators``, by name or TOML file, or a variant: ``remus100+munk_on``.
 
     Raises:
-        ScenarioError: there is no such vehicle, or its file is broken.
+        ScenarioError: there is no such vehicle or variant, or its file is broken.
     """
     return _vehicle(name).data
+
+
+def variant_names(vehicle: str) -> list[str]:
+    """Variants that a vehicle's file has: other numbers where sources disagree. ``vehicle`` as for ``load_vehicle``."""
+    return sorted(_parse(_find_vehicle(_without_variants(vehicle)[0])).data.get("variants", {}))
+
+
+def show_vehicle(name: str) -> str:
+    """A vehicle's file, with the source of every number; where variants are named, with theirs.
+
+    Args:
+        name: as for ``load_vehicle``.
+
+    Raises:
+        ScenarioError: there is no such vehicle or variant, or its file is broken.
+    """
+    file = _vehicle(name)
+    document = tomlkit.parse(file.text)
+    if file.variants:
+        changed = _variant_comments(file)
+        del document["variants"]
+        for section, fields in file.data.items():
+            table: Any = document[section]
+            for field, value in fields.items():
+                if f"{section}.{field}" in changed:
+                    item = cast(Any, tomlkit).item(value)
+                    table[field] = item.comment(changed[f"{section}.{field}"].lstrip("# "))
+        document["vehicle"]["name"] = file.data["vehicle"]["name"]  # pyright: ignore[reportIndexIssue] - a table
+    return tomlkit.dumps(document).rstrip("\n") + "\n"  # pyright: ignore[reportUnknownMemberType]
 
 
 def load_scenario(
@@ -56,7 +92,8 @@ def load_scenario(
             A file states only what differs from the scenario named by its ``extends``, else from ``base.toml``.
         num_vehicles: replaces ``swarm.num_vehicles``.
         overrides: ``{"sonar.echo_reports": "surface", "sonar.arrays.bow.range_m": 80.0}``; entries of lists are
-            addressed by their name or index. ``{"vehicle": "literature_185"}`` replaces the vehicle and its limits.
+            addressed by their name or index. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and lags, and
+            ``{"vehicle": "remus100+munk_on"}`` takes a variant of it.
 
     Raises:
         ScenarioError: names the field, the value and the remedy.
@@ -130,6 +167,7 @@ def show(name: str | os.PathLike[str]) -> str:
     for file in _layers(_find(name)):
         own = "" if file.path.is_relative_to(_FOLDER) else f"# {file.path.name}"
         sources |= {field: item.trivia.comment or own for field, item in _items(tomlkit.parse(file.text))}
+        sources |= _variant_comments(file)
     for field, item in _items(document):
         if "." in field and sources.get(field):
             item.trivia.comment_ws, item.trivia.comment = "  ", sources[field]
@@ -151,10 +189,23 @@ def _items(table: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield field, item
 
 
+def _variant_comments(file: "_File") -> dict[str, str]:
+    """Comments of what the chosen variants of a vehicle change, by field."""
+    every = dict(_items(tomlkit.parse(file.text)))
+    return {
+        field.removeprefix(f"variants.{name}."): item.trivia.comment
+        for name in file.variants
+        for field, item in every.items()
+        if field.startswith(f"variants.{name}.")
+    }
+
+
 class _File(NamedTuple):
     path: Path
     text: str
     data: dict[str, Any]
+    variants: Sequence[str] = ()
+    """Those that are chosen, of a vehicle's file."""
 
 
 def _find(name: Any, beside: Path | None = None) -> Path:
@@ -180,17 +231,56 @@ def _find(name: Any, beside: Path | None = None) -> Path:
 
 def _vehicle(name: str, beside: Path | None = None) -> _File:
     """A vehicle's file, which must be complete: numbers of two vehicles are never mixed without a word."""
-    file = _parse(_find_vehicle(name, beside))
-    needed = {"vehicle": set(Vehicle.model_fields), "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"}}
-    for section, fields in needed.items():
+    plain, chosen = _without_variants(name)
+    file = _parse(_find_vehicle(plain, beside))
+    for section, fields in _GIVEN.items():
         given = file.data.get(section)
-        missing = sorted(fields - set(cast(dict[str, Any], given) if isinstance(given, dict) else ()))
+        needed = fields - _OPTIONAL[section].keys()
+        missing = sorted(needed - set(cast(dict[str, Any], given) if isinstance(given, dict) else ()))
         if missing:
             raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; a vehicle's file gives all numbers")
-    other = next((key for key in file.data if key not in needed), None)
+    other = next((key for key in file.data if key not in {*_GIVEN, "variants"}), None)
     if other is not None:
-        raise ScenarioError(f"vehicle {file.path} holds {shown(other)}; it may hold vehicle and actuators only")
-    return file
+        raise ScenarioError(
+            f"vehicle {file.path} holds {shown(other)}; it may hold vehicle and actuators only, and variants of them"
+        )
+    data = {section: {**_OPTIONAL[section], **file.data[section]} for section in _GIVEN}
+    for variant in chosen:
+        data = _merged(data, _variant(file, variant))
+    if chosen:
+        data["vehicle"]["name"] = "+".join([str(data["vehicle"]["name"]), *chosen])
+    return file._replace(data=data, variants=chosen)
+
+
+def _variant(file: _File, name: str) -> dict[str, Any]:
+    """What a variant of a vehicle changes."""
+    every = file.data.get("variants", {})
+    variants = cast(dict[str, Any], every) if isinstance(every, dict) else {}
+    changes = variants.get(name)
+    if changes is None:
+        there = f"it has {', '.join(variants)}" if variants else "it has none"
+        raise ScenarioError(f"vehicle {file.path.stem} has no variant {shown(name)}; {there}")
+    if not isinstance(changes, dict) or not all(
+        isinstance(part, dict) for part in cast(dict[str, Any], changes).values()
+    ):
+        raise ScenarioError(
+            f"vehicle {file.path}: variants.{short(name)} must hold tables, such as [variants.{short(name)}.vehicle]"
+        )
+    other = next((key for key in cast(dict[str, Any], changes) if key not in _GIVEN), None)
+    if other is not None:
+        raise ScenarioError(
+            f"vehicle {file.path}: variants.{short(name)} holds {shown(other)}; it may hold vehicle and actuators only"
+        )
+    return cast(dict[str, Any], changes)
+
+
+def _without_variants(name: str) -> tuple[str, list[str]]:
+    """A vehicle's name or file, and the variants that follow it: a plus before each."""
+    file, toml, after = name.rpartition(".toml")
+    if toml and (not after or after.startswith("+")):
+        return file + toml, after.split("+")[1:]
+    plain, *variants = name.split("+")
+    return plain, variants
 
 
 def _find_vehicle(name: str, beside: Path | None = None) -> Path:

@@ -9,7 +9,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from uuv_marl.scenario.fields import Lag, Name, NonNegative, NonPositive, Positive, Radius, Section, Signed, within
+from uuv_marl.scenario.fields import (
+    Lag,
+    NonNegative,
+    NonPositive,
+    Positive,
+    Radius,
+    Section,
+    Signed,
+    Speed,
+    VehicleName,
+    within,
+)  # fmt: skip
 
 MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0
 """Widths of sub-sectors that the sonar's table of directions is made for."""
@@ -19,8 +30,8 @@ Channel = Literal["compass", "link", "current", "age", "ranged", "modem"]
 class Vehicle(Section):
     """Parameters of Eq. 3-4. Dimensions follow from the force or moment and the velocities they multiply."""
 
-    name: Name
-    """The file in ``vehicles/`` that the numbers come from, where nothing overrides them."""
+    name: VehicleName
+    """The file in ``vehicles/`` that the numbers come from, and its variants, where nothing overrides them."""
     m_kg: Positive
     I_z_kgm2: Positive
     x_G_m: Annotated[float, within(-100, 100)]
@@ -38,6 +49,23 @@ class Vehicle(Section):
     Y_rr: Signed
     N_rv: Signed
     N_rr: NonNegative
+    N_vv: Signed = 0.0
+    """Beside N_v, as a derivative like it: positive adds."""
+    Y_uv: Signed = 0.0
+    """Lift of body and fins: the sway force (Y_uv v + Y_ur r) max(u, 0) and the yaw moment (N_uv v + N_ur r) max(u, 0).
+    Derivatives, of lift alone: where ``munk_moment`` is on, the added masses' part of a source's sums is in C(nu)."""
+    Y_ur: Signed = 0.0
+    N_uv: Signed = 0.0
+    N_ur: Signed = 0.0
+    munk_moment: bool = True
+    """Whether added masses count in C(nu) (Eq. 4), which turn a hull across its way. Inertia has them always."""
+    length_m: Positive | None = None
+    """Of the hull. This and what follows describes; nothing computes with it."""
+    cruise_mps: Speed | None = None
+    max_mps: Speed | None = None
+    """The top speed that the source states."""
+    source: str | None = None
+    """Where the numbers come from, in a line."""
 
     @property
     def inertia(self) -> tuple[float, float, float, float]:
@@ -50,20 +78,22 @@ class Vehicle(Section):
         )
 
     def times(self, mass: float, added_mass: float, drag: float) -> "Vehicle":
-        """A vehicle whose mass (and moment of inertia), added masses and resistances are times these factors."""
+        """A vehicle whose masses (and moment of inertia), added masses, and resistances and lift are times these."""
         factors = dict.fromkeys(("m_kg", "I_z_kgm2"), mass)
         factors |= dict.fromkeys(("X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"), added_mass)
         factors |= dict.fromkeys(("X_u", "Y_v", "Y_r", "N_v", "N_r", "X_uu", "Y_vv", "Y_rr", "N_rv", "N_rr"), drag)
+        factors |= dict.fromkeys(("N_vv", "Y_uv", "Y_ur", "N_uv", "N_ur"), drag)
         return self.model_copy(update={name: factor * getattr(self, name) for name, factor in factors.items()})
 
 
 class Actuators(Section):
-    """Limits of thrust and torque, the same for every policy."""
+    """Limits of thrust and torque, or of thrust and rudder, the same for every policy."""
 
     max_force_n: Positive
-    """Surge force at full action, ahead or astern."""
+    """Surge force at full action, ahead; astern too, unless ``max_astern_n`` says otherwise."""
     max_torque_nm: Positive
-    """Yaw torque at full action."""
+    """Yaw torque at full action. With a rudder it is no limit: hand-made policies divide the torque that they want by
+    it, so it should be what full rudder gives at cruise."""
     lever_arm_m: Annotated[float, within(0.001, 1_000)]
     """Turns the sideways component of a desired force into a torque (Eq. 22)."""
     yaw_damping_nms: NonNegative
@@ -73,7 +103,52 @@ class Actuators(Section):
     yaw_lag_s: Lag
     """The same of the torque."""
     yaw_authority: Annotated[float, within(0, 1)]
-    """Share of the torque that reaches the water."""
+    """Share of the torque, or of the rudder's angle, that reaches the water."""
+    kind: Literal["force_torque", "rudder"] = "force_torque"
+    """What the second number of an action is a share of: ``max_torque_nm``, or ``rudder_max_deg``. With a rudder both
+    numbers lie in a box, not on the unit disc, and stay as they are between control holds."""
+    max_astern_n: NonNegative | None = None
+    """Surge force at full action astern, where it is not ``max_force_n``."""
+    Y_uud: Signed = 0.0
+    """A rudder's sway force, Y_uud max(u, 0)^2 times its angle [rad], and yaw moment, N_uud max(u, 0)^2 times it. Signs
+    as in the source: an angle that is positive there turns to port where N_uud is negative (Fossen). An action that is
+    positive turns to starboard always."""
+    N_uud: Signed = 0.0
+    rudder_max_deg: Annotated[float, within(0, 60)] = 0.0
+    """The rudder's largest angle, to either side."""
+
+    @property
+    def astern_n(self) -> float:
+        """Surge force at full action astern."""
+        return self.max_force_n if self.max_astern_n is None else self.max_astern_n
+
+    @property
+    def rudder(self) -> tuple[float, float]:
+        """Sway force and yaw moment of a rudder over u^2 [kg/m, kg], for an angle that turns it clockwise."""
+        side = -1.0 if self.N_uud < 0.0 else 1.0
+        return side * self.Y_uud, side * self.N_uud
+
+    def _check(self) -> None:
+        fin = {name: getattr(self, name) for name in ("Y_uud", "N_uud", "rudder_max_deg")}
+        if self.kind == "force_torque":
+            set_one = next((name for name, value in fin.items() if value), None)
+            if set_one:
+                raise ValueError(
+                    f"actuators.{set_one} = {fin[set_one]:g} is a rudder's, and actuators.kind is 'force_torque'; set "
+                    "it to 0, or actuators.kind = 'rudder'"
+                )
+            return
+        for name in ("N_uud", "rudder_max_deg"):
+            if not fin[name]:
+                raise ValueError(
+                    f"actuators.{name} must not be 0 where actuators.kind is 'rudder': it would never turn; set it, or "
+                    "actuators.kind = 'force_torque'"
+                )
+        if self.yaw_damping_nms > 0.0:
+            raise ValueError(
+                f"actuators.yaw_damping_nms must be 0 where actuators.kind is 'rudder', got {self.yaw_damping_nms:g}: "
+                "a rudder has no torque of its own to damp with; set it to 0"
+            )
 
 
 class SonarArray(Section):

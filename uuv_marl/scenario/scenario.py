@@ -92,8 +92,7 @@ class Scenario(fields.Section):
             )
         check_vehicle(self.vehicle, self.actuators, self.timing, self.start.speed_max_mps)
         _check_mismatch(self)
-        if self.trajectory.speed_mps > top_speed(self.vehicle, self.actuators):
-            warn_of_speed(self.trajectory.speed_mps)
+        _check_speed(self)
 
 
 def _check_start(scenario: Scenario) -> None:
@@ -205,13 +204,34 @@ def _check_faults(scenario: Scenario) -> None:
             raise ValueError(f"faults.{k}.array must be one of {', '.join(names)}, got {fault.array!r}")
 
 
+def _check_speed(scenario: Scenario) -> None:
+    """L(t) is no faster than a vehicle with a rudder, which would never come back to it; others are warned of."""
+    speed, most = scenario.trajectory.speed_mps, top_speed(scenario.vehicle, scenario.actuators)
+    if speed <= most:
+        return
+    if scenario.actuators.kind == "force_torque":
+        warn_of_speed(speed)
+        return
+    cruise = scenario.vehicle.cruise_mps
+    raise ValueError(
+        f"trajectory.speed_mps = {speed:g} is more than the {most:.3g} m/s that {scenario.vehicle.name!r} holds at "
+        f"full force (actuators.max_force_n = {scenario.actuators.max_force_n:g}), and a rudder needs flow; lower it"
+        + (f", for instance to the vehicle's cruise_mps = {cruise:g}" if cruise is not None and cruise <= most else "")
+    )
+
+
 def _check_mismatch(scenario: Scenario) -> None:
     """The simulation can follow whatever is drawn: what is lightest, braked hardest and pushed most moves fastest."""
     most, limits = scenario.mismatch, scenario.actuators
     if not any((most.mass, most.added_mass, most.drag, most.thrust)):
         return
     quickest = scenario.vehicle.times(1.0 - most.mass, 1.0 - most.added_mass, 1.0 + most.drag)
-    pushed = limits.model_copy(update={"max_force_n": (1.0 + most.thrust) * limits.max_force_n})
+    pushed = limits.model_copy(
+        update={
+            "max_force_n": (1.0 + most.thrust) * limits.max_force_n,
+            "max_astern_n": (1.0 + most.thrust) * limits.astern_n,
+        }
+    )
     try:
         check_vehicle(quickest, pushed, scenario.timing, scenario.start.speed_max_mps)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""What the physics demands of a vehicle: inertia positive, damping dissipative, no motion too fast for its time steps.
+"""What the physics demands of a vehicle: inertia positive, damping and lift dissipative, no motion too fast.
 
 Every message names the field, its value and the remedy.
 """
@@ -42,6 +42,7 @@ def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_
             "strongly that the inertia matrix is not positive definite; lower them"
         )
     _check_damping(vehicle)
+    _check_lift(vehicle)
     _check_step(vehicle, actuators, timing, speed_mps)
     damping, hold = actuators.yaw_damping_nms, timing.control_hold_s
     if not damping / inertia[2, 2] * hold < SAMPLED_LIMIT:
@@ -82,11 +83,49 @@ def _check_damping(p: Vehicle) -> None:
             f"vehicle.Y_rr + vehicle.N_rv = {p.Y_rr + p.N_rv:g} lets quadratic damping add energy; "
             f"keep its size within {bound:g}"
         )
+    if p.N_vv and _least_power(p) < -1e-9 * max(p.Y_vv, p.N_rr):
+        raise ValueError(
+            f"vehicle.N_vv = {p.N_vv:g} lets quadratic damping add energy; lower its size, or raise vehicle.Y_vv = "
+            f"{p.Y_vv:g} or vehicle.N_rr = {p.N_rr:g}"
+        )
     for linear, quadratic in (("X_u", "X_uu"), ("N_r", "N_rr")):
         if max(getattr(p, linear), getattr(p, quadratic)) == 0:
             raise ValueError(
                 f"vehicle.{linear} and vehicle.{quadratic} must not both be 0: nothing would bound the speed; raise one"
             )
+
+
+def _least_power(p: Vehicle) -> float:
+    """The least that quadratic sway and yaw damping take, over |r|^3, for all ratios v / r; -inf without a bound."""
+    if p.Y_vv == 0.0:
+        return -math.inf  # -N_vv s^2 is more than all else for some sign of v and large s = |v / r|
+    least = p.N_rr
+    for sign in (1.0, -1.0):
+        power = np.polynomial.Polynomial([p.N_rr, -sign * (p.Y_rr + p.N_rv), -sign * p.N_vv, p.Y_vv])
+        lowest = [s.real for s in power.deriv().roots() if s.imag == 0.0 and s.real > 0.0]
+        least = min([least, *(float(power(s)) for s in lowest)])
+    return least
+
+
+def _check_lift(p: Vehicle) -> None:
+    """Lift of body and fins takes energy from sway and yaw: -(Y_uv v^2 + (Y_ur + N_uv) v r + N_ur r^2) u >= 0.
+
+    A fin's lift does, wherever it is. Where C(nu) leaves the added masses out, the coefficients may hold their part.
+    """
+
+    def takes(y_uv: float, y_ur: float, n_uv: float, n_ur: float) -> bool:
+        return max(y_uv, n_ur) <= 0.0 and (y_ur + n_uv) ** 2 <= 4.0 * y_uv * n_ur * (1.0 + 1e-9)
+
+    if takes(p.Y_uv, p.Y_ur, p.N_uv, p.N_ur):
+        return
+    without = p.Y_uv, p.Y_ur - p.X_udot_kg, p.N_uv + p.X_udot_kg - p.Y_vdot_kg, p.N_ur - p.Y_rdot_kgm
+    if not p.munk_moment and takes(*without):
+        return
+    raise ValueError(
+        f"vehicle.Y_uv = {p.Y_uv:g}, Y_ur = {p.Y_ur:g}, N_uv = {p.N_uv:g} and N_ur = {p.N_ur:g} are a lift that adds "
+        "energy to sway and yaw; keep Y_uv and N_ur at most 0, and (Y_ur + N_uv)^2 at most 4 Y_uv N_ur. Of a source's "
+        "sums with the added masses' Coriolis terms give the lift's part alone, or set vehicle.munk_moment = false"
+    )
 
 
 def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float) -> None:
@@ -112,9 +151,12 @@ def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float)
     if fails(h):
         shorter = (timing.control_hold_s / 2**k for k in range(1, 16))
         remedy = next((f"use at most {step:.3g}, or " for step in shorter if step < h and not fails(step)), "")
+        steers = f"max_torque_nm = {limits.max_torque_nm:g}"
+        if limits.kind == "rudder":
+            steers = f"rudder_max_deg = {limits.rudder_max_deg:g}"
         raise ValueError(
             f"timing.integration_step_s = {h:g} is too long for this vehicle, so that Runge-Kutta diverges "
-            f"under actuators.max_force_n = {limits.max_force_n:g} and max_torque_nm = {limits.max_torque_nm:g}; "
+            f"under actuators.max_force_n = {limits.max_force_n:g} and {steers}; "
             f"{remedy}lower these limits, the vehicle's resistances or its added masses"
         )
 
@@ -122,10 +164,18 @@ def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float)
 def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
     """How fast [1/s] damping acts at the largest speeds that full force and torque can hold, or at the start."""
     u = max(top_speed(p, limits), speed_mps)
-    r = _terminal(p.N_r, p.N_rr, limits.max_torque_nm)
-    sway, yaw = [p.Y_v + 2 * p.Y_vv * u, -p.Y_r - 2 * p.Y_rr * r], [-p.N_v - p.N_rv * r, p.N_r + 2 * p.N_rr * r]
+    r = _terminal(p.N_r, p.N_rr, _most_moment(limits, u))
+    sway = [p.Y_v + 2 * p.Y_vv * u - p.Y_uv * u, -p.Y_r - 2 * p.Y_rr * r - p.Y_ur * u]
+    yaw = [-p.N_v - p.N_rv * r - 2 * p.N_vv * u - p.N_uv * u, p.N_r + 2 * p.N_rr * r - p.N_ur * u]
     sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(_inertia(p)[1:, 1:], [sway, yaw]))).max())
     return max(sway_yaw, (p.X_u + 2 * p.X_uu * u) / (p.m_kg - p.X_udot_kg))
+
+
+def _most_moment(limits: Actuators, speed_mps: float) -> float:
+    """The largest yaw moment [N m] that steers a vehicle at a speed ahead [m/s]."""
+    if limits.kind == "force_torque":
+        return limits.max_torque_nm
+    return limits.rudder[1] * math.radians(limits.rudder_max_deg) * speed_mps**2
 
 
 @lru_cache(maxsize=1024)
@@ -140,25 +190,31 @@ def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) ->
     """
     inverse = np.linalg.inv(_inertia(p))
     motion = inverse @ _resistance(p)
-    push = inverse[:, ::2] @ _pushes(limits)
+    thrust, steer = _pushes(limits)
+    fin = np.outer(inverse[:, 1:] @ limits.rudder, np.ones(RUNS))
+    push = inverse[:, :1] * thrust[:, None]
+    if limits.kind == "force_torque":
+        push += inverse[:, 2:] * steer[:, None]
     # Half of them start at the speeds that an action holds alone, so that short steps need no time to reach them.
     nu = np.zeros((3, RUNS))
     nu[0] = speed_mps
     held = np.array([[math.cos(k), math.sin(k)] for k in range(RUNS // 2)]).T
     nu[0, ::2] = [_terminal(p.X_u, p.X_uu, limits.max_force_n * share) for share in held[0]]
-    nu[2, ::2] = [_terminal(p.N_r, p.N_rr, limits.max_torque_nm * share) for share in held[1]]
+    most = _most_moment(limits, max(top_speed(p, limits), speed_mps))
+    nu[2, ::2] = [_terminal(p.N_r, p.N_rr, most * share) for share in held[1]]
     factor = np.ones((7, RUNS))
 
-    def rate(nu: Float64, push: Float64) -> Float64:
+    def rate(nu: Float64, k: int) -> Float64:
         factor[1:4], factor[4:] = nu, np.abs(nu)
-        return push + motion @ (nu[:, None] * factor).reshape(21, RUNS)
+        total = push[k] + motion @ (nu[:, None] * factor).reshape(21, RUNS)
+        return total + fin * (np.maximum(nu[0], 0.0) ** 2 * steer[k]) if limits.kind == "rudder" else total
 
     with np.errstate(all="ignore"):
         for k in range(TRIAL_STEPS):
-            a = rate(nu, push[k])
-            b = rate(nu + step_s / 2 * a, push[k])
-            c = rate(nu + step_s / 2 * b, push[k])
-            d = rate(nu + step_s * c, push[k])
+            a = rate(nu, k)
+            b = rate(nu + step_s / 2 * a, k)
+            c = rate(nu + step_s / 2 * b, k)
+            d = rate(nu + step_s * c, k)
             nu += step_s / 6 * (a + 2 * (b + c) + d)
             if k % 50 == 49 and not (np.abs(nu) < RUNAWAY).all():
                 return True
@@ -167,21 +223,27 @@ def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) ->
 
 def _resistance(p: Vehicle) -> Float64:
     """-C(nu) nu - D(nu) nu of Eq. 2 as a matrix times the products of (u, v, r) with (1, u, v, r, |u|, |v|, |r|)."""
-    inertia = _inertia(p)
-    m_11, m_22, m_23 = inertia[0, 0], inertia[1, 1], inertia[1, 2]
+    m_11, m_22, m_23 = p.inertia[:3] if p.munk_moment else (p.m_kg, p.m_kg, p.m_kg * p.x_G_m)
     force = np.zeros((3, 3, 7))
     force[0, 0, [0, 4]], force[0, 1, 3], force[0, 2, 3] = (-p.X_u, -p.X_uu), m_22, m_23
     force[1, 0, 3], force[1, 1, [0, 5]], force[1, 2, [0, 6]] = -m_11, (-p.Y_v, -p.Y_vv), (p.Y_r, p.Y_rr)
     force[2, 0, [2, 3]] = m_11 - m_22, -m_23
-    force[2, 1, [0, 6]], force[2, 2, [0, 6]] = (p.N_v, p.N_rv), (-p.N_r, -p.N_rr)
+    force[2, 1, [0, 5, 6]], force[2, 2, [0, 6]] = (p.N_v, p.N_vv, p.N_rv), (-p.N_r, -p.N_rr)
+    lift = np.array([[p.Y_uv, p.Y_ur], [p.N_uv, p.N_ur]])
+    force[1:, 1:, [1, 4]] += lift[:, :, None] / 2  # max(u, 0) = (u + |u|) / 2
     return force.reshape(3, 21)
 
 
-def _pushes(limits: Actuators) -> Float64:
-    """Thrust and torque of every trial, shape (step, 2, run): 16 are held, others redrawn after 1 to 100 steps."""
+def _pushes(limits: Actuators) -> tuple[Float64, Float64]:
+    """Thrust, and torque or rudder, of all trials, shape (step, run); 16 are held, others redrawn after 1 to 100."""
     runs, every = np.arange(RUNS), np.resize([1, 2, 5, 20, 100], RUNS)
     every[:16] = TRIAL_STEPS
     drawn = np.random.default_rng(0).integers(0, 16, (TRIAL_STEPS, RUNS))
     drawn[0, :16] = runs[:16]
     angle = drawn[np.arange(TRIAL_STEPS)[:, None] // every, runs] * math.pi / 8
-    return np.stack([limits.max_force_n * np.cos(angle), limits.max_torque_nm * np.sin(angle)], axis=1)
+    a_x, a_y = np.cos(angle), np.sin(angle)
+    most = limits.max_torque_nm
+    if limits.kind == "rudder":  # a box, in place of the disc
+        a_x, a_y = (share / np.maximum(np.abs(a_x), np.abs(a_y)) for share in (a_x, a_y))
+        most = math.radians(limits.rudder_max_deg)
+    return np.where(a_x < 0.0, limits.astern_n, limits.max_force_n) * a_x, most * a_y

@@ -66,7 +66,7 @@ class Facts(NamedTuple):
     contacts: Annotated[Int64, "world vehicle", "Contact episodes of the vehicle that began."]
     collisions: Annotated[Int64, "world", "Contact episodes that began."]
     lost: Annotated[Bool, "world vehicle", "True for vehicles lost in this step."]
-    effort: Annotated[Float64, "world vehicle", "Mean squared action, as a share of full force."]
+    effort: Annotated[Float64, "world vehicle", "Mean squared action, as a share of full force or rudder."]
     saturated: Annotated[Float64, "world", "Share of actions at the actuators' limit."]
     arrival_s: Annotated[Float64, "world radius", "When the swarm arrived, by ``Rules.arrival_radii``; NaN before."]
     diverged: Annotated[

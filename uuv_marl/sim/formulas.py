@@ -70,15 +70,41 @@ def project(a_x: float, a_y: float) -> Pair:
     return (a_x / norm, a_y / norm) if norm > 1.0 else (a_x, a_y)
 
 
-def turned(a: Row, angle: float, p: Plant) -> Pair:
-    """The action that keeps the same horizontal force in the world after the vehicle has turned by an angle [rad]."""
-    f_x, f_y = to_body(a[0] * p.max_force, a[1] * p.max_torque / p.lever_arm, cos_sin(angle))
-    return project(f_x / p.max_force, f_y * p.lever_arm / p.max_torque)
+def limited(a: Row, p: Plant) -> Pair:
+    """The nearest action that the actuators take: on the unit disc, or with a rudder in the box around it."""
+    if p.direct > 0.0:
+        return project(*a)
+    a_x, a_y = cut(1.0, *a)
+    return a_x, a_y
+
+
+def most_thrust(direction: float, p: Plant) -> float:
+    """Full thrust [N] ahead, or astern where the direction is negative."""
+    return p.max_force if direction >= 0.0 else p.max_astern
+
+
+def held(a: Row, angle: float, p: Plant) -> Pair:
+    """The action that keeps the same horizontal force in the world after the vehicle has turned by an angle [rad].
+
+    A rudder holds its angle, and its vehicle the thrust.
+    """
+    if not p.direct > 0.0:
+        return a[0], a[1]
+    f_x, f_y = to_body(a[0] * most_thrust(a[0], p), a[1] * p.max_torque / p.lever_arm, cos_sin(angle))
+    most = most_thrust(f_x, p)
+    return project(f_x / most if most > 0.0 else 0.0, f_y * p.lever_arm / p.max_torque)
+
+
+def effort(a: Row, p: Plant) -> float:
+    """What an action demands, 1 at most: its squared length; with a rudder the larger of the two numbers' squares."""
+    if p.direct > 0.0:
+        return a[0] * a[0] + a[1] * a[1]
+    return max(a[0] * a[0], a[1] * a[1])
 
 
 def actuators(a: Row, r: float, p: Plant) -> Pair:
-    """Thrust [N] and torque [N m] of an action; an inner loop damps the yaw rate. Eq. 22."""
-    return p.max_force * a[0], cut(p.max_torque, p.max_torque * a[1] - p.yaw_damping * r)[0]
+    """Thrust [N] and torque [N m] (or the rudder's angle [rad]) of an action; an inner loop damps yaw. Eq. 22."""
+    return most_thrust(a[0], p) * a[0], cut(p.max_torque, p.max_torque * a[1] - p.yaw_damping * r)[0]
 
 
 def lagging(asked: float, given: float, half: float, whole: float) -> tuple[float, float, float]:
@@ -98,18 +124,25 @@ def lagging(asked: float, given: float, half: float, whole: float) -> tuple[floa
 def derivative(now: Row, tau: Row, flow: Row, p: Plant) -> Row:
     """Rates of (x, y, psi, u, v, r): eta' = R(psi) nu + flow, nu' = M^-1 (tau - C(nu) nu - D(nu) nu). Eq. 1-2, 4.
 
+    D holds the lift of body and fins too, which grows with the speed ahead; the paper has none.
+
     Args:
         now: (x, y, psi, u, v, r), velocities relative to the water.
-        tau: thrust [N] and torque [N m].
+        tau: thrust [N] and torque [N m], or the rudder's angle [rad].
         flow: velocity of the water, north and east [m/s].
         p: the vehicle.
     """
     _, _, psi, u, v, r = now
     a = p.m * (p.x_G * r + v) - p.Y_vdot * v - p.Y_rdot * r
     b = p.m * u - p.X_udot * u
+    ahead = max(u, 0.0)
+    d_v = (p.Y_v + p.Y_vv * abs(v) - p.Y_uv * ahead) * v - (p.Y_r + p.Y_rr * abs(r) + p.Y_ur * ahead) * r
+    n_v = p.N_v + p.N_rv * abs(r) + p.N_vv * abs(v) + p.N_uv * ahead
+    n_r = p.N_r + p.N_rr * abs(r) - p.N_ur * ahead
+    rudder = p.Y_uud * (ahead * ahead) * tau[1]
     f_u = tau[0] - -a * r - (p.X_u + p.X_uu * abs(u)) * u
-    f_v = -b * r - ((p.Y_v + p.Y_vv * abs(v)) * v - (p.Y_r + p.Y_rr * abs(r)) * r)
-    f_r = tau[1] - (a * u - b * v) - (-(p.N_v + p.N_rv * abs(r)) * v + (p.N_r + p.N_rr * abs(r)) * r)
+    f_v = -b * r - d_v - (0.0 - rudder)
+    f_r = (p.direct + p.N_uud * (ahead * ahead)) * tau[1] - (a * u - b * v) - (-n_v * v + n_r * r)
     north, east = to_world(u, v, cos_sin(psi))
     return (
         north + flow[0],

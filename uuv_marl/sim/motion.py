@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from uuv_marl.sim.arrays import State
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.vehicle import STILL, Plant, actuators, advance, project, turned, wrap
+from uuv_marl.sim.vehicle import STILL, Plant, actuators, advance, effort, held, limited, wrap
 from uuv_marl.sim.workspace import Columns
 
 Float32 = NDArray[np.float32]
@@ -42,22 +42,21 @@ def load_one(w: int, i: int, state: State, now: Columns) -> None:
 
 
 @compiled
-def load_action(w: int, action: Float32, now: Columns) -> None:
-    """Project the actions of world w, shape (world, vehicle, 2), onto the unit disc."""
+def load_action(w: int, action: Float32, now: Columns, plant: Plant) -> None:
+    """The actions of world w, shape (world, vehicle, 2), brought within what the actuators take."""
     for i in range(action.shape[1]):
-        now.a_x[i], now.a_y[i] = project(np.float64(action[w, i, 0]), np.float64(action[w, i, 1]))
+        now.a_x[i], now.a_y[i] = limited(np.float64(action[w, i, 0]), np.float64(action[w, i, 1]), plant)
 
 
 @compiled
 def apply_actuators(first: bool, now: Columns, plant: Plant) -> None:
-    """Thrust and torque of one control hold. After the first, the force keeps its direction in the world. Eq. 22."""
+    """Forces of one control hold. After the first, they keep their direction in the world; a rudder holds. Eq. 22."""
     for i in range(now.x.shape[0]):
         a_x, a_y = now.a_x[i], now.a_y[i]
         if not first:
-            a_x, a_y = turned(a_x, a_y, now.psi[i] - now.psi_0[i], plant)
-            a_x, a_y = project(a_x, a_y)
+            a_x, a_y = held(a_x, a_y, now.psi[i] - now.psi_0[i], plant)
         now.tau_u[i], now.tau_r[i] = actuators(a_x, a_y, now.r[i], plant)
-        now.effort[i] = a_x * a_x + a_y * a_y
+        now.effort[i] = effort(a_x, a_y, plant)
 
 
 @compiled

@@ -24,17 +24,18 @@ from uuv_marl.sim.formulas import (
     cos_sin,
     cut,
     echo,
+    effort,
     hear,
+    held,
     hypot,
     lagging,
+    limited,
     middle,
-    project,
     reference,
     sub_sectors,
     to_body,
     to_obstacles,
     to_world,
-    turned,
     wrap,
 )  # fmt: skip
 from uuv_marl.sim.model import model
@@ -72,7 +73,7 @@ class PlainEngine:
         """One decision period of world w: control holds, and what is perceived after the last."""
         self.clear_facts(w)
         acting, decided_at = self.living(w), self.state.eta[w, :, 2].tolist()
-        action = [project(*a) for a in action]
+        action = [limited(a, self.plant) for a in action]
         for hold in range(self.rules.holds):
             self.move(w, action, None if hold == 0 else decided_at)
             self.state.tick[w] += 1
@@ -122,12 +123,15 @@ class PlainEngine:
     # --- Motion ---
 
     def move(self, w: int, action: Rows, decided_at: Row | None) -> None:
-        """One control hold. Forces keep their direction in the world, from the headings [rad] at the decision."""
+        """One control hold. Forces keep their direction in the world, from the headings [rad] at the decision.
+
+        A rudder keeps its angle.
+        """
         state, facts = self.state, self.facts
         state.before[w] = state.eta[w, :, :2]
         for i in self.living(w):
             now: Row = [*state.eta[w, i].tolist(), *state.nu[w, i].tolist()]
-            a = action[i] if decided_at is None else turned(action[i], now[2] - decided_at[i], self.plant)
+            a = action[i] if decided_at is None else held(action[i], now[2] - decided_at[i], self.plant)
             tau = actuators(a, now[5], self.plant)
             now = self.swim(now, tau) if self.sea is None else self.swim_at_sea(w, i, now, tau, self.sea)
             x, y, psi, u, v, r = now
@@ -135,9 +139,9 @@ class PlainEngine:
                 facts.diverged[w] = i if facts.diverged[w] < 0 else facts.diverged[w]
                 continue
             state.eta[w, i], state.nu[w, i] = (x, y, wrap(psi)), (u, v, r)
-            effort = a[0] * a[0] + a[1] * a[1]
-            facts.effort[w, i] += effort / self.rules.holds
-            facts.saturated[w] += effort >= 1.0 - 1e-6
+            demand = effort(a, self.plant)
+            facts.effort[w, i] += demand / self.rules.holds
+            facts.saturated[w] += demand >= 1.0 - 1e-6
 
     def swim(self, now: Row, tau: Row) -> Row:
         """One control hold of a vehicle in still water."""

@@ -276,7 +276,7 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
     for i in range(action.shape[1]):
         num_alive += int(world.state.alive[w, i])
     load(w, world.state, workspace.now)
-    load_action(w, action, workspace.now)
+    load_action(w, action, workspace.now, model.plant)
     for hold in range(holds):
         grid = step_hold(w, hold == 0, world, model, workspace, sea)
         if sea is not None:

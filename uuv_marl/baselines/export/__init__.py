@@ -72,6 +72,7 @@ def _model(policy: Policy, graph: Graph) -> onnx.ModelProto:
             meaning = rows(Surroundings)[name].meaning
             for door, called in ((inputs, KEPT + name), (outputs, NEXT + name)):
                 door.append(helper.make_tensor_value_info(called, TensorProto.DOUBLE, ["vehicle", *shape], meaning))
+    damping = policy.scenario.actuators.yaw_damping_nms
     opset = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(
         helper.make_graph(graph.nodes, "policy", inputs, outputs, graph.used()),
@@ -79,7 +80,7 @@ def _model(policy: Policy, graph: Graph) -> onnx.ModelProto:
         ir_version=helper.find_min_ir_version_for(opset),
         producer_name="uuv_marl",
         doc_string=f"A policy of uuv_marl, {policy.name}, for every vehicle of a swarm. It decides every "
-        f"{_periods(policy)} s, beside an inner loop with a yaw damping of {policy.yaw_damping_nms:g} N m s.",
+        f"{_periods(policy)} s, beside an inner loop with a yaw damping of {damping:g} N m s.",
     )
     helper.set_model_props(model, _said(policy))
     return model
@@ -99,7 +100,7 @@ def _doors(layout: PerceptLayout) -> tuple[list[Any], list[Any]]:
         "action",
         TensorProto.FLOAT,
         ["vehicle", 2],
-        "Surge force and yaw torque [full force, full torque], within the unit disc.",
+        "Surge force, and yaw torque or rudder [full force, full torque or rudder], within the unit disc.",
     )
     return [observation], [action]
 

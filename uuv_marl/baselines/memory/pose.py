@@ -15,7 +15,7 @@ from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, plant, project, turned
+from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, held, plant
 from uuv_marl.sim.views import Fields
 
 Float32 = NDArray[np.float32]
@@ -66,13 +66,12 @@ def reckoned(motion: Float64, action: Float64 | Float32, own: Reckoning) -> Stat
 
     Args:
         motion: surge and sway velocity [m/s] and yaw rate [rad/s] at the decision, shape (3,).
-        action: shares of full thrust and torque, shape (2,).
+        action: shares of full thrust and torque (or rudder), shape (2,).
         own: the vehicle.
     """
     state = (0.0, 0.0, 0.0, motion[0], motion[1], motion[2])
     for _ in range(own.holds):
-        a_x, a_y = turned(action[0], action[1], state[2], own.plant)
-        a_x, a_y = project(a_x, a_y)
+        a_x, a_y = held(action[0], action[1], state[2], own.plant)
         tau = actuators(a_x, a_y, state[5], own.plant)
         for _ in range(own.steps):
             state = advance(state, tau, STILL, own.step_s, own.plant)

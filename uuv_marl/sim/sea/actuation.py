@@ -58,7 +58,7 @@ class Hull(NamedTuple):
 
     plants: Annotated[Float64, "world vehicle plant", "Its own ``uuv_marl.sim.vehicle.Plant``, field by field."]
     thrust: Annotated[Float64, "world vehicle", "Its thrust, as a share of the scenario's."]
-    tau: Annotated[Float64, "world vehicle 2", "Thrust [N] and torque [N m] that reach the water now."]
+    tau: Annotated[Float64, "world vehicle 2", "Thrust [N] and torque [N m] (or rudder [rad]) in the water now."]
     broken: Annotated[Int64, "world vehicle fault 2", "Control holds from which and up to which each fault acts."]
 
 
@@ -231,7 +231,7 @@ def own_plant(w: int, i: int, hull: Hull) -> Plant:
     p = hull.plants[w, i]
     return Plant(
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16],
-        p[17], p[18], p[19], p[20], p[21], p[22],
+        p[17], p[18], p[19], p[20], p[21], p[22], p[23], p[24], p[25], p[26], p[27], p[28], p[29], p[30], p[31],
     )  # fmt: skip
 
 

@@ -1,0 +1,289 @@
+"""The vehicles of the catalogue swim as their sources say, and every number has its source."""
+
+import math
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.cli import app
+from uuv_marl.replay.traces import from_folder
+from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, variant_names, vehicle_names
+from uuv_marl.scenario.files import _VEHICLES
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.studies.dynamics import acceptance
+
+SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
+
+
+# --- Against the sources ---
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return {
+        name: acceptance.measured(name) for name in (*vehicle_names(), "remus100+munk_on", "bluerov2_heavy+drag_wu")
+    }
+
+
+@pytest.mark.parametrize("figure", acceptance.FIGURES, ids=lambda figure: figure.vehicle)
+def test_a_vehicle_does_what_its_source_states(figure, measured):
+    assert getattr(measured[figure.vehicle], figure.quantity) == pytest.approx(figure.stated, abs=figure.within)
+
+
+OTHER = {
+    "lauv": {"top_mps": 1.97, "coast_m": 4.7, "coast_s": 13.5},
+    "remus100": {"top_mps": 2.59, "turn_radius_m": 11.3, "coast_m": 11.8, "coast_s": 46.0},
+    "remus100+munk_on": {"top_mps": 2.59, "turn_radius_m": 5.84},
+    "bluerov2_heavy": {"top_mps": 0.83, "turn_dps": 253.0, "turn_radius_m": 0.0},
+    "bluerov2_heavy+drag_wu": {"top_mps": 2.34},
+    "literature_185": {"top_mps": 5.14, "turn_dps": 300.0},
+}
+"""What another program, which shares no line with this one, made of the same numbers."""
+
+
+@pytest.mark.parametrize("vehicle", OTHER)
+def test_a_vehicle_does_what_another_program_made_of_its_numbers(vehicle, measured):
+    for quantity, value in OTHER[vehicle].items():
+        assert getattr(measured[vehicle], quantity) == pytest.approx(value, rel=0.01, abs=1e-9), quantity
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "speed", "expected"),
+    [
+        ("lauv", 1.0, [-1.57, -4.16]),
+        ("remus100", 1.5, [-0.72 + 1j, -0.72 - 1j]),
+        ("remus100+munk_on", 1.0, [0.66, -1.52]),
+        ("remus100+munk_on+drag_prestero", 1.0, [0.66, -1.52]),
+        ("bluerov2_heavy", 0.5, [0.56, -0.56]),
+        ("literature_185", 1.0, [0.22, -1.22]),
+    ],
+)
+def test_going_straight_is_as_stable_as_another_program_found(vehicle, speed, expected):
+    np.testing.assert_allclose(acceptance.sway_yaw(acceptance.alone(vehicle), speed), expected, atol=0.012)
+
+
+def test_the_lauv_turns_from_cruise_as_another_program_found():
+    """Full rudder at the thrust that holds 1.5 m/s ahead."""
+    thrust = (2.4 + 2.4 * 1.5) * 1.5 / 14.0
+    *_, (_, _, _, u, v, r) = acceptance.swim(acceptance.alone("lauv"), (thrust, 1.0), 60.0, 1.5)
+    assert math.hypot(u, v) == pytest.approx(1.2, abs=0.05)
+    assert math.degrees(r) == pytest.approx(24.0, abs=0.5)
+    assert math.hypot(u, v) / r == pytest.approx(2.85, abs=0.02)
+
+
+def test_presteros_sums_without_the_munk_moment_turn_as_lift_with_it():
+    """They hold the added masses' part of sway and yaw; of the surge they don't, so the speed in the turn differs."""
+    sums, lift = (acceptance.turn(acceptance.alone(f"remus100+{name}")) for name in ("sums", "munk_on"))
+    assert sums[2] == pytest.approx(lift[2], rel=0.002)
+    eigenvalues = [acceptance.sway_yaw(acceptance.alone(f"remus100+{name}"), 1.3) for name in ("sums", "munk_on")]
+    np.testing.assert_allclose(*eigenvalues, rtol=1e-6)
+    with pytest.raises(ScenarioError, match="N_uv = -24 .* adds energy .* give the lift's part alone"):
+        load_scenario("tracking", overrides={"vehicle": "remus100+munk_on+sums"})
+
+
+# --- Against SciPy, the sources' equations written anew ---
+
+
+class Lauv:
+    """Da Silva et al. 2007: signs of the source, D and the lift as they stand there."""
+
+    thrust_n, rudder_deg, lags = 14.0, 30.0, (0.05, 0.2)
+    m, i_z, added = 18.0, 1.77, (-1.0, -16.0, 0.0, -1.3)
+    fin, munk = (19.2, -7.68), True
+
+    @staticmethod
+    def damping(u, v, r):
+        return np.array(
+            [
+                [-2.4 - 2.4 * abs(u), 0.0, 0.0],
+                [0.0, -23.0 - 80.0 * abs(v), 11.5 + 0.3 * abs(r)],
+                [0.0, -3.1 - 1.5 * abs(v), -9.7 - 9.1 * abs(r)],
+            ]
+        ) + u * np.array([[0.0, 0.0, 0.0], [0.0, -30.16, 7.68], [0.0, 10.99, -3.07]])
+
+
+class Remus:
+    """Prestero 2001, with the drag of Allen et al. and Fossen's zeros in the added masses' Coriolis matrix."""
+
+    thrust_n, rudder_deg, lags = 41.0, 15.0, (1.0, 0.1)
+    m, i_z, added = 30.48, 3.45, (-0.93, -35.5, 1.93, -4.88)
+    fin, munk = (9.64, -6.15), False
+
+    @staticmethod
+    def damping(u, v, r):
+        return np.array(
+            [
+                [-6.11 * abs(u), 0.0, 0.0],
+                [0.0, -1310.0 * abs(v), 0.632 * abs(r)],
+                [0.0, -3.18 * abs(v), -94.0 * abs(r)],
+            ]
+        ) + u * np.array([[0.0, 0.0, 0.0], [0.0, -28.6, 6.15], [0.0, 10.57, -3.93]])
+
+
+def fossen(source, asked):
+    """Rates of (x, y, psi, u, v, r, thrust, rudder): M nu' + C(nu) nu = D nu + tau; a positive rudder turns to port."""
+    x_u, y_v, y_r, n_r = source.added
+    added = -np.array([[x_u, 0.0, 0.0], [0.0, y_v, y_r], [0.0, y_r, n_r]])
+    inertia = np.diag([source.m, source.m, source.i_z]) + added
+
+    def rate(_, state):
+        psi, nu, thrust, rudder = state[2], state[3:6], state[6], state[7]
+        u, v, r = nu
+        c_rb = np.array([[0.0, 0.0, -source.m * v], [0.0, 0.0, source.m * u], [source.m * v, -source.m * u, 0.0]])
+        a_u, a_v = added[0, 0] * u, added[1, 1] * v + added[1, 2] * r
+        c_a = np.array([[0.0, 0.0, -a_v], [0.0, 0.0, a_u], [a_v, -a_u, 0.0]]) if source.munk else 0.0
+        tau = np.array([thrust, source.fin[0] * u * u * rudder, source.fin[1] * u * u * rudder])
+        turn = np.array([[math.cos(psi), -math.sin(psi), 0.0], [math.sin(psi), math.cos(psi), 0.0], [0.0, 0.0, 1.0]])
+        moved = np.linalg.solve(inertia, tau + source.damping(u, v, r) @ nu - (c_rb + c_a) @ nu)
+        return [*(turn @ nu), *moved, (asked[0] - thrust) / source.lags[0], (asked[1] - rudder) / source.lags[1]]
+
+    return rate
+
+
+@pytest.mark.parametrize(("name", "source"), [("lauv", Lauv), ("remus100", Remus)])
+def test_a_minute_of_a_steady_turn_is_scipys(name, source):
+    """Full thrust and half the rudder to starboard, from rest, lags included."""
+    scenario = load_scenario(
+        "tracking", num_vehicles=1, overrides=SLOW | {"vehicle": name, "timing.integration_step_s": 0.01}
+    )
+    swarm = Swarm(scenario)
+    swarm.reset(0)
+    swarm.state.eta[...] = swarm.state.nu[...] = 0.0
+    for _ in range(600):
+        swarm.step(np.array([[[1.0, 0.5]]], np.float32))
+    asked = source.thrust_n, -0.5 * math.radians(source.rudder_deg)
+    solved = solve_ivp(fossen(source, asked), (0.0, 60.0), np.zeros(8), "DOP853", rtol=1e-12, atol=1e-12)
+    x, y, psi, *nu = solved.y[:6, -1]
+    assert math.dist(swarm.state.eta[0, 0, :2], (x, y)) < 1e-6
+    assert math.remainder(swarm.state.eta[0, 0, 2] - psi, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-7)
+    np.testing.assert_allclose(swarm.state.nu[0, 0], nu, atol=1e-7)
+    assert psi > 2.0 * math.pi, "to starboard, more than a full circle"
+
+
+# --- The files ---
+
+
+SOURCES = r"assumed|Repoulias|section 5|da Silva|Havenstrøm|lauv_gazebo|Prestero|Fossen|Allen|Sgarioto|von Benzon|Wu"
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_every_number_of_a_vehicle_has_its_source(name):
+    text = (_VEHICLES / f"{name}.toml").read_text()
+    for line in text.splitlines():
+        if " = " in line.split("#")[0] and not line.startswith(("name =", "source =")):
+            assert re.search(SOURCES, line.partition("#")[2]), line
+    data = tomllib.loads(text)
+    assert data["vehicle"]["name"] == name
+    assert data["vehicle"]["source"]
+
+
+@pytest.mark.parametrize("name", acceptance.every())
+def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
+    changes = SLOW | {"vehicle": name, "trajectory.speed_mps": 0.5}
+    scenario = granted("bio_inspired_plus", load_scenario("single_obstacle", num_vehicles=4, overrides=changes))
+    assert scenario.vehicle.name == name
+    swarm, policy = Swarm(scenario), make("bio_inspired_plus", scenario)
+    percept = swarm.reset(0)
+    for _ in range(20):
+        percept = swarm.step(policy.act(percept))
+    assert np.isfinite(swarm.state.eta).all()
+    assert (swarm.state.nu[0, :, 0] > 0.0).any()
+    (tmp_path / "again.toml").write_text(to_toml(scenario))
+    assert load_scenario(tmp_path / "again.toml").vehicle == scenario.vehicle
+    shown = tomllib.loads(show_vehicle(name))
+    loaded = load_vehicle(name)
+    for section in ("vehicle", "actuators"):
+        assert {field: loaded[section][field] for field in shown[section]} == shown[section]
+
+
+def test_a_variant_changes_what_it_says_and_is_shown_with_its_source():
+    plain, munk = (load_vehicle(name)["vehicle"] for name in ("remus100", "remus100+munk_on"))
+    assert {name for name in plain if plain[name] != munk[name]} == {"name", "munk_moment"}
+    assert variant_names("remus100") == ["drag_prestero", "drag_sgarioto", "munk_on", "small_rudder", "sums"]
+    assert "munk_moment = true # Prestero: his sums" in show_vehicle("remus100+munk_on")
+    assert "[variants.munk_on.vehicle]" in show_vehicle("remus100")
+
+
+def test_a_file_of_ones_own_has_variants_too(tmp_path):
+    own = tmp_path / "my+boat.toml"
+    own.write_text(
+        show_vehicle("lauv").replace('"lauv"', '"mine"') + "\n[variants.heavy.vehicle]\nm_kg = 25.0  # weighed\n"
+    )
+    heavy = load_scenario("tracking", overrides=SLOW | {"vehicle": f"{own}+heavy"})
+    assert (heavy.vehicle.name, heavy.vehicle.m_kg) == ("mine+heavy", 25.0)
+    (tmp_path / "course.toml").write_text(
+        'vehicle = "my+boat.toml+heavy"\nextends = "tracking"\n[trajectory]\nspeed_mps = 1\n'
+    )
+    assert load_scenario(tmp_path / "course.toml").vehicle == heavy.vehicle
+
+
+@pytest.mark.parametrize(
+    ("variants", "name", "message"),
+    [
+        ("", "heavy", "has no variant 'heavy'; it has none"),
+        ("[variants.heavy.vehicle]\nm_kg = 25.0", "havy", "has no variant 'havy'; it has heavy"),
+        ("[variants.heavy]\nm_kg = 25.0", "heavy", "variants.heavy must hold tables, such as [variants.heavy.vehicle]"),
+        (
+            "[variants.heavy.sonar]\nm = 25.0",
+            "heavy",
+            "variants.heavy holds 'sonar'; it may hold vehicle and actuators",
+        ),
+        ("[variants.heavy.vehicle]\nmass = 25.0", "heavy", "vehicle.mass is unknown"),
+    ],
+)
+def test_a_variant_that_is_none_is_refused(variants, name, message, tmp_path):
+    own = tmp_path / "mine.toml"
+    own.write_text(show_vehicle("lauv") + variants)
+    with pytest.raises(ScenarioError, match=re.escape(message)):
+        load_scenario("tracking", overrides=SLOW | {"vehicle": f"{own}+{name}"})
+
+
+def test_a_vehicle_that_replaces_another_leaves_nothing_of_it():
+    torpedo = load_scenario("tracking", overrides=SLOW | {"vehicle": "lauv"})
+    assert (torpedo.actuators.kind, torpedo.actuators.yaw_lag_s) == ("rudder", 0.2)
+    back, never = (load_scenario(s, overrides={**SLOW, "vehicle": "literature_185"}) for s in (torpedo, "tracking"))
+    assert back.vehicle == never.vehicle
+    assert back.actuators == never.actuators
+
+
+def test_a_vehicle_that_a_scenario_is_too_fast_for_is_refused_with_the_remedy():
+    with pytest.raises(ScenarioError, match=r"trajectory.speed_mps = 4 is more than the 1.97 m/s .* cruise_mps = 1.5"):
+        load_scenario("single_obstacle", overrides={"vehicle": "lauv"})
+    with pytest.raises(
+        ScenarioError, match=r"integration_step_s = 0.1 is too long .* rudder_max_deg = 15; use at most"
+    ):
+        load_scenario("single_obstacle", overrides={"vehicle": "remus100"})
+
+
+# --- The command ---
+
+
+def test_the_command_lists_the_catalogue_and_shows_one():
+    listed = CliRunner().invoke(app, ["vehicles"], env={"COLUMNS": "200"})
+    assert listed.exit_code == 0, listed.output
+    assert all(name in listed.output for name in acceptance.every())
+    row = next(line for line in listed.output.splitlines() if "remus100+munk_on" in line)
+    assert "5.8 m" in row
+    assert "2.59" in row
+    assert "variant: munk_moment = true" in row
+    shown = CliRunner().invoke(app, ["vehicles", "--show", "lauv"])
+    assert shown.output == show_vehicle("lauv") + "\n"
+    wrong = CliRunner().invoke(app, ["vehicles", "--show", "remus"])
+    assert wrong.exit_code != 0
+    assert "did you mean 'remus100'" in wrong.output
+
+
+def test_a_benchmark_of_a_torpedo_says_that_it_has_no_inner_loop_and_can_be_replayed(tmp_path):
+    torpedo = ["vehicle=lauv", "trajectory.speed_mps=1.5", "start.speed_max_mps=1.5", "time_limit.factor=0.05"]
+    command = ["benchmark", "--scenario", "starter", "--policy", "bio_inspired_plus", "--seeds", "1", "--output"]
+    run = CliRunner().invoke(app, [*command, str(tmp_path / "run"), *(f"--set={change}" for change in torpedo)])
+    assert run.exit_code == 0, run.output
+    assert "yaw damping" not in (tmp_path / "run" / "table.md").read_text()
+    recording = from_folder(tmp_path / "run", None, None, 0)
+    assert np.isfinite(recording.position[-1]).all()
