@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines.checkpoint import load_checkpoint
+from uuv_marl.baselines.scout import PLUS
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 
@@ -69,6 +70,12 @@ def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
         first = group._turn - len(swarms) + 1
         told = [conditions[(first + k) % len(conditions)] for k in range(len(swarms))]
         assert made == [(t["timing.decision_period_s"], t.get("sonar.echo_reports", "centre")) for t in told]
+
+
+def test_the_shipped_recipe_trims_the_law_of_scout_plus():
+    from uuv_marl.train.recipe import load_recipe
+
+    assert load_recipe("memory").settings(0).law == PLUS
 
 
 @pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
