@@ -8,7 +8,7 @@ PYTEST := -m pytest --durations=15
 HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark reproduce paper test docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
+.PHONY: help benchmark reproduce paper test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
 .PHONY: check dist test-attacks perf perf-training clean
 
 help:
@@ -38,7 +38,9 @@ reproduce: .venv/base.stamp
 paper: reproduce
 	$(BIN)/python tools/ship_paper.py results/reproduce
 
-test: check
+test: check tests
+
+tests: .venv/dev.stamp
 	$(BIN)/python $(PYTEST) $(HALVES) -m "not docs" $(ARGS)
 
 docs-check: .venv/dev.stamp
