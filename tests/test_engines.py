@@ -18,7 +18,7 @@ import uuv_marl
 from tests import contract
 from uuv_marl import load_scenario, scenario_names
 from uuv_marl.baselines import make
-from uuv_marl.sim import formulas
+from uuv_marl.sim import formulas, formulas_sonar
 from uuv_marl.sim import model as model_module
 from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
 from uuv_marl.sim.swarm import Swarm
@@ -357,16 +357,16 @@ def test_cosine_is_even_and_sine_odd_and_both_exact_at_zero():
 # --- Neighbours, distances, contacts ---
 
 
-def compiled_copy(module):
-    """The functions of a module compiled as they stand, so that swarms of hundreds can be compared with them."""
-    space = dict(vars(module))
-    for name, function in vars(module).items():
-        if isinstance(function, types.FunctionType) and function.__module__ == module.__name__:
+def compiled_copy(*modules):
+    """Modules' functions compiled as they stand, so that swarms of hundreds can be compared with them."""
+    space = {name: value for module in modules for name, value in vars(module).items()}
+    for name, function in list(space.items()):
+        if isinstance(function, types.FunctionType) and function.__module__ in {module.__name__ for module in modules}:
             space[name] = numba.njit(types.FunctionType(function.__code__, space, name))
     return types.SimpleNamespace(**space)
 
 
-PLAIN = compiled_copy(formulas)
+PLAIN = compiled_copy(formulas, formulas_sonar)
 
 
 SUITES = {
@@ -506,7 +506,7 @@ def fill(swarm, layout, seed):
 
 
 def sectors(swarm):
-    return formulas.Sectors(*(np.array(part) for part in formulas.sub_sectors(swarm.scenario.sonar.arrays)))
+    return formulas_sonar.Sectors(*(np.array(part) for part in formulas_sonar.sub_sectors(swarm.scenario.sonar.arrays)))
 
 
 def check(swarm):

@@ -14,7 +14,7 @@ from uuv_marl.baselines import granted, make
 from uuv_marl.cli import app
 from uuv_marl.replay.traces import from_folder
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, variant_names, vehicle_names
-from uuv_marl.scenario.files import _VEHICLES
+from uuv_marl.scenario.vehicle_files import VEHICLES
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.studies.dynamics import acceptance
 
@@ -174,7 +174,7 @@ SOURCES = r"assumed|Repoulias|section 5|da Silva|Havenstrøm|lauv_gazebo|Prester
 
 @pytest.mark.parametrize("name", vehicle_names())
 def test_every_number_of_a_vehicle_has_its_source(name):
-    text = (_VEHICLES / f"{name}.toml").read_text()
+    text = (VEHICLES / f"{name}.toml").read_text()
     for line in text.splitlines():
         if " = " in line.split("#")[0] and not line.startswith(("name =", "source =")):
             assert re.search(SOURCES, line.partition("#")[2]), line

@@ -1,8 +1,8 @@
 """The physics in plain Python, in the order of a step: ``PlainEngine.decide`` is one decision of a swarm.
 
-Its parts follow in that order; the formulas that they use are in ``uuv_marl.sim.formulas``. Nothing is sorted,
-tabulated or skipped, so it is slow. The compiled engine gives the same bits: tests/test_engines.py. Who changes the
-physics changes both.
+Its parts follow in that order; the formulas that they use are in ``formulas.py`` and ``formulas_sonar.py``. Nothing is
+sorted, tabulated or skipped, so it is slow. The compiled engine gives the same bits: tests/test_engines.py. Who changes
+the physics changes both.
 """
 
 import math
@@ -20,24 +20,19 @@ from uuv_marl.sim.formulas import (
     Rows,
     actuators,
     advance,
-    between_vehicles,
     cos_sin,
     cut,
-    echo,
     effort,
-    hear,
     held,
     hypot,
     lagging,
     limited,
-    middle,
     reference,
-    sub_sectors,
     to_body,
-    to_obstacles,
     to_world,
     wrap,
 )  # fmt: skip
+from uuv_marl.sim.formulas_sonar import between_vehicles, echo, hear, middle, sub_sectors, to_obstacles
 from uuv_marl.sim.model import model
 from uuv_marl.sim.sea.actuation import THRUSTER, YAW, is_lost
 from uuv_marl.sim.sea.sea import Sea, begin, drift, know, reads, take_readings

@@ -1,0 +1,140 @@
+"""Vehicles from names and TOML files, and the variants that a file has where sources disagree."""
+
+import difflib
+from pathlib import Path
+from typing import Any, cast
+
+import tomlkit
+
+from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario.documents import File, items, merged, parse
+from uuv_marl.scenario.hardware import Actuators, Vehicle
+from uuv_marl.scenario.messages import short, shown
+
+VEHICLES = Path(__file__).resolve().parent / "vehicles"
+_GIVEN = {"vehicle": set(Vehicle.model_fields), "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"}}
+_OPTIONAL: dict[str, dict[str, Any]] = {
+    section: {name: field.default for name, field in model.model_fields.items() if not field.is_required()}
+    for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
+}
+_OPTIONAL["actuators"] |= {"thrust_lag_s": 0.0, "yaw_lag_s": 0.0}
+"""What a vehicle's file may leave out, and what it is then, whatever vehicle there was before."""
+
+
+def vehicle_names() -> list[str]:
+    """Names of the vehicles that ship with the package."""
+    return sorted(path.stem for path in VEHICLES.glob("*.toml"))
+
+
+def load_vehicle(name: str) -> dict[str, dict[str, Any]]:
+    """A vehicle's sections ``vehicle`` and ``actuators``, by name or TOML file, or a variant: ``remus100+munk_on``.
+
+    Raises:
+        ScenarioError: there is no such vehicle or variant, or its file is broken.
+    """
+    return vehicle_file(name).data
+
+
+def variant_names(vehicle: str) -> list[str]:
+    """Variants that a vehicle's file has: other numbers where sources disagree. ``vehicle`` as for ``load_vehicle``."""
+    return sorted(parse(_find_vehicle(_without_variants(vehicle)[0])).data.get("variants", {}))
+
+
+def show_vehicle(name: str) -> str:
+    """A vehicle's file, with the source of every number; where variants are named, with theirs.
+
+    Args:
+        name: as for ``load_vehicle``.
+
+    Raises:
+        ScenarioError: there is no such vehicle or variant, or its file is broken.
+    """
+    file = vehicle_file(name)
+    document = tomlkit.parse(file.text)
+    if file.variants:
+        changed = variant_comments(file)
+        del document["variants"]
+        for section, fields in file.data.items():
+            table: Any = document[section]
+            for field, value in fields.items():
+                if f"{section}.{field}" in changed:
+                    item = cast(Any, tomlkit).item(value)
+                    table[field] = item.comment(changed[f"{section}.{field}"].lstrip("# "))
+        document["vehicle"]["name"] = file.data["vehicle"]["name"]  # pyright: ignore[reportIndexIssue] - a table
+    return tomlkit.dumps(document).rstrip("\n") + "\n"  # pyright: ignore[reportUnknownMemberType]
+
+
+def vehicle_file(name: str, beside: Path | None = None) -> File:
+    """A vehicle's file, which must be complete: numbers of two vehicles are never mixed without a word."""
+    plain, chosen = _without_variants(name)
+    file = parse(_find_vehicle(plain, beside))
+    for section, fields in _GIVEN.items():
+        given = file.data.get(section)
+        needed = fields - _OPTIONAL[section].keys()
+        missing = sorted(needed - set(cast(dict[str, Any], given) if isinstance(given, dict) else ()))
+        if missing:
+            raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; a vehicle's file gives all numbers")
+    other = next((key for key in file.data if key not in {*_GIVEN, "variants"}), None)
+    if other is not None:
+        raise ScenarioError(
+            f"vehicle {file.path} holds {shown(other)}; it may hold vehicle and actuators only, and variants of them"
+        )
+    data = {section: {**_OPTIONAL[section], **file.data[section]} for section in _GIVEN}
+    for variant in chosen:
+        data = merged(data, _variant(file, variant))
+    if chosen:
+        data["vehicle"]["name"] = "+".join([str(data["vehicle"]["name"]), *chosen])
+    return file._replace(data=data, variants=chosen)
+
+
+def _variant(file: File, name: str) -> dict[str, Any]:
+    """What a variant of a vehicle changes."""
+    every = file.data.get("variants", {})
+    variants = cast(dict[str, Any], every) if isinstance(every, dict) else {}
+    changes = variants.get(name)
+    if changes is None:
+        there = f"it has {', '.join(variants)}" if variants else "it has none"
+        raise ScenarioError(f"vehicle {file.path.stem} has no variant {shown(name)}; {there}")
+    if not isinstance(changes, dict) or not all(
+        isinstance(part, dict) for part in cast(dict[str, Any], changes).values()
+    ):
+        raise ScenarioError(
+            f"vehicle {file.path}: variants.{short(name)} must hold tables, such as [variants.{short(name)}.vehicle]"
+        )
+    other = next((key for key in cast(dict[str, Any], changes) if key not in _GIVEN), None)
+    if other is not None:
+        raise ScenarioError(
+            f"vehicle {file.path}: variants.{short(name)} holds {shown(other)}; it may hold vehicle and actuators only"
+        )
+    return cast(dict[str, Any], changes)
+
+
+def _without_variants(name: str) -> tuple[str, list[str]]:
+    """A vehicle's name or file, and the variants that follow it: a plus before each."""
+    file, toml, after = name.rpartition(".toml")
+    if toml and (not after or after.startswith("+")):
+        return file + toml, after.split("+")[1:]
+    plain, *variants = name.split("+")
+    return plain, variants
+
+
+def _find_vehicle(name: str, beside: Path | None = None) -> Path:
+    path = (beside or Path()) / name if name.endswith(".toml") else VEHICLES / f"{name}.toml"
+    if name in vehicle_names() or (name.endswith(".toml") and path.is_file()):
+        return path
+    near = difflib.get_close_matches(name, vehicle_names(), n=1, cutoff=0.4)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise ScenarioError(
+        f"vehicle {shown(name)} is unknown; {hint}give one of {', '.join(vehicle_names())}, or a path ending in .toml"
+    )
+
+
+def variant_comments(file: "File") -> dict[str, str]:
+    """Comments of what the chosen variants of a vehicle change, by field."""
+    every = dict(items(tomlkit.parse(file.text)))
+    return {
+        field.removeprefix(f"variants.{name}."): item.trivia.comment
+        for name in file.variants
+        for field, item in every.items()
+        if field.startswith(f"variants.{name}.")
+    }
