@@ -86,7 +86,7 @@ def test_the_rule_has_the_papers_numbers():
     paper = load_scenario("single_obstacle")
     assert 2.0 * paper.contact.hull_radius_m == PAPER_LENGTH_M
     assert (paper.trajectory.speed_mps, paper.actuators.max_force_n) == (PAPER_SPEED_MPS, PAPER_FORCE_N)
-    assert (paper.start.spacing_m - paper.constraints.s_u_m) / 2.0 == PAPER_TURN_M
+    assert (paper.start.spacing_m - paper.constraints.s_u_m) / 4.0 == PAPER_TURN_M
 
 
 @pytest.mark.parametrize("name", ["lauv", "remus100", "remus100+munk_on", "remus100+small_rudder"])
@@ -98,10 +98,10 @@ def test_the_turning_radius_is_that_of_the_acceptance_test(name):
 
 
 @pytest.mark.parametrize("name", vehicle_names())
-def test_a_vehicle_has_room_to_turn_and_more_than_its_length(name):
+def test_neighbours_have_room_to_turn_and_more_than_their_length(name):
     scenario = in_scale("sea_trial", name)
     vehicle, limits = scenario.vehicle, scenario.constraints
-    turn = 2.0 * turning_radius(vehicle, scenario.actuators, vehicle.cruise_mps)
+    turn = 4.0 * turning_radius(vehicle, scenario.actuators, vehicle.cruise_mps)
     assert scenario.start.spacing_m >= turn + limits.s_u_m - 1e-9
     assert scenario.start.spacing_m >= 6.5 * (vehicle.length_m or 2.0)
     assert scenario.trajectory.speed_mps == pytest.approx(vehicle.cruise_mps)
@@ -132,7 +132,8 @@ def test_every_scenario_loads_in_the_scale_of_every_vehicle(name, vehicle):
         for (field, value), (same, there) in zip(before, now, strict=True):
             assert field == same
             if field not in follow:
-                assert there == pytest.approx(value * theirs.get(field, units.of(dimension(field) or NUMBER))), field
+                expected = value * theirs.get(field, units.of(dimension(field) or NUMBER))
+                assert there == pytest.approx(min(expected, 4096.0) if field == "range_m" else expected), field
 
 
 def test_files_are_scaled_and_overrides_are_not(tmp_path):

@@ -55,6 +55,8 @@ class BioInspired(Policy):
             obstacle where their positions agree (centres) or follow without a gap (surfaces); its nearest echo counts.
     """
 
+    wishes_force: ClassVar[bool] = True
+
     def __init__(
         self,
         scenario: Scenario,

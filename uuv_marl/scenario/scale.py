@@ -8,12 +8,12 @@ and times, as the paper's is. A device's own range can be set beside (``--set so
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import ValidationError
 
 from uuv_marl.scenario.dimensions import Units, converted
-from uuv_marl.scenario.fields import Section, within
+from uuv_marl.scenario.fields import MAX_RANGE_M, Section, within
 from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.sections import Start, Timing
 from uuv_marl.scenario.turning import turning_radius
@@ -23,9 +23,9 @@ Ratio = Annotated[float, within(1e-6, 1e6)]
 PAPER_LENGTH_M, PAPER_SPEED_MPS, PAPER_FORCE_N = 2.0, 4.0, 3000.0
 """The paper's vehicle: twice ``contact.hull_radius_m``, ``trajectory.speed_mps``, and ``literature_185``'s full
 thrust."""
-PAPER_TURN_M = 4.0
-"""Room to turn in: vehicles start 13 m apart, and one that makes a full circle of this radius beside another that stays
-keeps s_u = 5 m from it: 13 m - 2 x 4 m."""
+PAPER_TURN_M = 2.0
+"""Room to turn in: vehicles start 13 m apart with headings drawn at random. Two neighbours that both make a full circle
+of this radius keep s_u = 5 m from each other: 13 m - 4 x 2 m."""
 _OWN = ("vehicle", "actuators", "sound_speed_mps")
 _HALVINGS = 12
 
@@ -52,7 +52,7 @@ def scale_of(vehicle: Vehicle, actuators: Actuators) -> Scale:
     """The scale of a vehicle; 1 each for ``literature_185``.
 
     Speed: cruise over the paper's 4 m/s. Length: the larger of the hull's over the paper's 2 m (that of the paper where
-    the vehicle's file gives none), and of the turning radius at cruise and full rudder over 4 m.
+    the vehicle's file gives none), and of the turning radius at cruise and full rudder over 2 m.
 
     Raises:
         ValueError: the vehicle has no cruise speed.
@@ -99,10 +99,20 @@ def in_scale(data: dict[str, Any], was: Scale) -> dict[str, Any]:
         "arrival": {"by": "rest" if can_stop(actuators) else "passage"},
         "timing": {"integration_step_s": _step(made, vehicle, actuators)},
     }
+    _bound_ranges(made.get("sonar"))
     for section, fields in own.items():
         if isinstance(made.get(section), dict):
             made[section] |= {name: value for name, value in fields.items() if value is not None}
     return {**made, "scale": scale.model_dump()}
+
+
+def _bound_ranges(sonar: Any) -> None:
+    """Sonars hear no farther than percepts tell."""
+    arrays: Any = cast(dict[str, Any], sonar).get("arrays") if isinstance(sonar, dict) else None
+    for array in cast(list[Any], arrays) if isinstance(arrays, list | tuple) else ():
+        own = cast(dict[str, Any], array) if isinstance(array, dict) else {}
+        if isinstance(own.get("range_m"), float):
+            own["range_m"] = min(own["range_m"], MAX_RANGE_M)
 
 
 def _step(data: Mapping[str, Any], vehicle: Vehicle, actuators: Actuators) -> float | None:
