@@ -15,9 +15,11 @@ from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
 from uuv_marl.baselines.units import in_own_units
 from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.scenario import ScenarioError
 from uuv_marl.scenario.dimensions import converted
 from uuv_marl.scenario.scale import Scale
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.train.shaping import in_si_units, overrides_for
 
 POLICIES = (
     "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "sff", "sdc", "apf", "olfati_saber", "orca_informed",
@@ -205,3 +207,26 @@ def test_a_vehicle_with_a_rudder_knows_how_it_turns():
     """At rest a rudder does nothing, and shares of nothing would be none."""
     own = in_own_units(LAUV)
     assert 0.0 < Reckoning.of(own).yaw < 10.0
+
+
+# --- Training ---
+
+
+@pytest.mark.parametrize(("vehicle", "damping"), [("literature_185", 600.0), ("bluerov2_heavy", 5.8), ("lauv", 0.0)])
+def test_a_training_has_the_inner_loop_of_its_vehicle(vehicle, damping):
+    slow = {
+        "vehicle": vehicle,
+        "trajectory.speed_mps": 0.5,
+        "start.speed_max_mps": 0.5,
+        "timing.integration_step_s": 0.05,
+    }
+    changes = overrides_for("random_field", slow)
+    assert changes["actuators.yaw_damping_nms"] == pytest.approx(damping)
+    assert load_scenario("random_field", overrides=changes).timing.decision_period_s == 0.5
+    assert overrides_for("random_field", {"actuators.yaw_damping_nms": 7.0})["actuators.yaw_damping_nms"] == 7.0
+
+
+def test_a_training_refuses_a_vehicles_scale():
+    in_si_units(load_scenario("sea_trial"))
+    with pytest.raises(ScenarioError, match="'sea_trial' into the scale of lauv, .* leave scale out"):
+        in_si_units(LAUV)

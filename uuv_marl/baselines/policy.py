@@ -323,7 +323,18 @@ def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
 
 
 def tuned(name: str) -> Mapping[str, float]:
-    """The best parameters that tuning found for a policy; all its trials are in the CSV file beside it."""
-    text = resources.files("uuv_marl.baselines").joinpath("tuned", f"{name}.json").read_text(encoding="utf-8")
-    data: dict[str, Any] = json.loads(text)
+    """The best parameters that tuning found for a policy; all its trials are in the CSV file beside it.
+
+    Args:
+        name: of the policy; ``POLICY.VEHICLE`` for those that were found in a vehicle's scale.
+
+    Raises:
+        PolicyError: it was not tuned.
+    """
+    folder = resources.files("uuv_marl.baselines").joinpath("tuned")
+    file = folder.joinpath(f"{name}.json")
+    if not file.is_file():
+        known = sorted(each.name.removesuffix(".json") for each in folder.iterdir() if each.name.endswith(".json"))
+        raise PolicyError(f"nobody has tuned {name!r}; there are {', '.join(known)}: uuv-marl tune makes others")
+    data: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return data["best"]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uuv_marl.atomic import replacing
-from uuv_marl.scenario import load_vehicle, vehicle_names
+from uuv_marl.scenario import load_scenario, load_vehicle, vehicle_names
 from uuv_marl.scenario.scale import PAPER_LENGTH_M
 from uuv_marl.studies.suite import Case, Report, Suite
 
@@ -123,3 +123,21 @@ def _summary(episodes: Sequence[Episode], hull_m: float) -> tuple[str, ...]:
         f"{apart:.2f}", f"{apart / hull_m:.1f}", "–" if late is None else f"{late:.3f}",
         f"{np.mean([e.effort for e in episodes]):.3f}",
     )  # fmt: skip
+
+
+def scales() -> list[Sequence[str]]:
+    """Rows of every vehicle's scale and of what it makes of ``sea_trial``, a head first."""
+    rows: list[Sequence[str]] = [
+        ("vehicle", "L", "V", "full thrust over 3,000 N", "course [m]", "for [s]", "vehicles start apart [m]",
+         "obstacle's radius [m]", "bow sonar [m]", "a decision every [s]", "arrives")
+    ]  # fmt: skip
+    for name in vehicle_names():
+        one = load_scenario("sea_trial", overrides={"vehicle": name, "scale": "vehicle"})
+        scale, course = one.scale, one.trajectory
+        rows.append(
+            (f"`{name}`", f"{scale.length:.3g}", f"{scale.speed:.3g}", f"{scale.force:.3g}",
+             f"{course.duration_s * course.speed_mps:.0f}", f"{course.duration_s:.0f}", f"{one.start.spacing_m:.1f}",
+             f"{one.obstacles[0].radius_m:.1f}", f"{one.sonar.arrays[0].range_m:.0f}",
+             f"{one.timing.decision_period_s:.3g}", "in passage" if one.arrival.by == "passage" else "at rest")
+        )  # fmt: skip
+    return rows
