@@ -1,7 +1,10 @@
 """Policies in the units of a vehicle's scale, and from a wished force to a rudder."""
 
+import csv
+import json
 import math
 import re
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -230,3 +233,26 @@ def test_a_training_refuses_a_vehicles_scale():
     in_si_units(load_scenario("sea_trial"))
     with pytest.raises(ScenarioError, match="'sea_trial' into the scale of lauv, .* leave scale out"):
         in_si_units(LAUV)
+
+
+# --- Gains tuned for a hull ---
+
+
+@pytest.mark.parametrize("vehicle", ["bluerov2_heavy", "lauv", "remus100"])
+def test_gains_tuned_for_a_hull_come_from_shipped_trials(vehicle):
+    folder = resources.files("uuv_marl.baselines") / "tuned"
+    data = json.loads((folder / f"bio_inspired_plus.{vehicle}.json").read_text())
+    trials = list(csv.DictReader((folder / f"bio_inspired_plus.{vehicle}.csv").read_text().splitlines()))
+    assert (data["scenario"], data["vehicle"], len(trials)) == ("sea_trial", vehicle, 100)
+    assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
+    best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
+    assert best == {"cost_s": data["best_cost_s"], **data["best"]}
+    name = f"bio_inspired_plus,tuned_for={vehicle}"
+    scenario = granted(name, load_scenario("sea_trial", overrides={"vehicle": vehicle, "scale": "vehicle"}))
+    gains = make(name, scenario).gains._asdict()
+    assert {key: gains[key] for key in data["best"]} == data["best"]
+
+
+def test_gains_that_nobody_tuned_are_refused():
+    with pytest.raises(PolicyError, match="nobody has tuned 'bio_inspired_plus.otter'; there are apf, .*lauv"):
+        make("bio_inspired_plus,tuned_for=otter", load_scenario("starter"))
