@@ -81,6 +81,9 @@ RAW = {
     "latency.travel_time": True, "latency.sound_speed_mps": 150.0, "latency.processing_s": 0.1,
     "noise.passive_ranges": False, "noise.false_echo_probability": 0.2, "sonar.echo_reports": "surface",
 }  # fmt: skip
+QUICK = {
+    "timing.decision_period_s": 0.1, "timing.control_hold_s": 0.1, "timing.integration_step_s": 0.0125
+}  # fmt: skip
 EPISODES = {
     **{name: (name, {"num_vehicles": n}, "") for n, name in enumerate(scenario_names(), 7)},
     "starter": ("starter", {}, "arrival"),
@@ -105,6 +108,10 @@ EPISODES = {
         "starter", {"overrides": {**FINE, **COUPLED, **LIFT, **ASTERN, **DAMPED}}, "arrival"
     ),
     "the sea, lift, rudder that lags": ("random_field", {"overrides": {**SEA, **LIFT, **RUDDER}}, "lost"),
+    "in passage": ("starter", {"overrides": {"arrival.by": "passage"}}, "arrival"),
+    "in passage, rudder, in scale": (
+        "random_field", {"num_vehicles": 7, "overrides": {"vehicle": "lauv", "scale": "vehicle", **QUICK}}, "arrival"
+    ),
     "five holds, coupled, damped": ("starter", {"overrides": {**FINE, **COUPLED, **DAMPED}}, "arrival"),
 }  # fmt: skip
 """Scenario, changes, and what must happen beside echoes and contacts."""

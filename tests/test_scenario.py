@@ -16,7 +16,7 @@ from uuv_marl.scenario.scenario import warn_of_speed
 
 FOLDER = resources.files("uuv_marl.scenario")
 BASE = "single_obstacle"
-SCENARIOS = (*LARGE, "starter")
+SCENARIOS = (*LARGE, "sea_trial", "starter")
 
 
 def test_the_shipped_scenarios():

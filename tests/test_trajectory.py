@@ -13,18 +13,18 @@ TIMES = arrival_times(CORNERS, 4.0)
 
 def test_corners_are_passed_on_time_and_the_end_is_rest():
     for corner, t in zip(CORNERS[:-1], TIMES[:-1], strict=True):
-        assert reference(t, CORNERS, TIMES, 3)[:2] == pytest.approx(corner)
-    assert reference(TIMES[-1], CORNERS, TIMES, 3) == (1000.0, 1000.0, 0.0, 0.0)
-    assert reference(1e6, CORNERS, TIMES, 3) == (1000.0, 1000.0, 0.0, 0.0)
+        assert reference(t, CORNERS, TIMES, 3, False)[:2] == pytest.approx(corner)
+    assert reference(TIMES[-1], CORNERS, TIMES, 3, False) == (1000.0, 1000.0, 0.0, 0.0)
+    assert reference(1e6, CORNERS, TIMES, 3, False) == (1000.0, 1000.0, 0.0, 0.0)
     assert TIMES[-1] == pytest.approx(462.137, abs=1e-3)
 
 
 @given(st.floats(0.0, float(TIMES[-1]) - 1e-3))
 def test_speed_is_constant_and_velocity_is_the_rate_of_position(t):
-    x, y, v_x, v_y = reference(t, CORNERS, TIMES, 3)
+    x, y, v_x, v_y = reference(t, CORNERS, TIMES, 3, False)
     assert np.hypot(v_x, v_y) == pytest.approx(4.0)
     h = 1e-6
-    x2, y2, w_x, w_y = reference(t + h, CORNERS, TIMES, 3)
+    x2, y2, w_x, w_y = reference(t + h, CORNERS, TIMES, 3, False)
     if (w_x, w_y) == (v_x, v_y):
         assert (x2 - x, y2 - y) == pytest.approx((v_x * h, v_y * h), abs=1e-9)
 
@@ -32,4 +32,15 @@ def test_speed_is_constant_and_velocity_is_the_rate_of_position(t):
 def test_padding_after_the_last_corner_is_never_reached():
     padded = np.vstack([CORNERS, [[9e9, 9e9]]])
     times = np.append(TIMES, TIMES[-1])
-    assert reference(TIMES[-1] + 1.0, padded, times, 3)[:2] == (1000.0, 1000.0)
+    assert reference(TIMES[-1] + 1.0, padded, times, 3, False)[:2] == (1000.0, 1000.0)
+
+
+@given(st.floats(0.0, 2.0 * float(TIMES[-1])))
+def test_who_passes_the_end_goes_on_as_before_it(t):
+    before, after = (reference(t, CORNERS, TIMES, 3, passes) for passes in (False, True))
+    if t < TIMES[-1]:
+        assert after == before
+        return
+    last = reference(np.nextafter(TIMES[-1], 0.0), CORNERS, TIMES, 3, True)
+    assert after[2:] == last[2:]
+    assert after[:2] == pytest.approx(CORNERS[-1] + (t - TIMES[-1]) * np.array(last[2:]))

@@ -297,7 +297,7 @@ def test_the_trial_of_a_step_has_the_engine_s_equations(munk):
     p = plant(scenario)
     for nu in np.random.default_rng(0).uniform(-5.0, 5.0, (50, 3)):
         products = np.outer(nu, [1.0, *nu, *abs(nu)]).ravel()
-        there = vehicle_checks._resistance(scenario.vehicle) @ products
+        there = vehicle_checks.resistance(scenario.vehicle) @ products
         here = -np.array(vehicle.coriolis(nu, p)) - np.array(vehicle.damping(nu, p))
         np.testing.assert_allclose(there, here, rtol=1e-12, atol=1e-9)
 

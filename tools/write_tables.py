@@ -11,12 +11,16 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
-from uuv_marl.studies.dynamics import acceptance
+from uuv_marl.studies.dynamics import acceptance, sea_trials
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = tuple(ROOT / page for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md"))
+PAGES = tuple(
+    ROOT / page
+    for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md", "docs/sea-trials.md")
+)
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
+TRIALS = sea_trials.read(ROOT / "docs" / "sea-trials.csv")
 
 
 def table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
@@ -98,6 +102,8 @@ TABLES = filled() | {
     "vehicles": rows(acceptance.measures()),
     "figures": rows(acceptance.figures()),
     "stability": rows(acceptance.stability()),
+    "scales": rows(sea_trials.scales()),
+    **{name: rows(sea_trials.table(TRIALS, name)) for name in sea_trials.SCENARIOS},
     "history": table(("version", "what changed"), list(uuv_swarm_v0.HISTORY.items())),
 }
 """The tables by the names of their marks."""

@@ -43,6 +43,7 @@ class Gains(NamedTuple):
 class Apf(Policy):
     """Artificial potential field: a well at l(t), hills at neighbours, and at obstacles weighted by the way to l(t)."""
 
+    wishes_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:

@@ -55,6 +55,8 @@ class BioInspired(Policy):
             obstacle where their positions agree (centres) or follow without a gap (surfaces); its nearest echo counts.
     """
 
+    wishes_force: ClassVar[bool] = True
+
     def __init__(
         self,
         scenario: Scenario,
@@ -79,14 +81,22 @@ class BioInspired(Policy):
 
 
 class BioInspiredPlus(BioInspired):
-    """The same law with feed-forward of the reference's velocity, yaw damping, and tuned gains."""
+    """The same law with feed-forward of the reference's velocity, yaw damping, and tuned gains.
+
+    Args:
+        scenario: gives the vehicle's limits and the percept's layout.
+        num_worlds: first axis of the percepts.
+        gains: those that were tuned by default.
+        tuned_for: a vehicle of the catalogue, in whose scale they were tuned; ``literature_185`` by default.
+    """
 
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
-        super().__init__(
-            scenario, num_worlds, gains=gains or Gains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)
-        )
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, tuned_for: str | None = None
+    ) -> None:
+        name = "bio_inspired_plus" if tuned_for is None else f"bio_inspired_plus.{tuned_for}"
+        super().__init__(scenario, num_worlds, gains=gains or Gains(**tuned(name), feed_forward=FEED_FORWARD))
 
 
 @compiled

@@ -112,6 +112,11 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
         """Full torque of that vehicle [N m]."""
         return float(self.vehicle.get("actuators.max_torque_nm", Policy.full_torque_nm))
 
+    @property
+    def wishes_force(self) -> bool:
+        """Whether its actions are forces, as that vehicle has no rudder."""
+        return self.vehicle.get("actuators.kind") != "rudder"
+
 
 class Layer(NamedTuple):
     """Weight (in, out) and bias (out,)."""

@@ -12,11 +12,28 @@ from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.turning import turning_radius
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
+
+
+TURNS = 8.0
+"""Turning radii at l(t)'s speed, at least, in which a vehicle with a rudder closes a distance that is left. By hand."""
+
+
+def turnable(barrier: Barrier, scenario: Scenario) -> Barrier:
+    """A filter whose rates leave a vehicle with a rudder the way to turn in: speed over ``TURNS`` turning radii."""
+    speed = scenario.trajectory.speed_mps
+    radius = turning_radius(scenario.vehicle, scenario.actuators, speed)  # pyright: ignore[reportArgumentType] - frozen models have a hash
+    if radius == 0.0:
+        return barrier
+    most = speed / (TURNS * radius)
+    return barrier._replace(
+        obstacle_rate=min(barrier.obstacle_rate, most), neighbour_rate=min(barrier.neighbour_rate, most)
+    )
 
 
 class Filtered(Policy):
@@ -28,11 +45,12 @@ class Filtered(Policy):
         barrier: margins and rates of the filter.
     """
 
+    wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = Surroundings
 
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
         super().__init__(scenario, num_worlds)
-        self.barrier = Barrier(*map(float, barrier))
+        self.barrier = turnable(Barrier(*map(float, barrier)), scenario)
         self.model = Model.of(scenario)
         """What vehicles know of themselves."""
         self.gain = velocity_gain(scenario)

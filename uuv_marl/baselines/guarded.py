@@ -3,6 +3,8 @@
 The policy decides. Where the velocity that its action leads to would come too near to something that the vehicle
 remembers, the safe velocity is taken instead that is nearest to what the action asks for: the velocity at which the
 resistance equals its force. Where nothing is near, actions stay as they are, bit for bit.
+
+With a rudder the action is the wished force, whose torque is near enough what the rudder does at cruise speed.
 """
 
 from collections.abc import Sequence
@@ -50,7 +52,7 @@ class Guarded(Filtered):
     def decide(self, percept: Percept) -> Float32:
         """The policy's actions of shape (world, vehicle, 2), changed where they are not safe."""
         self.inner.active = self.active
-        action = self.inner.act(percept)
+        action = self.inner.wish(percept)
         guard_all(
             self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes,
             action,

@@ -62,6 +62,7 @@ class Gains(NamedTuple):
 class OlfatiSaber(Policy):
     """Olfati-Saber's flocking without alignment: lattice, obstacles and navigation, from positions alone."""
 
+    wishes_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
     tuned_as: ClassVar[str] = "olfati_saber"
 

@@ -46,6 +46,7 @@ class Gains(NamedTuple):
 class OrcaInformed(Policy):
     """Reciprocal velocity obstacles: half-planes of velocity from neighbours' velocities and from echoes."""
 
+    wishes_force: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = ("link",)
     yaw_damping_nms: ClassVar[float] = 600.0
 

@@ -1,6 +1,7 @@
 """What a policy is: percepts in, actions out, memory behind ``reset``; and the channels that it needs beyond them."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any, ClassVar, NamedTuple
@@ -8,9 +9,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.rudder import Rudder, steer_by_rudder
+from uuv_marl.baselines.units import Reader
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Clock, Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.scale import Scale
 from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import allocate
@@ -22,29 +26,38 @@ Int64 = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 
+FULL_RUDDER = 0.5
+"""Sine of the angle between bow and wished velocity that asks for the whole rudder at cruise speed [1]. Assumed: 30
+degrees, for which the catalogue's torpedoes need a second or two."""
+
+
 class Limits(NamedTuple):
-    """What a vehicle knows of itself: actuators' limits and surge resistance. SI units."""
+    """What a vehicle knows of itself: actuators' limits and surge resistance. SI units, or those of its scale."""
 
     max_force: float
     max_torque: float
     lever_arm: float
     X_u: float
     X_uu: float
+    helm: float
+    """Sideways force over the sine of the angle to a wished velocity [N] that a rudder makes good; 0 without one."""
 
     @staticmethod
     def of(scenario: Scenario) -> "Limits":
         """Those of a scenario's vehicle."""
         actuators, vehicle = scenario.actuators, scenario.vehicle
+        helm = actuators.max_torque_nm / actuators.lever_arm_m / FULL_RUDDER
         return Limits(
-            actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, vehicle.X_u, vehicle.X_uu
+            actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, vehicle.X_u, vehicle.X_uu,
+            helm if actuators.kind == "rudder" else 0.0,
         )  # fmt: skip
 
 
 def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenario) -> float:
     """The inner loop that a policy gets on a scenario's vehicle [N m s]: what it declares, scaled with full torque.
 
-    So it takes all torque at the same yaw rate, whatever the vehicle. A rudder has no torque of its own, and no such
-    loop: 0.
+    So it takes all torque at the same yaw rate, in the scenario's scale, whatever the vehicle; but it is no stiffer
+    than a loop that stops a yaw rate within one control hold. A rudder has no torque of its own, and no such loop: 0.
 
     Args:
         declared_nms: the policy's ``yaw_damping_nms``.
@@ -52,7 +65,33 @@ def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenari
         scenario: gives the vehicle.
     """
     actuators = scenario.actuators
-    return 0.0 if actuators.kind == "rudder" else declared_nms * (actuators.max_torque_nm / full_torque_nm)
+    if actuators.kind == "rudder":
+        return 0.0
+    alike = declared_nms * (actuators.max_torque_nm / full_torque_nm) * scenario.scale.units.time
+    return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_hold_s)
+
+
+def needs_of(policy: "Policy | type[Policy] | Any", scenario: Scenario) -> list[str]:
+    """What a policy declares and a scenario does not grant, in words: channels, and an inner loop."""
+    has = scenario.sonar.channels
+    missing = [name for name in policy.channels if name not in has and not (name == "link" and "modem" in has)]
+    needs: list[str] = []
+    if missing:
+        needs.append(f"the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)} (sonar.channels)")
+    damping = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
+    if not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
+        needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
+    return needs
+
+
+def need_granted(name: str, policy: "Policy | type[Policy] | Any", scenario: Scenario) -> None:
+    """Raise PolicyError where a scenario does not grant what a policy declares."""
+    needs = needs_of(policy, scenario)
+    if needs:
+        raise PolicyError(
+            f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
+            "use uuv_marl.baselines.granted(policy, scenario), or override these fields"
+        )
 
 
 class Policy:
@@ -79,33 +118,35 @@ class Policy:
     """Inner loop that the policy was designed with [N m s], on a vehicle of ``full_torque_nm``: ``inner_loop_nms``."""
     full_torque_nm: ClassVar[float] = 3000.0
     """Full torque of that vehicle [N m], ``literature_185`` where nothing else is said."""
+    wishes_force: ClassVar[bool] = False
+    """Whether ``decide`` gives a wished force in the body frame, as shares of full thrust and torque
+    (``write_action``). Where the vehicle has a rudder ``act`` then gives thrust and rudder (``steer_by_rudder``); else
+    what ``decide`` gives goes to the actuators as it is."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.name: str = getattr(self, "name", type(self).__name__)
         """By which messages call it."""
         if type(self).act is Policy.act and type(self).decide is Policy.decide:
             raise PolicyError(f"policy {self.name!r} must define decide(percept), or act(percept) if it has no memory")
-        has = scenario.sonar.channels
-        missing = [name for name in self.channels if name not in has and not (name == "link" and "modem" in has)]
-        needs: list[str] = []
-        if missing:
-            needs.append(f"the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)} (sonar.channels)")
-        damping = inner_loop_nms(self.yaw_damping_nms, self.full_torque_nm, scenario)
-        if scenario.actuators.yaw_damping_nms != damping:
-            needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
-        if needs:
+        if scenario.scale != Scale():
             raise PolicyError(
-                f"{self.name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
-                "use uuv_marl.baselines.granted(policy, scenario), or override these fields"
+                f"{self.name} thinks in the paper's units, and scenario {scenario.name!r} is in the scale of "
+                f"{scenario.vehicle.name}; make it with uuv_marl.baselines.make(name, scenario), which converts"
             )
+        need_granted(self.name, self, scenario)
         if num_worlds < 1:
             raise PolicyError(f"num_worlds must be at least 1, got {num_worlds}")
         self.scenario = scenario
         self.num_worlds = num_worlds
         self.layout = PerceptLayout.of(scenario)
-        self.at = self.layout.offsets if "link" in has else self.layout.message_offsets
+        told = "link" in scenario.sonar.channels
+        self.at = self.layout.offsets if told else self.layout.message_offsets
         """Where each field starts in a flat percept; the link's fields are the modem's where only that is granted."""
         self.limits = Limits.of(scenario)
+        self.rudder = Rudder.of(scenario) if self.wishes_force else None
+        """By which wished forces become actions; None where they are actions."""
+        self.reader: Reader | None = None
+        """Takes percepts into the policy's units; None where they are in them. ``make`` sets it."""
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)
         """How often a numerical clamp bound since the reset, shape (world,)."""
         self.active: Bool = np.ones(num_worlds, np.bool_)
@@ -125,7 +166,7 @@ class Policy:
 
     def declare_as(self, other: Any) -> None:
         """Declare what another does: a policy inside, or the card of a training. To be called before ``__init__``."""
-        for name in ("channels", "yaw_damping_nms", "full_torque_nm"):
+        for name in ("channels", "yaw_damping_nms", "full_torque_nm", "wishes_force"):
             setattr(self, name, getattr(other, name))
 
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
@@ -150,16 +191,33 @@ class Policy:
             percept: of shape (world, vehicle, ...).
 
         Returns:
-            Actions of shape (world, vehicle, 2), float32, within the unit disc.
+            Actions of shape (world, vehicle, 2), float32, within the unit disc, or with a rudder within the box.
 
         Raises:
             PolicyError: the percept is of another swarm; or the policy has a memory and was left out of a decision.
         """
-        self.hear(percept)
-        action = self.decide(percept)
+        percept = self.read(percept)
+        action = self.steered(percept, self.wish(percept))
         if self.Memory is not None:
             self.acted(action, self.active)
         return action
+
+    def read(self, percept: Percept) -> Percept:
+        """A percept in the policy's units, as ``hear`` and ``wish`` take it."""
+        return percept if self.reader is None else self.reader.read(percept)
+
+    def wish(self, percept: Percept) -> Float32:
+        """Remember what is perceived, then decide: ``act`` without the way from a wished force to the actuators."""
+        if type(self).decide is Policy.decide:
+            return self.act(percept)
+        self.hear(percept)
+        return self.decide(percept)
+
+    def steered(self, percept: Percept, wish: Float32) -> Float32:
+        """Actions from what ``decide`` gave, shape (world, vehicle, 2), which is overwritten."""
+        if self.rudder is not None:
+            steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, wish)
+        return wish
 
     def hear(self, percept: Percept) -> None:
         """Remember what is perceived: the first half of ``act``, for who looks at ``memory`` before deciding.
@@ -175,7 +233,7 @@ class Policy:
         """Hook: take what these worlds perceive, shape (world,), into ``memory``."""
 
     def decide(self, percept: Percept) -> Float32:
-        """Actions as ``act`` gives them, from the percept and ``memory``, which stay as they are."""
+        """Actions, or wished forces (``wishes_force``), from the percept and ``memory``, which stay as they are."""
         raise NotImplementedError
 
     def acted(self, action: Float32, worlds: Bool) -> None:
@@ -261,12 +319,27 @@ def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
         limits: of the actuators, and the surge resistance.
         out: filled with the shares of full surge force and yaw torque, shape (2,).
     """
-    a_x, a_y = project(f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque)
-    out[0], out[1] = a_x, a_y
+    a_x, a_y = f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque
+    if limits.helm > 0.0:  # thrust takes nothing from a rudder
+        out[0], out[1] = min(max(a_x, -1.0), 1.0), min(max(a_y, -1.0), 1.0)
+    else:
+        a_x, a_y = project(a_x, a_y)
+        out[0], out[1] = a_x, a_y
 
 
 def tuned(name: str) -> Mapping[str, float]:
-    """The best parameters that tuning found for a policy; all its trials are in the CSV file beside it."""
-    text = resources.files("uuv_marl.baselines").joinpath("tuned", f"{name}.json").read_text(encoding="utf-8")
-    data: dict[str, Any] = json.loads(text)
+    """The best parameters that tuning found for a policy; all its trials are in the CSV file beside it.
+
+    Args:
+        name: of the policy; ``POLICY.VEHICLE`` for those that were found in a vehicle's scale.
+
+    Raises:
+        PolicyError: it was not tuned.
+    """
+    folder = resources.files("uuv_marl.baselines").joinpath("tuned")
+    file = folder.joinpath(f"{name}.json")
+    if not file.is_file():
+        known = sorted(each.name.removesuffix(".json") for each in folder.iterdir() if each.name.endswith(".json"))
+        raise PolicyError(f"nobody has tuned {name!r}; there are {', '.join(known)}: uuv-marl tune makes others")
+    data: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return data["best"]

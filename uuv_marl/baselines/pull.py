@@ -25,6 +25,7 @@ class Gains(NamedTuple):
 class Pull(Policy):
     """The velocity of l(t) and a pull to it; neighbours and obstacles are ignored. Meant for ``guarded:pull``."""
 
+    wishes_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:

@@ -18,12 +18,13 @@ from uuv_marl.baselines.floors import Idle, Random
 from uuv_marl.baselines.guarded import Guarded
 from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.orca import OrcaInformed
-from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms
+from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_granted
 from uuv_marl.baselines.pull import Pull
 from uuv_marl.baselines.safety import GUARD, Barrier
 from uuv_marl.baselines.scout import Scout, ScoutPlus
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
+from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.modules import named_object
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
@@ -189,7 +190,7 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
     """
     kind, written = parse(name)
     if isinstance(target, Scenario):
-        return _made(name, kind, target, num_worlds, {**written, **parameters})
+        return _in_units(name, kind, target, num_worlds, {**written, **parameters})
     env: Any = getattr(target, "unwrapped", None)
     if not isinstance(getattr(env, "scenario", None), Scenario):
         raise PolicyError(f"a policy is made for a Scenario (see load_scenario) or our parallel_env, got {target!r}")
@@ -198,7 +199,23 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
             f"{type(env).__name__} has no agents by name; make the policy with make(name, env.scenario, num_worlds) "
             "and call policy.act(env.swarm.percept)"
         )
-    return EnvPolicy(_made(name, kind, env.scenario, 1, {**written, **parameters}), env.possible_agents)
+    return EnvPolicy(_in_units(name, kind, env.scenario, 1, {**written, **parameters}), env.possible_agents)
+
+
+def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
+    """The policy, made for a scenario in the units of its scale, and reading percepts in them. See ``_made``."""
+    reader = Reader.of(scenario)
+    if reader is None:
+        return _made(name, kind, scenario, num_worlds, parameters)
+    need_granted(name, kind, scenario)
+    policy = _made(name, kind, in_own_units(scenario), num_worlds, parameters)
+    if type(policy).act is not Policy.act:
+        raise PolicyError(
+            f"{name} defines act, and scenario {scenario.name!r} is in the scale of {scenario.vehicle.name}, to which "
+            "act converts; define decide in its place"
+        )
+    policy.reader = reader
+    return policy
 
 
 def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:

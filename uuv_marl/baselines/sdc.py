@@ -83,6 +83,7 @@ class Sdc(Policy):
     acts on its own percept. The informed vehicle is the one whose slot is nearest to the lattice's centre.
     """
 
+    wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = Memory
     channels: ClassVar[tuple[str, ...]] = ("compass", "link")
     yaw_damping_nms: ClassVar[float] = 600.0

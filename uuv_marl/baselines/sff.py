@@ -76,6 +76,7 @@ class Memory(NamedTuple):
 class Sff(Policy):
     """Self-organised fission and fusion, neighbours' velocity over the link, the reference's velocity unused."""
 
+    wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = Memory
     channels: ClassVar[tuple[str, ...]] = ("link",)
     tuned_as: ClassVar[str] = "sff"

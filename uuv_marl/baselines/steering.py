@@ -29,7 +29,9 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
     """The action that takes a vehicle towards a wished velocity: resistance made up for, error made good. Eq. 22.
 
     The force lies in the horizontal plane. Its forward part becomes thrust, ahead or astern; its sideways part turns
-    the bow to it by the lever arm, since the vehicle can't push sideways.
+    the bow to it by the lever arm, since the vehicle can't push sideways. With a rudder the sideways part follows the
+    angle between the bow and the wished velocity alone, by its sine: such a hull slips sideways in every turn, and
+    making that good would turn it back.
 
     Args:
         w_x: wished velocity, forward [m/s].
@@ -42,6 +44,9 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
     """
     drag = resistance(math.hypot(w_x, w_y), limits)
     f_x, f_y = drag * w_x + gain * (w_x - u), drag * w_y + gain * (w_y - v)
+    if limits.helm > 0.0:
+        across = w_y / max(math.hypot(w_x, w_y), 1e-9)
+        f_y = limits.helm * (across if w_x > 0.0 else (1.0 if w_y >= 0.0 else -1.0))
     write_action(f_x, f_y, limits, out)
 
 

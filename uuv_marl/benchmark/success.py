@@ -51,7 +51,8 @@ class SuccessRecorder:
         touches = facts.contacts > 0
         self._touched |= active[:, None] & touches
         self._failed |= active[:, None] & facts.lost & ~touches
-        now = active & ~self._judged & (facts.time_s >= swarm.duration_s + GRACE_S - 1e-9)
+        grace = GRACE_S * swarm.scenario.scale.units.time
+        now = active & ~self._judged & (facts.time_s >= swarm.duration_s + grace - 1e-9)
         there = now[:, None] & swarm.state.alive
         self._offset[there] = (swarm.state.eta[:, :, :2] - facts.reference[:, None, :2])[there]
         self._judged |= now
@@ -66,7 +67,7 @@ class SuccessRecorder:
             )
         safe, offset = ~self._touched[world, healthy], self._offset[world, healthy]
         done = np.hypot(*offset.T) <= self._spread
-        centred = bool(np.hypot(*offset.mean(axis=0)) <= CENTRE_M)
+        centred = bool(np.hypot(*offset.mean(axis=0)) <= CENTRE_M * self._swarm.scenario.scale.length)
         return Success(
             success_share=float((safe & done).mean()),
             safe_share=float(safe.mean()),

@@ -18,6 +18,8 @@ TRIALS = 300
 SEEDS = (10_000, 10_001, 10_002, 10_003)
 """Of the tuning range 10,000-99,999; the benchmark never uses them."""
 SCENARIO = "single_obstacle"
+SCALED = "sea_trial"
+"""The same in the scale of a vehicle."""
 _COLLISION_COST_S = 50.0
 _CLEARANCE_COST_S_PER_M = 20.0
 
@@ -56,14 +58,17 @@ SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
 def cost(run: Run, scenario: Scenario) -> float:
     """What tuning minimises for one seed [s]: the task's time; the time limit and more where it fails.
 
-    A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too.
+    A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. On a
+    scenario in a vehicle's scale these seconds and metres are those of its scale.
     """
+    unit = scenario.scale.units
     metrics = run.metrics
     time, clearance = metrics["task_time_s"], metrics["min_obstacle_distance_m"]
     if time is None:
-        time = scenario.time_limit.of(metrics["duration_s"]) + (metrics["centre_error_m"] or 0.0)
+        time = scenario.time_limit.of(metrics["duration_s"])
+        time += (metrics["centre_error_m"] or 0.0) / unit.length * unit.time
     short = 0.0 if clearance is None else max(0.0, scenario.constraints.s_o_m - clearance)
-    return time + _COLLISION_COST_S * metrics["collisions"] + _CLEARANCE_COST_S_PER_M * short
+    return time / unit.time + _COLLISION_COST_S * metrics["collisions"] + _CLEARANCE_COST_S_PER_M * short / unit.length
 
 
 def search(
@@ -112,7 +117,9 @@ def search(
     return study.get_trials(states=(TrialState.COMPLETE,))
 
 
-def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], None]) -> Path:
+def tune(
+    policy: str, output: Path, trials: int, report: Callable[[int, float], None], vehicle: str | None = None
+) -> Path:
     """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
 
     Writes ``output/POLICY.json`` with the best parameters and ``POLICY.csv`` with every trial, and keeps Optuna's
@@ -123,11 +130,16 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
         output: folder of the files.
         trials: to reach in all, those before an interruption included.
         report: called with the number of trials done and the best cost [s].
+        vehicle: on which, in its scale (``sea_trial``); the files are then ``POLICY.VEHICLE.json`` and ``.csv``. None:
+            on ``single_obstacle``.
     """
     import optuna  # noqa: PLC0415 - an extra
 
     space, gains = SPACES[policy]
-    scenario = granted(policy, load_scenario(SCENARIO))
+    where, changes = (SCENARIO, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
+    scenario, name = granted(policy, load_scenario(where, overrides=changes)), policy
+    if vehicle is not None:
+        name = f"{policy}.{vehicle}"
 
     def objective(trial: optuna.Trial) -> float:
         drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.items()}
@@ -137,19 +149,20 @@ def tune(policy: str, output: Path, trials: int, report: Callable[[int, float], 
     def sampler(seed: int) -> optuna.samplers.BaseSampler:
         return optuna.samplers.CmaEsSampler(seed=seed, n_startup_trials=0, warn_independent_sampling=False)
 
-    finished = search(output, policy, trials, objective, sampler, report)
+    finished = search(output, name, trials, objective, sampler, report)
     best = min(finished, key=lambda trial: trial.values)
     result = {
         "policy": policy,
         "objective": "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
-        "scenario": SCENARIO,
+        "scenario": where,
+        **({} if vehicle is None else {"vehicle": vehicle}),
         "seeds": list(SEEDS),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
         "space": {name: r._asdict() for name, r in space.items()},
         "best": best.params,  # in full, as evaluated: four digits of them can be another swarm, with a collision
         "best_cost_s": round(best.values[0], 3),
     }
-    trials_path, path = output / f"{policy}.csv", output / f"{policy}.json"
+    trials_path, path = output / f"{name}.csv", output / f"{name}.json"
     with replacing(trials_path) as partial_path, partial_path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["cost_s", *space])

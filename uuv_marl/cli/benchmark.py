@@ -110,6 +110,7 @@ def tune(
     policy: Annotated[list[str] | None, typer.Option(help="Name; repeat for several. Default: all.")] = None,
     trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
     output: Annotated[Path, typer.Option(help="Folder of the trials.")] = Path("results/tune"),
+    vehicle: Annotated[str | None, typer.Option(help="On which vehicle, in its scale. Default: the paper's.")] = None,
 ) -> None:
     """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
 
@@ -129,5 +130,5 @@ def tune(
             for name in policy or SPACES:
                 line = shown(bar, name, trials)
                 report = lambda done, best, line=line, name=name: line(done, f"{name}: best {best:.1f} s")  # noqa: E731
-                path = search(name, output, trials, report)
+                path = search(name, output, trials, report, vehicle)
                 bar.console.print(f"{path}", highlight=False)

@@ -110,7 +110,8 @@ class Task(NamedTuple):
 
     def settings(self, algorithm: Any) -> Any:
         """The settings of a training with this algorithm."""
-        from uuv_marl.train.training import OVERRIDES, Settings, swarms_of
+        from uuv_marl.train.shaping import overrides_for
+        from uuv_marl.train.training import Settings, swarms_of
 
         size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
         sizes = whole_numbers("--sizes", self.sizes)
@@ -120,7 +121,7 @@ class Task(NamedTuple):
             raise typer.BadParameter(f"--sees must be percept or memory, got {self.sees!r}")
         if self.reward:
             find_modules([self.reward])
-        changes = {**OVERRIDES, **size, **changes_of(self.overrides or [])}
+        changes = overrides_for(self.scenario, {**size, **changes_of(self.overrides or [])})
         return Settings(
             scenario=self.scenario, overrides=changes, sizes=swarms_of(sizes) if sizes else (), reward=self.reward,
             sees=self.sees, seed=self.seed, start=None if self.start is None else str(self.start), algorithm=algorithm,

@@ -18,6 +18,7 @@ from uuv_marl.errors import RewardError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Bool, Facts, Float64, State
 from uuv_marl.sim.compiled import compiled, compiled_parallel
+from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
 
 RewardFunction = Callable[[Swarm], Float64]
@@ -79,7 +80,7 @@ class RewardWeights(NamedTuple):
 def reward_weights(scenario: Scenario) -> RewardWeights:
     """The scenario's weights and lengths."""
     weight, limit, timing = scenario.reward, scenario.constraints, scenario.timing
-    dwell = round(scenario.arrival.dwell_s / timing.control_hold_s)
+    dwell = rules(scenario).dwell_ticks
     return RewardWeights(
         timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
         weight.collision, weight.arrival, limit.s_l_m, limit.s_o_m, limit.s_u_m,

@@ -153,7 +153,7 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
         waypoints=trace["waypoints"],
         obstacles=trace["obstacles"],
         time_s=trace["route_time_s"],
-        reference=_reference(trace["waypoints"], scenario.trajectory.speed_mps, trace["route_time_s"]),
+        reference=_reference(trace["waypoints"], scenario, trace["route_time_s"]),
         position=trace["route_position"],
         heading=trace["route_heading"],
         speed=np.hypot(velocity[:, :, 0], velocity[:, :, 1]),
@@ -215,11 +215,11 @@ def _water(scenario: Scenario, seed: int, time_s: Float32) -> Water | None:
     return Water(drift, swarm.flow_field().eddies)
 
 
-def _reference(waypoints: Float32, speed_mps: float, time_s: Float32) -> Float32:
+def _reference(waypoints: Float32, scenario: Scenario, time_s: Float32) -> Float32:
     """Where l(t) was, shape (time, 2)."""
-    corners = waypoints.astype(np.float64)
-    times = arrival_times(corners, speed_mps)
-    return np.array([reference(t, corners, times, len(corners) - 1)[:2] for t in time_s.tolist()], np.float32)
+    corners, passes = waypoints.astype(np.float64), scenario.arrival.by == "passage"
+    times = arrival_times(corners, scenario.trajectory.speed_mps)
+    return np.array([reference(t, corners, times, len(corners) - 1, passes)[:2] for t in time_s.tolist()], np.float32)
 
 
 def _events(scenario: Scenario, trace: dict[str, Float32], metrics: Metrics) -> list[Event]:

@@ -14,11 +14,14 @@ from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario.documents import File, items, merged, parse
 from uuv_marl.scenario.messages import explain, shown
 from uuv_marl.scenario.overrides import assign
+from uuv_marl.scenario.scale import Scale, in_scale
 from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.vehicle_files import load_vehicle, variant_comments, vehicle_file
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
+_OWN = ("vehicle", "actuators")
+"""What a scenario's scale follows from, so that it is changed before all else."""
 
 
 def scenario_names() -> list[str]:
@@ -40,7 +43,9 @@ def load_scenario(
         num_vehicles: replaces ``swarm.num_vehicles``.
         overrides: ``{"sonar.echo_reports": "surface", "sonar.arrays.bow.range_m": 80.0}``; entries of lists are
             addressed by their name or index. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and lags, and
-            ``{"vehicle": "remus100+munk_on"}`` takes a variant of it.
+            ``{"vehicle": "remus100+munk_on"}`` takes a variant of it. ``{"scale": "vehicle"}`` multiplies lengths,
+            speeds and times by the vehicle's (``uuv_marl.scenario.scale``); what other overrides give is not
+            multiplied.
 
     Raises:
         ScenarioError: names the field, the value and the remedy.
@@ -50,11 +55,16 @@ def load_scenario(
     data: dict[str, Any] = {}
     try:
         data = _data(scenario)
-        for field, value in (overrides or {}).items():
+        changes = {str(field): value for field, value in (overrides or {}).items()}
+        own = {field: changes.pop(field) for field in list(changes) if field.partition(".")[0] in _OWN}
+        for field, value in own.items():
             if field == "vehicle" and isinstance(value, str):
                 data = merged(data, load_vehicle(value))
             else:
-                assign(data, str(field), value)
+                assign(data, field, value)
+        data = _scaled(data, changes)
+        for field, value in changes.items():
+            assign(data, field, value)
         if num_vehicles is not None:
             whole = isinstance(cast(object, num_vehicles), Integral) and not isinstance(num_vehicles, bool)
             assign(data, "swarm.num_vehicles", int(num_vehicles) if whole else num_vehicles)
@@ -65,6 +75,22 @@ def load_scenario(
         raise ScenarioError(
             f"scenario {shown(scenario)} or its overrides are nested too deeply; flatten them"
         ) from None
+
+
+def _scaled(data: dict[str, Any], changes: dict[str, object]) -> dict[str, Any]:
+    """The fields in the vehicle's scale, where a file or an override (which is taken out) says so."""
+    before = data.get("scale", {})
+    wanted = changes.pop("scale") if isinstance(changes.get("scale"), str) else before
+    if not isinstance(wanted, str):
+        return data
+    if wanted != "vehicle":
+        raise ScenarioError(f"scale must be 'vehicle', or a table of fields, got {shown(wanted)}")
+    try:
+        return in_scale(data, Scale.model_validate(before if isinstance(before, dict) else {}))
+    except ValidationError:
+        return {**data, "scale": {}}  # the check of the whole names the field that is wrong
+    except ValueError as error:
+        raise ScenarioError(str(error)) from None
 
 
 def to_toml(scenario: Scenario) -> str:
@@ -159,6 +185,8 @@ def _data(scenario: Any) -> dict[str, Any]:
     path = _find(scenario)
     data: dict[str, Any] = {}
     for file in _layers(path):
+        if isinstance(file.data.get("scale"), str) and isinstance(data.get("scale"), dict):
+            raise ScenarioError(f"{file.path} extends a scenario that is in scale already; leave scale out")
         data = merged(data, file.data)
     data.pop("extends", None)
     return {**data, "name": path.stem}

@@ -11,6 +11,7 @@ from typing import Annotated
 from pydantic import Field
 
 from uuv_marl.scenario import fields, hardware, sea, sections
+from uuv_marl.scenario.scale import Scale
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
 MAX_READINGS = 64
@@ -34,6 +35,8 @@ class Scenario(fields.Section):
     """Where it comes from."""
     version: Annotated[int, fields.within(1, 1_000_000)]
     """Raised by any change of its numbers."""
+    scale: Scale = Scale()
+    """Of its vehicle over the paper's, where the file says ``scale = "vehicle"``."""
     swarm: sections.Swarm
     start: sections.Start
     trajectory: sections.Trajectory

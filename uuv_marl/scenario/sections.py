@@ -5,7 +5,7 @@ A section has fields with ranges, and says what they demand of each other.
 
 import math
 from itertools import pairwise
-from typing import Annotated, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,8 +204,12 @@ class Contact(Section):
 
 
 class Arrival(Section):
-    """When the task is done."""
+    """When the task is done: at rest at the trajectory's end, or in passage, for hulls that can't stop."""
 
+    by: Literal["rest", "passage"] = "rest"
+    """In passage l(t) goes on along the last leg beyond the end. The swarm has arrived once l(t) and its centre have
+    crossed the line through the end across that leg, with every vehicle within ``spread_m`` of where the centre is
+    along the leg. ``radius_m`` and ``dwell_s`` say nothing then."""
     radius_m: Positive
     """The swarm's centre this close to the end of the trajectory, with l(t) at rest there ..."""
     dwell_s: Annotated[float, within(0, 3_600)]

@@ -35,7 +35,7 @@ def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_
     Raises:
         ValueError: names the field, the value and the remedy.
     """
-    inertia = _inertia(vehicle)
+    inertia = inertia_matrix(vehicle)
     if np.linalg.eigvalsh(inertia)[0] <= 0:
         raise ValueError(
             f"vehicle.x_G_m = {vehicle.x_G_m:g} and vehicle.Y_rdot_kgm = {vehicle.Y_rdot_kgm:g} couple sway and yaw so "
@@ -62,7 +62,7 @@ def _terminal(linear: float, quadratic: float, force: float) -> float:
     return 2 * force / (linear + math.sqrt(linear**2 + 4 * quadratic * abs(force))) if force else 0.0
 
 
-def _inertia(p: Vehicle) -> Float64:
+def inertia_matrix(p: Vehicle) -> Float64:
     """The inertia matrix M of Eq. 2, added mass included."""
     m_11, m_22, m_23, m_33 = p.inertia
     return np.array([[m_11, 0, 0], [0, m_22, m_23], [0, m_23, m_33]])
@@ -142,15 +142,12 @@ def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float)
     Raises:
         ValueError: names the field, the value and the remedy.
     """
-    rate = _damping_rate(p, limits, speed_mps)
-
-    def fails(step_s: float) -> bool:
-        return not rate * step_s < RK4_LIMIT or _diverges(p, limits, speed_mps, step_s)  # pyright: ignore[reportArgumentType] - frozen models have a hash
-
     h = timing.integration_step_s
-    if fails(h):
-        shorter = (timing.control_hold_s / 2**k for k in range(1, 16))
-        remedy = next((f"use at most {step:.3g}, or " for step in shorter if step < h and not fails(step)), "")
+    if not can_follow(p, limits, speed_mps, h):
+        shorter = [step for k in range(1, 16) if (step := timing.control_hold_s / 2**k) < h]
+        remedy = next(
+            (f"use at most {step:.3g}, or " for step in shorter if can_follow(p, limits, speed_mps, step)), ""
+        )
         steers = f"max_torque_nm = {limits.max_torque_nm:g}"
         if limits.kind == "rudder":
             steers = f"rudder_max_deg = {limits.rudder_max_deg:g}"
@@ -161,13 +158,20 @@ def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float)
         )
 
 
+def can_follow(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -> bool:
+    """Whether Runge-Kutta can follow the fastest motion with a step [s]. Arguments as for ``check_vehicle``."""
+    if not _damping_rate(p, limits, speed_mps) * step_s < RK4_LIMIT:
+        return False
+    return not _diverges(p, limits, speed_mps, step_s)  # pyright: ignore[reportArgumentType] - frozen models have a hash
+
+
 def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
     """How fast [1/s] damping acts at the largest speeds that full force and torque can hold, or at the start."""
     u = max(top_speed(p, limits), speed_mps)
     r = _terminal(p.N_r, p.N_rr, _most_moment(limits, u))
     sway = [p.Y_v + 2 * p.Y_vv * u - p.Y_uv * u, -p.Y_r - 2 * p.Y_rr * r - p.Y_ur * u]
     yaw = [-p.N_v - p.N_rv * r - 2 * p.N_vv * u - p.N_uv * u, p.N_r + 2 * p.N_rr * r - p.N_ur * u]
-    sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(_inertia(p)[1:, 1:], [sway, yaw]))).max())
+    sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(inertia_matrix(p)[1:, 1:], [sway, yaw]))).max())
     return max(sway_yaw, (p.X_u + 2 * p.X_uu * u) / (p.m_kg - p.X_udot_kg))
 
 
@@ -188,8 +192,8 @@ def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) ->
         speed_mps: the highest surge speed at the start [m/s].
         step_s: the integration step that is tried [s].
     """
-    inverse = np.linalg.inv(_inertia(p))
-    motion = inverse @ _resistance(p)
+    inverse = np.linalg.inv(inertia_matrix(p))
+    motion = inverse @ resistance(p)
     thrust, steer = _pushes(limits)
     fin = np.outer(inverse[:, 1:] @ limits.rudder, np.ones(RUNS))
     push = inverse[:, :1] * thrust[:, None]
@@ -221,7 +225,7 @@ def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) ->
     return False
 
 
-def _resistance(p: Vehicle) -> Float64:
+def resistance(p: Vehicle) -> Float64:
     """-C(nu) nu - D(nu) nu of Eq. 2 as a matrix times the products of (u, v, r) with (1, u, v, r, |u|, |v|, |r|)."""
     m_11, m_22, m_23 = p.inertia[:3] if p.munk_moment else (p.m_kg, p.m_kg, p.m_kg * p.x_G_m)
     force = np.zeros((3, 3, 7))

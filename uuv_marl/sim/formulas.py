@@ -173,10 +173,25 @@ def advance(now: Row, tau: Rows, flow: Row, h: float, p: Plant) -> Row:
     return after([a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k_1, k_2, k_3, k_4, strict=True)], h / 6.0)
 
 
-def reference(t: float, waypoints: Rows, times: Row) -> tuple[float, float, float, float]:
-    """Position and velocity of l(t): constant speed from waypoint to waypoint, then at rest at the last. Eq. 5."""
+def reference(t: float, waypoints: Rows, times: Row, passes: bool) -> tuple[float, float, float, float]:
+    """Position and velocity of l(t): constant speed from waypoint to waypoint, then at rest at the last, or on. Eq. 5.
+
+    Args:
+        t: time since the reset [s].
+        waypoints: corners of the trajectory, north and east [m].
+        times: when l(t) passes them [s].
+        passes: whether it goes on along the last leg beyond the end.
+    """
     for k, (start, end) in enumerate(itertools.pairwise(waypoints)):
-        if t < times[k + 1]:
+        if t < times[k + 1] or (passes and k == len(waypoints) - 2):
             v_x, v_y = ((end[axis] - start[axis]) / (times[k + 1] - times[k]) for axis in range(2))
             return start[0] + v_x * (t - times[k]), start[1] + v_y * (t - times[k]), v_x, v_y
     return waypoints[-1][0], waypoints[-1][1], 0.0, 0.0
+
+
+def passed(x: float, y: float, waypoints: Rows) -> tuple[float, float, bool]:
+    """The point of the last leg, prolonged, that is nearest to a point [m], and whether it lies beyond the end."""
+    (start_x, start_y), (end_x, end_y) = waypoints[-2:]
+    leg_x, leg_y = end_x - start_x, end_y - start_y
+    along = ((x - end_x) * leg_x + (y - end_y) * leg_y) / (leg_x * leg_x + leg_y * leg_y)
+    return end_x + along * leg_x, end_y + along * leg_y, along >= 0.0

@@ -1,5 +1,6 @@
 """A scenario's numbers, as the compiled functions take them: made once, and never changed."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,12 +34,14 @@ class Rules(NamedTuple):
     """Radius of a hull."""
     contact_ends: bool
     """Whether a vehicle that touches something is lost."""
+    passes: bool
+    """Whether the swarm arrives in passage, and l(t) goes on beyond the end (``arrival.by``)."""
     dwell_ticks: int
-    """Control holds that the swarm must rest to have arrived."""
+    """Control holds that the swarm must rest to have arrived; 0 in passage."""
     spread: float
-    """Largest distance of a vehicle from the end for arrival."""
+    """Largest distance of a vehicle from the end for arrival; in passage, from where the centre is along the leg."""
     arrival_radii: NDArray[np.float64]
-    """Of the swarm's centre, the scenario's own first, shape (radius,)."""
+    """Of the swarm's centre, the scenario's own first, which is infinite in passage, shape (radius,)."""
     loss_ticks: NDArray[np.int64]
     """Control hold at whose end each loss happens, shape (loss,)."""
     cell_side: float
@@ -60,7 +63,8 @@ def model(scenario: Scenario) -> Model:
 
 def rules(scenario: Scenario) -> Rules:
     """Clocks, thresholds and losses of a scenario."""
-    timing = scenario.timing
+    timing, arrival = scenario.timing, scenario.arrival
+    passes = arrival.by == "passage"
     return Rules(
         hold_s=timing.control_hold_s,
         step_s=timing.integration_step_s,
@@ -68,9 +72,10 @@ def rules(scenario: Scenario) -> Rules:
         steps=timing.steps_per_hold,
         hull=scenario.contact.hull_radius_m,
         contact_ends=scenario.contact.ends_vehicle,
-        dwell_ticks=round(scenario.arrival.dwell_s / timing.control_hold_s),
-        spread=scenario.arrival.spread_m * growth(scenario.swarm.num_vehicles),
-        arrival_radii=np.array([scenario.arrival.radius_m, *ARRIVAL_RADII_M]),
+        passes=passes,
+        dwell_ticks=0 if passes else round(arrival.dwell_s / timing.control_hold_s),
+        spread=arrival.spread_m * growth(scenario.swarm.num_vehicles),
+        arrival_radii=np.array([math.inf if passes else arrival.radius_m, *ARRIVAL_RADII_M]),
         loss_ticks=loss_ticks(scenario),
         cell_side=_CELL_SPACINGS * scenario.start.spacing_m,
     )

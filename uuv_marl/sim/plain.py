@@ -27,6 +27,7 @@ from uuv_marl.sim.formulas import (
     hypot,
     lagging,
     limited,
+    passed,
     reference,
     to_body,
     to_world,
@@ -206,19 +207,22 @@ class PlainEngine:
                 self.lose_vehicle(w, i)
 
     def check_arrival(self, w: int) -> None:
-        """Where l(t) is and where the swarm's centre; the swarm arrives once it has rested at the end long enough."""
+        """Where l(t) is and where the swarm's centre; the swarm arrives once it has rested long enough, or passed."""
         state, facts, rules, last = self.state, self.facts, self.rules, int(self.course.last[w])
         t = int(state.tick[w]) * rules.hold_s
         times = self.course.times[w, : last + 1].tolist()
-        l_x, l_y, *_ = facts.reference[w] = reference(t, self.course.waypoints[w, : last + 1].tolist(), times)
+        corners = self.course.waypoints[w, : last + 1].tolist()
+        l_x, l_y, *_ = facts.reference[w] = reference(t, corners, times, rules.passes)
         facts.time_s[w], facts.centre[w] = t, math.nan
         places = [(x, y) for x, y, _ in state.eta[w, self.living(w)].tolist()]
         if not places:
             return
         c_x, c_y = facts.centre[w] = middle(places)
-        rests = t >= times[last] and max(hypot(x - l_x, y - l_y) for x, y in places) <= rules.spread
+        at_x, at_y, beyond = passed(c_x, c_y, corners) if rules.passes else (l_x, l_y, True)
+        there = beyond and t >= times[last]
+        whole = max(hypot(x - at_x, y - at_y) for x, y in places) <= rules.spread
         for k, radius in enumerate(rules.arrival_radii):
-            if not (rests and hypot(c_x - l_x, c_y - l_y) <= radius):
+            if not (there and whole and hypot(c_x - at_x, c_y - at_y) <= radius):
                 state.dwell[w, k] = 0
                 continue
             if state.dwell[w, k] == rules.dwell_ticks and math.isnan(facts.arrival_s[w, k]):

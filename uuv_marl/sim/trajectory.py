@@ -1,4 +1,4 @@
-"""The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest at its end."""
+"""The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest at its end, or on beyond it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ def arrival_times(waypoints: Float64, speed: float) -> Float64:
 
 
 @compiled
-def reference(t: float, waypoints: Float64, times: Float64, last: int) -> tuple[float, float, float, float]:
+def reference(
+    t: float, waypoints: Float64, times: Float64, last: int, passes: bool
+) -> tuple[float, float, float, float]:
     """Position [m] and velocity [m/s] of l(t), north and east.
 
     Args:
@@ -23,11 +25,12 @@ def reference(t: float, waypoints: Float64, times: Float64, last: int) -> tuple[
         waypoints: corners of the trajectory, north and east [m], shape (point, 2).
         times: when l(t) passes them [s], shape (point,).
         last: index of the last corner; those beyond it are padding.
+        passes: whether it goes on along the last leg beyond the end, where it else rests (``arrival.by``).
     """
-    if t >= times[last]:
+    if t >= times[last] and not passes:
         return waypoints[last, 0], waypoints[last, 1], 0.0, 0.0
     k = 0
-    while t >= times[k + 1]:
+    while k < last - 1 and t >= times[k + 1]:
         k += 1
     duration = times[k + 1] - times[k]
     v_x = (waypoints[k + 1, 0] - waypoints[k, 0]) / duration

@@ -25,6 +25,7 @@ from uuv_marl.sim.views import fields, sea_fields
 from uuv_marl.sim.workspace import Columns, Workspace
 
 Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 UInt64 = NDArray[np.uint64]
 
@@ -136,27 +137,49 @@ def check_arrival(w: int, world: World, rules: Rules) -> None:
     state, course, facts = world.state, world.course, world.facts
     last = course.last[w]
     t = state.tick[w] * rules.hold_s
-    l_x, l_y, l_vx, l_vy = reference(t, course.waypoints[w], course.times[w], last)
+    l_x, l_y, l_vx, l_vy = reference(t, course.waypoints[w], course.times[w], last, rules.passes)
     facts.time_s[w] = t
     facts.reference[w, 0], facts.reference[w, 1], facts.reference[w, 2], facts.reference[w, 3] = l_x, l_y, l_vx, l_vy
-    x, y, far, num = 0.0, 0.0, 0.0, 0
+    x, y, num = 0.0, 0.0, 0
     for i in range(state.eta.shape[1]):
         if state.alive[w, i]:
             x, y, num = x + state.eta[w, i, 0], y + state.eta[w, i, 1], num + 1
-            far = max(far, math.hypot(state.eta[w, i, 0] - l_x, state.eta[w, i, 1] - l_y))
     if num == 0:
         facts.centre[w] = math.nan
         return
     facts.centre[w, 0], facts.centre[w, 1] = x / num, y / num
-    error = math.hypot(x / num - l_x, y / num - l_y)
-    rests = t >= course.times[w, last] and far <= rules.spread
+    at_x, at_y, there = l_x, l_y, t >= course.times[w, last]
+    if rules.passes:
+        at_x, at_y, beyond = passed(x / num, y / num, course.waypoints[w], last)
+        there = there and beyond
+    far = 0.0
+    for i in range(state.eta.shape[1]):
+        if state.alive[w, i]:
+            far = max(far, math.hypot(state.eta[w, i, 0] - at_x, state.eta[w, i, 1] - at_y))
+    error = math.hypot(x / num - at_x, y / num - at_y)
     for k in range(rules.arrival_radii.shape[0]):
-        if not (rests and error <= rules.arrival_radii[k]):
+        if not (there and far <= rules.spread and error <= rules.arrival_radii[k]):
             state.dwell[w, k] = 0
             continue
         if state.dwell[w, k] == rules.dwell_ticks and math.isnan(facts.arrival_s[w, k]):
             facts.arrival_s[w, k] = t - rules.dwell_ticks * rules.hold_s
         state.dwell[w, k] += 1
+
+
+@compiled_inner
+def passed(x: float, y: float, waypoints: Float64, last: int) -> tuple[float, float, bool]:
+    """The point of the last leg, prolonged, that is nearest to another [m], and whether it lies beyond the end.
+
+    Args:
+        x: the other point, north [m].
+        y: the same, east [m].
+        waypoints: corners of the trajectory, north and east [m], shape (point, 2).
+        last: index of the last corner.
+    """
+    end_x, end_y = waypoints[last, 0], waypoints[last, 1]
+    leg_x, leg_y = end_x - waypoints[last - 1, 0], end_y - waypoints[last - 1, 1]
+    along = ((x - end_x) * leg_x + (y - end_y) * leg_y) / (leg_x * leg_x + leg_y * leg_y)
+    return end_x + along * leg_x, end_y + along * leg_y, along >= 0.0
 
 
 @compiled_inner

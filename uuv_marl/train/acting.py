@@ -125,6 +125,7 @@ class Trims:
 
     def hear(self, percept: Percept) -> None:
         """Remember what is perceived."""
+        self._percept = percept
         self._policy.hear(percept)
 
     def look(self, percept: Percept, features: Float32) -> None:
@@ -134,7 +135,7 @@ class Trims:
 
     def actions(self, output: Float32) -> Float32:
         """Those of the policy, which is told what it did."""
-        action = self._policy.trim(output)
+        action = self._policy.steered(self._percept, self._policy.trim(output))
         self._policy.acted(action, self._policy.active)
         self.changed[...] = self._policy.memory.filtered[:, :, 0]
         return action

@@ -17,7 +17,7 @@ from uuv_marl.train import ppo
 from uuv_marl.train.acting import Sees
 from uuv_marl.train.group import Conditions
 from uuv_marl.train.mappo import Hyperparameters
-from uuv_marl.train.shaping import OVERRIDES, Weights
+from uuv_marl.train.shaping import Weights, overrides_for
 from uuv_marl.train.training import Settings
 
 Algorithm = Literal["mappo", "ppo"]
@@ -98,7 +98,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
         return Settings(
             **taken,
             seed=seed,
-            overrides={**OVERRIDES, **self.overrides},
+            overrides=overrides_for(self.scenario, self.overrides),
             law=Gains(**self.law),
             weights=Weights(**self.weights),
             algorithm=kind(**numbers),

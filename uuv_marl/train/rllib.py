@@ -17,7 +17,7 @@ from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.env import TRAINING_SEEDS
 from uuv_marl.train.folder import Say, opened, quiet
-from uuv_marl.train.shaping import OVERRIDES
+from uuv_marl.train.shaping import OVERRIDES, in_si_units
 
 with extra("distributed", "training with RLlib"):
     import ray  # pyright: ignore[reportMissingImports]
@@ -62,7 +62,7 @@ class Settings:
 
     def load(self) -> Scenario:
         """The scenario that is trained on."""
-        return load_scenario(self.scenario, num_vehicles=self.num_vehicles, overrides=self.overrides)
+        return in_si_units(load_scenario(self.scenario, num_vehicles=self.num_vehicles, overrides=self.overrides))
 
 
 class Record(NamedTuple):

@@ -9,14 +9,43 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uuv_marl.baselines.policy import Policy, inner_loop_nms
+from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.scale import Scale
 from uuv_marl.sim.arrays import Float32, Float64
 from uuv_marl.sim.swarm import Swarm
 
-OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}
-"""What training changes in a scenario: a fifth of the decisions, and an inner loop, as our tuned policies have it, so
-that noise on the torque does not spin a vehicle."""
+_LOOP = "actuators.yaw_damping_nms"
+OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, _LOOP: 600.0}
+"""What training changes in a scenario of the paper's vehicle: a fifth of the decisions, and an inner loop, as our tuned
+policies have it, so that noise on the torque does not spin a vehicle."""
 PRIVILEGED_SIZE = 18
 """Entries that the critic sees beyond the actor's features."""
+
+
+def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]:
+    """What training changes in a scenario: ``OVERRIDES``, with the inner loop of its vehicle, and fields of one's own.
+
+    Args:
+        scenario: name or TOML file.
+        own: go before the others; they may name another vehicle.
+
+    Raises:
+        ScenarioError: the scenario can't be loaded with them.
+    """
+    bare = load_scenario(scenario, overrides={**OVERRIDES, **own, _LOOP: own.get(_LOOP, 0.0)})
+    return {**OVERRIDES, _LOOP: inner_loop_nms(600.0, Policy.full_torque_nm, bare), **own}
+
+
+def in_si_units(scenario: Scenario) -> Scenario:
+    """The scenario. Raises ScenarioError for one in a vehicle's scale, in whose units learners do not read percepts."""
+    if scenario.scale == Scale():
+        return scenario
+    raise ScenarioError(
+        f"scale = 'vehicle' puts scenario {scenario.name!r} into the scale of {scenario.vehicle.name}, which training "
+        "does not know; leave scale out, and set trajectory.speed_mps and start.speed_max_mps"
+    )
 
 
 class Weights(NamedTuple):

@@ -32,7 +32,7 @@ from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
 from uuv_marl.train.group import Conditions, Problem
 from uuv_marl.train.mappo import Hyperparameters, Mappo
-from uuv_marl.train.shaping import OVERRIDES, Weights
+from uuv_marl.train.shaping import OVERRIDES, Weights, in_si_units
 from uuv_marl.train.validation import ValidationResult, validate
 
 with extra("train", "training"):
@@ -123,7 +123,7 @@ class Settings:
 
     def load(self) -> Scenario:
         """The scenario that is trained on."""
-        return load_scenario(self.scenario, overrides=self.overrides)
+        return in_si_units(load_scenario(self.scenario, overrides=self.overrides))
 
     def load_for_validation(self) -> Scenario:
         """The same, with the decision period of its own that the benchmark has."""

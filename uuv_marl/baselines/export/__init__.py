@@ -47,6 +47,9 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
         ResultsError: the file can't be written.
     """
     made = make(policy, granted(policy, scenario))
+    if made.reader is not None or (made.rudder is not None and not isinstance(made, Filtered)):
+        what = "a scenario in a vehicle's scale" if made.reader is not None else "a network's force on a rudder"
+        raise PolicyError(f"policy {policy!r} on {what} has no form in ONNX; export it for a scenario without")
     if isinstance(made, Filtered):
         graph = remembering_nodes(made)
     elif isinstance(made, Learned):

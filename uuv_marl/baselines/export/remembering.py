@@ -20,6 +20,7 @@ from uuv_marl.baselines.learned_law import LearnedLaw
 from uuv_marl.baselines.memory import Surroundings, listen
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.recall import RECALLED, recall
+from uuv_marl.baselines.rudder import steer_by_rudder
 from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Scout, ScoutPlus, decide_all
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
@@ -79,7 +80,8 @@ def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], l
     percept = (Value(g, "row") * policy.layout.scale).double()
     memory = Surroundings(**{name: _array(g, Value(g, f"own_{name}"), shape) for name, shape in kept})
     knows = policy.layout.offsets, _ONE, policy.model, policy.kept_s
-    g.call(listen, _array(g, percept, (size,), single=True), *knows, memory)
+    seen = _array(g, percept, (size,), single=True)
+    g.call(listen, seen, *knows, memory)
     if isinstance(policy, Guarded):
         heads.append(_info("wish", TensorProto.FLOAT, (2,)))
         action = _guarded(g, policy, memory)
@@ -87,6 +89,8 @@ def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], l
         action = _by_law(g, policy, memory)
     else:
         raise PolicyError(f"policy {policy.name!r} has no form in ONNX")
+    if policy.rudder is not None:
+        g.call(steer_by_rudder, seen, policy.layout.offsets, policy.rudder, action)
     g.tensors[cast(Any, memory.action).cells] = g.tensors[action.cells]
     acted = Value(g, g.tensors[action.cells]).single().name
     tails = [_info(acted, TensorProto.FLOAT, (2,))]

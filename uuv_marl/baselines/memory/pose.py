@@ -46,18 +46,20 @@ class Reckoning(NamedTuple):
     surge: float
     """Velocity that thrust gives in that time from rest, over its share [m/s]."""
     yaw: float
-    """Yaw rate that torque gives so [rad/s]."""
+    """Yaw rate that torque gives so, or a rudder at l(t)'s speed [rad/s]."""
 
     @staticmethod
     def of(scenario: Scenario) -> "Reckoning":
         """That of a scenario's vehicle, undisturbed."""
-        timing, still = scenario.timing, np.zeros(3)
+        timing, still, going = scenario.timing, np.zeros(3), np.zeros(3)
+        if scenario.actuators.kind == "rudder":  # which does nothing at rest
+            going[0] = scenario.trajectory.speed_mps
         own = Reckoning(
             plant(scenario), timing.holds_per_decision, timing.steps_per_hold, timing.integration_step_s,
             timing.decision_period_s, 1.0, 1.0,
         )  # fmt: skip
         surge = reckoned(still, np.array([_TENTH, 0.0]), own)[3] / _TENTH
-        return own._replace(surge=surge, yaw=reckoned(still, np.array([0.0, _TENTH]), own)[5] / _TENTH)
+        return own._replace(surge=surge, yaw=reckoned(going, np.array([0.0, _TENTH]), own)[5] / _TENTH)
 
 
 @compiled

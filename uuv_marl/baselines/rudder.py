@@ -1,0 +1,83 @@
+"""From a wished force to thrust and rudder, for hulls that turn by the flow past a fin."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.vehicle_checks import top_speed
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Starts, fields
+
+Float32 = NDArray[np.float32]
+
+STEERAGE = 0.5
+"""Steerage way over cruise speed: a rudder then gives a quarter of its moment. Assumed: few hulls steer slower."""
+
+
+class Rudder(NamedTuple):
+    """What a vehicle with a rudder knows of how it steers. SI units."""
+
+    sideways: float
+    """Newtons to starboard that an action's second number stands for: full torque over the lever arm."""
+    ahead: float
+    """Full thrust ahead."""
+    astern: float
+    """Full thrust astern over that ahead [1]."""
+    lever_arm: float
+    full_moment: float
+    """Yaw moment of the rudder at its limit, over the squared flow [kg]."""
+    steerage: float
+    """Speed below which the rudder has little flow."""
+    holding: float
+    """Thrust that holds that speed, over full thrust [1]."""
+
+    @staticmethod
+    def of(scenario: Scenario) -> "Rudder | None":
+        """That of a scenario's vehicle; None without one."""
+        hull, actuators = scenario.vehicle, scenario.actuators
+        if actuators.kind != "rudder":
+            return None
+        speed = STEERAGE * (hull.cruise_mps or top_speed(hull, actuators))
+        return Rudder(
+            sideways=actuators.max_torque_nm / actuators.lever_arm_m,
+            ahead=actuators.max_force_n,
+            astern=actuators.astern_n / actuators.max_force_n,
+            lever_arm=actuators.lever_arm_m,
+            full_moment=actuators.rudder[1] * math.radians(actuators.rudder_max_deg),
+            steerage=speed,
+            holding=(hull.X_u + hull.X_uu * speed) * speed / actuators.max_force_n,
+        )
+
+
+@compiled
+def steer_by_rudder(flat: Float32, at: Starts, fin: Rudder, action: Float32) -> None:
+    """Turn wished forces into thrust and rudder.
+
+    The wished yaw moment is the force's part to starboard by the lever arm (Eq. 22). Of a force that points astern the
+    whole counts: the bow goes round to it, since the vehicle can't follow it backwards. The rudder's angle is that
+    moment over what the rudder gives at its limit in the present flow, which is taken as no slower than steerage way.
+    Thrust is the force's part ahead, or astern as far as there is thrust astern; below steerage way it is no less than
+    what holds that speed, as a vehicle without flow would not turn at all.
+
+    Args:
+        flat: percepts in physical units, shape (world, vehicle, entry).
+        at: first index of every field in a flat percept.
+        fin: the vehicle's rudder.
+        action: forces as shares of full thrust and torque, shape (world, vehicle, 2); overwritten by shares of full
+            thrust and of the rudder's limit.
+    """
+    see = fields(flat, at)
+    for w in range(action.shape[0]):
+        for i in range(action.shape[1]):
+            f_x, f_y = action[w, i, 0] * fin.ahead, action[w, i, 1] * fin.sideways
+            if f_x < 0.0:
+                f_y = math.hypot(f_x, f_y) * (1.0 if f_y >= 0.0 else -1.0)
+            u = float(see.velocity[w, i, 0])
+            flow = max(u, fin.steerage)
+            share = f_y * fin.lever_arm / (fin.full_moment * flow * flow)
+            thrust = max(float(action[w, i, 0]), -fin.astern)
+            action[w, i, 0] = max(thrust, fin.holding) if u < fin.steerage else thrust
+            action[w, i, 1] = min(max(share, -1.0), 1.0)
