@@ -42,9 +42,7 @@ class Guarded(Filtered):
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: Policy, barrier: Barrier = GUARD) -> None:
         self.inner = inner
         self.name = f"guarded:{inner.name}"
-        self.channels, self.yaw_damping_nms = inner.channels, inner.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
-        self.full_torque_nm = inner.full_torque_nm  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
-        self.wishes_force = inner.wishes_force  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
+        self.declare_as(inner)
         super().__init__(scenario, num_worlds, barrier)
 
     def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:

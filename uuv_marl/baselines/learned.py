@@ -69,9 +69,7 @@ class Learned(Policy):
         self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
-        self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
-        self.full_torque_nm = card.full_torque_nm  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
-        self.wishes_force = card.wishes_force  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
+        self.declare_as(card)
         super().__init__(scenario, num_worlds)
         need_same(self, card, any_vehicle)
         self._features = Features(scenario, card.barrier)

@@ -51,8 +51,7 @@ class LearnedLaw(TrimmedLaw):
         self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
-        self.channels, self.yaw_damping_nms = card.channels, card.yaw_damping_nms  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
-        self.full_torque_nm = card.full_torque_nm  # pyright: ignore[reportAttributeAccessIssue] - an instance's own
+        self.declare_as(card)
         super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety)
         need_same(self, card, any_vehicle)
         self._features = np.zeros((*self._trims.shape[:2], RECALLED), np.float32)

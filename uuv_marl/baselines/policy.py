@@ -164,6 +164,11 @@ class Policy:
         self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
         """What is remembered, the arrays of ``Memory``."""
 
+    def declare_as(self, other: Any) -> None:
+        """Declare what another does: a policy inside, or the card of a training. To be called before ``__init__``."""
+        for name in ("channels", "yaw_damping_nms", "full_torque_nm", "wishes_force"):
+            setattr(self, name, getattr(other, name))
+
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Forget the past of these worlds (default all); world w draws from ``seed + w``, or one seed for each."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)

@@ -14,7 +14,7 @@ from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown
 from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo")
-"""The paper's Table 2, the strongest hand-made law, the strongest learned policy; all others by name."""
+"""The paper's Table 2, the safest hand-made law, the strongest learned policy; all others by name."""
 
 Report = Callable[[str, str, float], None]
 """Called with scenario, policy and the share of that pair's work that is done."""

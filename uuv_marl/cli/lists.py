@@ -56,15 +56,6 @@ def vehicles(
         console.print(table)
 
 
-def _print_toml(text: str) -> None:
-    console.print(
-        Syntax(text, "toml", background_color="default") if console.is_terminal else text,
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
-    )
-
-
 def policies() -> None:
     """List the policies and what they need beyond the percept."""
     from uuv_marl.baselines import POLICIES
@@ -74,3 +65,12 @@ def policies() -> None:
         what = (made.__doc__ or "").strip().splitlines()[0]
         table.add_row(name, ", ".join(made.channels) or "–", f"{made.yaw_damping_nms:g}", what)
     console.print(table)
+
+
+def _print_toml(text: str) -> None:
+    console.print(
+        Syntax(text, "toml", background_color="default") if console.is_terminal else text,
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )

@@ -45,7 +45,7 @@ class Hyperparameters(PPOHyperparameters):
     """Share of that variance which all vehicles of a world have in common, so that what a swarm does together is
     tried: one vehicle alone moves its centre by 1/n. The objective takes each output as if it were drawn alone."""
     noise_kept: float = 0.0
-    """Of the common noise, what is left at the next decision [1]."""
+    """Of noise, what is left at the next decision [1]: what takes seconds to show is tried for seconds."""
     max_gradient: float = 1.0
     value_decay: float = 0.99
     """Of the running mean and variance by which returns are normalised."""
@@ -173,19 +173,14 @@ class Learner:
 
     def _noise(self, env: Environment) -> Iterator[Float32]:
         """Standard normal numbers for the outputs of each decision, shape (row, output); a world's rows share some."""
-        shared, kept = self.by.shared_noise, self.by.noise_kept
-        shape = env.rows, env.outputs
-        if shared == 0.0:
-            while True:
-                yield self._rng.standard_normal(shape, np.float32)
-        common = self._rng.standard_normal((env.world[-1] + 1, env.outputs), np.float32)
+        shared, kept = np.float32(self.by.shared_noise), np.float32(self.by.noise_kept)
+        shapes = [(env.rows, env.outputs)] + [(env.world[-1] + 1, env.outputs)] * bool(shared)
+        noises = [self._rng.standard_normal(shape, np.float32) for shape in shapes]
         while True:
-            drawn = self._rng.standard_normal(shape, np.float32)
-            drawn *= np.float32(math.sqrt(1.0 - shared))
-            drawn += np.float32(math.sqrt(shared)) * common[env.world]
-            yield drawn
-            fresh = self._rng.standard_normal(common.shape, np.float32)
-            common = np.float32(kept) * common + np.float32(math.sqrt(1.0 - kept * kept)) * fresh
+            own, *common = noises
+            yield np.sqrt(1 - shared) * own + np.sqrt(shared) * common[0][env.world] if shared else own
+            fresh = [self._rng.standard_normal(shape, np.float32) for shape in shapes]
+            noises = [kept * old + np.sqrt(1 - kept * kept) * new for old, new in zip(noises, fresh, strict=True)]
 
     def update(self, batch: Rollout, noise: float, learning_rate: float, actor_learns: bool = True) -> Update:
         """Some epochs of PPO on a batch, if the actor learns, and of regression to its returns."""
