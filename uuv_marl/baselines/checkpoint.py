@@ -114,8 +114,8 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
 
     @property
     def wishes_force(self) -> bool:
-        """Whether its actions are forces, as that vehicle has no rudder."""
-        return self.vehicle.get("actuators.kind") != "rudder"
+        """Whether its actions are forces: those of the law that it trims are; else where that vehicle has no rudder."""
+        return self.features == "memory" or self.vehicle.get("actuators.kind") != "rudder"
 
 
 class Layer(NamedTuple):
