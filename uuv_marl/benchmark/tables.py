@@ -50,7 +50,8 @@ class Cells(NamedTuple):
 
 CAPTION = (
     "Interquartile mean over seeds [95 % bootstrap interval]; worst seed; times over the seeds that arrived. "
-    "Arrived is the paper's success: the whole swarm rests at the end, whether it touched anything or not. "
+    "Arrived is the paper's success: the whole swarm rests at the end, or where arrival.by = passage has "
+    "passed it, whether it touched anything or not. "
     "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles, and its time mean. "
     "Within Eq. 7: mean share of the time in which all vehicles are within s_l of l(t), keep s_o from obstacles, "
     "and s_u from each other. "
