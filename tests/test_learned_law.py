@@ -127,7 +127,7 @@ def test_trims_are_bounded_factors_of_a_vehicle_s_own_gains():
 
 def test_trims_by_hand():
     law = Gains(together=0.1, behind_m=1.0)
-    trims = np.array([math.log(2.0), 1.5, math.log(1.5), 0.5, -0.5, 1.0], np.float32)
+    trims = np.array([math.log(2.0), 1.5, math.log(1.5), 0.5, -0.25, 1.0], np.float32)
     wanted = law._replace(pull=0.1, together=0.1 + 1.5 * 0.04, push=15.0, behind_m=2.0, steering=math.exp(-2.0))
     np.testing.assert_allclose(trimmed(law, trims, 1.0, 1.0), wanted, rtol=1e-6)
     np.testing.assert_allclose(trimmed(law, 4.0 * trims, 0.25, 0.25), wanted, rtol=1e-6)
@@ -135,6 +135,8 @@ def test_trims_by_hand():
     assert trimmed(law, -3.0 * trims, 1.0, 0.0).together == 0.0, "and never below none"
     back = trimmed(law, -trims, 1.0, 1.0)
     assert (back.steering, back.push) == (1.0, 10.0), "never harder steering, never weaker pushes"
+    soft = trimmed(law, 3.0 * trims, 1.0, 1.0)
+    assert soft.steering == pytest.approx(math.exp(-3.0)), "and never so soft that a vehicle drifts"
     assert widened(Barrier(), -trims, 1.0) == Barrier(), "never nearer"
     still = np.zeros(TRIMS, np.float32)
     assert trimmed(law, still, 1.0, 1.0) == trimmed(law, trims, 0.0, 0.0) == law

@@ -61,10 +61,10 @@ TRIMS = 6
 neighbours (``widened``)."""
 MOST_TRIM = 3.0
 """They are bounded here [1]. Assumed: a factor of 20 is more than any gain should change."""
-_TRIM_STEERING, _TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 4.0, 0.04, 2.0, 1.0
-"""What 1 does: a factor of e^4 on steering, as a long lag asks for a tenth; and what it adds to ``together`` [1/s], to
-``behind_m`` [m] and to the distance kept from neighbours [m]. Assumed: as much as the pull, the way for which a swarm
-coasts on, and a share of a hull's length."""
+_TRIM_STEERING, _TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 8.0, 0.04, 2.0, 1.0
+"""What 1 does: a factor of e^8 on steering, so that a third asks for the tenth that a long lag needs; and what it adds
+to ``together`` [1/s], to ``behind_m`` [m] and to the distance kept from neighbours [m]. Assumed: as much as the pull,
+the way for which a swarm coasts on, and a share of a hull's length."""
 
 
 class Scout(Filtered):
@@ -132,7 +132,7 @@ class ScoutPlus(Scout):
 def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
     """Gains of one vehicle, changed: pull, push and steering by factors, together and behind_m by sums.
 
-    Steering is never harder than the law's, and pushes are never weaker.
+    Steering is never harder than the law's, nor softer than a twentieth of it; pushes are never weaker.
 
     Args:
         g: the law's.
@@ -140,7 +140,8 @@ def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
         share: of them that counts, 0 to 1.
         lags: of that of steering, 0 to 1.
     """
-    pull, push, steering = share * trims[0], share * max(trims[2], 0.0), lags * _TRIM_STEERING * min(trims[4], 0.0)
+    pull, push = share * trims[0], share * max(trims[2], 0.0)
+    steering = max(lags * _TRIM_STEERING * min(trims[4], 0.0), -MOST_TRIM)
     together, behind_m = share * _TRIM_PER_S * trims[1], share * _TRIM_M * trims[3]
     return Gains(
         g.pull * math.exp(pull), g.push * math.exp(push), g.push_range, g.pull_at_rest, g.push_at_rest,
