@@ -101,6 +101,8 @@ def test_a_recipe_resumes_bit_for_bit(algorithm, tmp_path):
         ({"sizez": "[[4, 2]]"}, "sizez"),
         ({"scenario": '"nowhere"'}, "nowhere"),
         ({"held_s": -1}, "held_s"),
+        ({"ppo": "{ noise = [0.4, 0.2] }"}, "noise"),
+        ({"mappo": "{ noize = [0.4, 0.2] }"}, "noize"),
     ],
 )
 def test_bad_recipes_are_refused_by_name(tmp_path, changes, told):

@@ -101,7 +101,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
             overrides=overrides_for(self.scenario, self.overrides),
             law=Gains(**self.law),
             weights=Weights(**self.weights),
-            algorithm=kind(**numbers),
+            algorithm=pydantic.TypeAdapter(kind).validate_python(vars(kind(**numbers))),
             conditions=self.episodes.draw(self.scenario, seed) if self.episodes else (),
             validation_conditions=self.episodes.draw_validated(self.scenario) if self.episodes else (),
         )
