@@ -71,8 +71,17 @@ def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenari
     return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_hold_s)
 
 
-def needs_of(policy: "Policy | type[Policy] | Any", scenario: Scenario) -> list[str]:
-    """What a policy declares and a scenario does not grant, in words: channels, and an inner loop."""
+def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
+    """Refuse a scenario that does not grant what a policy declares: channels, and an inner loop.
+
+    Args:
+        name: by which the message calls the policy.
+        policy: a policy, its class, or what else declares ``channels``, ``yaw_damping_nms`` and ``full_torque_nm``.
+        scenario: on which it is to run.
+
+    Raises:
+        PolicyError: it lacks some; the message names them and the remedy.
+    """
     has = scenario.sonar.channels
     missing = [name for name in policy.channels if name not in has and not (name == "link" and "modem" in has)]
     needs: list[str] = []
@@ -81,12 +90,6 @@ def needs_of(policy: "Policy | type[Policy] | Any", scenario: Scenario) -> list[
     damping = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
     if not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
         needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
-    return needs
-
-
-def need_granted(name: str, policy: "Policy | type[Policy] | Any", scenario: Scenario) -> None:
-    """Raise PolicyError where a scenario does not grant what a policy declares."""
-    needs = needs_of(policy, scenario)
     if needs:
         raise PolicyError(
             f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "

@@ -173,14 +173,26 @@ class Learner:
 
     def _noise(self, env: Environment) -> Iterator[Float32]:
         """Standard normal numbers for the outputs of each decision, shape (row, output); a world's rows share some."""
-        shared, kept = np.float32(self.by.shared_noise), np.float32(self.by.noise_kept)
-        shapes = [(env.rows, env.outputs)] + [(env.world[-1] + 1, env.outputs)] * bool(shared)
-        noises = [self._rng.standard_normal(shape, np.float32) for shape in shapes]
+        own, shared = self._kept_noise((env.rows, env.outputs)), self.by.shared_noise
+        if shared == 0.0:
+            yield from own
+        common = self._kept_noise((int(env.world[-1]) + 1, env.outputs))
+        for mine, ours in zip(own, common, strict=True):
+            drawn = ours[env.world]
+            drawn *= math.sqrt(shared)
+            drawn += math.sqrt(1.0 - shared) * mine
+            yield drawn
+
+    def _kept_noise(self, shape: tuple[int, int]) -> Iterator[Float32]:
+        """Standard normal numbers of a shape, of which ``noise_kept`` is left at the next decision."""
+        kept = self.by.noise_kept
+        noise = self._rng.standard_normal(shape, np.float32)
         while True:
-            own, *common = noises
-            yield np.sqrt(1 - shared) * own + np.sqrt(shared) * common[0][env.world] if shared else own
-            fresh = [self._rng.standard_normal(shape, np.float32) for shape in shapes]
-            noises = [kept * old + np.sqrt(1 - kept * kept) * new for old, new in zip(noises, fresh, strict=True)]
+            yield noise
+            fresh = self._rng.standard_normal(shape, np.float32)
+            fresh *= math.sqrt(1.0 - kept * kept)
+            fresh += kept * noise
+            noise = fresh
 
     def update(self, batch: Rollout, noise: float, learning_rate: float, actor_learns: bool = True) -> Update:
         """Some epochs of PPO on a batch, if the actor learns, and of regression to its returns."""

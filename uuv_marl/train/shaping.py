@@ -17,7 +17,8 @@ from uuv_marl.sim.arrays import Float32, Float64
 from uuv_marl.sim.swarm import Swarm
 
 _LOOP = "actuators.yaw_damping_nms"
-OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, _LOOP: 600.0}
+_LOOP_NMS = 600.0
+OVERRIDES: Mapping[str, object] = {"timing.decision_period_s": 0.5, _LOOP: _LOOP_NMS}
 """What training changes in a scenario of the paper's vehicle: a fifth of the decisions, and an inner loop, as our tuned
 policies have it, so that noise on the torque does not spin a vehicle."""
 PRIVILEGED_SIZE = 18
@@ -32,10 +33,12 @@ def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]
         own: go before the others; they may name another vehicle.
 
     Raises:
-        ScenarioError: the scenario can't be loaded with them.
+        ScenarioError: the scenario can't be loaded with them, or is in another scale.
     """
-    bare = load_scenario(scenario, overrides={**OVERRIDES, **own, _LOOP: own.get(_LOOP, 0.0)})
-    return {**OVERRIDES, _LOOP: inner_loop_nms(600.0, Policy.full_torque_nm, bare), **own}
+    # Before the decision period, which is no multiple of a hold in another scale, so that the scale is what is named.
+    clock = OVERRIDES if "timing.control_hold_s" in own else {}
+    bare = in_si_units(load_scenario(scenario, overrides={**clock, **own, _LOOP: own.get(_LOOP, 0.0)}))
+    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, Policy.full_torque_nm, bare), **own}
 
 
 def in_si_units(scenario: Scenario) -> Scenario:

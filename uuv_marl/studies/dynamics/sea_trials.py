@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from uuv_marl.atomic import replacing
 from uuv_marl.scenario import load_scenario, load_vehicle, vehicle_names
@@ -21,7 +22,6 @@ POLICIES = (
 )  # fmt: skip
 SEEDS = 20
 _PAPERS = "literature_185"
-_METRICS = ("task_time_s", "duration_s", "collisions", "min_obstacle_distance_m", "min_spacing_m", "effort")
 
 
 class Episode(NamedTuple):
@@ -75,7 +75,7 @@ def run(folder: Path, path: Path, report: Report) -> None:
 def _rows(suite: Suite, case: Case) -> Iterator[list[object]]:
     for row in suite.results(case).select(case.scenario, case.policy, suite.seeds_of(case)):
         metrics: dict[str, Any] = dict(row.metrics)
-        values = [metrics[name] for name in _METRICS]
+        values = [metrics[name] for name in Episode._fields[4:]]
         shown = [f"{value:.6g}" if isinstance(value, float) else value for value in values]
         yield [case.scenario, case.overrides["vehicle"], case.policy, row.seed, *shown]
 
@@ -84,16 +84,7 @@ def read(path: Path) -> list[Episode]:
     """The episodes that ``run`` wrote."""
     with path.open(newline="", encoding="utf-8") as file:
         rows = [{name: text or None for name, text in row.items()} for row in csv.DictReader(file)]
-    return [
-        Episode(**{name: _value(name, text) for name, text in row.items()})  # pyright: ignore[reportArgumentType]
-        for row in rows
-    ]
-
-
-def _value(name: str, text: str | None) -> Any:
-    if text is None or name in ("scenario", "vehicle", "policy"):
-        return text
-    return int(text) if name in ("seed", "collisions") else float(text)
+    return TypeAdapter(list[Episode]).validate_python(rows)
 
 
 def table(episodes: Sequence[Episode], scenario: str) -> list[Sequence[str]]:
