@@ -50,6 +50,8 @@ POLICIES: dict[str, Kind] = {
     "pull": Pull,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
     "ppo": shipped("ppo", "The same, trained by Stable-Baselines3's PPO."),
+    "mappo_v2": shipped("mappo_v2", "Trained by MAPPO: an actor that trims scout_plus from what vehicles remember."),
+    "mappo_v2_seed1": shipped("mappo_v2_seed1", "The same recipe as mappo_v2 with another training seed."),
     "random": Random,
     "idle": Idle,
 }
