@@ -1,12 +1,14 @@
 """Recipes: what they say is what is trained on, in turn; they resume exactly."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
+from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import load_checkpoint
 from uuv_marl.baselines.scout import PLUS
 from uuv_marl.cli import app
@@ -30,8 +32,8 @@ def recipe(path, **changes):
 def test_a_recipe_draws_what_it_says():
     from uuv_marl.train.recipe import load_recipe
 
-    one, other = (load_recipe("memory").settings(seed) for seed in (0, 1))
-    assert one == load_recipe("memory").settings(0)
+    one, other = (load_recipe("mappo_v2").settings(seed) for seed in (0, 1))
+    assert one == load_recipe("mappo_v2").settings(0)
     assert one.conditions != other.conditions
     assert one.validation_conditions == other.validation_conditions
     assert not any("random_field.legs" in changes for changes in one.validation_conditions), "of the set's own length"
@@ -75,7 +77,7 @@ def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
 def test_the_shipped_recipe_trims_the_law_of_scout_plus():
     from uuv_marl.train.recipe import load_recipe
 
-    assert load_recipe("memory").settings(0).law == PLUS
+    assert load_recipe("mappo_v2").settings(0).law == PLUS
 
 
 @pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
@@ -92,6 +94,36 @@ def test_a_recipe_resumes_bit_for_bit(algorithm, tmp_path):
     one, two = (load_checkpoint(tmp_path / name / "best").layers for name in ("whole", "parts"))
     for a, b in zip(one, two, strict=True):
         np.testing.assert_array_equal(a.weight, b.weight)
+
+
+def test_a_recipe_can_choose_the_last_policy(tmp_path):
+    from uuv_marl.train import training as trainings
+    from uuv_marl.train.recipe import load_recipe
+
+    settings = load_recipe(recipe(tmp_path / "r.toml", chosen='"last"', validate_every=1)).settings(0)
+    *_, last = trainings.train(tmp_path / "run", settings)
+    best, end = (load_checkpoint(tmp_path / "run" / name) for name in ("best", f"checkpoints/{last.iteration:06d}"))
+    assert best.card.training["record"]["iteration"] == last.iteration > 1
+    np.testing.assert_array_equal(best.layers[0].weight, end.layers[0].weight)
+
+
+@pytest.mark.parametrize(("seed", "name"), [(0, "mappo_v2"), (1, "mappo_v2_seed1")])
+def test_what_ships_says_that_it_was_trained_by_the_recipe(seed, name):
+    from uuv_marl.train.recipe import load_recipe
+
+    told = json.loads(json.dumps(dataclasses.asdict(load_recipe("mappo_v2").settings(seed))))
+    card = POLICIES[name].checkpoint.card
+    said = {"chosen": "last", **card.training}  # it was chosen by hand what the recipe says since
+    assert {field: said[field] for field in told} == told
+    assert card.law == PLUS
+
+
+def test_the_robustness_page_marks_what_was_trained_with():
+    from uuv_marl.studies.robustness.page import _LEARNED
+    from uuv_marl.train.recipe import load_recipe
+
+    episodes = load_recipe("mappo_v2").episodes
+    assert set(_LEARNED.values()) == {(frozenset(episodes.axes), frozenset(episodes.levels))}
 
 
 @pytest.mark.parametrize(

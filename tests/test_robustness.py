@@ -115,7 +115,7 @@ def test_plans():
     assert len(job.QUICK.axes) == 8
     assert len(job.cells(job.QUICK)) * job.QUICK.seeds == 2 * 3 * 25 * 5
     # 21 axes have three levels, and the shipped policies use neither link nor modem.
-    assert len(job.cells(job.SHIPPED)) == 4 * (1 + 3 * (len(AXES) - 1))
+    assert len(job.cells(job.SHIPPED)) == 6 * (1 + 3 * (len(AXES) - 1))
 
 
 # Scores
@@ -190,6 +190,18 @@ def test_groups_are_means_over_axes_and_all_over_groups():
     assert scores.group_score(own, scores.EVERY).value == pytest.approx(0.8)
     assert scores.group_score(own, "X").value == 0.0
     assert scores.group_score(own, "N") is None
+
+
+def test_policies_are_compared_on_the_cells_and_seeds_that_both_have():
+    import pandas
+
+    mine = table(calm=[1.0] * 7, W1_1=[0.8] * 7, S1_1=[0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 0.0])
+    other = table(calm=[1.0] * 6, W1_1=[0.6] * 6, S1_1=[0.4, 0.5, 0.6, 0.7, 0.8, 0.9], C1_1=[1.0] * 6)
+    both = pandas.concat({"mine": mine.droplevel("policy"), "other": other.droplevel("policy")}, names=["policy"])
+    found = scores.difference(both, "mine", "other", scores.EVERY)
+    assert found.value == pytest.approx(0.15)
+    assert found.high - found.low < 1e-12, "what differs between seeds cancels"
+    assert scores.difference(both, "mine", "other", "X") is None
 
 
 # Job, page, command

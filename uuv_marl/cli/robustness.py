@@ -27,7 +27,7 @@ def robustness(
         list[str] | None,
         typer.Option(
             help="Name, checkpoint or module:Class. Repeat it for several. Default: bio_inspired, bio_inspired_plus "
-            "and mappo; without --quick scout too."
+            "and mappo; without --quick also scout, scout_plus and mappo_v2."
         ),
     ] = None,
     scenario: Annotated[

@@ -84,7 +84,7 @@ Recipe = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE",
-        help="All of a training from a file: scenario, sizes, disturbances, reward and algorithm; memory is one that "
+        help="All of a training from a file: scenario, sizes, disturbances, reward and algorithm; mappo_v2 is one that "
         "comes with the package. Besides it give --seed, --steps, --device, --output and --resume alone.",
     ),
 ]

@@ -83,6 +83,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     steps: int = pydantic.Field(Settings.steps, ge=1)
     held_s: float = pydantic.Field(0.0, ge=0.0, le=10.0)
     change_cost: float = pydantic.Field(0.0, ge=0.0)
+    chosen: Literal["best", "last"] = "best"
     validate_every: int = pydantic.Field(Settings.validate_every, ge=1)
     law: dict[str, float] = {}
     weights: dict[str, float] = {}
@@ -107,7 +108,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
         )
 
 
-_TAKEN = ("scenario", "sees", "sizes", "validation", "steps", "held_s", "change_cost", "validate_every")
+_TAKEN = ("scenario", "sees", "sizes", "validation", "steps", "held_s", "change_cost", "chosen", "validate_every")
 
 
 def recipes() -> Sequence[str]:

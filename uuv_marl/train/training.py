@@ -1,7 +1,7 @@
 """A training from its settings: iterations, validation, TensorBoard, and files from which it goes on exactly.
 
 ``config.json``, ``progress.csv`` and ``checkpoints/`` as ``uuv_marl.train.folder`` keeps them; ``best/``, the policy of
-the best validation; ``tensorboard/``. Needs ``train``.
+the best validation, or of the last one (``Settings.chosen``); ``tensorboard/``. Needs ``train``.
 """
 
 import json
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 import safetensors.numpy
@@ -86,6 +86,8 @@ class Settings:
     output trimming the gains of ``law``, inside the safety filter."""
     change_cost: float = 0.0
     """With memory: paid for each 0.5 s in which the filter changed a vehicle's action."""
+    chosen: Literal["best", "last"] = "best"
+    """Whose policy ``best`` holds: that of the best validation, or of the last one."""
     law: Gains = field(default_factory=Gains)
     """With memory: of the hand-made law that the actor trims."""
     held_s: float = 0.0
@@ -301,7 +303,7 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
     result: ValidationResult = validate(
         candidate, settings.load_for_validation(), settings.validation, settings.validation_conditions
     )
-    better = record.best is None or result.score > record.best
+    better = settings.chosen == "last" or record.best is None or result.score > record.best
     record = record._replace(
         seconds=record.seconds + time.perf_counter() - started,
         best=result.score if better else record.best,

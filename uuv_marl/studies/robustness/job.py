@@ -32,7 +32,9 @@ class Plan(NamedTuple):
     """Benchmark seeds 0 to ``seeds - 1``."""
 
 
-SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), ("bio_inspired", "bio_inspired_plus", "scout", "mappo"), 20)
+SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
+    "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "mappo", "mappo_v2",
+), 20)  # fmt: skip
 """Whose report is in docs/robustness."""
 QUICK = SHIPPED._replace(
     axes=("W1", "S4", "S7", "S9", "N1", "A1", "F3", "X"), scenarios=("single_obstacle", "random_field"), seeds=5,

@@ -22,11 +22,18 @@ from uuv_marl.studies.robustness.scores import (
     axis_score,
     by_seed,
     critical_text,
+    difference,
     group_score,
     scored,
 )
 
 _NOTHING = "–"
+_LEARNED: dict[str, tuple[frozenset[str], frozenset[int]]] = {
+    name: (frozenset(("W1", "W2", "W3", "S1", "S2", "S3", "S5", "S7", "S8", "S9", "A1", "A2")), frozenset((1, 2, 3)))
+    for name in ("mappo_v2", "mappo_v2_seed1")
+}
+"""Axes and levels that a learned policy was trained with; all others were tuned or trained in still water."""
+_TRAINED_WITH = "A star: trained with it."
 
 
 def write_report(folder: Path) -> list[Path]:
@@ -91,12 +98,14 @@ def _scenario(name: str, episodes: Any, table: Any) -> str:
     parts = (
         ("Scores", "Mean success over the levels that were run. `all`: the mean over the groups, without X.",
          _groups(policies)),
+        ("Who is best", "By how much the highest mean over all groups is above that of each other, paired by seed.",
+         _best(table)),
         ("Axes", f"Mean success over the levels that were run; then what it keeps of level 0's success, where that "
-         f"is at least {WORTH_KEEPING:g}.", _axes(policies)),
+         f"is at least {WORTH_KEEPING:g}. {_TRAINED_WITH}", _axes(policies)),
         ("Critical severity", f"Where success falls below {ENOUGH:g} first, linear between the levels that were run, "
          "in the axis's unit.", _critical(policies)),
         ("Every cell", "Success; in how many episodes the whole swarm succeeded; contacts per episode, those of "
-         "faulty vehicles too.",
+         "faulty vehicles too. " + _TRAINED_WITH,
          _cells(episodes[episodes["scenario"] == name], policies)),
     )  # fmt: skip
     return f"## {name}\n\n" + "\n".join(f"### {title}\n\n{words}\n\n{rows}" for title, words, rows in parts)
@@ -112,12 +121,27 @@ def _groups(policies: dict[str, Any]) -> str:
     return markdown_table(headers, rows)
 
 
+def _best(table: Any) -> str:
+    """The policy that is best over all groups, minus each other."""
+    scores = {name: group_score(own, EVERY) for name, own in table.groupby(level="policy", sort=False)}
+    known = {name: score.value for name, score in scores.items() if score}
+    best = max(known, key=known.__getitem__, default="")
+    rows = [
+        (f"{best} - {name}", *(f"{more:+.3f}" if more else _NOTHING for more in found))
+        for name in known
+        if name != best
+        for found in [[difference(table, best, name, group) for group in (EVERY, "X")]]
+    ]
+    return markdown_table(("policies", EVERY, f"{GROUPS['X']} (X)"), rows) if rows else "There is one policy.\n"
+
+
 def _axes(policies: dict[str, Any]) -> str:
     def cell(own: Any, axis: str) -> str:
         score = axis_score(own, axis)
         if score is None:
             return _NOTHING
-        return f"{score.success:.2f}" + (f"; {score.retention.value:.0%}" if score.retention else "")
+        mark = _mark(own.index.get_level_values("policy")[0], axis, *score.levels)
+        return f"{score.success:.2f}{mark}" + (f"; {score.retention.value:.0%}" if score.retention else "")
 
     return _table(policies, cell)
 
@@ -147,8 +171,16 @@ def _cells(episodes: Any, policies: dict[str, Any]) -> str:
     for axis, level, label in places:
         if any((axis, level, policy) in found for policy in policies):
             cells = [found.get((axis, level, policy)) for policy in policies]
-            rows.append([axis, str(level), label, *(_NOTHING if own is None else _cell(own) for own in cells)])
+            marks = [_mark(policy, axis, level) for policy in policies]
+            texts = (_NOTHING if own is None else _cell(own) + mark for own, mark in zip(cells, marks, strict=True))
+            rows.append([axis, str(level), label, *texts])
     return markdown_table(("axis", "level", "severity", *policies), rows)
+
+
+def _mark(policy: str, axis: str, *levels: int) -> str:
+    """A star where the policy was trained with one of these levels."""
+    axes, known = _LEARNED.get(policy.removeprefix("guarded:"), (frozenset[str](), frozenset[int]()))
+    return "*" if axis in axes and not known.isdisjoint(levels) else ""
 
 
 def _cell(own: Any) -> str:

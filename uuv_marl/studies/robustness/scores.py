@@ -148,19 +148,34 @@ def critical_text(axis: str, score: AxisScore) -> str:
 
 def group_score(table: Any, group: str) -> Score | None:
     """A policy's mean over the axes of a group that were run; ``EVERY``: over the groups but X. None for none."""
-    if group == EVERY:
-        parts = [_group(table, name) for name in dict.fromkeys(axis.group for axis in AXES.values()) if name != "X"]
-    else:
-        parts = [_group(table, group)]
-    found = [part for part in parts if part is not None]
-    if not found:
+    seeds = _group(table, group)
+    return None if seeds is None else scored(seeds[~np.isnan(seeds)])
+
+
+def difference(table: Any, mine: str, other: str, group: str) -> Score | None:
+    """By how much ``group_score`` of one policy is above that of another, on cells and seeds that both have.
+
+    Args:
+        table: of ``by_seed``, for one scenario.
+        mine: name of the first policy.
+        other: name of the second.
+        group: as in ``group_score``.
+    """
+    both = [table.xs(name, level="policy").dropna(axis="columns", how="all") for name in (mine, other)]
+    rows, columns = (both[0].axes[k].intersection(both[1].axes[k]) for k in (0, 1))
+    first, second = (_group(one.loc[rows, columns], group) for one in both)
+    if first is None or second is None:
         return None
-    seeds = np.mean(np.stack(found), axis=0)
-    return scored(seeds[~np.isnan(seeds)])
+    more = first - second
+    return scored(more[~np.isnan(more)])
 
 
 def _group(table: Any, group: str) -> Float64 | None:
-    """Of each seed, NaN where one of its cells is missing."""
+    """The mean over a group's axes for each seed, NaN where one of its cells is missing; ``EVERY`` over the groups."""
+    if group == EVERY:
+        parts = [_group(table, name) for name in dict.fromkeys(axis.group for axis in AXES.values()) if name != "X"]
+        found = [part for part in parts if part is not None]
+        return np.mean(np.stack(found), axis=0) if found else None
     axes = [name for name, axis in AXES.items() if axis.group == group and name in table]
     whole = [table[name].dropna(axis="columns", how="all").to_numpy() for name in axes]
     means = [values.mean(axis=1) for values in whole if values.size]
