@@ -2,13 +2,14 @@
 
 The actor is local and small, so that it runs without torch (``uuv_marl.baselines.learned``). The critic's input adds
 means and extremes over the world (``shaping.privileged_observation``), so that neither depends on how many vehicles
-there are. Action noise is not learned but annealed. One seed gives one training, bit for bit, on one thread.
-Needs ``train``.
+there are. Action noise is not learned but annealed. Actor and critic learn side by side, each on one thread:
+one seed gives one training, bit for bit. Needs ``train``.
 """
 
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -195,26 +196,31 @@ class Learner:
             noise = fresh
 
     def update(self, batch: Rollout, noise: float, learning_rate: float, actor_learns: bool = True) -> Update:
-        """Some epochs of PPO on a batch, if the actor learns, and of regression to its returns."""
+        """Some epochs of PPO on a batch, if the actor learns, and of regression to its returns, side by side."""
         by = self.by
         for optimiser, rate in zip(self._optimisers, (1.0, by.critic_rate), strict=True):
             for group in optimiser.param_groups:
                 group["lr"] = rate * learning_rate
         error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
-        kl = self._improve(batch._replace(advantage=_standard(batch.advantage)), noise) if actor_learns else 0.0
-        self._regress(batch.observation, batch.returns)
+        rows = len(batch.observation)  # orders are drawn before the threads part: a seed fixes a training
+        actors, critics = (self._orders(rows, epochs) for epochs in (by.actor_epochs * actor_learns, by.critic_epochs))
+        with ThreadPoolExecutor(1) as beside:
+            regression = beside.submit(self._regress, batch.observation, batch.returns, critics)
+            standard = batch._replace(advantage=_standard(batch.advantage))
+            kl = self._improve(standard, noise, actors) if actor_learns else 0.0
+            regression.result()
         self._updates += 1
         fresh = max(1.0 - by.average, 10.0 / (9.0 + self._updates))  # about the last tenth at first
         for mean, now in zip(self._average, self.actor.parameters(), strict=True):
             mean.lerp_(now.detach(), fresh)
         return Update(kl, 1.0 - error)
 
-    def _improve(self, batch: Rollout, noise: float) -> float:
+    def _improve(self, batch: Rollout, noise: float, orders: Sequence[Tensor]) -> float:
         """PPO's clipped objective; the last divergence measured."""
         by, kl = self.by, 0.0
         features = batch.observation[:, : self._features].contiguous()
-        for rows in self._minibatches(len(batch.observation), by.actor_epochs):
+        for rows in self._minibatches(orders):
             old, action = batch.mean[rows], batch.action[rows]
             new = self.actor(features.index_select(0, rows))
             log_ratio = ((action - old).square() - (action - new).square()).sum(-1) / (2.0 * noise * noise)
@@ -226,10 +232,10 @@ class Learner:
             self._descend(0, self.actor, -torch.minimum(ratio * advantage, clipped * advantage).mean())
         return kl
 
-    def _regress(self, observation: Tensor, returns: Tensor) -> None:
+    def _regress(self, observation: Tensor, returns: Tensor, orders: Sequence[Tensor]) -> None:
         mean, std = self._scale()
         target = (returns - mean) / std
-        for rows in self._minibatches(len(observation), self.by.critic_epochs):
+        for rows in self._minibatches(orders):
             loss = (self.critic(observation.index_select(0, rows)).squeeze(-1) - target[rows]).square().mean()
             self._descend(1, self.critic, loss)
 
@@ -239,9 +245,12 @@ class Learner:
         nn.utils.clip_grad_norm_(net.parameters(), self.by.max_gradient)
         self._optimisers[k].step()
 
-    def _minibatches(self, rows: int, epochs: int) -> Iterator[Tensor]:
-        for _ in range(epochs):
-            order = torch.from_numpy(self._rng.permutation(rows)).to(self._device)
+    def _orders(self, rows: int, epochs: int) -> list[Tensor]:
+        """The order of rows in each epoch."""
+        return [torch.from_numpy(self._rng.permutation(rows)).to(self._device) for _ in range(epochs)]
+
+    def _minibatches(self, orders: Sequence[Tensor]) -> Iterator[Tensor]:
+        for order in orders:
             yield from order.split(self.by.minibatch)
 
     def _scale(self) -> tuple[float, float]:

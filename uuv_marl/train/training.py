@@ -247,7 +247,7 @@ def train(
     """Train to ``settings.steps``; a record for each iteration.
 
     Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
-    come without the break, bit for bit. Uses one thread of torch.
+    come without the break, bit for bit. Uses two threads of torch: actor and critic learn side by side.
 
     Args:
         output: a new or empty folder, or with ``resume`` that of an earlier training.
