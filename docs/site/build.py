@@ -1,0 +1,33 @@
+"""Build the site into build/site; what follows on the command line goes to Sphinx: build.py -W --keep-going.
+
+Sphinx reads a copy of the pages, so that README.md can be its front page and nothing is written beside the sources.
+"""
+
+import shutil
+import sys
+from pathlib import Path
+
+from sphinx.cmd.build import main
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+COPY = ROOT / "build" / "site-source"
+PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", "LICENSE", "docs", "perf", "examples", "uuv_marl")
+
+
+def copy_pages() -> None:
+    """Make the copy anew; files keep their times, so that Sphinx reads again only what changed."""
+    for name in PAGES:
+        new, old = COPY / name, ROOT / name
+        if old.is_dir():
+            shutil.rmtree(new, ignore_errors=True)
+            shutil.copytree(old, new, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            new.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(old, new)
+
+
+if __name__ == "__main__":
+    copy_pages()
+    folders = ["-c", str(HERE), "-d", str(ROOT / "build" / "site-doctrees"), str(COPY), str(ROOT / "build" / "site")]
+    raise SystemExit(main([*sys.argv[1:], *folders]))
