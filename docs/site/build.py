@@ -12,19 +12,18 @@ from sphinx.cmd.build import main
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 COPY = ROOT / "build" / "site-source"
-PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", "LICENSE", "docs", "perf", "examples", "uuv_marl")
+FILES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", "LICENSE")
+FOLDERS = ("docs", "perf", "examples", "uuv_marl")
 
 
 def copy_pages() -> None:
     """Make the copy anew; files keep their times, so that Sphinx reads again only what changed."""
-    for name in PAGES:
-        new, old = COPY / name, ROOT / name
-        if old.is_dir():
-            shutil.rmtree(new, ignore_errors=True)
-            shutil.copytree(old, new, ignore=shutil.ignore_patterns("__pycache__"))
-        else:
-            new.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(old, new)
+    COPY.mkdir(parents=True, exist_ok=True)
+    for name in FILES:
+        shutil.copy2(ROOT / name, COPY / name)
+    for name in FOLDERS:
+        shutil.rmtree(COPY / name, ignore_errors=True)
+        shutil.copytree(ROOT / name, COPY / name, ignore=shutil.ignore_patterns("__pycache__"))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """What the pages need beyond Sphinx: the navigation, pages of the source files that they link to, and index.html."""
 
-import os
 import posixpath
 import shutil
 from collections.abc import Iterator
@@ -27,10 +26,10 @@ def link_sources(app: Sphinx, doctree: nodes.document) -> None:
     """Lead links to source files and folders to pages of this site that show them."""
     docname = app.env.docname
     shown: set[str] = set()
-    links = [*doctree.findall(addnodes.download_reference), *doctree.findall(addnodes.pending_xref)]
-    for link in links:
+    folders = [link for link in doctree.findall(addnodes.pending_xref) if link["reftype"] == "myst"]
+    for link in [*doctree.findall(addnodes.download_reference), *folders]:
         name, path = app.env.relfn2path(link["reftarget"], docname)
-        if not os.path.exists(path) or Path(path).suffix not in LANGUAGES:
+        if not Path(path).exists() or Path(path).suffix not in LANGUAGES:
             continue
         shown.add(name)
         address = posixpath.relpath(f"source/{name}.html", posixpath.dirname(docname) or ".")
