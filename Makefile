@@ -54,7 +54,9 @@ SITE := .venv-docs/bin/python docs/site/build.py
 docs: .venv-docs/docs.stamp
 	$(SITE) $(ARGS)
 
+# From nothing, because Sphinx warns of a page only when it reads it.
 test-docs: .venv-docs/docs.stamp
+	rm -rf build/site build/site-source build/site-doctrees
 	$(SITE) -W --keep-going
 	.venv-docs/bin/python $(PYTEST) tests/site $(ARGS)
 

@@ -25,9 +25,10 @@ exclude_patterns = ["docs/site", "uuv_marl", "examples"]
 
 # The pages are written for a code host; it makes the same anchors of the headings.
 myst_heading_anchors = 6
-# Tutorials run when their text has changed; the others are plain Markdown.
+# Tutorials run, each in an empty folder, when their cells have changed; tests/site runs them always.
 nb_execution_mode = "cache"
-nb_execution_cache_path = str(ROOT / "build" / "site-notebooks")
+nb_execution_cache_path = str(ROOT / "build" / "notebooks")
+nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600
 nb_execution_show_tb = True
@@ -41,7 +42,6 @@ autoapi_keep_files = True
 autoapi_options = ["members", "undoc-members", "show-inheritance", "show-module-summary", "imported-members"]
 autoapi_python_class_content = "class"
 autoapi_member_order = "bysource"
-autodoc_typehints = "signature"
 # Constants that are unpacked from a range are imported by modules that do not show them; a folder may have no page yet.
 suppress_warnings = ["autoapi.python_import_resolution", "toc.empty_glob"]
 
