@@ -9,7 +9,7 @@ HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
 .PHONY: help benchmark reproduce paper test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
-.PHONY: check dist test-attacks perf perf-training clean
+.PHONY: docs test-docs docs-links check dist test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
@@ -17,6 +17,9 @@ help:
 	@echo "make paper                          the same, then the page in docs/paper from it"
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make docs-check                     pages, tables and pictures are those of the code and of the shipped data"
+	@echo "make docs                           the site of these pages and of the code: build/site/index.html"
+	@echo "make test-docs                      the site without a warning, its links, search and width; tutorials run"
+	@echo "make docs-links                     the site's links to other sites, which need the internet"
 	@echo "make test-bounds                    the simulation's tests, every index of compiled code checked"
 	@echo "make test-attacks                   hostile inputs, kills and crash points: docs/reliability.md"
 	@echo "make test-lowest                    tests with the oldest libraries that pyproject.toml allows, without torch"
@@ -45,6 +48,20 @@ tests: .venv/dev.stamp
 
 docs-check: .venv/dev.stamp
 	$(BIN)/python $(PYTEST) $(HALVES) -m docs $(ARGS)
+
+SITE := .venv-docs/bin/python docs/site/build.py
+
+docs: .venv-docs/docs.stamp
+	$(SITE) $(ARGS)
+
+# From nothing, because Sphinx warns of a page only when it reads it.
+test-docs: .venv-docs/docs.stamp
+	rm -rf build/site build/site-source build/site-doctrees
+	$(SITE) -W --keep-going
+	.venv-docs/bin/python $(PYTEST) tests/site $(ARGS)
+
+docs-links: .venv-docs/docs.stamp
+	$(SITE) -b linkcheck $(ARGS)
 
 # On one thread, because an error on a thread that Numba starts is lost; what is compiled so stays out of the user's cache.
 BOUNDED := baselines bounds engines env reward sea sea_modem sea_sonar sonar swarm trajectory vector_env vehicle
@@ -90,7 +107,7 @@ perf-training: .venv/dev.stamp .venv-perf-supersuit/perf-supersuit.stamp .venv-r
 versions: .venv/dev.stamp
 	$(BIN)/python perf/versions.py $(OTHER) $(ARGS)
 
-ENVIRONMENTS := light lowest benchmarl rllib perf-supersuit $(PEERS)
+ENVIRONMENTS := docs light lowest benchmarl rllib perf-supersuit $(PEERS)
 STAMPS := .venv/base.stamp .venv/dev.stamp $(foreach name,$(ENVIRONMENTS),.venv-$(name)/$(name).stamp)
 $(STAMPS): pyproject.toml $(wildcard constraints*.txt) tools/setup_venv.py
 	@command -v "$(PYTHON)" >/dev/null || { echo "There is no '$(PYTHON)' here. Install Python 3.11 or later, or name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }

@@ -107,6 +107,7 @@ async function show({ page, width, height, scheme, steps }) {
 
 const seen = [];
 for (const view of views) seen.push(await show(view));
-await send("Browser.close");
-socket.close();
+const gone = new Promise((closed) => socket.addEventListener("close", closed));
+send("Browser.close"); // it may go without an answer
+await gone;
 console.log(JSON.stringify(seen));

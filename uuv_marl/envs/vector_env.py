@@ -9,20 +9,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.envs.batched_env import (
-    BatchedEnv,
-    Bool,
-    EnvOptions,
-    Float32,
-    Float64,
-    ScenarioLike,
-    StepResult,
-    make_batched_env,
-)
+from uuv_marl.envs.batched_env import BatchedEnv, EnvOptions, ScenarioLike, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
+from uuv_marl.sim.arrays import Bool, Float32, Float64
 
 Infos = dict[str, Any]
 

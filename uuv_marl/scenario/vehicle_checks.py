@@ -226,7 +226,7 @@ def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) ->
 
 
 def resistance(p: Vehicle) -> Float64:
-    """-C(nu) nu - D(nu) nu of Eq. 2 as a matrix times the products of (u, v, r) with (1, u, v, r, |u|, |v|, |r|)."""
+    """-C(nu) nu - D(nu) nu of Eq. 2: a matrix times the products of (u, v, r) with ``(1, u, v, r, |u|, |v|, |r|)``."""
     m_11, m_22, m_23 = p.inertia[:3] if p.munk_moment else (p.m_kg, p.m_kg, p.m_kg * p.x_G_m)
     force = np.zeros((3, 3, 7))
     force[0, 0, [0, 4]], force[0, 1, 3], force[0, 2, 3] = (-p.X_u, -p.X_uu), m_22, m_23

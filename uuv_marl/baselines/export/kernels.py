@@ -1,7 +1,7 @@
 """Compiled functions as ONNX nodes: the source that Numba compiles is read, and every number it computes is a node.
 
 So memory, law and filter have one definition. A branch whose condition is known when the model is written leaves no
-node; other branches become ``If``, loops ``Loop``, and calls are written out. Of
+node; other branches become ``If``, loops ``Loop``, and calls are written out. Of::
 
     def nearest(away, num):
         best, least = -1, math.inf
