@@ -1,5 +1,6 @@
 """The tutorials run from top to bottom, each in a clean folder, and take about as long as they say."""
 
+import itertools
 import os
 import re
 from pathlib import Path
@@ -46,7 +47,7 @@ def test_cells_are_short_and_explained(page):
     shown = [c for c in cells if c.cell_type == "markdown" or "remove-cell" not in c.metadata.get("tags", [])]
     kinds = [cell.cell_type for cell in shown]
     assert kinds[0] == kinds[-1] == "markdown"
-    assert all({one, other} != {"code"} for one, other in zip(kinds, kinds[1:], strict=False))
+    assert all({one, other} != {"code"} for one, other in itertools.pairwise(kinds))
     assert all(len(cell.source.splitlines()) < 30 for cell in cells if cell.cell_type == "code")
 
 
