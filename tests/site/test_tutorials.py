@@ -58,4 +58,4 @@ def test_the_index_states_the_same_times():
 
 
 def test_all_together_are_quick_once_compiled():
-    assert sum(whole - compiling for whole, compiling in map(minutes, PAGES)) < 8.0
+    assert sum(whole - compiling for whole, compiling in map(minutes, PAGES)) < 6.0
