@@ -50,8 +50,9 @@ def verify(
         from uuv_marl.studies.verify import check
 
         rows, others = check.find(files or [])
-        for path in others:
-            console.print(f"{path} holds no episodes; it is left out.", highlight=False, soft_wrap=True)
+        if others:
+            names = ", ".join(sorted({path.name for path in others}))
+            console.print(f"Left out, because they hold no episodes: {names}.", highlight=False)
         found = check.only(rows, only or [], policy or [])
         find_modules(policy or [])
         seed = check.fresh_seed() if seed is None else seed

@@ -15,7 +15,7 @@ from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.benchmark.results import FILE
 from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
 from uuv_marl.studies.heldout.targets import upper_bound
-from uuv_marl.studies.verify.rows import Row, rows_of
+from uuv_marl.studies.verify.rows import NoEpisodesError, Row, rows_of
 
 _HOME = Path("heldout") / "episodes.csv"
 _HINT = (
@@ -54,7 +54,7 @@ def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
         paths: files and folders; empty for the documents of the checkout that holds this package, or of this folder.
 
     Raises:
-        ResultsError: there is nothing.
+        ResultsError: there is nothing, or a file is broken.
     """
     rows: list[Row] = []
     others: list[Path] = []
@@ -65,7 +65,7 @@ def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
         for file in sorted([*path.rglob("*.csv"), *path.rglob(FILE)]):
             try:
                 rows += rows_of(file)
-            except ResultsError:
+            except NoEpisodesError:
                 others.append(file)
     if not rows:
         raise ResultsError(f"{', '.join(map(str, paths))} holds no episodes; give a file such as docs/{_HOME}")
@@ -165,6 +165,8 @@ def summary(verdicts: Sequence[Verdict], rows: int) -> str:
         rows: how many there are to draw from.
     """
     run = [verdict for verdict in verdicts if not verdict.reason]
+    if not verdicts:
+        return "No row was run."
     differ, left = sum(not verdict.agrees for verdict in run), len(verdicts) - len(run)
     words = [f"{len(run) - differ} of {len(run)} rows that were run agree in every digit, {differ} differ."]
     if left:

@@ -18,7 +18,12 @@ from uuv_marl.studies.heldout.sets import SETS
 from uuv_marl.studies.heldout.trainings import find_trainings
 from uuv_marl.studies.robustness import job as robustness
 from uuv_marl.studies.robustness.axes import AXES, CALM
-from uuv_marl.studies.suite import Case
+from uuv_marl.studies.suite import NOTHING, Case
+
+
+class NoEpisodesError(ResultsError):
+    """A table of something else."""
+
 
 Cells = Mapping[str, str]
 """A row by its columns, as it stands in the file."""
@@ -30,7 +35,7 @@ class Source(NamedTuple):
     scenario: Scenario
     """Before it grants what the policy declares."""
     policy: str
-    parameters: Mapping[str, object] = {}
+    parameters: Mapping[str, object] = NOTHING
     """Of the policy."""
 
 
@@ -73,7 +78,7 @@ class Row(NamedTuple):
 
 
 def rows_of(file: Path) -> list[Row]:
-    """All rows of a file. Raises ResultsError where it is no file of episodes."""
+    """All rows of a file. Raises NoEpisodesError where it holds something else, ResultsError where it is broken."""
     if file.name == FILE:
         return list(_of_results(file))
     try:
@@ -85,7 +90,7 @@ def rows_of(file: Path) -> list[Row]:
         raise ResultsError(f"{file} can't be read ({error}); give a file of episodes") from None
     kind = _kinds(file).get(tuple(head))
     if kind is None:
-        raise ResultsError(
+        raise NoEpisodesError(
             f"{file} is no file of episodes, its columns are {', '.join(head) or 'missing'}; give an episodes.csv of "
             f"heldout or robustness, sea-trials.csv, identification.csv or a benchmark's {FILE}"
         )
