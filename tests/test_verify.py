@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import platform
 from pathlib import Path
 
@@ -23,6 +24,12 @@ SAME_BITS = pytest.mark.skipif(
 N10 = {"set": "random_field_n10", "policy": "mappo", "training_seed": "", "seed": "5000"}
 
 
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    """Short paths, so that the table has room."""
+    monkeypatch.chdir(tmp_path)
+
+
 def verify(*words):
     done = CliRunner().invoke(app, ["verify", *map(str, words)])
     return done.exit_code, " ".join(done.output.replace("│", " ").split())
@@ -38,7 +45,7 @@ def copied(folder, name, wanted, **changes):
         writer = csv.DictWriter(file, row, quoting=csv.QUOTE_NONE, lineterminator="\n")
         writer.writeheader()
         writer.writerow(row | changes)
-    return path, row
+    return Path(path.name), row
 
 
 @SAME_BITS
@@ -85,15 +92,16 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
     assert code == 0, output
     assert "2 of 2 rows" in output
     content = json.loads(results.read_text())
-    content["runs"][1]["metrics"]["effort"] += 1e-15
+    true = content["runs"][1]["metrics"]["effort"]
+    content["runs"][1]["metrics"]["effort"] = wrong = math.nextafter(true, 1.0)
     (tmp_path / "results.json").write_text(json.dumps(content))
-    code, output = verify(tmp_path / "results.json")
+    code, output = verify("results.json")
     assert code == 1
-    assert "effort: 0." in output
+    assert f"effort: {wrong} in the file, now {true}" in output
     assert "1 of 2 rows" in output
     content["policies"]["mappo"]["source"] = "0" * 16
     (tmp_path / "results.json").write_text(json.dumps(content))
-    code, output = verify(tmp_path / "results.json")
+    code, output = verify("results.json")
     assert code == 1
     assert "the file of 'mappo' is not the one that was run" in output
     assert "2 more can't be reproduced here" in output
@@ -110,8 +118,7 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
         ({"policy": "guarded:evil:Law"}, "policy 'guarded:evil:Law' is somebody's code"),
     ],
 )
-def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, monkeypatch, changes, reason):
-    monkeypatch.chdir(tmp_path)
+def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, changes, reason):
     (tmp_path / "evil.py").write_text("open('ran', 'w')")
     path, _ = copied(tmp_path, "heldout/episodes.csv", N10, **changes)
     code, output = verify(path)
@@ -173,7 +180,6 @@ def test_ctrl_c_shows_what_was_compared_until_then(monkeypatch):
 
 
 def test_what_is_missing_or_broken_is_explained(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(check.uuv_marl, "__file__", str(tmp_path / "site" / "uuv_marl" / "__init__.py"))
     code, output = verify()
     assert code == 2
@@ -183,7 +189,7 @@ def test_what_is_missing_or_broken_is_explained(tmp_path, monkeypatch):
         tmp_path, "sea-trials.csv", {"vehicle": "lauv", "policy": "mappo", "seed": "0"} | {"scenario": "sea_trial"}
     )
     path.write_text(path.read_text() + "sea_trial,lauv\n")
-    assert "sea-trials.csv:3 has 2 cells under 10 columns" in verify(tmp_path)[1]
+    assert "sea-trials.csv:3 has 2 cells under 10 columns" in verify(".")[1]
     path.write_text("a,b\n1,2\n")
     assert "is no file of episodes, its columns are a, b" in verify(path)[1]
-    assert "holds no episodes; give a file" in verify(tmp_path)[1]
+    assert "holds no episodes; give a file" in verify(".")[1]
