@@ -15,7 +15,8 @@ from uuv_marl.cli import app
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
 README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
-PAGES = [README, CONTRIBUTING, *sorted((ROOT / "docs").rglob("*.md"))]
+POLICY = [ROOT / name for name in ("SECURITY.md", "CODE_OF_CONDUCT.md", "ROADMAP.md")]
+PAGES = [README, CONTRIBUTING, *POLICY, *sorted((ROOT / "docs").rglob("*.md"))]
 ELSEWHERE = {"benchmarl.md", "rllib.md"}
 """Pages whose Python runs in tests/adapters, where their libraries are."""
 
