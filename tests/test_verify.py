@@ -116,8 +116,9 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
         ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),
         ({"training_seed": "3"}, "weights do not ship"),
         ({"seed": "5e3"}, "seed must be a whole number, got '5e3'"),
-        ({"policy": "evil:Law"}, "policy 'evil:Law' is somebody's code"),
-        ({"policy": "guarded:evil:Law"}, "policy 'guarded:evil:Law' is somebody's code"),
+        ({"policy": "evil:Law"}, "policy 'evil:Law' is somebody's file"),
+        ({"policy": "guarded:evil:Law"}, "policy 'guarded:evil:Law' is somebody's file"),
+        ({"policy": "runs/best"}, "policy 'runs/best' is somebody's file"),
     ],
 )
 def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, changes, reason):

@@ -33,7 +33,9 @@ def verify(
     ] = None,
     policy: Annotated[
         list[str] | None,
-        typer.Option(help="Only rows of this policy. Repeat it for several. It also lets a module:Class run."),
+        typer.Option(
+            help="Only rows of this policy. Repeat it for several. It also lets a checkpoint or module:Class run."
+        ),
     ] = None,
 ) -> None:
     """Run shipped episodes again and compare every number with its file, digit by digit.

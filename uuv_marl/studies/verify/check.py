@@ -118,7 +118,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
 
     Args:
         row: to check.
-        allowed: policies whose code may be imported because the reader named them: a file's word alone never runs code.
+        allowed: policies that are no names of the package but may be opened or imported, because the reader named them.
         report: called with the share of the episode that is done.
     """
     try:
@@ -134,8 +134,8 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
 
 def _need_trust(policy: str, allowed: Collection[str]) -> None:
     plain = policy.removeprefix(GUARDED)
-    if ":" in plain and not is_checkpoint(plain) and policy not in allowed:
-        raise PolicyError(f"policy {policy!r} is somebody's code; --policy {policy} runs it, if you trust it")
+    if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
+        raise PolicyError(f"policy {policy!r} is somebody's file; --policy {policy} runs it, if you trust it")
 
 
 def _rerun(row: Row, report: Callable[[float], None]) -> Run:
