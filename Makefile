@@ -9,7 +9,7 @@ HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
 .PHONY: help benchmark reproduce paper test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
-.PHONY: docs test-docs docs-links check dist test-attacks perf perf-training clean
+.PHONY: docs test-docs docs-links check dist test-release test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
@@ -22,6 +22,7 @@ help:
 	@echo "make docs-links                     the site's links to other sites, which need the internet"
 	@echo "make test-bounds                    the simulation's tests, every index of compiled code checked"
 	@echo "make test-attacks                   hostile inputs, kills and crash points: docs/reliability.md"
+	@echo "make test-release                   a wheel, installed into an empty environment, and its commands there"
 	@echo "make test-lowest                    tests with the oldest libraries that pyproject.toml allows, without torch"
 	@echo "make test-light PYTHON=python3.13   tests without torch, on another Python"
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
@@ -44,7 +45,7 @@ paper: reproduce
 test: check tests
 
 tests: .venv/dev.stamp
-	$(BIN)/python $(PYTEST) $(HALVES) -m "not docs" $(ARGS)
+	$(BIN)/python $(PYTEST) $(HALVES) -m "not docs and not release" $(ARGS)
 
 docs-check: .venv/dev.stamp
 	$(BIN)/python $(PYTEST) $(HALVES) -m docs $(ARGS)
@@ -69,6 +70,9 @@ test-bounds: .venv/dev.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
 	$(BIN)/python $(PYTEST) $(HALVES) $(BOUNDED:%=tests/test_%.py) $(ARGS)
 
+test-release: .venv/dev.stamp
+	$(BIN)/python $(PYTEST) -m release tests/test_release.py $(ARGS)
+
 test-attacks: .venv/dev.stamp
 	$(BIN)/python -m tests.attacks $(ARGS)
 
@@ -79,7 +83,7 @@ test-light: .venv-light/light.stamp
 # What is old is deprecated by newer libraries beneath it.
 test-lowest: PYTEST += -W default::DeprecationWarning
 test-lowest test-light: test-%:
-	.venv-$*/bin/python $(PYTEST) $(HALVES) -m "not docs" $(ARGS)
+	.venv-$*/bin/python $(PYTEST) $(HALVES) -m "not docs and not release" $(ARGS)
 
 test-benchmarl: .venv-benchmarl/benchmarl.stamp
 test-rllib: .venv-rllib/rllib.stamp

@@ -15,7 +15,8 @@ from uuv_marl.cli import app
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
 README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
-PAGES = [README, CONTRIBUTING, *sorted((ROOT / "docs").rglob("*.md"))]
+POLICY = [ROOT / name for name in ("SECURITY.md", "CODE_OF_CONDUCT.md", "ROADMAP.md")]
+PAGES = [README, CONTRIBUTING, *POLICY, *sorted((ROOT / "docs").rglob("*.md"))]
 ELSEWHERE = {"benchmarl.md", "rllib.md"}
 """Pages whose Python runs in tests/adapters, where their libraries are."""
 
@@ -77,12 +78,14 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "studies.heldout.job.run",
         "studies.robustness.job.run",
         "studies.robustness.pilot.run",
+        "studies.verify.check.check",
         "replay.record.record",
         "replay.traces.from_folder",
     ):
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.training.train", stop_at_once)
     monkeypatch.chdir(tmp_path)
+    line = line.replace("verify docs/", f"verify {ROOT / 'docs'}/")
     line = re.sub(r"--policy runs/\S+", "--policy mappo", line)  # a reader's own training
     done = CliRunner().invoke(app, line.split()[1:])
     # Ray has an environment of its own; without it a command says so once its options are understood.

@@ -13,9 +13,12 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 from packaging.version import Version
 
 ROOT = Path(__file__).resolve().parent.parent
+MOST_BYTES = 1_500_000
+"""Of a wheel: an installation stays a matter of seconds."""
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
@@ -81,7 +84,7 @@ def test_the_oldest_libraries_that_are_tested_are_the_oldest_that_are_allowed():
 
 @pytest.fixture(scope="module")
 def distributions(tmp_path_factory):
-    """Names in the source distribution and in the wheel, and the text that a package index shows."""
+    """Names in the source distribution, sizes by name in the wheel, and the text that a package index shows."""
     out = tmp_path_factory.mktemp("dist")
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(ROOT)]
     subprocess.run(command, check=True, capture_output=True)
@@ -89,9 +92,9 @@ def distributions(tmp_path_factory):
     with tarfile.open(sdist) as file:
         source = {name.partition("/")[2] for name in file.getnames()}
     with zipfile.ZipFile(wheel) as file:
-        names = set(file.namelist())
-        (metadata,) = (file.read(name).decode() for name in names if name.endswith("/METADATA"))
-    return source, names, email.message_from_string(metadata)
+        sizes = {one.filename: one.compress_size for one in file.infolist()}
+        (metadata,) = (file.read(name).decode() for name in sizes if name.endswith("/METADATA"))
+    return source, sizes, email.message_from_string(metadata)
 
 
 @pytest.mark.needs("build")
@@ -115,6 +118,33 @@ def test_the_wheel_is_the_package_with_its_data_and_nothing_else(distributions):
 
 
 @pytest.mark.needs("build")
+def test_the_wheel_holds_its_data_and_licences_and_is_small(distributions):
+    _, wheel, metadata = distributions
+    for needed in (
+        "scenario/starter.toml", "scenario/vehicles/lauv.toml", "studies/heldout/sets.toml", "py.typed",
+        "baselines/trained/mappo.safetensors", "baselines/tuned/sdc.json", "replay/page/uPlot.iife.min.js",
+    ):  # fmt: skip
+        assert f"uuv_marl/{needed}" in wheel
+    for licence in PROJECT["license-files"]:
+        assert any(name.endswith(f".dist-info/licenses/{licence}") for name in wheel), licence
+    assert metadata.get_all("License-File") == PROJECT["license-files"]
+    assert not [name for name in wheel if "test" in name or name.endswith((".pyc", ".pt", ".pkl", ".nbi", ".log"))]
+    assert sum(wheel.values()) < MOST_BYTES
+
+
+@pytest.mark.needs("build")
+def test_the_metadata_name_pythons_and_extras(distributions):
+    metadata = distributions[2]
+    low, high = (
+        Version(one.version).release[1] for one in sorted(SpecifierSet(PROJECT["requires-python"]), key=str)[::-1]
+    )
+    found = [one.rpartition(" ")[2] for one in metadata.get_all("Classifier") if " :: 3." in one]
+    assert found == [f"3.{minor}" for minor in range(low, high)]
+    assert set(metadata.get_all("Provides-Extra")) == set(PROJECT["optional-dependencies"])
+    assert metadata["License-Expression"] == "MIT"
+
+
+@pytest.mark.needs("build")
 def test_the_page_of_a_package_index_has_no_dead_links(distributions):
     metadata = distributions[2]
     page = metadata.get_payload()
@@ -122,4 +152,18 @@ def test_the_page_of_a_package_index_has_no_dead_links(distributions):
     links = re.findall(r"\]\(([^)]*)\)", page)
     assert links
     assert all(link.startswith(("https:", "#")) for link in links)
-    assert "doi.org" in metadata["Project-URL"]
+    assert any("doi.org" in url for url in metadata.get_all("Project-URL"))
+
+
+@pytest.mark.needs("hatchling")
+def test_with_the_repositorys_address_every_link_and_picture_of_the_page_is_whole():
+    spec = importlib.util.spec_from_file_location("index_page", ROOT / "tools" / "index_page.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    text = (ROOT / "README.md").read_text()
+    whole = module.page(text, "https://example.org/uuv_marl/")
+    for _, target in re.findall(r"(\[[^\]]+)\]\((?!https?:|#)([^)]*)\)", text):
+        kind = "raw" if target.endswith((".gif", ".png")) else "blob"
+        assert f"](https://example.org/uuv_marl/{kind}/HEAD/{target})" in whole
+    assert all(link.startswith(("https:", "#")) for link in re.findall(r"\]\(([^)]*)\)", whole))
+    assert len(whole.splitlines()) == len(text.splitlines())

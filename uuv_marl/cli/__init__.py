@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl import __version__
-from uuv_marl.cli import benchmark, export, lists, replay, robustness, studies, train
+from uuv_marl.cli import benchmark, export, lists, replay, robustness, studies, train, verify
 from uuv_marl.cli.console import console
 
 app = typer.Typer(
@@ -17,8 +17,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
-    benchmark.benchmark, robustness.robustness, replay.replay, studies.heldout, studies.reproduce, lists.scenarios,
-    lists.vehicles, lists.policies, benchmark.tune, export.export, studies.identify,
+    benchmark.benchmark, robustness.robustness, replay.replay, studies.heldout, studies.reproduce, verify.verify,
+    lists.scenarios, lists.vehicles, lists.policies, benchmark.tune, export.export, studies.identify,
 ):  # fmt: skip
     app.command()(command)
 app.add_typer(train.app, name="train")

@@ -4,6 +4,7 @@
 """
 
 import csv
+import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +13,9 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from uuv_marl.atomic import replacing
+from uuv_marl.baselines.actors import Trained
+from uuv_marl.baselines.registry import policy_class
+from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import load_scenario, load_vehicle, vehicle_names
 from uuv_marl.scenario.scale import PAPER_LENGTH_M
 from uuv_marl.studies.suite import Case, Report, Suite
@@ -42,17 +46,15 @@ class Episode(NamedTuple):
     """Mean squared action, share of full force."""
 
 
-def cases(scenario: str, vehicle: str) -> list[Case]:
-    """What is run with a vehicle, a case for each policy. ``mappo`` was trained on ``literature_185`` alone."""
+MEASURED = Episode._fields[4:]
+"""What the simulation gives; the fields before say which episode it is."""
+
+
+def case(scenario: str, vehicle: str, policy: str) -> Case:
+    """A policy with a vehicle. Trained policies may run on vehicles that they were not trained on."""
+    other = {"any_vehicle": True} if vehicle != _PAPERS and isinstance(policy_class(policy), Trained) else {}
     changes = {"vehicle": vehicle, "scale": "vehicle"}
-    other = {"any_vehicle": True} if vehicle != _PAPERS else {}
-    return [
-        Case(
-            f"{scenario}.{vehicle}", scenario, policy, changes, other if policy == "mappo" else {}, range(SEEDS),
-            shared=True,
-        )
-        for policy in POLICIES
-    ]  # fmt: skip
+    return Case(f"{scenario}.{vehicle}", scenario, policy, changes, other, range(SEEDS), shared=True)
 
 
 def run(folder: Path, path: Path, report: Report) -> None:
@@ -64,20 +66,23 @@ def run(folder: Path, path: Path, report: Report) -> None:
         report: called as it goes on.
     """
     suite = Suite(folder, traces=False)
-    every = [case for scenario in SCENARIOS for vehicle in vehicle_names() for case in cases(scenario, vehicle)]
+    every = [case(*place) for place in itertools.product(SCENARIOS, vehicle_names(), POLICIES)]
     suite.run(every, report)
     with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(Episode._fields)
-        table.writerows(row for case in every for row in _rows(suite, case))
+        table.writerows(row for one in every for row in _rows(suite, one))
 
 
-def _rows(suite: Suite, case: Case) -> Iterator[list[object]]:
-    for row in suite.results(case).select(case.scenario, case.policy, suite.seeds_of(case)):
-        metrics: dict[str, Any] = dict(row.metrics)
-        values = [metrics[name] for name in Episode._fields[4:]]
-        shown = [f"{value:.6g}" if isinstance(value, float) else value for value in values]
-        yield [case.scenario, case.overrides["vehicle"], case.policy, row.seed, *shown]
+def _rows(suite: Suite, one: Case) -> Iterator[list[object]]:
+    for row in suite.results(one).select(one.scenario, one.policy, suite.seeds_of(one)):
+        yield [one.scenario, one.overrides["vehicle"], one.policy, row.seed, *written(row.metrics)]
+
+
+def written(metrics: Metrics) -> list[str]:
+    """What stands in the file for what was measured of an episode, six significant digits."""
+    values = [dict[str, Any](metrics)[name] for name in MEASURED]
+    return ["" if v is None else f"{v:.6g}" if isinstance(v, float) else str(v) for v in values]
 
 
 def read(path: Path) -> list[Episode]:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from pydantic import TypeAdapter
 
+from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import Results
 from uuv_marl.studies.heldout.trainings import Trained
 
@@ -83,23 +84,40 @@ def episodes_of(results: Mapping[str, Results], trained: Sequence[Trained]) -> l
     for name, kept in results.items():
         for row in sorted(kept.rows, key=lambda row: (row.policy, row.seed)):
             policy, training_seed = trainings.get(row.policy, (row.policy, None))
-            values: dict[str, Any] = {
-                **row.metrics,
-                "within_eq7": row.metrics["constraint_share"]["all"],
-                "limit_s": kept.scenarios[row.scenario].time_limit.of(row.metrics["duration_s"]),
-            }
-            fields = {field: values[field] for field in Episode._fields if field in values}
-            rows.append(Episode(set=name, policy=policy, training_seed=training_seed, seed=row.seed, **fields))
+            limit_s = kept.scenarios[row.scenario].time_limit.of(row.metrics["duration_s"])
+            rows.append(episode_of(name, policy, training_seed, row.seed, limit_s, row.metrics))
     return rows
 
 
+def episode_of(
+    name: str, policy: str, training_seed: int | None, seed: int, limit_s: float, metrics: Metrics
+) -> Episode:
+    """The row of a run.
+
+    Args:
+        name: of the set.
+        policy: its name.
+        training_seed: of its training; None for a policy that ships.
+        seed: of the run.
+        limit_s: when the episode ends at the latest.
+        metrics: of the run.
+    """
+    values: dict[str, Any] = {**metrics, "within_eq7": metrics["constraint_share"]["all"], "limit_s": limit_s}
+    fields = {field: values[field] for field in Episode._fields if field in values}
+    return Episode(set=name, policy=policy, training_seed=training_seed, seed=seed, **fields)
+
+
+def written(episode: Episode) -> list[str]:
+    """An episode's cells in the file: lengths and times to a millimetre and a millisecond, nothing for None."""
+    return ["" if v is None else f"{v:.3f}" if isinstance(v, float) else str(v) for v in episode]
+
+
 def write_episodes(episodes: Iterable[Episode], path: Path) -> None:
-    """As CSV, lengths and times to a millimetre and a millisecond."""
+    """As CSV, a line for each."""
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(Episode._fields)
-        for episode in episodes:
-            table.writerow(["" if v is None else f"{v:.3f}" if isinstance(v, float) else v for v in episode])
+        table.writerows(map(written, episodes))
 
 
 def read_episodes(path: Path) -> list[Episode]:

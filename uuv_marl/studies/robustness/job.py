@@ -56,15 +56,18 @@ class Cell(NamedTuple):
 def cells(plan: Plan) -> list[Cell]:
     """All that a plan runs, level 0 of each scenario first."""
     return [
-        Cell(axis, level, Case(
-            f"{load_scenario(scenario).name}.{axis}.{level}", scenario, policy, overrides(axis, level, scenario),
-            seeds=range(plan.seeds), shared=True,
-        ))
+        Cell(axis, level, case_of(scenario, axis, level, policy)._replace(seeds=range(plan.seeds)))
         for scenario in plan.scenarios
         for axis, level in _places(plan)
         for policy in plan.policies
         if axis == CALM or AXES[axis].concerns(policy)
     ]  # fmt: skip
+
+
+def case_of(scenario: str, axis: str, level: int, policy: str) -> Case:
+    """A policy on a scenario at one level of an axis."""
+    name = f"{load_scenario(scenario).name}.{axis}.{level}"
+    return Case(name, scenario, policy, overrides(axis, level, scenario), shared=True)
 
 
 def _places(plan: Plan) -> Iterator[tuple[str, int]]:

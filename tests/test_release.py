@@ -1,0 +1,94 @@
+"""A release: the wheel, installed into an empty environment outside the checkout, does what README says there.
+
+``make test-release``: it builds, installs from the package registry, and compiles. The content of the distributions is
+tested in test_setup.py, with every run.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.test_verify import SAME_BITS
+
+pytestmark = [pytest.mark.release, pytest.mark.needs("build"), pytest.mark.needs("twine")]
+ROOT = Path(__file__).resolve().parent.parent
+EPISODES = ROOT / "docs" / "heldout" / "episodes.csv"
+
+
+def run(*command, **options):
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False, timeout=900, **options)
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dist")
+    code, output = run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT)
+    assert code == 0, output
+    return sorted(folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def installed(built, tmp_path_factory):
+    """Runs ``uuv-marl`` of an environment that holds the wheel and what it depends on, in an empty folder."""
+    folder = tmp_path_factory.mktemp("empty")
+    env = folder / "env"
+    assert run(sys.executable, "-m", "venv", "--without-pip", env)[0] == 0
+    scripts = env / ("Scripts" if os.name == "nt" else "bin")
+    (wheel,) = (path for path in built if path.suffix == ".whl")
+    pip = (sys.executable, "-m", "pip", "--python", scripts / "python", "--disable-pip-version-check")
+    code, output = run(*pip, "install", "--quiet", "-c", ROOT / "constraints.txt", wheel)
+    assert code == 0, output
+    work = folder / "work"
+    work.mkdir()
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+
+    def command(*words):
+        return run(scripts / "uuv-marl", *words, cwd=work, env=clean)
+
+    command.folder = work
+    return command
+
+
+def test_package_indexes_take_the_distributions(built):
+    code, output = run(sys.executable, "-m", "twine", "check", "--strict", *built)
+    assert code == 0, output
+    assert output.count("PASSED") == len(built) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--help"], "verify"),
+        (["--version"], "uuv_marl "),
+        (["scenarios"], "starter"),
+        (["scenarios", "--show", "starter"], "num_vehicles = 5"),
+        (["vehicles"], "remus100"),
+        (["policies"], "bio_inspired_plus"),
+        (["benchmark", "--scenario", "starter", "--seeds", "1", "--policy", "mappo", "--output", "out"], "Every seed:"),
+        (["replay", "out", "--output", "episode.html"], "episode.html"),
+        (["verify", "out/results.json"], "1 of 1 rows that were run agree in every digit"),
+    ],
+    ids=lambda value: "_".join(value[:2]) if isinstance(value, list) else "",
+)
+def test_a_command_works_outside_the_checkout(installed, words, says):
+    code, output = installed(*words)
+    assert code == 0, output
+    assert says in output
+
+
+def test_verify_says_that_the_wheel_holds_no_episodes(installed):
+    code, output = installed("verify")
+    assert code == 2
+    assert "the shipped episodes are not here" in " ".join(output.split())
+
+
+@SAME_BITS
+def test_an_installed_package_verifies_the_episodes_of_a_checkout(installed):
+    words = ("--only", "random_field_n10", "--policy", "mappo", "--sample", "1", "--seed", "0")
+    code, output = installed("verify", EPISODES, *words)
+    assert code == 0, output
+    assert "1 of 1 rows that were run agree in every digit" in output

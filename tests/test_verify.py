@@ -1,0 +1,198 @@
+"""``uuv-marl verify``: shipped rows come out again, a changed digit is found, and what can't be run is named."""
+
+import csv
+import json
+import math
+import platform
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from uuv_marl import load_scenario
+from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.runner import run_missing
+from uuv_marl.cli import app
+from uuv_marl.studies.verify import check
+from uuv_marl.studies.verify.check import Verdict
+from uuv_marl.studies.verify.rows import rows_of
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+SAME_BITS = pytest.mark.skipif(
+    platform.machine().lower() not in ("x86_64", "amd64"), reason="files come from an x86-64 processor"
+)
+N10 = {"set": "random_field_n10", "policy": "mappo", "training_seed": "", "seed": "5000"}
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    """Short paths, so that the table has room."""
+    monkeypatch.chdir(tmp_path)
+
+
+def verify(*words):
+    """The exit status, and the output as one line, of its table the last column alone."""
+    done = CliRunner().invoke(app, ["verify", *map(str, words)])
+    lines = (line.split("│")[-2] if "│" in line else line for line in done.output.splitlines())
+    return done.exit_code, " ".join(" ".join(lines).split())
+
+
+def copied(folder, name, wanted, **changes):
+    """A file with the one shipped row that has these cells, some of them changed."""
+    with (DOCS / name).open(newline="") as file:
+        table = csv.DictReader(file)
+        (row,) = (row for row in table if wanted.items() <= row.items())
+    path = folder / Path(name).name
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, row, quoting=csv.QUOTE_NONE, lineterminator="\n")
+        writer.writeheader()
+        writer.writerow(row | changes)
+    return Path(path.name), row
+
+
+@SAME_BITS
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("heldout/episodes.csv", N10),
+        ("robustness/episodes.csv", {"axis": "A1", "level": "3", "policy": "mappo", "seed": "3"}),
+        ("sea-trials.csv", {"scenario": "sea_trial", "vehicle": "lauv", "policy": "mappo", "seed": "4"}),
+    ],
+    ids=["heldout", "robustness", "sea-trials"],
+)
+def test_shipped_rows_come_out_again(tmp_path, name, wanted):
+    path, row = copied(tmp_path, name, wanted)
+    code, output = verify(path)
+    assert code == 0, output
+    assert "agrees (11 numbers)" in output or f"agrees ({len(row) - len(wanted)} numbers)" in output
+    assert "1 of 1 rows that were run agree in every digit, 0 differ." in output
+
+
+@SAME_BITS
+def test_a_changed_digit_is_found_with_field_and_both_values(tmp_path):
+    path, row = copied(tmp_path, "heldout/episodes.csv", N10)
+    true = row["effort"]
+    wrong = true[:-1] + str((int(true[-1]) + 1) % 10)
+    path.write_text(path.read_text().replace(f",{true},", f",{wrong},"))
+    code, output = verify(path)
+    assert code == 1
+    assert f"differs effort: {wrong} in the file, now {true}" in output
+    assert "0 of 1 rows that were run agree in every digit, 1 differ." in output
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("benchmark")
+    overrides = {"time_limit.factor": 0.1, "time_limit.extra_s": 1.0}
+    kept = Results(folder, [load_scenario("starter", overrides=overrides)], traces=False)
+    run_missing(kept, [load_scenario("starter", overrides=overrides)], ["mappo"], [0, 1], lambda *_: None)
+    return folder / "results.json"
+
+
+def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
+    code, output = verify(results.parent)
+    assert code == 0, output
+    assert "2 of 2 rows" in output
+    content = json.loads(results.read_text())
+    true = content["runs"][1]["metrics"]["effort"]
+    content["runs"][1]["metrics"]["effort"] = wrong = math.nextafter(true, 1.0)
+    (tmp_path / "results.json").write_text(json.dumps(content))
+    code, output = verify("results.json")
+    assert code == 1
+    assert f"effort: {wrong} in the file, now {true}" in output
+    assert "1 of 2 rows" in output
+    content["policies"]["mappo"]["source"] = "0" * 16
+    (tmp_path / "results.json").write_text(json.dumps(content))
+    code, output = verify("results.json")
+    assert code == 1
+    assert "the file of 'mappo' is not the one that was run" in output
+    assert "2 more can't be reproduced here" in output
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"policy": "mapo"}, "policy 'mapo' is unknown; did you mean 'mappo'?"),
+        ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),
+        ({"training_seed": "3"}, "weights do not ship"),
+        ({"seed": "5e3"}, "seed must be a whole number, got '5e3'"),
+        ({"policy": "evil:Law"}, "policy 'evil:Law' is somebody's file"),
+        ({"policy": "guarded:evil:Law"}, "policy 'guarded:evil:Law' is somebody's file"),
+        ({"policy": "runs/best"}, "policy 'runs/best' is somebody's file"),
+    ],
+)
+def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, changes, reason):
+    (tmp_path / "evil.py").write_text("open('ran', 'w')")
+    path, _ = copied(tmp_path, "heldout/episodes.csv", N10, **changes)
+    code, output = verify(path)
+    assert code == 1
+    assert f"not reproducible here: {reason}" in output
+    assert "0 of 0 rows that were run agree in every digit, 0 differ. 1 more can't be reproduced here" in output
+    assert not (tmp_path / "ran").exists()
+
+
+def test_an_unknown_level_of_an_axis_is_named(tmp_path):
+    cell = {"axis": "A1", "level": "3", "policy": "mappo", "seed": "0"}
+    path, _ = copied(tmp_path, "robustness/episodes.csv", cell, level="7")
+    assert "there is no level '7' of axis 'A1' in this version" in verify(path)[1]
+
+
+def test_every_kind_of_shipped_row_knows_what_it_is_made_of():
+    """One row of each file for every policy, set, axis, vehicle and parameter set that is named there."""
+    rows, others = check.find([DOCS])
+    assert {path.name for path in others} == {"progress.csv", "critical.csv", "margins.csv", "rest.csv", "pilot.csv"}
+    assert {"heldout", "robustness", "data", "docs"} <= {row.file.parent.name for row in rows}
+    some = {(row.file, key, row.cells[key]): row for row in rows for key in row.kind.keys if key != "seed"}
+    for row in {row.where: row for row in some.values()}.values():
+        assert row.kind.source(row.cells).policy, row.where
+
+
+def test_a_draw_is_fixed_by_its_seed():
+    rows = rows_of(DOCS / "sea-trials.csv")
+    first = check.draw(rows, 24, 7)
+    assert first == check.draw(rows, 24, 7) != check.draw(rows, 24, 8)
+    assert len({row.line for row in first}) == 24
+    assert check.draw(rows, 10**6, 0) == rows
+    assert [row.line for row in rows[:2]] == [2, 3]
+
+
+def test_filters_name_what_there_is():
+    file = DOCS / "sea-trials.csv"
+    code, output = verify(file, "--policy", "scout", "--only", "tracking")
+    assert code == 2
+    assert "no episode has the set or scenario 'tracking'; there are random_field, sea_trial" in output
+    found = check.only(rows_of(file), ["sea_trial"], ["scout"])
+    assert {(row.place, row.cells["policy"]) for row in found} == {("sea_trial", "scout")}
+
+
+def test_ctrl_c_shows_what_was_compared_until_then(monkeypatch):
+    done = []
+
+    def stopped(row, allowed, report):
+        if done:
+            raise KeyboardInterrupt
+        done.append(row)
+        return Verdict(row)
+
+    monkeypatch.setattr(check, "check", stopped)
+    code, output = verify(DOCS / "sea-trials.csv", "--sample", "5", "--seed", "1")
+    assert code == 130
+    assert "5 of 1,280 rows, drawn with --seed 1" in output
+    assert "agrees (6 numbers)" in output
+    assert output.endswith("Stopped after 1 of 5 rows.")
+
+
+def test_what_is_missing_or_broken_is_explained(tmp_path, monkeypatch):
+    monkeypatch.setattr(check.uuv_marl, "__file__", str(tmp_path / "site" / "uuv_marl" / "__init__.py"))
+    code, output = verify()
+    assert code == 2
+    assert "the shipped episodes are not here" in output
+    assert "only in the repository and in the source distribution" in output
+    path, _ = copied(
+        tmp_path, "sea-trials.csv", {"vehicle": "lauv", "policy": "mappo", "seed": "0"} | {"scenario": "sea_trial"}
+    )
+    path.write_text(path.read_text() + "sea_trial,lauv\n")
+    assert "sea-trials.csv:3 has 2 cells under 10 columns" in verify(".")[1]
+    path.write_text("a,b\n1,2\n")
+    assert "is no file of episodes, its columns are a, b" in verify(path)[1]
+    assert "holds no episodes; give a file" in verify(".")[1]
