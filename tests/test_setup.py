@@ -12,6 +12,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.version import Version
@@ -142,6 +143,7 @@ def test_the_metadata_name_pythons_and_extras(distributions):
     assert found == [f"3.{minor}" for minor in range(low, high)]
     assert set(metadata.get_all("Provides-Extra")) == set(PROJECT["optional-dependencies"])
     assert metadata["License-Expression"] == "MIT"
+    assert Metadata.from_email(metadata.as_string(), validate=True).description_content_type == "text/markdown"
 
 
 @pytest.mark.needs("build")

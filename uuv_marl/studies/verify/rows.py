@@ -84,20 +84,20 @@ def rows_of(file: Path) -> list[Row]:
     try:
         with file.open(newline="", encoding="utf-8") as opened:
             table = csv.reader(opened)
-            head = next(table, [])
             lines = [(table.line_num, line) for line in table]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ResultsError(f"{file} can't be read ({error}); give a file of episodes") from None
+    head = lines[0][1] if lines else []
     kind = _kinds(file).get(tuple(head))
     if kind is None:
         raise NoEpisodesError(
             f"{file} is no file of episodes, its columns are {', '.join(head) or 'missing'}; give an episodes.csv of "
             f"heldout or robustness, sea-trials.csv, identification.csv or a benchmark's {FILE}"
         )
-    for number, line in lines:
+    for number, line in lines[1:]:
         if len(line) != len(head):
             raise ResultsError(f"{file}:{number} has {len(line)} cells under {len(head)} columns; mend or remove it")
-    return [Row(file, number, kind, dict(zip(head, line, strict=True))) for number, line in lines]
+    return [Row(file, number, kind, dict(zip(head, line, strict=True))) for number, line in lines[1:]]
 
 
 @cache
@@ -106,8 +106,7 @@ def _kinds(file: Path) -> dict[tuple[str, ...], Kind]:
     kinds = (
         Kind(heldout.Episode._fields[:4], heldout.Episode._fields[4:], partial(_heldout, file), _heldout_written),
         Kind(("scenario", "axis", "level", "policy", "seed"), robustness.METRICS, _robustness, _robustness_written),
-        Kind(("scenario", "vehicle", "policy", "seed"), sea_trials.MEASURED, _sea_trial,
-             lambda _, metrics: sea_trials.written(metrics)),
+        Kind(("scenario", "vehicle", "policy", "seed"), sea_trials.MEASURED, _sea_trial, _sea_trial_written),
         Kind(("parameters", "scenario", "seed"), identify.METRICS, _identified, _identified_written),
     )  # fmt: skip
     return {(*kind.keys, *kind.measured): kind for kind in kinds}
@@ -162,6 +161,10 @@ def _sea_trial(cells: Cells) -> Source:
     return _of(sea_trials.case(cells["scenario"], cells["vehicle"], cells["policy"]))
 
 
+def _sea_trial_written(_: Cells, metrics: Metrics) -> Sequence[str]:
+    return sea_trials.written(metrics)
+
+
 def _identified(cells: Cells) -> Source:
     cases = {(name, case.scenario): case for name, case in identify.SETS}
     case = cases.get((cells["parameters"], cells["scenario"]))
@@ -182,9 +185,12 @@ def _of_results(file: Path) -> Iterator[Row]:
     for number, run in enumerate(content["runs"], start=1):
         keys = {"scenario": run.scenario, "policy": run.policy, "seed": str(run.seed)}
         metrics = _flat(run.metrics)
-        names = tuple(metrics)
-        kind = Kind(tuple(keys), names, source, lambda _, now, names=names: [_flat(now)[name] for name in names])
-        yield Row(file, number, kind, keys | metrics)
+        yield Row(file, number, Kind(tuple(keys), tuple(metrics), source, _benchmarked_written), keys | metrics)
+
+
+def _benchmarked_written(cells: Cells, metrics: Metrics) -> Sequence[str]:
+    now = _flat(metrics)
+    return [now.get(name, "") for name in cells if name not in ("scenario", "policy", "seed")]
 
 
 def _flat(metrics: Metrics) -> dict[str, str]:
