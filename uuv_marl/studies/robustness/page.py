@@ -33,7 +33,6 @@ _LEARNED: dict[str, tuple[frozenset[str], frozenset[int]]] = {
     for name in ("mappo_v2", "mappo_v2_seed1")
 }
 """Axes and levels that a learned policy was trained with; all others were tuned or trained in still water."""
-_TRAINED_WITH = "A star: trained with it."
 
 
 def write_report(folder: Path) -> list[Path]:
@@ -95,17 +94,18 @@ def _missing(episodes: Any) -> Iterator[str]:
 def _scenario(name: str, episodes: Any, table: Any) -> str:
     """A scenario's tables."""
     policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
+    star = " A star: trained with it." if any(_mark(name, "A1", 1) for name in policies) else ""
     parts = (
         ("Scores", "Mean success over the levels that were run. `all`: the mean over the groups, without X.",
          _groups(policies)),
         ("Who is best", "By how much the highest mean over all groups is above that of each other, paired by seed.",
          _best(table)),
         ("Axes", f"Mean success over the levels that were run; then what it keeps of level 0's success, where that "
-         f"is at least {WORTH_KEEPING:g}. {_TRAINED_WITH}", _axes(policies)),
+         f"is at least {WORTH_KEEPING:g}.{star}", _axes(policies)),
         ("Critical severity", f"Where success falls below {ENOUGH:g} first, linear between the levels that were run, "
          "in the axis's unit.", _critical(policies)),
         ("Every cell", "Success; in how many episodes the whole swarm succeeded; contacts per episode, those of "
-         "faulty vehicles too. " + _TRAINED_WITH,
+         "faulty vehicles too." + star,
          _cells(episodes[episodes["scenario"] == name], policies)),
     )  # fmt: skip
     return f"## {name}\n\n" + "\n".join(f"### {title}\n\n{words}\n\n{rows}" for title, words, rows in parts)
