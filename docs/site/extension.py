@@ -52,7 +52,7 @@ def source_pages(app: Sphinx) -> Iterator[Page]:
 def look_up_exactly(app: Sphinx, doctree: nodes.document) -> None:
     """Link a type to the object of that full name, or of that name in its own module, and to no other's namesake."""
     for link in doctree.findall(addnodes.pending_xref):
-        link["refspecific"] = False
+        link.attributes.pop("refspecific", None)  # its mere presence, with any value, means a search
 
 
 def skip_namesakes(app: Sphinx, what: str, name: str, obj: Any, skip: bool, options: list[str]) -> bool:
