@@ -108,9 +108,9 @@ def fresh_seed() -> int:
 
 
 def draw(rows: Sequence[Row], sample: int, seed: int) -> list[Row]:
-    """So many rows, each equally likely, in the order of the files; all where there are not more."""
+    """So many rows, or all where there are not more, in random order: the first of them are a fair sample, too."""
     picked = np.random.default_rng(seed).choice(len(rows), min(sample, len(rows)), replace=False)
-    return [rows[k] for k in sorted(picked.tolist())]
+    return [rows[k] for k in picked.tolist()]
 
 
 def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -> Verdict:
@@ -172,5 +172,5 @@ def summary(verdicts: Sequence[Verdict], rows: int) -> str:
     if left:
         words.append(f"{left} more can't be reproduced here and count as neither.")
     if run and len(run) < rows:
-        words.append(f"Fewer than {upper_bound(differ, len(run)):.1%} of all rows differ (95 % confidence).")
+        words.append(f"Fewer than {upper_bound(differ, len(run)):.1%} of the {rows:,} rows differ (95 % confidence).")
     return " ".join(words)
