@@ -41,8 +41,8 @@ def verify(
     """Run shipped episodes again and compare every number with its file, digit by digit.
 
     The rows are drawn at random. The simulation gives the same bits on any x86-64 processor, so every digit of the file
-    must come out again. A row **agrees**, **differs** (the field, its value in the file, its value now), or is **not
-    reproducible here**, with the reason: such a row never counts as agreeing. 24 rows take a few minutes. Ctrl-C shows
+    must come out again. A row agrees, differs (the field, its value in the file, its value now), or is not
+    reproducible here, with the reason: such a row never counts as agreeing. 24 rows take a few minutes. Ctrl-C shows
     what was compared until then. The exit status is 0 where all rows that could be run agree, and 1 where one differs
     or none could be run.
 
