@@ -42,8 +42,8 @@ autoapi_keep_files = True
 autoapi_options = ["members", "undoc-members", "show-inheritance", "show-module-summary", "imported-members"]
 autoapi_python_class_content = "class"
 autoapi_member_order = "bysource"
-# Constants that are unpacked from a range are imported by modules that do not show them; a folder may have no page yet.
-suppress_warnings = ["autoapi.python_import_resolution", "toc.empty_glob"]
+# Constants that are unpacked from a range are imported by modules that do not show them.
+suppress_warnings = ["autoapi.python_import_resolution"]
 
 nitpicky = True
 # Objects of other libraries: their pages lie outside, and the site asks for nothing there.

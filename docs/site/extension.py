@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from autoapi._parser import Parser
 from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
@@ -61,6 +62,20 @@ def skip_namesakes(app: Sphinx, what: str, name: str, obj: Any, skip: bool, opti
     return skip or (what == "function" and (home.with_suffix(".py").exists() or home.is_dir()))
 
 
+def read_if(parser: Parser, node: Any) -> list[dict[str, Any]]:
+    """Names that are imported ``if TYPE_CHECKING``, of which the public ones are in the reference, too."""
+    return [found for child in node.body for found in parser.parse(child)]
+
+
+def lead_code_home(app: Sphinx) -> Iterator[Page]:
+    """Lead a module's code back to its own page, which names all that it defines, also where others export it."""
+    modules = {name: entry for name, entry in getattr(app.env, "_viewcode_modules", {}).items() if entry}
+    for name, (code, tags, used, _) in modules.items():
+        modules[name] = code, tags, dict.fromkeys(used, f"api/{name.replace('.', '/')}/index"), name
+    app.env._viewcode_modules = modules  # type: ignore[attr-defined]
+    return iter(())
+
+
 def write_index(app: Sphinx, failure: Exception | None) -> None:
     """A server shows index.html first."""
     front = Path(app.outdir, f"{app.config.root_doc}.html")
@@ -70,6 +85,8 @@ def write_index(app: Sphinx, failure: Exception | None) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the handlers."""
+    Parser.parse_if = read_if
+    app.connect("html-collect-pages", lead_code_home, priority=100)
     app.connect("source-read", add_navigation)
     app.connect("doctree-read", link_sources, priority=100)
     app.connect("html-collect-pages", source_pages)
