@@ -289,7 +289,7 @@ def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
     assert np.array_equal(policy.act(percept), first), "asked twice at one time, it must say the same"
     swarm.step(first)
     swarm.step(first)
-    with pytest.raises(PolicyError, match=r"was asked at 0\.6 s and then at 0\.8 s in world 0, and its memory needs"):
+    with pytest.raises(PolicyError, match=r"was called at 0\.6 s and then at 0\.8 s in world 0, but its memory needs"):
         policy.act(swarm.percept)
     policy.reset(0)
     policy.act(swarm.percept)

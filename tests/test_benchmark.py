@@ -245,7 +245,7 @@ def test_the_command_line_from_end_to_end(tmp_path):
         (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within 0.001 to 1,000,000"),
         (["benchmark", "--set=vehicle"], "must look like field=value"),
         (["scenarios", "--show=trackin"], "did you mean"),
-        (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy brings its own"),
+        (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy has its own"),
         (["benchmark", "--scenario=tracking", "--scenario=tracking"], "different names"),
         (["benchmark", "--policy=nowhere:Thing"], "can't be imported"),
         (["benchmark", "--policy=math:pi"], "must be a subclass"),

@@ -723,7 +723,7 @@ def test_the_command(tmp_path, monkeypatch):
     stopped = CliRunner().invoke(app, [*command, "--resume"])
     assert stopped.exit_code == 130
     assert "Stopping after this iteration" in stopped.output
-    assert "with --resume goes on" in " ".join(stopped.output.split())
+    assert "with --resume continues" in " ".join(stopped.output.split())
     seed = 2
     at_once = CliRunner().invoke(app, [*command, "--resume"])
     assert at_once.exit_code == 130
@@ -737,14 +737,14 @@ def test_the_command(tmp_path, monkeypatch):
         (["--steps=3.5"], "'3.5' is no whole number from 1 on"),
         (["--steps=inf"], "no whole number"),
         (["--steps=0"], "no whole number"),
-        (["--noise", "0.4"], "Give it at the start and at the end: --noise 0.4 0.08"),
+        (["--noise", "0.4"], "Give the value at the start and at the end: --noise 0.4 0.08"),
         (["--noise", "inf", "inf"], "Invalid value for '--noise'"),
         (["--noise", "nan", "0.1"], "Invalid value"),
         (["--rate", "inf", "1"], "Invalid value for '--rate'"),
         (["--num-vehicles=0"], "Invalid value for '--num-vehicles'"),
         (["--sizes=5,x"], "--sizes must be whole numbers from 1 on, such as 96,96; got '5,x'"),
         (["--network=0"], "--network must be whole numbers from 1 on"),
-        (["--sizes=5", "--num-vehicles=5"], "--num-vehicles is the size of every swarm; give it or --sizes"),
+        (["--sizes=5", "--num-vehicles=5"], "--num-vehicles is the size of every swarm; leave out this"),
         (["--set", "sonar.echo_report=surface"], "sonar.echo_report"),
         (["--reward=nowhere:reward"], "reward 'nowhere:reward' can't be imported"),
         (["--sees=nothing"], "--sees must be percept or memory, got 'nothing'"),

@@ -413,7 +413,7 @@ def test_the_command_shows_what_a_benchmark_saved(tmp_path, monkeypatch, written
         ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
         (["--policy=idel"], "did you mean 'idle'"),
         (["--scenario=lossi"], "did you mean 'lossy'"),
-        (["--set=sonar.channels=[]"], "every policy brings its own"),
+        (["--set=sonar.channels=[]"], "every policy has its own"),
         (["--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within"),
         (["nowhere"], "nowhere holds no results.json"),
         (["nowhere.npz"], "nowhere.npz does not exist"),
@@ -433,7 +433,7 @@ def test_mistakes_are_explained_before_anything_is_simulated(arguments, message,
 
 def test_a_saved_run_takes_no_other_numbers(tmp_path, written):
     trace = saved(tmp_path).trace_path("lossy", "idle", 0)
-    assert "is saved, with neither sonar nor other numbers" in replay(tmp_path, "--inspect=0")[1]
+    assert "holds saved episodes, which --inspect and --set can't change" in replay(tmp_path, "--inspect=0")[1]
     assert "is one episode already" in replay(trace, "--policy=idle")[1]
     assert "no routes" in replay(tmp_path, "--policy=idle", "--seed=1")[1]
 

@@ -235,14 +235,14 @@ BAD_SEA = [
     ({"faults": [MEMBER | {"efficency": 0.5}]}, "faults.0.efficency is unknown; did you mean 'efficiency'"),
     (
         {"faults": [MEMBER | {"efficiency": 0.5}]},
-        "efficiency is of kinds thruster and yaw alone, got 0.5 .*leave",
+        "efficiency is only for kinds thruster and yaw, got 0.5 .*leave",
     ),
     ({"faults": [MEMBER | {"duration_s": 5.0}]}, "faults.duration_s is of no use to kind member, got 5.*leave it out"),
     (
         {"faults": [MEMBER | {"array": "bow"}]},
-        "faults.array must name the array of a fault of kind array, .* got 'bow'",
+        "faults.array must be given for kind array and for no other kind, got 'bow'",
     ),
-    ({"faults": [ARRAY]}, "faults.array must name the array of a fault of kind array, .* got None"),
+    ({"faults": [ARRAY]}, "faults.array must be given for kind array and for no other kind, got None"),
     ({"faults": [ARRAY | {"array": "stern"}]}, "faults.0.array must be one of bow, port, starboard, got 'stern'"),
     (
         {"faults": [MEMBER | {"share": 1.0}]},
@@ -458,7 +458,7 @@ def test_a_scenario_names_its_vehicle_whose_numbers_stand_in_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("m_kg = 185.0", "", "lacks vehicle.m_kg; a vehicle's file gives all numbers"),
+        ("m_kg = 185.0", "", "lacks vehicle.m_kg; add this number to the file"),
         ("lever_arm_m = 1.0", "", "lacks actuators.lever_arm_m"),
         ("[vehicle]", "[swarm]\nnum_vehicles = 3\n[vehicle]", "holds 'swarm'; it may hold vehicle and actuators only"),
         ("m_kg = 185.0", "m_kg = ", "is not valid TOML"),

@@ -194,9 +194,9 @@ class Acts(Policy):
 
 
 def test_bad_combinations_are_refused_with_the_remedy():
-    with pytest.raises(PolicyError, match="thinks in the paper's units, .* make it with uuv_marl.baselines.make"):
+    with pytest.raises(PolicyError, match="computes in the paper's units, .* make it with uuv_marl.baselines.make"):
         BioInspired(LAUV)
-    with pytest.raises(PolicyError, match="tests.test_units:Acts defines act, .* define decide in its place"):
+    with pytest.raises(PolicyError, match="tests.test_units:Acts defines act, .* define decide instead of act"):
         make("tests.test_units:Acts", LAUV)
     with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
         make("mappo", LAUV)
@@ -254,5 +254,5 @@ def test_gains_tuned_for_a_hull_come_from_shipped_trials(vehicle):
 
 
 def test_gains_that_nobody_tuned_are_refused():
-    with pytest.raises(PolicyError, match="nobody has tuned 'bio_inspired_plus.otter'; there are apf, .*lauv"):
+    with pytest.raises(PolicyError, match="'bio_inspired_plus.otter' has no tuned gains; those of apf, .*lauv"):
         make("bio_inspired_plus,tuned_for=otter", load_scenario("starter"))

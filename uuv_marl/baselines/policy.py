@@ -1,4 +1,4 @@
-"""What a policy is: percepts in, actions out, memory behind ``reset``; and the channels that it needs beyond them."""
+"""The base class of policies: from percepts to actions, with a memory, and with the channels that a policy needs."""
 
 import json
 import math
@@ -54,14 +54,14 @@ class Limits(NamedTuple):
 
 
 def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenario) -> float:
-    """The inner loop that a policy gets on a scenario's vehicle [N m s]: what it declares, scaled with full torque.
+    """The inner loop that a policy gets on a scenario's vehicle [N m s]: the declared one, scaled with full torque.
 
-    So it takes all torque at the same yaw rate, in the scenario's scale, whatever the vehicle; but it is no stiffer
-    than a loop that stops a yaw rate within one control hold. A rudder has no torque of its own, and no such loop: 0.
+    So on every vehicle the loop takes all torque at the same yaw rate, in the scenario's scale. But it is no stiffer
+    than a loop that stops a yaw rate within one control hold. For a vehicle with a rudder the loop is 0.
 
     Args:
         declared_nms: the policy's ``yaw_damping_nms``.
-        full_torque_nm: of the vehicle that it declares it for [N m].
+        full_torque_nm: full torque of the vehicle for which the policy declares the loop [N m].
         scenario: gives the vehicle.
     """
     actuators = scenario.actuators
@@ -75,12 +75,12 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
     """Refuse a scenario that does not grant what a policy declares: channels, and an inner loop.
 
     Args:
-        name: by which the message calls the policy.
-        policy: a policy, its class, or what else declares ``channels``, ``yaw_damping_nms`` and ``full_torque_nm``.
-        scenario: on which it is to run.
+        name: the policy's name in the message.
+        policy: a policy, its class, or anything with ``channels``, ``yaw_damping_nms`` and ``full_torque_nm``.
+        scenario: the scenario on which the policy should run.
 
     Raises:
-        PolicyError: it lacks some; the message names them and the remedy.
+        PolicyError: the scenario lacks channels or the inner loop; the message names them and the remedy.
     """
     has = scenario.sonar.channels
     missing = [name for name in policy.channels if name not in has and not (name == "link" and "modem" in has)]
@@ -100,8 +100,8 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
 class Policy:
     """Maps the percepts of any number of worlds to actions.
 
-    A subclass defines ``decide``. One that remembers also names its ``Memory`` and defines ``remember``; the base class
-    makes, clears, keeps and gives back these arrays.
+    A subclass defines ``decide``. A subclass with a memory also declares its arrays in ``Memory`` and defines
+    ``remember``; the base class makes, clears, saves and restores these arrays.
 
     Args:
         scenario: gives the vehicle's limits, the decision period and the percept's layout.
@@ -133,8 +133,8 @@ class Policy:
             raise PolicyError(f"policy {self.name!r} must define decide(percept), or act(percept) if it has no memory")
         if scenario.scale != Scale():
             raise PolicyError(
-                f"{self.name} thinks in the paper's units, and scenario {scenario.name!r} is in the scale of "
-                f"{scenario.vehicle.name}; make it with uuv_marl.baselines.make(name, scenario), which converts"
+                f"{self.name} computes in the paper's units, and scenario {scenario.name!r} is in the scale of "
+                f"{scenario.vehicle.name}; make it with uuv_marl.baselines.make(name, scenario), which converts units"
             )
         need_granted(self.name, self, scenario)
         if num_worlds < 1:
@@ -185,19 +185,19 @@ class Policy:
         """Hook: start anew, in these worlds, what is not in ``memory``, such as random streams."""
 
     def act(self, percept: Percept) -> Float32:
-        """Remember what is perceived, then decide. To be called once for every decision.
+        """Remember the percept, then decide. Call this method once for every decision.
 
-        Where the percept says its time, a world that has been reset is forgotten by itself, and a second call at the
-        same time gives the same actions and remembers nothing twice.
+        If the percept has a time, the memory of a world that has been reset is cleared by itself, and a second call at
+        the same time gives the same actions and changes no memory.
 
         Args:
-            percept: of shape (world, vehicle, ...).
+            percept: percepts of shape (world, vehicle, ...).
 
         Returns:
-            Actions of shape (world, vehicle, 2), float32, within the unit disc, or with a rudder within the box.
+            Actions of shape (world, vehicle, 2), float32, within the unit disc, or with a rudder within the square.
 
         Raises:
-            PolicyError: the percept is of another swarm; or the policy has a memory and was left out of a decision.
+            PolicyError: the percept is of another swarm; or the policy has a memory and a decision was left out.
         """
         percept = self.read(percept)
         action = self.steered(percept, self.wish(percept))
@@ -256,19 +256,19 @@ class Policy:
         if late.any():
             w = int(np.flatnonzero(late)[0])
             raise PolicyError(
-                f"{self.name} was asked at {then[w]:g} s and then at {now[w]:g} s in world {w}, and its memory needs "
-                f"every decision, {period:g} s apart; call act once for every step, or reset or restore the policy too"
+                f"{self.name} was called at {then[w]:g} s and then at {now[w]:g} s in world {w}, but its memory needs "
+                f"a call every {period:g} s; call act once for every step, or reset or restore the policy too"
             )
         new = self.active & ~(passed == 0.0)
         then[new] = now[new]
         return new
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All that later decisions depend on, copied, for ``restore``."""
+        """A copy of all that later decisions depend on, for ``restore``."""
         return {name: array.copy() for name, array in self._arrays().items()}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot of the same policy, for the same scenario and number of worlds.
+        """Continue from a snapshot of the same policy, for the same scenario and number of worlds.
 
         Raises:
             PolicyError: an array is missing, or has another shape or type.
@@ -295,13 +295,13 @@ class Policy:
         rows, expected = percept.flat, (self.num_worlds, self.scenario.swarm.num_vehicles, self.layout.size)
         if rows.shape != expected or rows.dtype != np.float32:
             raise PolicyError(
-                f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry), and "
-                f"got {rows.dtype} of shape {rows.shape}; make one for this swarm: make(name, scenario, num_worlds)"
+                f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry), and got "
+                f"{rows.dtype} of shape {rows.shape}; make a policy for this swarm: make(name, scenario, num_worlds)"
             )
         if percept.layout != self.layout:
             raise PolicyError(
-                f"{self.name} was made for other fields of a percept than it got; make it from the scenario "
-                "that the swarm was made from"
+                f"{self.name} was made for percepts with other fields; make it from the scenario that the swarm was "
+                "made from"
             )
         return np.ascontiguousarray(rows)
 
@@ -331,18 +331,18 @@ def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
 
 
 def tuned(name: str) -> Mapping[str, float]:
-    """The best parameters that tuning found for a policy; all its trials are in the CSV file beside it.
+    """The best parameters that tuning found for a policy; all trials are in the CSV file beside them.
 
     Args:
-        name: of the policy; ``POLICY.VEHICLE`` for those that were found in a vehicle's scale.
+        name: the policy's name; ``POLICY.VEHICLE`` for parameters that were found in a vehicle's scale.
 
     Raises:
-        PolicyError: it was not tuned.
+        PolicyError: the policy was not tuned.
     """
     folder = resources.files("uuv_marl.baselines").joinpath("tuned")
     file = folder.joinpath(f"{name}.json")
     if not file.is_file():
         known = sorted(each.name.removesuffix(".json") for each in folder.iterdir() if each.name.endswith(".json"))
-        raise PolicyError(f"nobody has tuned {name!r}; there are {', '.join(known)}: uuv-marl tune makes others")
+        raise PolicyError(f"{name!r} has no tuned gains; those of {', '.join(known)} ship, uuv-marl tune finds others")
     data: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return data["best"]

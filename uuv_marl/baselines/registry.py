@@ -32,7 +32,7 @@ from uuv_marl.scenario import Scenario, load_scenario
 Float32 = NDArray[np.float32]
 
 Kind = type[Policy] | Trained
-"""A policy before it is made: called with a scenario it gives one; with ``channels`` and ``yaw_damping_nms``."""
+"""A class of policies: a call with a scenario makes a policy. It has ``channels`` and ``yaw_damping_nms``."""
 
 POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
@@ -49,8 +49,8 @@ POLICIES: dict[str, Kind] = {
     "orca_informed": OrcaInformed,
     "pull": Pull,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
-    "ppo": shipped("ppo", "The same, trained by Stable-Baselines3's PPO."),
-    "mappo_v2": shipped("mappo_v2", "Trained by MAPPO: an actor that trims scout_plus from what vehicles remember."),
+    "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on random_field: as mappo, an actor plus a barrier."),
+    "mappo_v2": shipped("mappo_v2", "Trained by MAPPO: an actor that corrects scout_plus by what vehicles remember."),
     "mappo_v2_seed1": shipped("mappo_v2_seed1", "The same recipe as mappo_v2 with another training seed."),
     "random": Random,
     "idle": Idle,
@@ -59,7 +59,7 @@ POLICIES: dict[str, Kind] = {
 
 
 class SwarmEnv(Protocol):
-    """What ``make`` needs of an environment: ours, or a wrapper whose ``unwrapped`` is ours."""
+    """The part of an environment that ``make`` needs. A wrapper has it, if its ``unwrapped`` is our environment."""
 
     @property
     def unwrapped(self) -> Any:
@@ -78,7 +78,7 @@ class EnvPolicy:
         self._agents = list(agents)
 
     def reset(self, seed: int = 0) -> None:
-        """Forget the episode before. The seed matters to policies that draw."""
+        """Forget the previous episode. The seed matters only for policies that draw random numbers."""
         self.policy.reset(seed)
 
     def __call__(self, observations: Mapping[str, Float32]) -> dict[str, Float32]:
@@ -112,11 +112,11 @@ def parse(name: str) -> Named:
             policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter.
 
     Raises:
-        PolicyError: nobody has that name; the message names the nearest.
+        PolicyError: no policy has that name; the message gives the most similar name.
     """
     name = name.removeprefix(GUARDED)
     if name.startswith(GUARDED):
-        raise PolicyError(f"policy {GUARDED + name!r}: once is enough; write {name!r}")
+        raise PolicyError(f"policy {GUARDED + name!r} names the filter twice; write {name!r}")
     plain, *pairs = [name] if Path(name).exists() else name.split(",")
     wrong = next((pair for pair in pairs if not all(pair.partition("="))), None)
     if wrong is not None:
@@ -126,7 +126,7 @@ def parse(name: str) -> Named:
 
 
 def policy_class(name: str) -> Kind:
-    """A policy's kind by its name, as ``parse`` reads it. Raises PolicyError with the nearest name."""
+    """The class of a policy by its name, as ``parse`` reads it. Raises PolicyError with the most similar name."""
     return parse(name).kind
 
 
@@ -154,10 +154,10 @@ def _kind(name: str) -> Kind:
 
 
 def granted(name: str, scenario: Scenario) -> Scenario:
-    """The scenario with the channels that a policy declares, and its inner loop (``inner_loop_nms``), and no others.
+    """The scenario with exactly the channels and the inner loop (``inner_loop_nms``) that a policy declares.
 
-    A scenario that grants ``modem`` grants it in place of ``link``, which is an oracle; but not to a policy that
-    declares both, nor to a trained one, which knows what it was trained on alone.
+    If the scenario has ``modem``, a policy that declares ``link`` gets ``modem`` instead. There are two exceptions: a
+    policy that declares both, and a trained policy, which knows only the channels of its training.
     """
     policy = policy_class(name)
     either = "modem" not in policy.channels and not isinstance(policy, Trained)
@@ -182,13 +182,14 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
         name: one of ``POLICIES``, the path of a checkpoint (``runs/mappo/best``), or ``module:Class``; parameters and
             gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``; ``guarded:`` before it
             puts the policy inside the safety filter.
-        target: a scenario, for a policy that maps ``Percept`` to actions; or a parallel environment of ours, wrapped
-            or not, for one that maps its observation dictionaries to action dictionaries.
+        target: a scenario, for a policy that maps ``Percept`` to actions; or our parallel environment, wrapped or not,
+            for a policy that maps the environment's observation dictionaries to action dictionaries.
         num_worlds: worlds stepped together; 1 for an environment.
         parameters: keyword arguments of the policy, such as ``gains``, or single gains by name.
 
     Raises:
-        PolicyError: unknown name or parameter, or the target lacks what the policy declares (see ``granted``).
+        PolicyError: the name or a parameter is unknown, or the target lacks channels or the inner loop that the policy
+            declares (see ``granted``).
     """
     kind, written = parse(name)
     if isinstance(target, Scenario):
@@ -213,8 +214,8 @@ def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parame
     policy = _made(name, kind, in_own_units(scenario), num_worlds, parameters)
     if type(policy).act is not Policy.act:
         raise PolicyError(
-            f"{name} defines act, and scenario {scenario.name!r} is in the scale of {scenario.vehicle.name}, to which "
-            "act converts; define decide in its place"
+            f"{name} defines act, which can't be converted to the scale of {scenario.vehicle.name} in scenario "
+            f"{scenario.name!r}; define decide instead of act"
         )
     policy.reader = reader
     return policy

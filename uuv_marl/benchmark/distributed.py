@@ -149,4 +149,4 @@ def _result(ready: Any) -> list[Run]:
     except ray.exceptions.RayTaskError as error:
         raise error.cause from error
     except ray.exceptions.RayError as error:
-        raise ClusterError(f"the Ray cluster lost a task: {error}; the same command goes on") from error
+        raise ClusterError(f"the Ray cluster lost a task: {error}; give the command again") from error

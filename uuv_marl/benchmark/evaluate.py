@@ -17,15 +17,15 @@ from uuv_marl.sim.swarm import Swarm
 Float32 = NDArray[np.float32]
 
 BATCH = 8
-"""Seeds stepped together: enough for all cores, and few are lost where a benchmark is stopped."""
+"""Seeds stepped together: enough for all cores, and few to repeat after a benchmark was stopped."""
 ROUTE_PERIOD_S = 0.5
 """Between two samples of the routes."""
 MOST_SAMPLES = 1_500_000
-"""Samples of vehicles kept of a run; with more than this, routes are thinned further in time."""
+"""Most samples (times x vehicles) of a run's routes; longer or larger runs are sampled less often."""
 
 
 class Routes(NamedTuple):
-    """Where everybody was, from start to end; NaN once a vehicle is lost. Frame north, east."""
+    """Positions of all vehicles, from start to end; NaN once a vehicle is lost. The frame is north, east."""
 
     time_s: Float32
     """Shape (time,): every ``ROUTE_PERIOD_S`` (see ``MOST_SAMPLES``), and the end."""
@@ -53,10 +53,10 @@ class Run(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far an evaluation is."""
+    """The progress of an evaluation."""
 
     share: float
-    """Of the simulated time that all its seeds need at most."""
+    """Share of the simulated time that all seeds need at most."""
 
 
 Watch = Callable[[Swarm, Float32 | None], None]
@@ -67,21 +67,20 @@ Watch = Callable[[Swarm, Float32 | None], None]
 def evaluate(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None = None, /, **parameters: object
 ) -> Iterator[Run | Progress]:
-    """Episodes of a policy on a scenario, each as soon as it ends, with progress in between.
+    """Run a policy on a scenario; yields each episode as soon as it ends, with progress in between.
 
-    The scenario must grant what the policy declares (``uuv_marl.baselines.granted``). A run depends on its seed
-    alone, not on the seeds beside it. ``watch`` sees every step, and ``parameters`` go to the policy.
+    A run depends on its seed alone, not on the other seeds.
 
     Args:
-        scenario: grants what the policy declares (``uuv_marl.baselines.granted``).
-        policy: its name, see ``uuv_marl.baselines.make``.
-        seeds: of the episodes, one each.
-        watch: sees every step.
-        parameters: go to the policy.
+        scenario: must have the channels and the inner loop of the policy (``uuv_marl.baselines.granted``).
+        policy: the policy's name, see ``uuv_marl.baselines.make``.
+        seeds: one seed for each episode.
+        watch: called after the reset and after every step.
+        parameters: keyword arguments of the policy.
 
     Raises:
-        DivergenceError: the integration step could not follow a vehicle. Such a run has no metrics; those of the seeds
-            beside it come first.
+        DivergenceError: the integration step was too long for a vehicle. This run has no metrics; the runs of the other
+            seeds are yielded first.
     """
     for first in range(0, len(seeds), BATCH):
         batch = seeds[first : first + BATCH]

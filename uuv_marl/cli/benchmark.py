@@ -14,14 +14,14 @@ from uuv_marl.cli.console import changes_of, console, explained, extra, find_mod
 if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
 
-_WORST = "The worst episode, by collisions, arrival and distance, is seed {worst.seed} of {worst.policy}. Watch it:"
+_WORST = "The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
 _NEXT = """Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}");
 train a policy with uuv-marl train mappo --output runs/mappo, and compare it with --policy runs/mappo/best."""
 
 
 def benchmark(
     scenario: Annotated[
-        list[str] | None, typer.Option(help="Name or TOML file; repeat for several. Default: single_obstacle.")
+        list[str] | None, typer.Option(help="Name or TOML file. Repeat it for several. Default: single_obstacle.")
     ] = None,
     policy: Annotated[
         list[str] | None,
@@ -31,7 +31,7 @@ def benchmark(
         ),
     ] = None,
     seeds: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1; tuning and training use those above 9,999.")
+        int, typer.Option(min=1, max=10_000, help="Runs seeds 0 to SEEDS - 1. Tuning and training use higher seeds.")
     ] = 20,
     overrides: Annotated[
         list[str] | None,
@@ -41,15 +41,16 @@ def benchmark(
     ray: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="Spread the seeds over this Ray cluster (auto: the one here). Needs: distributed."
+            metavar="ADDRESS",
+            help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
         ),
     ] = None,
 ) -> None:
     """Compare policies on scenarios over seeds.
 
-    Prints a table beside the paper's figures and writes `results.json` (every seed and metric), `table.md` and
-    `figures/*.png`. Table and pictures show every policy of which results.json holds runs on these scenarios and seeds.
-    Ctrl-C keeps the finished seeds; the same command goes on.
+    It prints a table with the paper's figures beside and writes `results.json` (every seed and metric), `table.md` and
+    `figures/*.png`. Table and pictures show every policy for which results.json holds runs on these scenarios and
+    seeds. Ctrl-C keeps the finished seeds, and the same command continues.
 
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
@@ -107,16 +108,18 @@ def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, A
 
 
 def tune(
-    policy: Annotated[list[str] | None, typer.Option(help="Name; repeat for several. Default: all.")] = None,
+    policy: Annotated[list[str] | None, typer.Option(help="Name. Repeat it for several. Default: all.")] = None,
     trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
-    output: Annotated[Path, typer.Option(help="Folder of the trials.")] = Path("results/tune"),
-    vehicle: Annotated[str | None, typer.Option(help="On which vehicle, in its scale. Default: the paper's.")] = None,
+    output: Annotated[Path, typer.Option(help="Folder for the trials.")] = Path("results/tune"),
+    vehicle: Annotated[
+        str | None, typer.Option(help="Tune on this vehicle, in its scale. Default: the paper's vehicle.")
+    ] = None,
 ) -> None:
     """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
 
-    Needs the extra "tune". Takes ten to fifteen minutes per policy. Ctrl-C keeps the finished trials; the same command
-    goes on. The shipped results are in uuv_marl/baselines/tuned. The trials' journal may hold pickled data: go on with
-    none that you do not trust.
+    This needs the extra "tune" and takes ten to fifteen minutes per policy. Ctrl-C keeps the finished trials, and the
+    same command continues. The shipped results are in uuv_marl/baselines/tuned. The trials' journal may hold pickled
+    data, which can run code: continue only a journal that you trust.
     """
     with explained():
         from uuv_marl.baselines import PolicyError

@@ -83,7 +83,7 @@ def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
         with nullcontext() if alone is None else locked(alone), progress_bar() as bar:
             yield bar
     except KeyboardInterrupt:
-        console.print(f"Stopped. {kept}; the same command goes on.")
+        console.print(f"Stopped. {kept}; the same command continues.")
         raise typer.Exit(130) from None
 
 
@@ -93,7 +93,7 @@ def changes_of(overrides: Sequence[str]) -> dict[str, object]:
 
     changes = dict(parse_override(text) for text in overrides)
     for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
-        raise PolicyError(f"{field} can't be set here: every policy brings its own, see 'uuv-marl policies'")
+        raise PolicyError(f"{field} can't be set here: every policy has its own ('uuv-marl policies'); leave it out")
     return changes
 
 

@@ -10,7 +10,7 @@ from uuv_marl.cli.console import console, explained, extra
 
 def export(
     policy: Annotated[
-        str, typer.Argument(help="A training's checkpoint (its file or folder), mappo, scout, or guarded:mappo.")
+        str, typer.Argument(help="Checkpoint of a training (file or folder), or a name: mappo, scout, guarded:mappo.")
     ],
     output: Annotated[Path, typer.Argument(help="ONNX file.", dir_okay=False)],
     scenario: Annotated[
@@ -19,7 +19,7 @@ def export(
 ) -> None:
     """Write a policy as an ONNX model, from an agent's observation to its action. Needs the extra "onnx".
 
-    What a policy remembers is inputs and outputs of the model: kept_... before a decision, next_... after it.
+    The memory of a policy is inputs and outputs of the model: kept_... before a decision, next_... after it.
 
     Example: uuv-marl export runs/mappo/best policy.onnx
     """

@@ -11,7 +11,7 @@ from uuv_marl.cli.console import console, explained
 
 def scenarios(
     show: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Print one, complete, with the source of every number.")
+        str | None, typer.Option(metavar="NAME", help="Print this scenario with the source of every number.")
     ] = None,
 ) -> None:
     """List the scenarios, or show one."""
@@ -32,10 +32,12 @@ def scenarios(
 def vehicles(
     show: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Print one's file, with the source of every number: lauv, remus100+munk_on."),
+        typer.Option(
+            metavar="NAME", help="Print this vehicle's file with the source of every number: lauv, remus100+munk_on."
+        ),
     ] = None,
 ) -> None:
-    """List the vehicles and how they move, or show one. ``--set vehicle=NAME`` takes one in any command."""
+    """List the vehicles and how they move, or show one. Other commands take a vehicle by ``--set vehicle=NAME``."""
     with explained():
         from uuv_marl.scenario import show_vehicle
 

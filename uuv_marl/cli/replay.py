@@ -26,19 +26,19 @@ def replay(
         typer.Argument(help="Folder of a benchmark, or a trace of its seed 0. Without it the episode is simulated."),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's only one.")
+        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's only scenario.")
     ] = None,
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, checkpoint (runs/mappo/best) or module:Class; repeat it for up to four side by side. "
-            f"Default: {_POLICY}, or the folder's only one."
+            help="Name, checkpoint (runs/mappo/best) or module:Class. Repeat it for up to four side by side. "
+            f"Default: {_POLICY}, or the folder's only policy."
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of the episode, for all policies. Default: 0.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the episode, for all policies. Default: 0.")] = None,
     inspect: Annotated[
         list[int] | None,
-        typer.Option(min=0, metavar="VEHICLE", help="Show this vehicle's sonar too; repeat it for up to eight."),
+        typer.Option(min=0, metavar="VEHICLE", help="Show this vehicle's sonar too. Repeat it for up to eight."),
     ] = None,
     overrides: Annotated[
         list[str] | None,
@@ -53,9 +53,9 @@ def replay(
 ) -> None:
     """Show an episode: as one HTML file that any browser opens without a network, or as a film.
 
-    The page has a time line on which collisions and near misses are marked, trails, zoom, and plots that follow the
-    time. A simulated episode is shown at every decision. What a benchmark saved of its seed 0 is shown every 0.5 s,
-    without forces and sonar.
+    The page has a time line with marks for collisions and near misses, trails, zoom, and plots that follow the time. A
+    simulated episode is shown at every decision. A benchmark's saved seed 0 is shown every 0.5 s, without forces and
+    sonar.
 
     Example: uuv-marl replay --policy bio_inspired --policy sff --seed 3 --inspect 7
 
@@ -70,8 +70,8 @@ def replay(
             raise ReplayError(f"at most {MOST_EPISODES} policies can be shown side by side, got {len(policies)}")
         if run is not None and (inspect or overrides):
             raise ReplayError(
-                f"{run} is saved, with neither sonar nor other numbers; leave it out for --inspect and --set, and give "
-                "--scenario, --policy and --seed"
+                f"{run} holds saved episodes, which --inspect and --set can't change; leave out these two, or leave "
+                "out the folder and give --scenario, --policy and --seed"
             )
         try:
             with progress_bar() as bar:

@@ -38,24 +38,25 @@ def robustness(
         bool,
         typer.Option(
             "--pilot",
-            help="Instead confirm or correct the findings of a pilot, in pilot.md; of the options, "
-            "--seeds, --ray and --output count.",
+            help="Instead confirm or correct the findings of a pilot study, in pilot.md. Only the options --seeds, "
+            "--ray and --output count then.",
         ),
     ] = False,
     ray: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="Spread the seeds over this Ray cluster (auto: the one here). Needs: distributed."
+            metavar="ADDRESS",
+            help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
         ),
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of results, page and picture.")] = Path("results/robustness"),
+    output: Annotated[Path, typer.Option(help="Folder for results, page and picture.")] = Path("results/robustness"),
 ) -> None:
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
 
-    Each axis makes one thing worse in five levels (uuv_marl/studies/robustness/axes.toml, with sources). It writes
-    report.md (scores, critical severities, every cell), figures/severity.png and episodes.csv (a row for each episode;
-    Python: pandas.read_csv). Without --quick or --full it makes the report that ships in docs/robustness, in more
-    than an hour on two cores. Needs the extra "analysis". Ctrl-C keeps the finished episodes; the same command goes on.
+    Each axis is one disturbance in five levels (uuv_marl/studies/robustness/axes.toml, with sources). The command
+    writes report.md (scores, critical severities, every cell), figures/severity.png and episodes.csv (a row for each
+    episode). Without --quick or --full it makes the report that ships in docs/robustness, in more than an hour on two
+    cores. It needs the extra "analysis". Ctrl-C keeps the finished episodes, and the same command continues.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """

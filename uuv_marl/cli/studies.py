@@ -63,7 +63,7 @@ def heldout(
         list[str] | None, typer.Option(help="Run only this set, such as random_field. Repeat it for several sets.")
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, max=10_000, help="Most seeds of a policy on a set. Without it 5 to 1,000.")
+        int | None, typer.Option(min=1, max=10_000, help="At most this many seeds of a policy on a set. Default: all.")
     ] = None,
     trainings: Annotated[
         Path | None, typer.Option(help="Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
@@ -73,9 +73,9 @@ def heldout(
     """Evaluate every policy on seeds that no training, no tuning and no choice has used.
 
     The sets are 1,000 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface,
-    and other decision periods. It writes report.md, episodes.csv and pictures; with --trainings it also compares
-    algorithms over training seeds, and writes marl_eval.json. All sets took about two hours in two processes, each with
-    its own --only. Ctrl-C keeps the finished episodes, and the same command continues.
+    and other decision periods. The command writes report.md, episodes.csv and pictures; with --trainings it also
+    compares algorithms over training seeds, and writes marl_eval.json. All sets took about two hours in two processes,
+    each with its own --only. Ctrl-C keeps the finished episodes, and the same command continues.
 
     Example: uuv-marl heldout --only single_obstacle --seeds 5
     """

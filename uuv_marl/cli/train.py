@@ -55,7 +55,7 @@ def train_mappo(
     noise: Annotated[
         tuple[float, float] | None,
         typer.Option(
-            min=1e-3, max=10.0, help="Of actions, at the start and at the end [full force]. Default: 0.4 0.08."
+            min=1e-3, max=10.0, help="Noise of actions at the start and at the end [full force]. Default: 0.4 0.08."
         ),
     ] = None,
     rate: Annotated[
@@ -69,12 +69,12 @@ def train_mappo(
 ) -> None:
     """Train one policy for all vehicles with MAPPO, on swarms of 10 to 100 at once, on one core.
 
-    Vehicles decide every 0.5 s, with yaw damping, whatever the scenario says. Noise and rates anneal over --steps.
-    Needs the extra "train". Writes config.json (settings, seeds, versions), progress.csv (a row per iteration),
-    checkpoints/, tensorboard/ and best/, the policy that did best on validation seeds: give it to uuv-marl benchmark as
-    --policy. Ctrl-C ends the training with a checkpoint after the iteration under way; the same command with --resume
-    goes on exactly. A kill leaves the last checkpoint, which is written every 20 iterations. With --resume and more
-    --steps a finished training goes on, too, with the last noise and rates.
+    Vehicles decide every 0.5 s, with yaw damping, whatever the scenario says. Noise and rates fall over --steps. This
+    needs the extra "train". It writes config.json (settings, seeds, versions), progress.csv (a row per iteration),
+    checkpoints/, tensorboard/ and best/, the policy that was best on validation seeds. Compare this policy with
+    uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops the training after the current iteration, with a checkpoint;
+    the same command with --resume continues exactly. A killed training leaves its last checkpoint, which is written
+    every 20 iterations. With --resume and more --steps a finished training continues with its last noise and rates.
 
     Example: uuv-marl train mappo --scenario starter --steps 2e6 --output runs/starter
     """
@@ -117,8 +117,8 @@ def train_ppo(
 ) -> None:
     """Train one policy for all vehicles with Stable-Baselines3's PPO, on swarms of 10 to 100 at once, on one core.
 
-    Problem, files and habits are those of uuv-marl train mappo: the critic sees what the actor sees, and noise is
-    learned. Needs the extra "train".
+    It trains on the same problem and writes the same files as uuv-marl train mappo. But the critic sees only what the
+    actor sees, and noise is learned. It needs the extra "train".
 
     Example: uuv-marl train ppo --output runs/ppo
     """
@@ -178,7 +178,7 @@ def _check_device(device: str) -> None:
 
 def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str:
     """Show a training in a bar, with a text for each field that was known so far; how it stood at last."""
-    last, known = "no iteration was needed: --steps are done already", {}
+    last, known = "no iteration was needed, because all --steps are done already", {}
     with progress_bar() as bar:
         report = shown(bar, "starting", steps)
         for record in records:
@@ -198,7 +198,7 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
         if noted:
             signal.default_int_handler(number, frame)
         noted.append(number)
-        console.print("Stopping after this iteration, with a checkpoint. Ctrl-C again stops at once, without.")
+        console.print("Stopping after this iteration, with a checkpoint. Ctrl-C again stops at once, without one.")
 
     before = signal.signal(signal.SIGINT, note)
     try:
@@ -210,28 +210,30 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
     if noted:
         kept = any((output / "checkpoints").glob("[0-9]*[0-9]"))
         rest = "The last checkpoint is" if kept else "There is no checkpoint yet, only settings"
-        console.print(f"Stopped. {rest} in {output}; the same command with --resume goes on.")
+        console.print(f"Stopped. {rest} in {output}; the same command with --resume continues.")
         raise typer.Exit(130)
 
 
 @app.command("rllib", cls=Command)
 def train_rllib(
     scenario: Scenario = "single_obstacle",
-    num_vehicles: Annotated[int | None, typer.Option(min=1, help="Replaces the scenario's.")] = None,
+    num_vehicles: Annotated[
+        int | None, typer.Option(min=1, help="Vehicles of the swarm. Default: those of the scenario.")
+    ] = None,
     steps: Steps = 1_000_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first worlds and weights.")] = 0,
-    env_runners: Annotated[int, typer.Option(min=0, max=1000, help="Processes that sample, a core each.")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first worlds and of the weights.")] = 0,
+    env_runners: Annotated[int, typer.Option(min=0, max=1000, help="Processes that sample; each uses a core.")] = 2,
     ray: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster (auto: the one here). Default: this machine.")
+        str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster (auto: the local one). Default: this machine.")
     ] = None,
     output: Output = Path("results/rllib"),
     resume: Resume = False,
 ) -> None:
     """Train one policy for all vehicles with RLlib's PPO, on this machine or a Ray cluster.
 
-    Vehicles decide every 0.5 s, with yaw damping. Needs the extra "distributed". Writes config.json (settings, seeds,
-    versions), progress.csv (a row per iteration) and checkpoints/. Ctrl-C ends it with a checkpoint after the iteration
-    under way; the same command with --resume goes on, to more --steps too.
+    Vehicles decide every 0.5 s, with yaw damping. This needs the extra "distributed". It writes config.json (settings,
+    seeds, versions), progress.csv (a row per iteration) and checkpoints/. Ctrl-C stops the training after the current
+    iteration, with a checkpoint; the same command with --resume continues, also to more --steps.
 
     Example: uuv-marl train rllib --scenario tracking --num-vehicles 8 --steps 200000
     """

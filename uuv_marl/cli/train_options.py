@@ -14,7 +14,7 @@ from uuv_marl.cli.console import changes_of, find_modules
 def whole_number(text: str) -> int:
     """A number such as 3000000 or 3e6."""
     if not re.fullmatch(r"[1-9]\d{0,14}|[1-9](\.\d+)?e\d{1,2}", str(text)):
-        raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give for instance 3000000 or 3e6")
+        raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give a number such as 3000000 or 3e6")
     return int(float(text))
 
 
@@ -28,13 +28,18 @@ class Command(TyperCommand):
         except Exception as error:
             if "2 arguments" not in str(error):
                 raise
-            raise typer.BadParameter(f"{error} Give it at the start and at the end: --noise 0.4 0.08", ctx) from None
+            raise typer.BadParameter(
+                f"{error} Give the value at the start and at the end: --noise 0.4 0.08", ctx
+            ) from None
 
 
 Scenario = Annotated[str, typer.Option(help="Name or TOML file.")]
 Vehicles = Annotated[
     int | None,
-    typer.Option(min=1, help="Of every swarm. Default: the scenario's; 10 to 100 at once where that has 54."),
+    typer.Option(
+        min=1,
+        help="Vehicles of every swarm. Default: those of the scenario; if these are 54, several sizes from 10 to 100.",
+    ),
 ]
 Steps = Annotated[
     int,
@@ -46,8 +51,8 @@ Length = Annotated[
     int | None,
     typer.Option(
         parser=whole_number, metavar="NUMBER",
-        help="Agent-steps in all, such as 3e6: decisions times vehicles. More at a --resume prolong the training. "
-        "Default: 3e7, or at a --resume those of before.",
+        help="Agent-steps in all, such as 3e6: decisions times vehicles. With --resume, more steps prolong the "
+        "training. Default: 3e7; with --resume, the steps given before.",
     ),
 ]  # fmt: skip
 Changes = Annotated[
@@ -61,39 +66,39 @@ Reward = Annotated[
     str | None,
     typer.Option(
         metavar="MODULE:FUNCTION",
-        help="A reward of your own: from the swarm after a decision to an array (world, vehicle). The module is looked "
-        "for in the current folder too. Default: that of uuv_marl/train/shaping.py.",
+        help="A reward of your own: a function from the swarm after a decision to an array (world, vehicle). The "
+        "module may be in the current folder. Default: the reward of uuv_marl/train/shaping.py.",
     ),
 ]
 Network = Annotated[
     str | None,
-    typer.Option(metavar="UNITS,UNITS,...", help="Layers of the actor's and of the critic's network. Default: 96,96."),
+    typer.Option(metavar="UNITS,UNITS,...", help="Units of each layer, in actor and critic. Default: 96,96."),
 ]
 Sees = Annotated[
     str,
     typer.Option(
         metavar="percept|memory",
-        help="What the actor sees. percept: the latest percept; it gives a force. memory: what vehicles remember; it "
-        "corrects the wish of scout, inside the safety filter.",
+        help="percept: the actor sees the latest percept and gives a force. memory: the actor sees what vehicles "
+        "remember, and corrects the velocity that scout asks for, inside the safety filter.",
     ),
 ]
 Device = Annotated[
-    str, typer.Option(help="Where networks and batches are: cpu, or cuda for a GPU. Worlds are on the CPU.")
+    str, typer.Option(help="Device of networks and batches: cpu, or cuda for a GPU. Worlds always run on the CPU.")
 ]
 Recipe = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE",
-        help="All of a training from a file: scenario, sizes, disturbances, reward and algorithm; mappo_v2 is one that "
-        "comes with the package. Besides it give --seed, --steps, --device, --output and --resume alone.",
+        help="A file with all settings of a training: scenario, sizes, disturbances, reward and algorithm. The recipe "
+        "mappo_v2 ships. Only --seed, --steps, --device, --output and --resume may stand beside it.",
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Of worlds, weights and noise: one seed, one training.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of worlds, weights and noise. It fixes the training.")]
 Start = Annotated[
-    Path | None, typer.Option(help="Start from the weights of another training: its best, or a checkpoint.")
+    Path | None, typer.Option(help="Start from the weights of another training: its folder best, or a checkpoint.")
 ]
-Output = Annotated[Path, typer.Option(help="Folder of settings, progress and checkpoint.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")]
+Output = Annotated[Path, typer.Option(help="Folder for settings, progress and checkpoints.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue from the folder's last checkpoint.")]
 
 
 class Task(NamedTuple):
@@ -116,7 +121,7 @@ class Task(NamedTuple):
         size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
         sizes = whole_numbers("--sizes", self.sizes)
         if sizes and size:
-            raise typer.BadParameter("--num-vehicles is the size of every swarm; give it or --sizes")
+            raise typer.BadParameter("--num-vehicles is the size of every swarm; leave out this option or --sizes")
         if self.sees not in ("percept", "memory"):
             raise typer.BadParameter(f"--sees must be percept or memory, got {self.sees!r}")
         if self.reward:

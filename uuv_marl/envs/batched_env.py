@@ -1,4 +1,4 @@
-"""What every environment API shares: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
+"""The core of every environment API: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
 
 import math
 import os
@@ -23,23 +23,23 @@ Reward = Literal["individual", "team"] | RewardFunction
 
 
 class StepResult(NamedTuple):
-    """One step of every world. Arrays of shape (world, vehicle, ...), or (world,) where that is said."""
+    """The result of one step of every world. Arrays have shape (world, vehicle, ...), or the shape in their text."""
 
     observation: Float32
     reward: Float64
-    """0 for vehicles that were lost before."""
+    """Zero for vehicles that were lost in an earlier step."""
     terminated: Bool
-    """The swarm arrived and that ends the episode, or the vehicle was lost in this step."""
+    """True where the arrival of the swarm ends the episode, or where the vehicle was lost in this step."""
     truncated: Bool
-    """The time limit, for vehicles that are not lost."""
+    """True where the time limit ends the episode, for vehicles that are not lost."""
     acting: Bool
-    """Vehicles that act in the next step: neither lost nor at their world's end."""
+    """True for vehicles that act in the next step: they are not lost, and their world's episode has not ended."""
     world_reward: Float64
-    """Shape (world,): the mean over all vehicles, before ``team`` adds anybody's own loss."""
+    """Shape (world,): the mean over all vehicles, before ``team`` adds a lost vehicle's own loss."""
     world_terminated: Bool
-    """Shape (world,): the swarm arrived and that ends the episode, or all its vehicles are lost."""
+    """Shape (world,): the arrival of the swarm ends the episode, or all vehicles are lost."""
     world_truncated: Bool
-    """Shape (world,): the time limit."""
+    """Shape (world,): the time limit ends the episode."""
     weighted: Float64 | None
     """The reward's terms, shape (term, world, vehicle); None for a user's own reward."""
 
@@ -60,10 +60,10 @@ class BatchedEnv:
     Args:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
-        reward: ``individual`` (the sum of a vehicle's terms), ``team`` (their mean over all vehicles, for each; a lost
-            vehicle is also charged its own loss whole), or a function from the swarm to an array (world, vehicle).
-        max_cycles: truncates after so many decisions, if the scenario's time limit does not come first.
-        engine: what steps the worlds: ``numba`` or ``plain``, see ``Swarm``.
+        reward: ``individual`` (the sum of a vehicle's terms), ``team`` (every vehicle gets the mean over all vehicles;
+            a lost vehicle also pays its own loss), or a function from the swarm to an array (world, vehicle).
+        max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
+        engine: ``numba`` or ``plain``, see ``Swarm``.
     """
 
     def __init__(
@@ -105,12 +105,12 @@ class BatchedEnv:
         return min(cycles, self.max_cycles or cycles)
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> Float32:
-        """Start worlds anew; the observations of all, shape (world, vehicle, entry).
+        """Start episodes; the observations of all worlds, shape (world, vehicle, entry).
 
         Args:
-            seed: world w starts from ``seed + w``; or a seed, or None, for each of ``worlds``; without a seed a world's
-                own random stream goes on.
-            worlds: which ones, default all.
+            seed: with a number, world w starts from ``seed + w``; a list has a seed or None for each of ``worlds``. A
+                world without a seed continues its own random stream.
+            worlds: the worlds to reset; None for all.
         """
         chosen = list(range(self.swarm.num_worlds)) if worlds is None else list(worlds)
         self.swarm.reset(seed, chosen)
@@ -119,14 +119,14 @@ class BatchedEnv:
         return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
 
     def need_reset(self, what: str) -> None:
-        """Raise RuntimeError where a world was never reset."""
+        """Raise RuntimeError if a world was never reset."""
         if self._waiting:
             raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
 
     def step(self, action: ArrayLike) -> StepResult:
         """One decision of every world; ``action`` has shape (world, vehicle, 2).
 
-        A world whose episode is over stays as it is, its flags too, and is paid nothing, until it is reset.
+        A world whose episode is over keeps its state and its flags, and its reward is 0, until it is reset.
         """
         self.need_reset("step")
         swarm = self.swarm
@@ -192,11 +192,11 @@ def changed(
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> Scenario:
-    """The scenario with what the arguments of an environment change in it.
+    """The scenario, changed by the arguments of an environment.
 
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
-        num_vehicles: replaces the scenario's.
+        num_vehicles: replaces the scenario's number of vehicles.
         decision_period: time between decisions [s], replaces ``timing.decision_period_s``.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
     """
@@ -218,7 +218,7 @@ def make_batched_env(
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
         num_worlds: worlds stepped together.
-        max_cycles: truncates after so many decisions; None for the scenario's time limit.
+        max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
         engine: ``numba`` or ``plain``.
         changes: ``num_vehicles``, ``decision_period`` [s] and ``overrides`` of the scenario, see ``changed``.
@@ -227,10 +227,10 @@ def make_batched_env(
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:
-    """Raise ScenarioError where vehicles can be lost, for an API whose rows must all live to the episode's end."""
+    """Raise ScenarioError if vehicles can be lost, for an API in which all rows must live to the episode's end."""
     if scenario.loses_vehicles:
         raise ScenarioError(
-            f"{api} can't show that a vehicle is lost before the others, which scenario {scenario.name!r} allows; use "
+            f"{api} can't show that a vehicle is lost, which can happen in scenario {scenario.name!r}; use "
             "uuv_marl.parallel_env, vector_env or the TorchRL or RLlib environment, or override "
-            "disturbance.loss_times_s=[], contact.ends_vehicle=false and no faults of kind member"
+            "disturbance.loss_times_s=[] and contact.ends_vehicle=false, and leave out faults of kind member"
         )

@@ -1,4 +1,4 @@
-"""The PettingZoo environments: ``parallel_env`` (all agents at once) and ``env`` (AEC, one after the other)."""
+"""The PettingZoo environments: ``parallel_env`` (agents act at once) and ``env`` (AEC: agents act in turn)."""
 
 import itertools
 import math
@@ -28,12 +28,12 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
     and yaw torque as shares of full force, projected onto the unit disc.
 
-    An agent's last info tells how its part ended: ``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``
-    (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users: ``reset(seed=s)`` seeds it
-    from ``s``, and the environment itself never draws from it.
+    An agent's last info tells how its episode ended: ``is_success``, ``ending``, ``arrived``, ``time_s``,
+    ``collisions`` (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users:
+    ``reset(seed=s)`` seeds it from ``s``, and the environment itself never draws from it.
 
     Args:
-        batch: the one world below.
+        batch: the simulation, of one world.
         render_mode: ``human``, ``rgb_array`` or None.
         info_terms: put the reward's terms into every agent's info.
         render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
@@ -86,7 +86,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         seed: int | None = None,
         options: dict[str, Any] | None = None,  # noqa: ARG002 - PettingZoo's signature
     ) -> tuple[dict[str, Float32], Infos]:
-        """Start an episode. Without a seed the environment's own random stream goes on. ``options`` are ignored."""
+        """Start an episode. Without a seed the environment's random stream continues. ``options`` are ignored."""
         observation = self._batch.reset(seed)[0]
         if seed is not None:
             self.np_random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0,)))
@@ -107,7 +107,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         if not self.agents:
             self._batch.need_reset("step")
             if actions:
-                raise RuntimeError("the episode is over; call reset() to start an episode")
+                raise RuntimeError("the episode is over; call reset() to start another")
             return {}, {}, {}, {}, {}
         result = self._batch.step(self._action_array(actions))
         acted, rows = self.agents, self._rows
@@ -186,15 +186,15 @@ def parallel_env(
 
     Args:
         scenario: a name (``uuv_marl.scenario_names()``), a TOML file or a ``Scenario``.
-        num_vehicles: replaces the scenario's.
-        max_cycles: truncates after so many decisions; None for the scenario's time limit.
+        num_vehicles: number of vehicles; None for the scenario's number.
+        max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         render_mode: ``human``, ``rgb_array`` or None.
-        render_options: how to draw, any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or ``map``) and
-            ``sonar_of`` (index of the vehicle whose sonar is shown): ``uuv_marl.envs.drawing.options``.
+        render_options: how to draw: a dictionary with any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or
+            ``map``) and ``sonar_of`` (index of the vehicle whose sonar is shown).
         reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
-            ``timing.decision_period_s``. Meanwhile the force is held in the world frame and projected anew.
+            ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
         engine: ``numba``, or ``plain``: the same run, bit for bit, from the plain Python of ``uuv_marl/sim/plain.py``,
             tens to hundreds of times slower.
@@ -207,5 +207,5 @@ def parallel_env(
 
 
 def env(*args: Any, **kwargs: Any) -> AECEnv[str, Float32, Float32 | None]:
-    """The same as an AEC environment; arguments as for ``parallel_env``."""
+    """A PettingZoo AEC environment, in which agents act in turn. Its arguments are those of ``parallel_env``."""
     return OrderEnforcingWrapper(parallel_to_aec(parallel_env(*args, **kwargs)))

@@ -1,4 +1,4 @@
-"""``vector_env``: many worlds as a Gymnasium vector environment, a row per world."""
+"""``vector_env``: many worlds as a Gymnasium vector environment; each row is a world."""
 
 from collections.abc import Mapping
 from typing import Any, Unpack
@@ -22,22 +22,22 @@ Infos = dict[str, Any]
 class SwarmVectorEnv(EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]):
     """Worlds stepped together; ``vector_env`` makes them.
 
-    Observation of shape (num_envs, vehicle, entry), action of shape (num_envs, vehicle, 2), reward the mean over a
-    world's vehicles. A world terminates when its swarm arrived or is lost as a whole, and the time limit truncates
-    it. What happens then is ``autoreset_mode``, Gymnasium's:
+    Observations have shape (num_envs, vehicle, entry), actions (num_envs, vehicle, 2). A reward is the mean over a
+    world's vehicles. An episode terminates when the swarm has arrived or all its vehicles are lost; the time limit
+    truncates it. Gymnasium's ``autoreset_mode`` says what happens then:
 
-    * ``SAME_STEP``: the world is reset in the step in which it ends. ``infos["final_obs"][world]`` is its last
-      observation, ``infos["final_info"]`` how it ended (``uuv_marl.envs.ending.ending``) and the last ``state``.
-    * ``NEXT_STEP``: the world is reset in the step after, which ignores its actions and pays nothing.
+    * ``SAME_STEP``: the world is reset in the step in which its episode ends. ``infos["final_obs"][world]`` is the last
+      observation. ``infos["final_info"]`` has the ending (``uuv_marl.envs.ending.ending``) and the last ``state``.
+    * ``NEXT_STEP``: the world is reset in the next step, which ignores the world's actions and gives the reward 0.
     * ``DISABLED``: the world stays as it is, its flags too, until you reset it.
 
-    In the last two the observation of the last step is the episode's own, and how it ended stands in ``infos`` itself.
+    In the last two modes the last step returns the episode's last observation, and ``infos`` itself has the ending.
 
-    ``infos``, arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated`` of
-    this step, and ``agent_mask``, the vehicles that act in the next one. Rows of vehicles lost before are zero.
+    ``infos`` holds arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated``
+    of this step, and ``agent_mask``, the vehicles that act in the next step. Rows of lost vehicles are zero.
 
     Args:
-        batch: the worlds below.
+        batch: the worlds.
         render_mode: ``rgb_array`` or None.
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED``, or its value.
@@ -77,8 +77,8 @@ class SwarmVectorEnv(EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]):
         """Start episodes.
 
         Args:
-            seed: world w starts from ``seed + w``; or a seed (or None) per world; without a seed every world's own
-                random stream goes on.
+            seed: with a number, world w starts from ``seed + w``; a list has a seed or None for each world. A world
+                without a seed continues its own random stream.
             options: ``{"reset_mask": bool array of shape (num_envs,)}`` resets these worlds only.
         """
         mask = self._mask(options)
@@ -187,8 +187,8 @@ def vector_env(
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
             ``SwarmVectorEnv``.
         options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
-            for ``uuv_marl.parallel_env``. ``reward`` shapes ``infos["agent_reward"]``; the row's own is the mean over
-            all vehicles.
+            for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each vehicle; the reward of
+            a row is the mean over all vehicles.
     """
     batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

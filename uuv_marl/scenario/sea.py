@@ -18,21 +18,21 @@ class Current(Section):
     """How the water moves: the sum of a mean, a Gauss-Markov process and steady eddies."""
 
     speed_mps: Speed
-    """Of the mean."""
+    """Speed of the mean current."""
     direction_deg: Annotated[float, within(-360, 360)] | None = None
-    """Where the mean flows to, clockwise from north; drawn by the seed where absent."""
+    """Direction to which the mean current flows, clockwise from north; if absent, the seed draws it."""
     variation_mps: Speed
-    """Standard deviation of the process, north and east each."""
+    """Standard deviation of the Gauss-Markov process, for north and for east."""
     variation_time_s: Clock
-    """In which it forgets: 1 / mu."""
+    """Time constant of the Gauss-Markov process: 1 / mu."""
     eddies: Annotated[int, within(0, 64)]
-    """Per square of 500 m, over the course's box and 250 m around it; made an even number."""
+    """Eddies per square of 500 m, over the course's box and 250 m around it; the total is made even."""
     eddy_speed_mps: Speed
-    """Largest speed of the water around one."""
+    """Largest speed of the water around an eddy."""
     eddy_core_m: Radius
-    """Radius of its core."""
+    """Radius of an eddy's core."""
     velocity: Literal["ground", "water"]
-    """What a vehicle knows its own velocity over: the ground (a log that reaches the bottom), or through the water."""
+    """The own velocity that a vehicle knows: over ground (a log that reaches the bottom), or through the water."""
 
     @property
     def flows(self) -> bool:
@@ -51,70 +51,70 @@ class Latency(Section):
     """How late the sonar is. A reading is what an array hears at one time."""
 
     travel_time: bool
-    """Whether a vehicle is heard where it was when its sound left it."""
+    """Whether a vehicle is heard at the place where its sound left it."""
     sound_speed_mps: Annotated[float, within(100, 10_000)]
-    """Of sound in water."""
+    """Speed of sound in water."""
     processing_s: Annotated[float, within(0, MAX_DELAY_S)]
-    """From reception until a policy gets the reading."""
+    """Time from the reception of a reading until a policy gets it."""
     compensated: bool
-    """Whether readings are carried to the present pose by the vehicle's own navigation."""
+    """Whether the vehicle corrects readings for its own motion since their reception, by its own navigation."""
     active_period_s: Annotated[float, within(0, 3_600)]
-    """Between two pings of an active array; 0: heard at every control hold, which no real one can."""
+    """Time between two pings of an active array; 0: a ping at every control hold, which no real array can do."""
     passive_period_s: Annotated[float, within(0, 3_600)]
-    """Between two readings of a passive array; 0: at every control hold."""
+    """Time between two readings of a passive array; 0: a reading at every control hold."""
 
 
 class Noise(Section):
-    """What the sonar gets wrong, at each reading anew unless something else is said."""
+    """Errors of the sonar, drawn for each reading unless a field says something else."""
 
     bearing_deg: Angle
     """Standard deviation of a bearing."""
     range_m: NonNegative
-    """Standard deviation of a range ..."""
+    """Constant part of the standard deviation of a range."""
     range_share: Probability
-    """... plus this share of it."""
+    """Part of the standard deviation of a range that grows with it, as a share of the range."""
     passive_range_log_sd: Annotated[float, within(0, 3)]
-    """A vehicle's passive arrays take ranges times one lasting factor: exp of a normal number with this deviation."""
+    """A vehicle's passive arrays multiply ranges by one lasting factor: exp of a normal number with this deviation."""
     passive_ranges: bool
     """Whether passive arrays measure ranges at all."""
     nominal_range_m: Radius
-    """Where a vehicle is put that is heard by its bearing alone."""
+    """Range that is reported for a vehicle of which only the bearing is heard."""
     active_r50_m: NonNegative
-    """Range at which an active array detects every second time; 0: always detects."""
+    """Range at which an active array detects every second time; 0: it always detects."""
     passive_r50_m: NonNegative
-    """The same of a passive array."""
+    """Range at which a passive array detects every second time; 0: it always detects."""
     detection_sd_db: Annotated[float, within(0.001, 100)]
     """Standard deviation of the signal excess."""
     silence_probability: Probability
-    """That an array falls silent at a reading ..."""
+    """Probability, at each reading, that an array falls silent."""
     silence_readings: Annotated[int, within(1, 10_000)]
-    """... for so many."""
+    """Number of readings for which an array stays silent."""
     false_echo_probability: Probability
-    """Per sub-sector: of an echo of nothing; an obstacle to active arrays, a vehicle to passive ones."""
+    """Probability of a false echo per sub-sector: an obstacle to active arrays, a vehicle to passive arrays."""
 
 
 class Navigation(Section):
-    """What a vehicle knows of where it is, and so of where l(t) is."""
+    """Errors of a vehicle's own navigation: of its position, and so of the vector to l(t), and of its compass."""
 
     drift_share: Probability
-    """Its position drifts by this share of the way made, in a direction of its own."""
+    """A vehicle's estimate of its position drifts by this share of its way, in a random direction."""
     compass_bias_deg: Angle
-    """Standard deviation of its compass's lasting error."""
+    """Standard deviation of the compass's lasting error."""
 
 
 class Modem(Section):
-    """Acoustic messages, one of each vehicle in a round, in turn. The channel ``modem`` gives what arrived."""
+    """Acoustic messages: in a round each vehicle sends one, in turn. The channel ``modem`` gives what arrived."""
 
     period_s: Annotated[float, within(0.001, 36_000)] | None = None
-    """Of a round; absent: one slot for each vehicle, long enough to send and for sound to cross ``guard_m``."""
+    """Period of a round; absent: a slot for each vehicle, long enough to send and for sound to cross ``guard_m``."""
     payload_bytes: Annotated[int, within(1, 4_096)]
-    """Of a message."""
+    """Length of a message."""
     bit_rate_bps: Annotated[float, within(1, 1_000_000)]
-    """Net."""
+    """Net bit rate."""
     guard_m: NonNegative
     """Distance that a message crosses before the next is sent."""
     loss_probability: Probability
-    """Of each message, for each listener."""
+    """Probability, for each listener, that a message is lost."""
 
     def round_s(self, num_vehicles: int, sound_speed_mps: float) -> float:
         """Time between two messages of a vehicle in a swarm of this size [s]."""
@@ -126,44 +126,44 @@ class Mismatch(Section):
     """How far a vehicle's numbers are from the scenario's: factors, uniform in 1 -+ share, one draw per vehicle."""
 
     mass: Share
-    """Of mass and moment of inertia."""
+    """Share for mass and moment of inertia."""
     added_mass: Share
-    """Of all added masses."""
+    """Share for all added masses."""
     drag: Share
-    """Of all resistances."""
+    """Share for all resistances."""
     thrust: Share
-    """Of thrust."""
+    """Share for thrust."""
 
 
 class Fault(Section):
-    """Something that breaks on a share of the vehicles, rounded up; a larger share has the smaller one's among them."""
+    """A fault of a share of the vehicles, rounded up. A larger share hits the same vehicles and more."""
 
     kind: Literal["thruster", "yaw", "array", "member"]
-    """Thrust, yaw torque, a sonar array, or the whole vehicle."""
+    """What fails: thrust, yaw torque, a sonar array, or the whole vehicle."""
     share: Probability
-    """Of the vehicles."""
+    """Share of the vehicles that the fault hits."""
     efficiency: Probability = 0.0
-    """What is left of thrust or torque."""
+    """Share of thrust or torque that remains."""
     array: str | None = None
-    """Which array."""
+    """Name of the array that fails."""
     onset_s: NonNegative | None = None
-    """When it breaks; absent: at a time of l(t)'s way, drawn for each vehicle."""
+    """Time at which the fault begins; absent: a random time while l(t) moves, drawn for each vehicle."""
     duration_s: NonNegative | None = None
-    """How long; absent: to the end. A lost member stays lost."""
+    """How long the fault lasts; absent: to the end. A lost member stays lost."""
 
     def _check(self) -> None:
         if (self.kind == "array") != (self.array is not None):
             raise ValueError(
-                f"faults.array must name the array of a fault of kind array, and of no other kind, got {self.array!r} "
-                f"for kind {self.kind}"
+                f"faults.array must be given for kind array and for no other kind, got {self.array!r} for kind "
+                f"{self.kind}"
             )
         if self.efficiency > 0.0 and self.kind not in ("thruster", "yaw"):
             raise ValueError(
-                f"faults.efficiency is of kinds thruster and yaw alone, got {self.efficiency:g} for kind {self.kind}; "
+                f"faults.efficiency is only for kinds thruster and yaw, got {self.efficiency:g} for kind {self.kind}; "
                 "leave it out"
             )
         if self.duration_s is not None and self.kind == "member":
             raise ValueError(
-                f"faults.duration_s is of no use to kind member, got {self.duration_s:g}: who is lost stays lost; "
+                f"faults.duration_s is of no use to kind member, got {self.duration_s:g}: a lost vehicle stays lost; "
                 "leave it out"
             )

@@ -40,7 +40,7 @@ def growth(num_vehicles: int) -> float:
 
 
 class Swarm(Section):
-    """How many."""
+    """The size of the swarm."""
 
     num_vehicles: Annotated[int, within(1, 16_384)]
     """Vehicles at the start."""
@@ -52,13 +52,13 @@ class Start(Section):
     length_m: Positive
     """Side along the first leg, of each rectangle, for up to 54 vehicles."""
     width_m: Positive
-    """Side across the first leg."""
+    """Side across the first leg, of each rectangle, for up to 54 vehicles."""
     gap_m: NonNegative
-    """Between the two."""
+    """Distance between the two rectangles."""
     spacing_m: Positive
     """Smallest distance between two vehicles at the start."""
     speed_min_mps: Speed
-    """Lowest initial surge speed; uniform, with uniform heading."""
+    """Lowest initial surge speed. Speeds and headings are drawn uniformly."""
     speed_max_mps: Speed
     """Highest initial surge speed."""
 
@@ -105,7 +105,7 @@ class Trajectory(Section):
     speed_mps: Annotated[float, within(0.01, 100)]
     """Speed along the polyline."""
     waypoints_m: Annotated[tuple[tuple[Signed, Signed], ...], Field(min_length=2, max_length=1024)] | None = None
-    """North and east of each corner; absent where ``random_field`` draws them."""
+    """North and east of each corner; absent where ``random_field`` draws the corners."""
 
     @property
     def duration_s(self) -> float:
@@ -138,7 +138,7 @@ class RandomField(Section):
     turn_max_deg: Annotated[float, within(0, 150)]
     """Sharpest turn between legs."""
     obstacles: tuple[Discs, Discs]
-    """Fewest and most obstacles wished for; where the field is full there are fewer."""
+    """Fewest and most obstacles; a field without room for them has fewer."""
     radius_m: tuple[Radius, Radius]
     """Smallest and largest radius."""
     offset_max_m: NonNegative
@@ -157,11 +157,11 @@ class Timing(Section):
     """Three clocks."""
 
     control_hold_s: Clock
-    """t_r: body forces are held this long."""
+    """t_r: time for which body forces are held."""
     integration_step_s: Clock
-    """Runge-Kutta step; divides the control hold."""
+    """Runge-Kutta step, of which the control hold is a multiple."""
     decision_period_s: Clock
-    """A policy acts this often, a multiple of the control hold; the force is held in the world frame meanwhile."""
+    """Time between two decisions, a multiple of the control hold; meanwhile the force is held in the world frame."""
 
     @property
     def holds_per_decision(self) -> int:
@@ -198,7 +198,7 @@ class Contact(Section):
     """What counts as a collision: two hulls, or a hull and an obstacle, overlap."""
 
     hull_radius_m: Positive
-    """Vehicles collide closer than twice this; with an obstacle at this surface distance."""
+    """Vehicles collide when their centres are closer than twice this; with an obstacle at this surface distance."""
     ends_vehicle: bool
     """Whether a vehicle that collides is lost."""
 
@@ -207,26 +207,26 @@ class Arrival(Section):
     """When the task is done: at rest at the trajectory's end, or in passage, for hulls that can't stop."""
 
     by: Literal["rest", "passage"] = "rest"
-    """In passage l(t) goes on along the last leg beyond the end. The swarm has arrived once l(t) and its centre have
-    crossed the line through the end across that leg, with every vehicle within ``spread_m`` of where the centre is
-    along the leg. ``radius_m`` and ``dwell_s`` say nothing then."""
+    """In passage l(t) continues along the last leg beyond the end. The swarm has arrived once l(t) and the swarm's
+    centre have crossed the line through the end across that leg, with every vehicle within ``spread_m`` of the centre's
+    place along the leg. ``radius_m`` and ``dwell_s`` have no effect then."""
     radius_m: Positive
-    """The swarm's centre this close to the end of the trajectory, with l(t) at rest there ..."""
+    """At rest: largest distance of the swarm's centre from the end of the trajectory, where l(t) rests."""
     dwell_s: Annotated[float, within(0, 3_600)]
-    """... for so long."""
+    """At rest: time for which the swarm's centre stays within ``radius_m``."""
     spread_m: Positive
-    """Every vehicle this close to the end, for up to 54 vehicles."""
+    """Largest distance of every vehicle from the end, for up to 54 vehicles."""
     ends_episode: bool
-    """Whether an episode ends when the swarm arrives; else it runs to its time limit."""
+    """Whether an episode ends when the swarm arrives; if not, it runs to its time limit."""
 
 
 class TimeLimit(Section):
-    """When it is given up."""
+    """The time limit of an episode: ``factor`` times the trajectory's duration, plus ``extra_s``."""
 
     factor: Annotated[float, within(0.001, 1_000)]
-    """Times the trajectory's duration ..."""
+    """Factor of the trajectory's duration."""
     extra_s: NonNegative
-    """... plus this."""
+    """Time added to it."""
 
     def of(self, duration_s: Seconds) -> Seconds:
         """The limit [s] of trajectories that take so long [s], a number or an array."""
@@ -234,7 +234,7 @@ class TimeLimit(Section):
 
 
 class Disturbance(Section):
-    """What goes wrong."""
+    """Losses of vehicles at set times."""
 
     loss_times_s: Annotated[tuple[NonNegative, ...], Field(max_length=16384)]
     """At each of these times a vehicle, drawn by the seed, is lost."""

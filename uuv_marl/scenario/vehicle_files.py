@@ -73,7 +73,7 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
         needed = fields - _OPTIONAL[section].keys()
         missing = sorted(needed - set(cast(dict[str, Any], given) if isinstance(given, dict) else ()))
         if missing:
-            raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; a vehicle's file gives all numbers")
+            raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; add this number to the file")
     other = next((key for key in file.data if key not in {*_GIVEN, "variants"}), None)
     if other is not None:
         raise ScenarioError(

@@ -57,7 +57,7 @@ class TrainingFolder(Generic[R]):
         if resume:
             self._resume()
         elif path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
-            raise ResultsError(f"{path} is not empty; give --resume to go on with it, or another --output")
+            raise ResultsError(f"{path} is not empty; give --resume to continue it, or another --output")
 
     def _resume(self) -> None:
         try:
