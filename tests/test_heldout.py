@@ -10,19 +10,21 @@ import pytest
 from scipy.stats import trim_mean
 from typer.testing import CliRunner
 
+from uuv_marl import baselines
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark.tables import estimate
 from uuv_marl.cli import app
 from uuv_marl.studies.heldout import across, figures, job, page, sets
-from uuv_marl.studies.heldout.across import efficiency, success
+from uuv_marl.studies.heldout.across import efficiency, improvement, success
 from uuv_marl.studies.heldout.episodes import Episode, read_episodes, write_episodes
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
 from uuv_marl.studies.heldout.sets import GROUPS, LEADING, SETS, HeldOut
 from uuv_marl.studies.heldout.targets import later, targets, upper_bound
-from uuv_marl.studies.heldout.trainings import find_trainings
+from uuv_marl.studies.heldout.trainings import Trained, Validation, find_trainings
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "heldout"
+SHIPPED = Path(baselines.__file__).parent / "trained" / "mappo.safetensors"
 QUICK = {"swarm.num_vehicles": 3, "time_limit.factor": 0.02, "time_limit.extra_s": 1.0}
 
 
@@ -40,7 +42,7 @@ def test_seeds_are_held_out_and_sets_are_told_apart():
         assert {seed for case in cases for seed in case.seeds} == set(range(5000, 5000 + held.seeds["leading"]))
         assert max(len(case.seeds) for case in held.cases([], 30)) <= 30
         assert held.seeds["leading"] == max(held.seeds.values()) >= held.across
-    assert sum(held.across > 0 for held in SETS) == 3
+    assert sum(held.across > 0 for held in SETS) == 4
     assert all(name.removeprefix("guarded:") in POLICIES for group in GROUPS.values() for name in group)
 
 
@@ -59,6 +61,43 @@ def test_runs_are_resampled_within_their_tasks():
     assert e.high - e.low < 0.05
     assert estimate(easy).iqm == pytest.approx(np.mean(easy[1:4]))
     assert estimate([0.5], [0.7]) == (0.6, 0.6, 0.6)
+
+
+def test_the_probability_of_improvement_by_hand():
+    assert improvement([[0.5, 0.7]], [[0.6, 0.7]]).value == pytest.approx((0 + 0 + 1 + 0.5) / 4)
+    mine, other = [[0.5, 0.7, 0.9], [1.0, 1.0, 1.0]], [[0.6, 0.7, 0.1], [1.0, 1.0, 1.0]]
+    one, back = improvement(mine, other), improvement(other, mine)
+    assert one.value + back.value == pytest.approx(1.0)
+    assert (one.low + back.high, one.high + back.low) == (pytest.approx(1.0, abs=0.05), pytest.approx(1.0, abs=0.05))
+    assert one.low < one.value < one.high
+    assert improvement(mine[:1], other[:1]).value - 0.5 == pytest.approx(2 * (one.value - 0.5)), "ties count half"
+    assert improvement([[1.0, 0.9]], [[0.1, 0.2]]) == (1.0, 1.0, 1.0)
+
+
+def test_ablations_stand_beside_the_comparison(tmp_path):
+    folder = trainings(tmp_path, SHIPPED)
+    shutil.copytree(folder / "ppo-0", folder / "ablations" / "one_size")
+    settings = {"settings": {"algorithm": {"name": "mappo"}, "seed": 0, "chosen": "last"}}
+    (folder / "ablations" / "one_size" / "config.json").write_text(json.dumps(settings))
+    found = find_trainings(folder)
+    assert [(one.algorithm, one.ablation) for one in found] == [("mappo", 0), ("ppo", 0), ("one_size", 1)]
+    episodes = [
+        episode(policy=one.algorithm, training_seed=one.seed, seed=5000 + k, task_time_s=110.0 + k)
+        for one in found
+        for k in range(3)
+    ]
+    write_marl_eval(episodes, found, tmp_path / "raw.json")
+    assert {*json.loads((tmp_path / "raw.json").read_text())["uuv_marl"]["random_field"]} == {"mappo", "ppo"}
+    text = page.report(episodes, found)
+    assert "| one_size* | 1 |" in text
+    assert "| probability that mappo is better than ppo | random_field | all |" in text
+
+
+def test_the_policy_that_counts_is_the_one_that_was_chosen():
+    both = Validation(10, 1.0, -0.5, 1.0), Validation(20, 2.0, -0.9, 0.5)
+    best = Trained("mappo", 0, Path("best"), both)
+    assert best.policy_at == both[0]
+    assert best._replace(chosen="last").policy_at == both[1]
 
 
 def test_targets_by_hand():
@@ -135,10 +174,7 @@ def trainings(folder, weights):
 
 
 def test_the_command_runs_what_is_missing_and_tells_of_it(tmp_path, quick):
-    import uuv_marl.baselines
-
-    weights = Path(uuv_marl.baselines.__file__).parent / "trained" / "mappo.safetensors"
-    where = trainings(tmp_path / "trainings", weights)
+    where = trainings(tmp_path / "trainings", SHIPPED)
     command = ["heldout", f"--output={tmp_path / 'out'}", f"--trainings={where}"]
     done = CliRunner().invoke(app, [*command, "--seeds=1"])
     assert done.exit_code == 0, done.output

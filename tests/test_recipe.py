@@ -13,6 +13,7 @@ from uuv_marl.baselines.checkpoint import load_checkpoint
 from uuv_marl.baselines.scout import PLUS
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
+from uuv_marl.sim.swarm import Swarm
 
 pytestmark = pytest.mark.needs("torch")
 
@@ -113,9 +114,43 @@ def test_what_ships_says_that_it_was_trained_by_the_recipe(seed, name):
 
     told = json.loads(json.dumps(dataclasses.asdict(load_recipe("mappo_v2").settings(seed))))
     card = POLICIES[name].checkpoint.card
-    said = {"chosen": "last", **card.training}  # it was chosen by hand what the recipe says since
+    # It was chosen by hand what the recipe says since, and the filter's margins had no field.
+    said = {"chosen": "last", "safety": list(card.safety), **card.training}
     assert {field: said[field] for field in told} == told
     assert card.law == PLUS
+
+
+def test_a_recipe_like_another_says_only_what_differs(tmp_path):
+    from uuv_marl.train.recipe import load_recipe, recipes
+
+    whole = load_recipe("mappo_v2")
+    for name in recipes():
+        one = load_recipe(name)
+        assert one.mappo == whole.mappo
+        assert (one == whole) == (name == "mappo_v2")
+    calm = load_recipe("mappo_v2_calm")
+    assert calm.episodes == whole.episodes.model_copy(update={"calm": 1.0})
+    (tmp_path / "own.toml").write_text('title = "own"\nlike = "mappo_v2_calm"\nsteps = 7\n', encoding="utf-8")
+    own = load_recipe(str(tmp_path / "own.toml"))
+    assert own == calm.model_copy(update={"title": "own", "steps": 7})
+
+
+def test_a_filter_that_sees_nothing_changes_nothing():
+    from uuv_marl.train.acting import ACTING
+    from uuv_marl.train.recipe import load_recipe
+
+    changed = {}
+    for name in ("mappo_v2", "mappo_v2_unfiltered"):
+        settings = load_recipe(name).settings(0)
+        scenario = load_scenario("random_field", num_vehicles=10, overrides=settings.overrides)
+        swarm, changed[name] = Swarm(scenario, 1), 0.0
+        swarm.reset([100_000])
+        acting = ACTING["memory"](scenario, 1, settings.law, settings.safety)
+        for _ in range(100):
+            acting.hear(swarm.percept)
+            swarm.step(acting.actions(np.zeros((1, 10, acting.outputs), np.float32)))
+            changed[name] += acting.changed.sum()
+    assert changed["mappo_v2"] > 0.0 == changed["mappo_v2_unfiltered"]
 
 
 def test_the_robustness_page_marks_what_was_trained_with():
@@ -135,6 +170,8 @@ def test_the_robustness_page_marks_what_was_trained_with():
         ({"held_s": -1}, "held_s"),
         ({"ppo": "{ noise = [0.4, 0.2] }"}, "noise"),
         ({"mappo": "{ noize = [0.4, 0.2] }"}, "noize"),
+        ({"safety": "{ horizon_km = 0.0 }"}, "horizon_km"),
+        ({"like": '"nowhere"'}, "like = 'nowhere' must name another recipe"),
     ],
 )
 def test_bad_recipes_are_refused_by_name(tmp_path, changes, told):

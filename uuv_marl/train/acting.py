@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_features
 from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.recall import RECALLED
+from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -64,12 +65,13 @@ class Forces:
         scenario: what is simulated.
         num_worlds: of the swarm.
         law: of the hand-made law, which it does not use.
+        safety: of the safety filter, which it does not use.
     """
 
     outputs = 2
     most = MOST_BARRIER
 
-    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains) -> None:  # noqa: ARG002
+    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier) -> None:  # noqa: ARG002
         self._features = Features(scenario, BARRIER)
         self.size = self._features.size
         shape = num_worlds, scenario.swarm.num_vehicles
@@ -108,14 +110,15 @@ class Trims:
         scenario: what is simulated.
         num_worlds: of the swarm.
         law: gains of the hand-made law.
+        safety: margins and rates of the safety filter.
     """
 
     size = RECALLED
     outputs = TRIMS
     most = MOST_TRIM
 
-    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains) -> None:
-        self._policy = TrimmedLaw(scenario, num_worlds, gains=law)
+    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier) -> None:
+        self._policy = TrimmedLaw(scenario, num_worlds, gains=law, barrier=safety)
         self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
 
     @staticmethod

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import Gains
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.envs.reward import RewardFunction, own_reward
@@ -40,6 +41,8 @@ class Problem(NamedTuple):
     """An output of the actor is held for so long; 0: for one decision."""
     law: Gains = Gains()
     """Of the hand-made law that an actor with memory trims."""
+    safety: Barrier = Barrier()
+    """Of the safety filter around it."""
     conditions: Conditions = ()
     """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
 
@@ -86,7 +89,7 @@ class Group:
         scenario = load_scenario(problem.scenario, num_vehicles=self.num_vehicles, overrides=changes)
         refuse_losses(scenario, "training")
         self.swarm = Swarm(scenario, self.num_worlds)
-        self.acting = ACTING[problem.sees](scenario, self.num_worlds, problem.law)
+        self.acting = ACTING[problem.sees](scenario, self.num_worlds, problem.law, problem.safety)
         self._held = max(1, round(problem.held_s / scenario.timing.decision_period_s))
 
     def start(self, seeds: Seeds, worlds: Bool) -> None:

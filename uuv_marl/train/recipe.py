@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pydantic
 
+from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import Gains
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
@@ -86,6 +87,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     chosen: Literal["best", "last"] = "best"
     validate_every: int = pydantic.Field(Settings.validate_every, ge=1)
     law: dict[str, float] = {}
+    safety: dict[str, float] = {}
     weights: dict[str, float] = {}
     mappo: dict[str, Any] = {}
     ppo: dict[str, Any] = {}
@@ -101,6 +103,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
             seed=seed,
             overrides=overrides_for(self.scenario, self.overrides),
             law=Gains(**self.law),
+            safety=Barrier(**self.safety),
             weights=Weights(**self.weights),
             algorithm=pydantic.TypeAdapter(kind).validate_python(vars(kind(**numbers))),
             conditions=self.episodes.draw(self.scenario, seed) if self.episodes else (),
@@ -121,19 +124,38 @@ def _folder() -> Any:
 
 
 def load_recipe(name: str) -> Recipe:
-    """A recipe by name, or from a TOML file. Raises ResultsError naming what is wrong in it."""
-    path = Path(name) if name.endswith(".toml") else _folder() / f"{name}.toml"
+    """A recipe by name, or from a TOML file. With ``like = "another"`` a file says only what differs from another.
+
+    Raises:
+        ResultsError: it can't be read or used; the message names what is wrong in it.
+    """
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        there = ", ".join(recipes())
-        raise ResultsError(
-            f"recipe {name!r} can't be read ({error.strerror}); give one of {there}, or a TOML file"
-        ) from None
-    try:
-        recipe = Recipe(**tomllib.loads(text))
+        recipe = Recipe(**_told(name))
         for algorithm in get_args(Algorithm):
             recipe.settings(0, algorithm)
     except (pydantic.ValidationError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
         raise ResultsError(f"recipe {name!r} can't be used: {error}") from None
     return recipe
+
+
+def _told(name: str) -> dict[str, Any]:
+    path = Path(name) if name.endswith(".toml") else _folder() / f"{name}.toml"
+    try:
+        told = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        there = ", ".join(recipes())
+        raise ResultsError(
+            f"recipe {name!r} can't be read ({error.strerror}); give one of {there}, or a TOML file"
+        ) from None
+    like = told.pop("like", None)
+    if like is None:
+        return told
+    if like not in recipes() or like == name:
+        raise ValueError(f"like = {like!r} must name another recipe of the package: {', '.join(recipes())}")
+    return _merged(_told(like), told)
+
+
+def _merged(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    for key, value in changes.items():
+        table[key] = _merged(table.get(key, {}), value) if isinstance(value, dict) else value
+    return table

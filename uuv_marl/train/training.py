@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
 from uuv_marl.baselines.features import BARRIER
+from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import Gains
 from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import ResultsError, RewardError
@@ -90,6 +91,8 @@ class Settings:
     """Whose policy ``best`` holds: that of the best validation, or of the last one."""
     law: Gains = field(default_factory=Gains)
     """With memory: of the hand-made law that the actor trims."""
+    safety: Barrier = field(default_factory=Barrier)
+    """With memory: margins and rates of the safety filter; with a horizon of 0 m it changes nothing."""
     held_s: float = 0.0
     """An output of the actor is held for so long; 0: for one decision."""
     conditions: Conditions = ()
@@ -177,6 +180,7 @@ class Trainer:
                 settings.change_cost,
                 settings.held_s,
                 settings.law,
+                settings.safety,
                 settings.conditions,
             ),
             settings.seed,
@@ -218,6 +222,7 @@ class Trainer:
             features=self.settings.sees,
             barrier=BARRIER,
             law=self.settings.law,
+            safety=self.settings.safety,
             vehicle=vehicle_of(self.scenario),
             training=training,
         )

@@ -1,11 +1,15 @@
-"""Algorithms over training seeds: interquartile means with stratified bootstrap intervals (Agarwal et al. 2021)."""
+"""Algorithms over training seeds: their runs on each task, and the probability of improvement (Agarwal et al. 2021)."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import bootstrap
 
 from uuv_marl.studies.heldout.episodes import Episode
 from uuv_marl.studies.heldout.sets import FIRST, SETS, HeldOut
+from uuv_marl.studies.robustness.scores import Score
 
 
 def success(episodes: Sequence[Episode]) -> float:
@@ -46,3 +50,30 @@ def runs(episodes: Sequence[Episode], held: HeldOut, policy: str, trained: bool)
         ) and e.seed < FIRST + held.across:
             found.setdefault(e.training_seed, []).append(e)
     return list(found.values())
+
+
+def improvement(mine: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> Score:
+    """Probability that a run of mine scores higher than one of the other's; a tie counts half.
+
+    The mean over tasks, with its interval by a bootstrap over runs within each task (Agarwal et al. 2021); repeatable.
+
+    Args:
+        mine: scores of an algorithm's runs, for each task.
+        other: the same of another algorithm.
+    """
+    samples = [np.asarray(scores, np.float64) for scores in (*mine, *other)]
+    value = float(_higher(*samples))
+    if min(map(len, samples)) < 2 or all(np.ptp(np.concatenate(both)) == 0.0 for both in zip(mine, other, strict=True)):
+        return Score(value, value, value)
+    resample: Any = bootstrap
+    interval = resample(
+        samples, _higher, vectorized=True, n_resamples=2000, method="percentile", rng=np.random.default_rng(0)
+    ).confidence_interval
+    return Score(value, float(interval.low), float(interval.high))
+
+
+def _higher(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:  # noqa: ARG001 - scipy names it
+    """Of mine and then the other's samples, runs along the last axis."""
+    half = len(samples) // 2
+    pairs = [(x[..., :, None], y[..., None, :]) for x, y in zip(samples[:half], samples[half:], strict=True)]
+    return np.mean([(0.5 + 0.5 * np.sign(x - y)).mean(axis=(-2, -1)) for x, y in pairs], axis=0)

@@ -51,9 +51,8 @@ def draw_fields(episodes: Sequence[Episode], name: str, path: Path) -> Path:
 def draw_trainings(episodes: Sequence[Episode], trained: Sequence[Trained], path: Path) -> Path:
     """How many validation episodes arrive while training goes on; success on held-out tasks beside what ships."""
     figure, (left, right) = panels(2, size=(5.4, 4.4))
-    colours: dict[str, str] = dict(
-        zip(dict.fromkeys(one.algorithm for one in trained), (BLUE, ORANGE, GREEN), strict=False)
-    )
+    compared = dict.fromkeys(one.algorithm for one in trained if not one.ablation)
+    colours: dict[str, str] = dict(zip(compared, (BLUE, ORANGE, GREEN), strict=False))
     for algorithm, colour in colours.items():
         found = [one.validations for one in trained if one.algorithm == algorithm]
         for k, run in enumerate(found):
@@ -77,7 +76,7 @@ def draw_trainings(episodes: Sequence[Episode], trained: Sequence[Trained], path
 
 def _held_out(ax: Axes, episodes: Sequence[Episode], colours: dict[str, str]) -> None:
     """By task: every training's success, and that of policies that ship."""
-    shipped = {"mappo": GREY, "bio_inspired_plus": PINK, "bio_inspired": SKY}
+    shipped = {"scout_plus": GREY, "mappo": PINK, "bio_inspired_plus": SKY}
     compared = tasks(episodes)
     for j, held in enumerate(compared):
         rows = [(f"{name}: one training", name, True, colour, ".") for name, colour in colours.items()]

@@ -16,9 +16,9 @@ from uuv_marl.studies.heldout.episodes import Episode, select
 from uuv_marl.studies.heldout.trainings import Trained, Validation
 
 ENVIRONMENT = "uuv_marl"
-"""Held-out episodes of the best checkpoint; its only step holds their means, at the steps of that checkpoint."""
+"""Held-out episodes of the policy that counts; its only step holds their means, at the steps of that checkpoint."""
 VALIDATION = "uuv_marl_validation"
-"""Validations while training; the absolute metrics are those of the best."""
+"""Validations while training; the absolute metrics are those of the policy that counts."""
 
 
 def write_marl_eval(episodes: Sequence[Episode], trained: Sequence[Trained], path: Path) -> None:
@@ -26,9 +26,9 @@ def write_marl_eval(episodes: Sequence[Episode], trained: Sequence[Trained], pat
     evaluated = {(e.policy, e.training_seed) for e in episodes}
     runs: dict[str, list[Trained]] = {}
     for one in trained:
-        if (one.algorithm, one.seed) in evaluated:
+        if (one.algorithm, one.seed) in evaluated and not one.ablation:
             runs.setdefault(one.algorithm, []).append(one)
-    fewest, steps = min(map(len, runs.values())), min(len(one.validations) for one in trained)
+    fewest, steps = min(map(len, runs.values())), min(len(one.validations) for one in trained if not one.ablation)
     data: dict[str, Any] = {ENVIRONMENT: {held.name: {} for held in tasks(episodes)}, VALIDATION: {"validation": {}}}
     for algorithm, found in runs.items():
         named = {f"run_{k + 1}": one for k, one in enumerate(found[:fewest])}
@@ -41,7 +41,7 @@ def write_marl_eval(episodes: Sequence[Episode], trained: Sequence[Trained], pat
 def _training(one: Trained, steps: int) -> dict[str, Any]:
     validations = one.validations[:steps]
     made = {f"step_{k + 1}": {"step_count": v.agent_steps, **_validated(v)} for k, v in enumerate(validations)}
-    return made | {"absolute_metrics": _validated(one.best)}
+    return made | {"absolute_metrics": _validated(one.policy_at)}
 
 
 def _validated(one: Validation) -> dict[str, list[float]]:
@@ -57,4 +57,4 @@ def _evaluation(one: Trained, task: str, episodes: Sequence[Episode]) -> dict[st
     }
     # Eight digits: the mean of 200 numbers of four digits has seven, and a tie would be rounded by how a Python adds.
     means = {name: [round(sum(values) / len(values), 8)] for name, values in metrics.items()}
-    return {"step_1": {"step_count": one.best.agent_steps, **means}, "absolute_metrics": metrics}
+    return {"step_1": {"step_count": one.policy_at.agent_steps, **means}, "absolute_metrics": metrics}

@@ -9,7 +9,7 @@ from uuv_marl.baselines import POLICIES
 from uuv_marl.benchmark.style import house_style
 from uuv_marl.benchmark.tables import estimate, markdown_table
 from uuv_marl.studies.data import read_text
-from uuv_marl.studies.heldout.across import SCORES, runs, tasks
+from uuv_marl.studies.heldout.across import SCORES, improvement, runs, tasks
 from uuv_marl.studies.heldout.episodes import Episode, measured, read_episodes, select, write_episodes
 from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
@@ -25,6 +25,8 @@ _HEADERS = (
     "spacing [m]", "worst", "within Eq. 7", "centre error [m]", "effort",
 )  # fmt: skip
 _GUARDED = "guarded:"
+_BESIDE = "bio_inspired_plus", "scout", "scout_plus", "mappo"
+"""Policies that ship, beside the trainings."""
 _ORDER = (*POLICIES, *(f"{_GUARDED}{name}" for name in POLICIES))
 """Policies in the order of tables."""
 
@@ -50,13 +52,14 @@ def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trai
 
 def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     """The page's text."""
+    shown = {e.set for e in episodes if e.training_seed is None}
     return read_text("heldout", "story.md").format(
         first=FIRST,
         targets=_targets(episodes),
         glance=_glance(episodes),
         guarded=_guarded(episodes),
-        sets="\n".join(_set(held, episodes) for held in SETS if any(e.set == held.name for e in episodes)),
-        across=_across(episodes),
+        sets="\n".join(_set(held, episodes) for held in SETS if held.name in shown),
+        across=_across(episodes, trained),
         trainings=_trainings(trained),
     )
 
@@ -140,34 +143,52 @@ def _interval(spec: str, *samples: Sequence[float]) -> str:
     return f"{estimate(*samples):{spec}}" if all(samples) else _NOTHING
 
 
-def _across(episodes: Sequence[Episode]) -> str:
+def _across(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     compared = tasks(episodes)
     if not compared:
         return _NO_TRAININGS
-    algorithms = sorted({e.policy for e in episodes if e.training_seed is not None})
-    hand_made = [p for p in ("bio_inspired", "bio_inspired_plus", "scout") if any(e.policy == p for e in episodes)]
-    headers = ["policy", *(f"{name}, {held.name}" for name in SCORES for held in compared)]
+    evaluated = {e.policy for e in episodes if e.training_seed is not None}
+    labels = {one.algorithm: f"{one.algorithm}*" if one.ablation else one.algorithm for one in trained}
+    algorithms = [name for name in labels if name in evaluated]
+    shipped = [p for p in _BESIDE if any(e.policy == p for e in episodes)]
+    headers = ["policy", "trainings", *(f"{name}, {held.name}" for name in SCORES for held in compared)]
     rows: list[list[str]] = []
-    for policy in [*algorithms, *hand_made]:
+    found: dict[str, list[list[list[float]]]] = {}
+    for policy in [*algorithms, *shipped]:
         by_task = [runs(episodes, held, policy, trained=policy in algorithms) for held in compared]
-        scores = [[[score(run) for run in found] for found in by_task] for score in SCORES.values()]
+        found[policy] = scores = [[[score(run) for run in task] for task in by_task] for score in SCORES.values()]
         each = [_interval(".2f", task) for tasks_of_score in scores for task in tasks_of_score]
-        rows.append([policy, *each, *(_interval(".2f", *tasks_of_score) for tasks_of_score in scores)])
-    return markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows)
+        label, count = (labels[policy], f"{len(by_task[0])}") if policy in algorithms else (f"`{policy}`", _NOTHING)
+        rows.append([label, count, *each, *(_interval(".2f", *tasks_of_score) for tasks_of_score in scores)])
+    table = markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows)
+    return table + _improvement([found[name] for name in ("mappo", "ppo") if name in algorithms], compared)
+
+
+def _improvement(pair: Sequence[list[list[list[float]]]], compared: Sequence[HeldOut]) -> str:
+    """Of the first algorithm over the second, by score and task."""
+    if len(pair) < 2:
+        return ""
+    rows = [
+        (name, *(f"{improvement([x], [y]):.2f}" for x, y in zip(mine, other, strict=True)),
+         f"{improvement(mine, other):.2f}")
+        for name, mine, other in zip(SCORES, *pair, strict=True)
+    ]  # fmt: skip
+    headers = ("probability that mappo is better than ppo", *(held.name for held in compared), "all")
+    return "\n" + markdown_table(headers, rows)
 
 
 def _trainings(trained: Sequence[Trained]) -> str:
     rows = [
         (
             one.algorithm, f"{one.seed}", f"{last.agent_steps / 1e6:.1f}", f"{last.seconds / 60:.0f}",
-            f"{one.best.agent_steps / 1e6:.1f}", f"{one.best.score:.2f}", f"{one.best.arrived:.0%}",
-            f"{last.score:.2f}",
+            f"{one.policy_at.agent_steps / 1e6:.1f}", f"{one.policy_at.score:.2f}", f"{one.policy_at.arrived:.0%}",
+            f"{max(one.validations, key=lambda v: v.score).score:.2f}",
         )
         for one in trained
         for last in one.validations[-1:]
     ]  # fmt: skip
     headers = (
-        "algorithm", "seed", "million agent-steps", "minutes", "best at [million]", "its score", "arrived",
-        "last score",
+        "algorithm", "seed", "million agent-steps", "minutes", "policy of [million]", "its score", "arrived",
+        "best score",
     )  # fmt: skip
     return markdown_table(headers, rows) if rows else _NO_TRAININGS

@@ -27,6 +27,8 @@ class HeldOut(NamedTuple):
     """What is different from the scenario as it is."""
     across: int = 0
     """On so many seeds the policies of all training seeds are compared; 0 where they are not."""
+    aimed: bool = True
+    """Whether the targets concern it."""
 
     def cases(self, trained: Iterable[str], most: int | None) -> list[Case]:
         """All that is run, with the policies of trainings; at most so many seeds of each."""

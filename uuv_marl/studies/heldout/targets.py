@@ -37,7 +37,7 @@ class Target(NamedTuple):
 def targets(episodes: Sequence[Episode]) -> list[Target]:
     """All demands on the policies of ``LEADING`` that the episodes can answer."""
     found: list[Target] = []
-    for held in SETS:
+    for held in (held for held in SETS if held.aimed):
         tuned = select(episodes, held.name, _TUNED)
         runs = {policy: mine for policy in LEADING if (mine := select(episodes, held.name, policy))}
         for policy, mine in runs.items():

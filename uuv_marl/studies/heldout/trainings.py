@@ -1,4 +1,7 @@
-"""Trainings on disk, as ``uuv-marl train mappo`` and ``train ppo`` leave them: one folder for each seed."""
+"""Trainings on disk, as ``uuv-marl train mappo`` and ``train ppo`` leave them: one folder for each seed.
+
+Those in the subfolder ``ablations`` are each without one part of the others; they go by their folders' names.
+"""
 
 import csv
 import json
@@ -6,6 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from uuv_marl.benchmark.results import ResultsError
+
+ABLATIONS = "ablations"
 
 
 class Validation(NamedTuple):
@@ -22,26 +27,31 @@ class Trained(NamedTuple):
     """One training."""
 
     algorithm: str
+    """Or the ablation's name."""
     seed: int
     policy: Path
-    """The checkpoint that did best on validation."""
+    """The checkpoint that counts: of the best validation, or of the last one."""
     validations: tuple[Validation, ...]
+    chosen: str = "best"
+    """Which of the two."""
+    ablation: bool = False
 
     @property
-    def best(self) -> Validation:
+    def policy_at(self) -> Validation:
         """The validation of the policy."""
-        return max(self.validations, key=lambda v: v.score)
+        return self.validations[-1] if self.chosen == "last" else max(self.validations, key=lambda v: v.score)
 
 
 def find_trainings(folder: Path) -> list[Trained]:
-    """The trainings in ``folder/*``, by algorithm and seed. Raises ResultsError where there is none."""
-    read = [_read(path.parent) for path in folder.glob("*/config.json") if (path.parent / "best").is_dir()]
+    """The trainings in ``folder`` by algorithm and seed, then its ablations. Raises ResultsError if there is none."""
+    paths = [*folder.glob("*/config.json"), *folder.glob(f"{ABLATIONS}/*/config.json")]
+    read = [_read(path.parent) for path in paths if (path.parent / "best").is_dir()]
     found = [one for one in read if one.validations]
     if not found:
         raise ResultsError(
             f"{folder} holds no trainings with a best policy; give a folder of outputs of uuv-marl train"
         )
-    return sorted(found, key=lambda one: (one.algorithm, one.seed))
+    return sorted(found, key=lambda one: (one.ablation, one.algorithm, one.seed))
 
 
 def _read(folder: Path) -> Trained:
@@ -52,4 +62,7 @@ def _read(folder: Path) -> Trained:
         Validation(int(row["agent_steps"]), float(row["seconds"]), float(row["score"]), float(row["arrived"]))
         for row in rows
     )
-    return Trained(settings["algorithm"]["name"], int(settings["seed"]), folder / "best", validations)
+    ablation = folder.parent.name == ABLATIONS
+    name = folder.name if ablation else settings["algorithm"]["name"]
+    chosen = settings.get("chosen", "best")
+    return Trained(name, int(settings["seed"]), folder / "best", validations, chosen, ablation)
