@@ -12,7 +12,9 @@ from sphinx.cmd.build import main
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 COPY = ROOT / "build" / "site-source"
-FILES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", "LICENSE")
+FILES = (
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "ROADMAP.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "CITATION.cff", "LICENSE",
+)  # fmt: skip
 FOLDERS = ("docs", "perf", "examples", "uuv_marl")
 
 
