@@ -168,8 +168,8 @@ def trainings(folder, weights):
         (one / "config.json").write_text(json.dumps({"settings": {"algorithm": {"name": algorithm}, "seed": k}}))
         with (one / "progress.csv").open("w") as file:
             table = csv.writer(file)
-            table.writerow(["agent_steps", "seconds", "score", "arrived"])
-            table.writerows([[1000, 2.0, -1.5, 0.5], [1500, 3.0, "", ""], [2000, 4.0, -0.5, 1.0]])
+            table.writerow(["agent_steps", "seconds", "reward", "score", "arrived"])
+            table.writerows([[1000, 2.0, -2.0, -1.5, 0.5], [1500, 3.0, -1.8, "", ""], [2000, 4.0, -1.7, -0.5, 1.0]])
     return folder
 
 

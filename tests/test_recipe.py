@@ -108,11 +108,14 @@ def test_a_recipe_can_choose_the_last_policy(tmp_path):
     np.testing.assert_array_equal(best.layers[0].weight, end.layers[0].weight)
 
 
-@pytest.mark.parametrize(("seed", "name"), [(0, "mappo_v2"), (1, "mappo_v2_seed1")])
-def test_what_ships_says_that_it_was_trained_by_the_recipe(seed, name):
+@pytest.mark.parametrize(
+    ("recipe", "seed", "name"),
+    [("mappo_v2", 0, "mappo_v2"), ("mappo_v2", 1, "mappo_v2_seed1"), ("mappo_v2_calm", 0, "mappo_v2_calm")],
+)
+def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
     from uuv_marl.train.recipe import load_recipe
 
-    told = json.loads(json.dumps(dataclasses.asdict(load_recipe("mappo_v2").settings(seed))))
+    told = json.loads(json.dumps(dataclasses.asdict(load_recipe(recipe).settings(seed))))
     card = POLICIES[name].checkpoint.card
     # It was chosen by hand what the recipe says since, and the filter's margins had no field.
     said = {"chosen": "last", "safety": list(card.safety), **card.training}

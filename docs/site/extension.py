@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from autoapi._astroid_utils import is_local_import_from
 from autoapi._parser import Parser
 from docutils import nodes
 from sphinx import addnodes
@@ -63,8 +64,9 @@ def skip_namesakes(app: Sphinx, what: str, name: str, obj: Any, skip: bool, opti
 
 
 def read_if(parser: Parser, node: Any) -> list[dict[str, Any]]:
-    """Names that are imported ``if TYPE_CHECKING``, of which the public ones are in the reference, too."""
-    return [found for child in node.body for found in parser.parse(child)]
+    """Names that a package imports ``if TYPE_CHECKING``, of which the public ones are in the reference, too."""
+    read = [child for child in node.body if node.root().package and is_local_import_from(child, "uuv_marl")]
+    return [found for child in read for found in parser._parse_local_import_from(child)]
 
 
 def lead_code_home(app: Sphinx) -> Iterator[Page]:

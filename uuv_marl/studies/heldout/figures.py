@@ -49,27 +49,24 @@ def draw_fields(episodes: Sequence[Episode], name: str, path: Path) -> Path:
 
 
 def draw_trainings(episodes: Sequence[Episode], trained: Sequence[Trained], path: Path) -> Path:
-    """How many validation episodes arrive while training goes on; success on held-out tasks beside what ships."""
+    """What a decision is paid while training goes on; success on held-out tasks beside what ships."""
     figure, (left, right) = panels(2, size=(5.4, 4.4))
     compared = dict.fromkeys(one.algorithm for one in trained if not one.ablation)
     colours: dict[str, str] = dict(zip(compared, (BLUE, ORANGE, GREEN), strict=False))
     for algorithm, colour in colours.items():
-        found = [one.validations for one in trained if one.algorithm == algorithm]
+        found = [np.array(one.rewards) for one in trained if one.algorithm == algorithm]
         for k, run in enumerate(found):
             label = "" if k else f"{algorithm}: one training"
-            steps, share = ([v.agent_steps / 1e6 for v in run], [v.arrived for v in run])
-            left.plot(steps, share, ".-", color=colour, linewidth=0.6, alpha=0.6, label=label)
-        least = min(len(run) for run in found)
-        mean = np.mean([[v.arrived for v in run[:least]] for run in found], axis=0)
-        steps = [v.agent_steps / 1e6 for v in found[0][:least]]
-        left.plot(steps, mean, color=colour, linewidth=2.5, label=f"{algorithm}: mean of {len(found)}")
-    left.set(xlabel="agent-steps [million]", ylabel="validation episodes that arrive [share]")
+            left.plot(run[:, 0] / 1e6, run[:, 1], color=colour, linewidth=0.6, alpha=0.6, label=label)
+        least = min(map(len, found))
+        mean = np.mean([run[:least] for run in found], axis=0)
+        left.plot(mean[:, 0] / 1e6, mean[:, 1], color=colour, linewidth=2.5, label=f"{algorithm}: mean of {len(found)}")
+    left.set(xlabel="agent-steps [million]", ylabel="mean reward of a decision, with noise [1]")
     left.set_title("(a) while training")
     _held_out(right, episodes, colours)
     right.set_title("(b) afterwards, on held-out tasks")
     right.set_ylabel("episodes that arrive untouched [share]")
-    for ax in (left, right):
-        ax.set_ylim(-0.04, 1.04)
+    right.set_ylim(-0.04, 1.04)
     figure.suptitle("Trainings from nothing, beside the policies that ship")
     return save(legend(figure, columns=4), path)
 

@@ -30,10 +30,12 @@ class Trained(NamedTuple):
     """Or the ablation's name."""
     seed: int
     policy: Path
-    """The checkpoint that counts: of the best validation, or of the last one."""
+    """The checkpoint that counts."""
     validations: tuple[Validation, ...]
+    rewards: tuple[tuple[int, float], ...] = ()
+    """Agent-steps until the end of each iteration, and its mean reward of a decision, with exploration noise."""
     chosen: str = "best"
-    """Which of the two."""
+    """Whose policy counts: of the best validation, or of the last one."""
     ablation: bool = False
 
     @property
@@ -57,12 +59,14 @@ def find_trainings(folder: Path) -> list[Trained]:
 def _read(folder: Path) -> Trained:
     settings = json.loads((folder / "config.json").read_text(encoding="utf-8"))["settings"]
     with (folder / "progress.csv").open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["score"]]
+        rows = list(csv.DictReader(file))
+    rewards = tuple((int(row["agent_steps"]), float(row["reward"])) for row in rows)
     validations = tuple(
         Validation(int(row["agent_steps"]), float(row["seconds"]), float(row["score"]), float(row["arrived"]))
         for row in rows
+        if row["score"]
     )
     ablation = folder.parent.name == ABLATIONS
     name = folder.name if ablation else settings["algorithm"]["name"]
     chosen = settings.get("chosen", "best")
-    return Trained(name, int(settings["seed"]), folder / "best", validations, chosen, ablation)
+    return Trained(name, int(settings["seed"]), folder / "best", validations, rewards, chosen, ablation)
