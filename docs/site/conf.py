@@ -32,6 +32,7 @@ nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600
 nb_execution_show_tb = True
+nb_merge_streams = True
 
 # The code is read, not imported: compiled functions keep their signatures, and no extra has to be installed.
 autoapi_dirs = [str(ROOT / "uuv_marl")]

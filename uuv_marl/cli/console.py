@@ -58,10 +58,10 @@ def _own_frames(error: BaseException | None) -> list[traceback.FrameSummary]:
 
 
 def progress_bar() -> Progress:
-    """A bar for each task, with the time that is left."""
+    """A bar for each task, with the time that is left; nothing where output is no terminal."""
     return Progress(
         TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
-        console=console,
+        console=console, disable=not console.is_terminal,
     )  # fmt: skip
 
 
