@@ -17,15 +17,15 @@ __all__ = ["Card", "Layer", "Learned", "forward", "need_same", "rows_of", "save_
 
 
 def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
-    """Refuse a scenario that is another than that of a training.
+    """Raise an error for a scenario that differs from the training's.
 
     Args:
         policy: made for the scenario.
-        card: of its checkpoint.
-        any_vehicle: let it run on a vehicle that it was not trained on.
+        card: of the policy's checkpoint.
+        any_vehicle: whether the policy may run on a vehicle that it was not trained on.
 
     Raises:
-        PolicyError: the percept, the vehicle or the decision period is another.
+        PolicyError: the percept, the vehicle or the decision period differs.
     """
     scenario, name = policy.scenario, policy.name
     then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, rows_of(policy.layout)))
@@ -57,9 +57,9 @@ class Learned(Policy):
     Args:
         scenario: gives the percept's layout and the vehicle's limits.
         num_worlds: first axis of the percepts.
-        name: by which messages call it.
+        name: of the policy in messages.
         checkpoint: the actor, and what it was trained on.
-        any_vehicle: run it also on a vehicle that it was not trained on.
+        any_vehicle: whether it may run on a vehicle that it was not trained on.
 
     Raises:
         PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.

@@ -26,7 +26,7 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
 
     Args:
         others: name of a policy, or ``module:Class``. The scenario gets the channels and the yaw damping that the
-            policy declares (``uuv_marl.baselines.granted``), for the learner too: with ``sdc`` the observation is longer.
+            policy declares (``uuv_marl.baselines.granted``), also for the learner: ``sdc`` makes observations longer.
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
             otherwise.

@@ -1,4 +1,4 @@
-"""Swarm: any number of worlds, reset one by one and stepped in one call. It seeds, draws and checks; an engine computes."""
+"""Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks; an engine computes."""
 
 import logging
 from collections.abc import Mapping, Sequence
