@@ -40,7 +40,7 @@ class Random(Policy):
         try:
             streams = unpacked(snapshot["streams"], self.num_worlds)
         except (KeyError, ValueError) as error:
-            raise PolicyError(f"the snapshot is none of {self.name}: {error}") from None
+            raise PolicyError(f"the snapshot is of another policy than {self.name}: {error}") from None
         self._rngs = [stream or np.random.default_rng() for stream in streams]
 
     def decide(self, percept: Percept) -> Float32:

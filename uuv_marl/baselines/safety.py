@@ -3,8 +3,8 @@
 A control barrier function on velocities (Ames, Coogan, Egerstedt, Notomista, Sreenath and Tabuada, Control barrier
 functions: theory and applications, ECC 2019): the distance to an obstacle or neighbour may shrink no faster than in
 proportion to what is left of it beyond a margin, n . v <= gamma (d - margin). A vehicle that keeps to it stays
-beyond the margin. Of a velocity that two neighbours must change, each changes a share, as in reciprocal avoidance (van den Berg et
-al. 2011, see ``halfplanes``).
+beyond the margin. If two neighbours must change a velocity, each makes a share of the change, as in reciprocal
+avoidance (van den Berg et al. 2011, see ``halfplanes``).
 """
 
 import math
