@@ -163,7 +163,7 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
 def test_another_percept_or_period_is_refused_with_the_remedy(best):
     other = granted(best, load_scenario("tracking", overrides={"sonar.arrays.bow.sub_sectors": 5}))
     with pytest.raises(
-        PolicyError, match=r"another percept.*was .'heard', 21, '1', 1.0. in .* and is .'heard', 19, '1', 1.0. here; use"
+        PolicyError, match=r"another percept.*was .'heard', 21, '1', 1.0. in .* is .'heard', 19, '1', 1.0. here; use"
     ):
         make(best, other)
     slow = granted(best, load_scenario("tracking", overrides={"timing.decision_period_s": 1.0}))
