@@ -159,7 +159,7 @@ def test_what_is_no_network_is_refused_with_the_remedy(tmp_path):
     with pytest.raises(PolicyError, match="trained on another percept"):
         write_onnx(best, other, tmp_path / "policy.onnx")
     heavy = load_scenario("tracking", overrides={"vehicle.m_kg": 600.0})
-    with pytest.raises(PolicyError, match=r"another vehicle.*vehicle.m_kg was 185.0 and is 600.0"):
+    with pytest.raises(PolicyError, match=r"another vehicle.*vehicle.m_kg was 185.0 in the training and is 600.0"):
         write_onnx(best, heavy, tmp_path / "policy.onnx")
     saved(tmp_path, load_scenario("tracking"), np.nan)
     with pytest.raises(PolicyError, match="0.weight must hold finite numbers"):

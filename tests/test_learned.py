@@ -163,7 +163,7 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
 def test_another_percept_or_period_is_refused_with_the_remedy(best):
     other = granted(best, load_scenario("tracking", overrides={"sonar.arrays.bow.sub_sectors": 5}))
     with pytest.raises(
-        PolicyError, match=r"another percept.*was .'heard', 21, '1', 1.0. and is .'heard', 19, '1', 1.0.; use"
+        PolicyError, match=r"another percept.*was .'heard', 21, '1', 1.0. in .* is .'heard', 19, '1', 1.0. here; use"
     ):
         make(best, other)
     slow = granted(best, load_scenario("tracking", overrides={"timing.decision_period_s": 1.0}))
@@ -228,7 +228,8 @@ def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     name = best if name == "best" else name
     other = granted(name, load_scenario("tracking", num_vehicles=2, overrides={field: value}))
     was = {**vehicle_of(load_scenario("tracking"))}[field]
-    message = f"another vehicle than scenario 'tracking' has: {field} was {was} and is {value}.*any_vehicle=True"
+    told = f"{field} was {was} in the training and is {value} here"
+    message = f"another vehicle than scenario 'tracking' has: {told}.*any_vehicle=True"
     with pytest.raises(PolicyError, match=message):
         make(name, other)
     assert make(name, other, any_vehicle=True).act(Swarm(other).reset(0)).shape == (1, 2, 2)
@@ -246,7 +247,7 @@ def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
     heavy = load_scenario("tracking", overrides={"vehicle.m_kg": 600.0})
     save_checkpoint(learned_file(best), card(vehicle=vehicle_of(heavy)), actor())
     make(best, granted(best, heavy))
-    with pytest.raises(PolicyError, match=r"vehicle.m_kg was 600.0 and is 185.0"):
+    with pytest.raises(PolicyError, match=r"vehicle.m_kg was 600.0 in the training and is 185.0"):
         make(best, granted(best, load_scenario("tracking")))
 
 

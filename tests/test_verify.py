@@ -105,7 +105,7 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
     (tmp_path / "results.json").write_text(json.dumps(content))
     code, output = verify("results.json")
     assert code == 1
-    assert "the file of 'mappo' is not the one that was run" in output
+    assert "the file of 'mappo' has changed since the run" in output
     assert "2 more can't be reproduced here" in output
 
 
@@ -116,9 +116,9 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
         ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),
         ({"training_seed": "3"}, "weights do not ship"),
         ({"seed": "5e3"}, "seed must be a whole number, got '5e3'"),
-        ({"policy": "evil:Law"}, "policy 'evil:Law' is somebody's file"),
-        ({"policy": "guarded:evil:Law"}, "policy 'guarded:evil:Law' is somebody's file"),
-        ({"policy": "runs/best"}, "policy 'runs/best' is somebody's file"),
+        ({"policy": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
+        ({"policy": "guarded:evil:Law"}, "policy 'guarded:evil:Law' is not part of the package"),
+        ({"policy": "runs/best"}, "policy 'runs/best' is not part of the package"),
     ],
 )
 def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, changes, reason):

@@ -22,7 +22,7 @@ def writing(path: Path) -> Iterator[None]:
     except OSError as error:
         raise ResultsError(
             f"{path} can't be written ({error.strerror or error}). What was finished before is safe; make room there, "
-            "permit writing or give another --output, and go on"
+            "permit writing or give another --output, and give the command again"
         ) from error
 
 

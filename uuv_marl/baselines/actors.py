@@ -1,4 +1,4 @@
-"""Learned policies by their checkpoints, whatever their actors see."""
+"""Learned policies from their checkpoints, with and without memory."""
 
 import functools
 from pathlib import Path
@@ -13,9 +13,9 @@ class Trained:
     """A learned policy before it is made for a scenario: call it with a scenario.
 
     Args:
-        name: by which messages call it.
-        path: of the checkpoint, a file or the folder that holds it; read when something of it is asked for.
-        doc: what it is.
+        name: of the policy in messages.
+        path: of the checkpoint, a file or the folder that holds it; read on first use.
+        doc: the policy's docstring.
     """
 
     def __init__(self, name: str, path: Path, doc: str | None = Learned.__doc__) -> None:
@@ -23,7 +23,7 @@ class Trained:
 
     @functools.cached_property
     def checkpoint(self) -> Checkpoint:
-        """What the file holds. Raises PolicyError where that is no policy."""
+        """The content of the file. Raises PolicyError if it holds no policy."""
         return load_checkpoint(self._path)
 
     @property
@@ -33,12 +33,12 @@ class Trained:
 
     @property
     def yaw_damping_nms(self) -> float:
-        """Inner loop that it was trained with [N m s]."""
+        """Yaw damping of the training [N m s]."""
         return self.checkpoint.card.yaw_damping_nms
 
     @property
     def full_torque_nm(self) -> float:
-        """Full torque of the vehicle that it was trained on [N m]."""
+        """Full torque of the training's vehicle [N m]."""
         return self.checkpoint.card.full_torque_nm
 
     def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedLaw:

@@ -67,10 +67,10 @@ def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g
 
     Args:
         n_x: unit vector to the surface's nearest point, forward.
-        n_y: and to starboard.
+        n_y: the same, to starboard.
         rho: distance to it [m].
         l_x: the goal, forward [m].
-        l_y: and to starboard [m].
+        l_y: the goal, to starboard [m].
         g: the law's gains.
 
     Returns:

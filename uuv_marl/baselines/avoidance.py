@@ -1,4 +1,4 @@
-"""Forces that the comparators share: passing an obstacle on the vehicle's own side, and the drag they make up for."""
+"""Forces that the comparators share: to pass an obstacle on the vehicle's own side, and to balance the drag."""
 
 import math
 
@@ -24,14 +24,14 @@ def bump(share: float) -> float:
 def obstacle_at(w: int, i: int, a: int, see: Fields, centres: bool) -> tuple[float, float, float, float]:
     """Where the obstacle of an echo lies: a unit vector towards it, the distance to its surface and its radius [m].
 
-    The radius is what lies between surface and centre; 0 where echoes are points of surfaces, whose radius is unknown.
+    The radius is the distance from surface to centre; 0 if echoes are points of surfaces, whose radius is unknown.
 
     Args:
         w: index of the world.
         i: index of the vehicle.
         a: index of the active sub-sector; it holds an echo.
         see: the fields of percepts, of all worlds.
-        centres: echoes report centres; else points of surfaces.
+        centres: True if echoes report centres, False if they report points of surfaces.
     """
     n_x, n_y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
     reach, distance = float(see.echo_range[w, i, a]), math.hypot(n_x, n_y)
@@ -78,5 +78,5 @@ def pass_obstacle(
 
 @compiled
 def own_drag(u: float, limits: Limits) -> float:
-    """Surge resistance at a vehicle's own surge velocity [m/s], in N."""
+    """Surge resistance [N] at a vehicle's own surge velocity [m/s]."""
     return resistance(abs(u), limits) * u

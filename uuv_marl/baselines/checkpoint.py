@@ -1,7 +1,7 @@
 """Checkpoints of learned policies: one safetensors file.
 
-It holds the weights, and in its header a ``Card`` as JSON, which says what they were trained on. Loading it executes
-nothing.
+The file holds the weights, and in its header a ``Card`` as JSON, which says what they were trained on. Loading a
+checkpoint executes no code.
 """
 
 import hashlib
@@ -55,8 +55,8 @@ _FIRST_VEHICLE = "literature_185"
 def vehicle_of(scenario: Scenario) -> dict[str, float | str]:
     """Hull and actuators of a scenario, by field; without the inner loop, which policies declare, and disturbances.
 
-    What a vehicle's file may leave out is there where it has another value than without: checkpoints of hulls without
-    lift and rudder say nothing of them.
+    A field that a vehicle's file may leave out is included only if it differs from its default: checkpoints of hulls
+    without lift and rudder do not mention lift and rudder.
     """
     return _numbers({"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()})
 
@@ -80,7 +80,7 @@ def _all_gains(gains: Any) -> Any:
 
 
 class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """What a checkpoint says of itself."""
+    """Facts about a policy and its training, in the header of its checkpoint."""
 
     format: Literal[1] = 1
     kind: Literal["mlp"] = "mlp"

@@ -1,4 +1,4 @@
-"""What a learned policy's actor sees of a percept, and the fixed short-range barrier beside it."""
+"""The features of a percept that a learned policy's actor sees, and the fixed short-range barrier beside it."""
 
 import numpy as np
 
@@ -22,11 +22,11 @@ def num_features(sectors: int, active_sectors: int) -> int:
 
 
 class Features:
-    """What actors see of a percept: bounded features, the same in training and in use, and the barrier's force.
+    """Bounded features of a percept, the same in training and in use, and the barrier's force.
 
     Args:
         scenario: gives the percept's layout and the vehicle's limits.
-        gains: the barrier's.
+        gains: of the barrier.
     """
 
     def __init__(self, scenario: Scenario, gains: Gains) -> None:

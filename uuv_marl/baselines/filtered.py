@@ -1,4 +1,4 @@
-"""What policies share that remember their surroundings and keep to the safety filter."""
+"""Base of the policies that remember their surroundings and keep to the safety filter."""
 
 from typing import Any, ClassVar
 
@@ -65,7 +65,7 @@ class Filtered(Policy):
 
     @property
     def infeasible(self) -> Int64:
-        """Those of them for which none was safe, so that the least unsafe was taken, shape (world,)."""
+        """Changed velocities for which no velocity was safe, so the least unsafe one was taken, shape (world,)."""
         return self._times(1)
 
     def _times(self, what: int) -> Int64:
@@ -77,9 +77,9 @@ class Filtered(Policy):
         return KEPT_S
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Take what is perceived into what is remembered."""
+        """Update the memory from the percept."""
         listen(self.flat(percept), self.layout.offsets, worlds, self.model, self.kept_s, self.memory)
 
     def acted(self, action: Float32, worlds: Bool) -> None:
-        """Keep the action: the vehicle's next place is reckoned from it."""
+        """Keep the action: the memory predicts the vehicle's next place from it."""
         self.memory.action[worlds] = action[worlds]

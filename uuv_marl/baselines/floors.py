@@ -1,4 +1,4 @@
-"""Floors that every other policy must beat: random actions, and none."""
+"""Floors that every other policy must beat: random actions, and no actions."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -31,16 +31,16 @@ class Random(Policy):
             self._rngs[w] = np.random.default_rng((seed, 1))
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All that later decisions depend on, the random streams too."""
+        """A copy of all that later decisions depend on, random streams included."""
         return super().snapshot() | {"streams": packed(self._rngs)}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot. Raises PolicyError where it is another policy's."""
+        """Continue from a snapshot. Raises PolicyError if it is another policy's."""
         super().restore(snapshot)
         try:
             streams = unpacked(snapshot["streams"], self.num_worlds)
         except (KeyError, ValueError) as error:
-            raise PolicyError(f"the snapshot is none of {self.name}: {error}") from None
+            raise PolicyError(f"the snapshot is of another policy than {self.name}: {error}") from None
         self._rngs = [stream or np.random.default_rng() for stream in streams]
 
     def decide(self, percept: Percept) -> Float32:

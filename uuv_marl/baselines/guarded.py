@@ -1,10 +1,10 @@
 """``guarded:NAME``: the safety filter around any policy.
 
-The policy decides. Where the velocity that its action leads to would come too near to something that the vehicle
-remembers, the safe velocity is taken instead that is nearest to what the action asks for: the velocity at which the
-resistance equals its force. Where nothing is near, actions stay as they are, bit for bit.
+The policy decides on an action. If the velocity that follows from the action would bring the vehicle too near to
+something that it remembers, the filter takes a safe velocity instead: the one nearest to the velocity at which the
+resistance equals the action's force. If nothing is near, actions stay as they are, bit for bit.
 
-With a rudder the action is the wished force, whose torque is near enough what the rudder does at cruise speed.
+With a rudder the action is the wished force; its torque is close to the rudder's at cruise speed.
 """
 
 from collections.abc import Sequence

@@ -17,15 +17,15 @@ __all__ = ["Card", "Layer", "Learned", "forward", "need_same", "rows_of", "save_
 
 
 def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
-    """Refuse a scenario that is another than that of a training.
+    """Raise an error for a scenario that differs from the training's.
 
     Args:
         policy: made for the scenario.
-        card: of its checkpoint.
-        any_vehicle: let it run on a vehicle that it was not trained on.
+        card: of the policy's checkpoint.
+        any_vehicle: whether the policy may run on a vehicle that it was not trained on.
 
     Raises:
-        PolicyError: the percept, the vehicle or the decision period is another.
+        PolicyError: the percept, the vehicle or the decision period differs.
     """
     scenario, name = policy.scenario, policy.name
     then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, rows_of(policy.layout)))
@@ -33,20 +33,20 @@ def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
         ("percept", then, now, "use a scenario with the sonar suite of its training")
     ]
     if not any_vehicle:
-        remedy = "leave it out, run it all the same with make(..., any_vehicle=True)"
+        remedy = "use another policy, allow this vehicle with make(..., any_vehicle=True)"
         pairs.append(("vehicle", card.vehicle, vehicle_of(scenario), remedy))
     for what, old, new, remedy in pairs:
         other = next((field for field in {**old, **new} if old.get(field) != new.get(field)), None)
         if other:
             raise PolicyError(
                 f"{name} was trained on another {what} than scenario {scenario.name!r} has: {other} was "
-                f"{old.get(other)} and is {new.get(other)}; {remedy}, or train on this one (uuv-marl train mappo "
-                "--scenario)"
+                f"{old.get(other)} in the training and is {new.get(other)} here; {remedy}, or train on this scenario "
+                "(uuv-marl train mappo --scenario)"
             )
     shortest, longest = card.decision_period_s
     if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
         raise PolicyError(
-            f"{name} decides every {shortest:g} to {longest:g} s, and scenario {scenario.name!r} every "
+            f"{name} decides every {shortest:g} to {longest:g} s, but scenario {scenario.name!r} has a decision every "
             f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
         )
 
@@ -57,9 +57,9 @@ class Learned(Policy):
     Args:
         scenario: gives the percept's layout and the vehicle's limits.
         num_worlds: first axis of the percepts.
-        name: by which messages call it.
+        name: of the policy in messages.
         checkpoint: the actor, and what it was trained on.
-        any_vehicle: run it also on a vehicle that it was not trained on.
+        any_vehicle: whether it may run on a vehicle that it was not trained on.
 
     Raises:
         PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.

@@ -1,7 +1,7 @@
 """A learned policy with memory: a network trims the gains of the hand-made law, and the filter has the last word.
 
-Each vehicle has gains of its own at each decision. They change as far as it doubts (``memory.doubt``): in still water
-with exact echoes next to nothing. With a network that says nothing the policy is the law alone.
+Each vehicle has gains of its own at each decision. The network changes them in proportion to the vehicle's doubt
+(``memory.doubt``): hardly at all in still water with exact echoes. If the network gives zeros, the policy is the law.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ class TrimmedLaw(Scout):
     num_trims = TRIMS
 
     def look(self, features: Float32) -> None:
-        """Fill what an actor sees of what is remembered, shape (world, vehicle, ``RECALLED``)."""
+        """Fill the features of the memory that an actor sees, shape (world, vehicle, ``RECALLED``)."""
         recall(
             self.active, self.scenario.swarm.num_vehicles, self.model.own.period_s, self.grown(), self.barrier,
             self.limits, self.memory, self.planes, features,
@@ -39,9 +39,9 @@ class LearnedLaw(TrimmedLaw):
     Args:
         scenario: gives the vehicle, the decision period and the percept's layout.
         num_worlds: first axis of the percepts.
-        name: by which messages call it.
+        name: of the policy in messages.
         checkpoint: the actor, and what it was trained on.
-        any_vehicle: run it also on a vehicle that it was not trained on.
+        any_vehicle: whether it may run on a vehicle that it was not trained on.
 
     Raises:
         PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.

@@ -2,8 +2,8 @@
 
 R. Olfati-Saber, IEEE Trans. Automatic Control 51(3), 401-420, 2006. Vehicles are alpha-agents that attract and repel
 each other towards a lattice; the nearest point of an obstacle's surface is a beta-agent that repels and brakes; the
-reference point is the gamma-agent. The source's lengths have no unit; here ``unit`` metres stand for 1 of them. Forces
-stand for its accelerations; its agents meet no resistance, so vehicles make up for theirs at the reference's velocity.
+reference point is the gamma-agent. The source's lengths have no unit; here ``unit`` metres stand for 1. Forces stand
+for the source's accelerations. Its agents meet no resistance, so vehicles balance theirs at the reference's velocity.
 """
 
 import math

@@ -1,8 +1,9 @@
 """Optimal reciprocal collision avoidance (ORCA): van den Berg, Guy, Lin and Manocha, ISRR 2009 (Springer 2011).
 
 Of two vehicles on a course of collision within a horizon, each takes half of the smallest change of their relative
-velocity that avoids it; of an obstacle, the vehicle takes all. Each such demand is a half-plane of velocities, and the
-vehicle takes the velocity nearest to its wished one that keeps all; where none does, obstacles go first.
+velocity that avoids the collision; with an obstacle, the vehicle takes the whole change. Each demand is a half-plane of
+velocities. The vehicle takes the velocity nearest to its wished one that meets all demands; if none does, demands from
+obstacles go first.
 """
 
 import math

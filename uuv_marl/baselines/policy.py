@@ -343,6 +343,6 @@ def tuned(name: str) -> Mapping[str, float]:
     file = folder.joinpath(f"{name}.json")
     if not file.is_file():
         known = sorted(each.name.removesuffix(".json") for each in folder.iterdir() if each.name.endswith(".json"))
-        raise PolicyError(f"{name!r} has no tuned gains; those of {', '.join(known)} ship, uuv-marl tune finds others")
+        raise PolicyError(f"{name!r} has no tuned gains; there are gains of {', '.join(known)}; see uuv-marl tune")
     data: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return data["best"]

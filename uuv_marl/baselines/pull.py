@@ -1,4 +1,4 @@
-"""The bare pull to the reference point: ``guarded:pull`` shows what the safety filter does alone."""
+"""The bare pull to the reference point: ``guarded:pull`` shows the effect of the safety filter alone."""
 
 from typing import ClassVar, NamedTuple
 
@@ -23,7 +23,7 @@ class Gains(NamedTuple):
 
 
 class Pull(Policy):
-    """The velocity of l(t) and a pull to it; neighbours and obstacles are ignored. Meant for ``guarded:pull``."""
+    """The velocity of l(t) and a pull to l(t); neighbours and obstacles are ignored. Meant for ``guarded:pull``."""
 
     wishes_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0

@@ -1,4 +1,4 @@
-"""What a learned policy's actor sees of what a vehicle remembers: bounded features in the vehicle's own frame."""
+"""The features of a vehicle's memory that an actor sees: bounded numbers in the vehicle's own frame."""
 
 import math
 

@@ -18,7 +18,7 @@ STEERAGE = 0.5
 
 
 class Rudder(NamedTuple):
-    """What a vehicle with a rudder knows of how it steers. SI units."""
+    """Steering data of a vehicle with a rudder. SI units."""
 
     sideways: float
     """Newtons to starboard that an action's second number stands for: full torque over the lever arm."""
@@ -36,7 +36,7 @@ class Rudder(NamedTuple):
 
     @staticmethod
     def of(scenario: Scenario) -> "Rudder | None":
-        """That of a scenario's vehicle; None without one."""
+        """The rudder of a scenario's vehicle; None if it has none."""
         hull, actuators = scenario.vehicle, scenario.actuators
         if actuators.kind != "rudder":
             return None

@@ -1,10 +1,10 @@
-"""A safety filter: the velocity nearest to a wished one that keeps clear of what a vehicle remembers.
+"""A safety filter: the velocity nearest to a wished one that keeps clear of the things a vehicle remembers.
 
 A control barrier function on velocities (Ames, Coogan, Egerstedt, Notomista, Sreenath and Tabuada, Control barrier
 functions: theory and applications, ECC 2019): the distance to an obstacle or neighbour may shrink no faster than in
-proportion to what is left of it beyond a margin, n . v <= gamma (d - margin), so that who keeps to it stays beyond the
-margin. Of a velocity that two neighbours must change, each changes a share, as in reciprocal avoidance (van den Berg et
-al. 2011, see ``halfplanes``).
+proportion to what is left of it beyond a margin, n . v <= gamma (d - margin). A vehicle that keeps to it stays
+beyond the margin. If two neighbours must change a velocity, each makes a share of the change, as in reciprocal
+avoidance (van den Berg et al. 2011, see ``halfplanes``).
 """
 
 import math

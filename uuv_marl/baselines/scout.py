@@ -1,7 +1,7 @@
 """The strongest hand-made laws here: they remember, flow round obstacles before they are near, and keep to the filter.
 
-What a vehicle wishes is l(t)'s velocity, a pull to l(t), and pushes from near neighbours. That wish is bent round what
-it remembers, made safe, and steered to.
+A vehicle's wished velocity is l(t)'s velocity, a pull to l(t), and pushes from near neighbours. This velocity is bent
+round remembered obstacles and made safe; the vehicle then steers to it.
 """
 
 import math
@@ -117,7 +117,7 @@ class Scout(Filtered):
 
 
 class ScoutPlus(Scout):
-    """``scout``, moving as a whole, pushing from farther, and remembering silent neighbours for twice as long.
+    """``scout`` with a swarm that moves as a whole, longer pushes, and silent neighbours remembered twice as long.
 
     Arguments as for ``Scout``.
     """

@@ -103,7 +103,7 @@ class Sdc(Policy):
         self._lattice = hexagonal_slots(n)
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Assign slots at a world's first decision, and count on: the funnel shrinks."""
+        """Assign slots at a world's first decision; then count decisions, with which the funnel shrinks."""
         for w in np.flatnonzero(worlds & (self.memory.decisions == 0)):
             self._assign(int(w), Percept(percept.flat[w], percept.layout))
         self.memory.decisions[worlds] += 1
@@ -139,7 +139,7 @@ class Sdc(Policy):
 
 
 class SdcInformed(Sdc):
-    """The same, every vehicle reading the reference."""
+    """``Sdc`` in which every vehicle reads the reference."""
 
     tuned_as: ClassVar[str] = "sdc_informed"
     all_informed: ClassVar[bool] = True

@@ -74,7 +74,7 @@ class Memory(NamedTuple):
 
 
 class Sff(Policy):
-    """Self-organised fission and fusion, neighbours' velocity over the link, the reference's velocity unused."""
+    """Self-organised fission and fusion, with neighbours' velocity over the link, without the reference's velocity."""
 
     wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = Memory
@@ -99,7 +99,7 @@ class Sff(Policy):
 
 
 class SffInformed(Sff):
-    """The same, every vehicle using the reference's velocity, with yaw damping."""
+    """``Sff`` in which every vehicle uses the reference's velocity, with yaw damping."""
 
     yaw_damping_nms: ClassVar[float] = 600.0
     tuned_as: ClassVar[str] = "sff_informed"

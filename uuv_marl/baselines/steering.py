@@ -1,4 +1,4 @@
-"""From a wished velocity to an action, and back: what policies that think in velocities share."""
+"""From a wished velocity to an action, and back; for all policies that compute with velocities."""
 
 import math
 
@@ -52,7 +52,7 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
 
 @compiled
 def wished_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, float]:
-    """The velocity [m/s] at which the resistance equals an action's force: what a force asks for. Eq. 22 backwards.
+    """The velocity [m/s] at which the resistance equals an action's force. Eq. 22 backwards.
 
     Args:
         a_x: share of full thrust.

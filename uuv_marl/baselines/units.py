@@ -1,11 +1,11 @@
-"""The units in which a policy thinks: on a scenario in a vehicle's scale those in which it looks like the paper's.
+"""The units in which a policy computes: on a scenario in a vehicle's scale, units that make it look like the paper's.
 
-A policy's gains carry units, such as newtons per metre. In place of scaling each gain, the policy is the same one in
+A policy's gains carry units, such as newtons per metre. Instead of scaled gains, the policy gets
 other units: lengths over L and speeds over V of ``scenario.scale``, times over L / V. The unit of force is full thrust
 over the paper's 3,000 N, so that a policy has as much force as it was made with, and saturates where it did. A hull
-that drags or weighs more or less than the paper's then shows in how it moves, and not in how much the policy dares.
-Torque follows: force times length. Actions are shares of full force and need no conversion. A vehicle that is the
-paper's in all but its size so gets the paper's runs, bit for bit where its scale is a power of two.
+with another drag or mass than the paper's then moves differently, but the policy does not dare more or less.
+Torque follows: force times length. Actions are shares of full force and need no conversion. So a vehicle that
+differs from the paper's only in size gets the paper's runs, bit for bit where its scale is a power of two.
 """
 
 from typing import NamedTuple

@@ -18,15 +18,15 @@ def load(path: str | Path) -> Any:
     """The runs of a ``results.json`` as a pandas data frame, a row for each, by scenario, policy and seed.
 
     Columns are ``scenario``, ``policy``, ``seed``, every metric (``constraint_share`` as ``constraint_share_all``,
-    ``constraint_share_s_l`` and so on), and ``trace``, the path of the run's time series for ``load_trace``. NaN stands
-    where there was nothing to measure. No policy is imported.
+    ``constraint_share_s_l`` and so on), and ``trace``, the path of the run's time series for ``load_trace``. NaN means
+    that there was nothing to measure. No policy is imported.
 
     Args:
         path: of the file, or of the folder that holds it.
 
     Raises:
         MissingExtraError: pandas is not installed.
-        ResultsError: it is no results.json of this version.
+        ResultsError: the file is no results.json of this version.
     """
     pandas = need_pandas("uuv_marl.benchmark.load")
     path = Path(path)

@@ -23,7 +23,7 @@ class Shares(TypedDict):
 
 
 class Measures(TypedDict):
-    """What is measured of the swarm as a whole. None where there is nothing to measure.
+    """Measures of the swarm as a whole; None if there was nothing to measure.
 
     Distances are in m and taken from the start to the episode's end; times are in s.
     """
@@ -48,11 +48,11 @@ class Measures(TypedDict):
 
 
 class Metrics(Measures, Success):
-    """What one run is summed up to; docs/results-format.md defines every key."""
+    """The metrics of one run; docs/results-format.md defines every key."""
 
 
 class Sample(NamedTuple):
-    """What is measured at one step of every world, shape (world,) each, lengths in m."""
+    """The measures of one step of every world, shape (world,) each, lengths in m."""
 
     time_s: Float64
     min_spacing_m: Float64
@@ -76,7 +76,7 @@ class Sample(NamedTuple):
 
 
 def measure(swarm: Swarm) -> Sample:
-    """The sample of a swarm as it stands."""
+    """The sample of a swarm in its present state."""
     facts, state, constraints = swarm.facts, swarm.state, swarm.scenario.constraints
     alive = state.alive
     living = np.maximum(alive.sum(axis=1), 1)
@@ -99,7 +99,7 @@ def measure(swarm: Swarm) -> Sample:
 
 
 class MetricsRecorder:
-    """Gathers samples of a batch of worlds and sums up each when it ends."""
+    """Gathers samples of a batch of worlds, and gives a world's metrics when its episode ends."""
 
     def __init__(self, swarm: Swarm) -> None:
         self._swarm = swarm
@@ -123,7 +123,7 @@ class MetricsRecorder:
         return {**columns, "obstacle_distance_m": distances.reshape(len(self._samples), num)}
 
     def metrics(self, world: int, clamps: int) -> Metrics:
-        """A world's metrics, as ``results.json`` keeps them; null where there is nothing to measure."""
+        """A world's metrics, as ``results.json`` keeps them; null if there was nothing to measure."""
         facts = self._swarm.facts
         table = self._table(world)
         clearance = min(float(clearance[world].min()) for clearance in self._clearances)

@@ -1,10 +1,10 @@
-"""The paper's own numbers (Wang et al., J. Mar. Sci. Eng. 2024, 12, 489), single runs as far as the paper tells."""
+"""The paper's own numbers (Wang et al., J. Mar. Sci. Eng. 2024, 12, 489), single runs as far as it says."""
 
 from typing import NamedTuple
 
 
 class PaperFigure(NamedTuple):
-    """What the paper states for a policy on a scenario; None where it states nothing."""
+    """The paper's numbers for a policy on a scenario; None if it states none."""
 
     task_time_s: float | None = None
     min_obstacle_distance_m: tuple[float, ...] | None = None
@@ -13,7 +13,7 @@ class PaperFigure(NamedTuple):
     source: str = ""
 
     def values(self, metric: str) -> tuple[float, ...]:
-        """What the paper states of a metric, which may be two values or none."""
+        """The paper's values of a metric: none, one or two."""
         stated: float | tuple[float, ...] | None = getattr(self, metric, None)
         return stated if isinstance(stated, tuple) else () if stated is None else (stated,)
 

@@ -94,17 +94,17 @@ def read_content(path: Path, remedy: str = "move it away or give another --outpu
 class Results:
     """``results.json`` in a folder, and ``traces/`` with the time series of every run.
 
-    Nothing keeps two processes from writing to one folder: take ``uuv_marl.atomic.locked`` around it.
+    Two processes must not write to one folder: hold ``uuv_marl.atomic.locked`` while you write.
 
     Args:
-        folder: made if missing. What it holds already is continued, if it comes from the same code, libraries and
-            scenarios. A policy that it names is not imported or opened before ``use``.
+        folder: made if missing. Results in it are continued if they come from the same code, libraries and
+            scenarios. A policy that they name is not imported or opened before ``use``.
         scenarios: the scenarios that runs will name.
         route_seeds: seeds whose routes are kept.
         traces: whether runs leave their time series, about 100 kB each.
 
     Raises:
-        ResultsError: the folder can't be written, or holds what can't be continued.
+        ResultsError: the folder can't be written, or holds results that can't be continued.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class Results:
         return [Row(*key, self._runs[key]) for key in sorted(self._runs)]
 
     def use(self, policy: str) -> None:
-        """Remember what a policy is, before its first run. Raises ResultsError once its file has changed."""
+        """Record a policy's knowledge and file before its first run. Raises ResultsError if its file has changed."""
         now = knowledge(policy)
         if self.policies.setdefault(policy, now)["source"] != now["source"]:
             raise ResultsError(
@@ -164,7 +164,7 @@ class Results:
         return (scenario, policy, seed) in self._runs
 
     def add(self, scenario: str, policy: str, run: Run) -> None:
-        """Keep a run, on disk at once; refused where the policy's file has changed, so that no table mixes two."""
+        """Keep a run, on disk at once. Raises ResultsError if the policy's file has changed: no table mixes two."""
         self.use(policy)
         if self._traces:
             self._add_trace(self.trace_path(scenario, policy, run.seed), run)
@@ -225,8 +225,8 @@ def run_name(scenario: str, policy: str, seed: int) -> str:
 def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
     """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
 
-    Beside them ``obstacles``, ``waypoints``, and for the seeds whose routes are kept the fields of
-    ``evaluate.Routes``, as ``route_time_s`` and so on; docs/results-format.md has shapes and units.
+    Also ``obstacles`` and ``waypoints``, and for seeds whose routes are kept the fields of ``evaluate.Routes``, as
+    ``route_time_s`` and so on; docs/results-format.md has shapes and units.
 
     Raises:
         ResultsError: the file is missing or broken.

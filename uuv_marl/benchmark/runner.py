@@ -1,4 +1,4 @@
-"""The benchmark as a job: which runs are missing, run them, and write table and pictures."""
+"""The benchmark as a job: it finds the missing runs, runs them, and writes table and pictures."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -34,7 +34,7 @@ def run_missing(
     """Run what ``results`` lacks; every finished seed is kept at once.
 
     Args:
-        results: takes the runs.
+        results: the runs are added to them.
         scenarios: to run on.
         policies: their names.
         seeds: of the runs on each scenario with each policy.
@@ -58,10 +58,10 @@ def run_missing(
 
 
 def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]) -> Row:
-    """The run that went worst: by most collisions, then by not arriving, then by the smallest distance.
+    """The worst run: the one with most collisions, then one that did not arrive, then the smallest distance.
 
-    That distance is between two vehicles or to an obstacle's surface, whichever is smaller. Of equals the first counts,
-    by scenario, policy and seed as given.
+    The distance is between two vehicles or to an obstacle's surface, whichever is smaller. Of equal runs the first
+    counts, in the given order of scenarios, policies and seeds.
 
     Args:
         results: with the runs.

@@ -23,7 +23,7 @@ BLUE, ORANGE, GREEN, PINK, AMBER, SKY, BLACK, GREY = COLOURS
 
 @contextmanager
 def house_style() -> Generator[None]:
-    """Whatever is drawn inside has the house style (``house.mplstyle``); Matplotlib's settings come back after it."""
+    """Pictures drawn inside have the house style (``house.mplstyle``); then Matplotlib's settings are restored."""
     with matplotlib.style.context(["default", "uuv_marl.benchmark.house"]):
         yield
 
@@ -71,7 +71,7 @@ def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Sequence[Sequence[
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """As PNG, the same bytes for the same picture."""
+    """Save a figure as PNG, the same bytes for the same picture."""
     path.parent.mkdir(parents=True, exist_ok=True)
     FigureCanvasAgg(figure).print_png(str(path), metadata={"Software": None})
     return path

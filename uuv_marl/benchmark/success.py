@@ -1,4 +1,4 @@
-"""Success in disturbed water, vehicle by vehicle: who touched nothing, and who is where it should be.
+"""Success in disturbed water: the share of vehicles that touched nothing and came to the goal.
 
 The paper's arrival asks a whole swarm to park within metres, which a current or one dead thruster forbids to policies
 that are perfectly safe. Here a vehicle is ``safe`` if it touched no obstacle and no living vehicle in the whole
@@ -25,7 +25,7 @@ TOGETHER = 0.95
 class Success(TypedDict, total=False):
     """Keys of ``Metrics`` that files of version 0.1.0 lack.
 
-    None where the episode ended earlier than ``GRACE_S`` after l(t), or where no vehicle stayed healthy.
+    None if the episode ended earlier than ``GRACE_S`` after l(t) stopped, or if no vehicle stayed healthy.
     """
 
     success_share: float | None
@@ -36,7 +36,7 @@ class Success(TypedDict, total=False):
 
 
 class SuccessRecorder:
-    """Watches a batch of worlds and judges each when it ends."""
+    """Watches a batch of worlds, and judges each world when its episode ends."""
 
     def __init__(self, swarm: Swarm) -> None:
         shape = swarm.num_worlds, swarm.num_vehicles

@@ -74,7 +74,7 @@ class Estimate(NamedTuple):
 def estimate(*samples: Sequence[float]) -> Estimate:
     """Interquartile mean and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable.
 
-    Of one sample, such as a value for each seed, or of several together: each is resampled by itself.
+    Several samples, such as one of a value for each seed, give one estimate; each sample is resampled by itself.
     """
     data = [np.asarray(sample, np.float64) for sample in samples]
     whole = float(_iqm(*data))
@@ -186,9 +186,9 @@ def _paper_cell(paper: PaperFigure | None) -> str:
 
 
 def rich_table(title: str, rows: Sequence[Cells], width: int) -> RichTable:
-    """For a terminal of so many columns: the same cells, stacked so that they fit.
+    """The table for a terminal of a given width in columns: the same cells, stacked so that they fit.
 
-    A narrow one leaves out intervals, the spacing's time mean and the shares of Eq. 7, which table.md has.
+    For a narrow terminal it leaves out intervals, the spacing's time mean and the shares of Eq. 7; table.md has them.
     """
     narrow = width < _NARROW
     table = RichTable(

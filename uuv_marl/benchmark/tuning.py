@@ -56,7 +56,7 @@ SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
 
 
 def cost(run: Run, scenario: Scenario) -> float:
-    """What tuning minimises for one seed [s]: the task's time; the time limit and more where it fails.
+    """What tuning minimises for one seed [s]: the task time, or more than the time limit if the swarm fails.
 
     A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. On a
     scenario in a vehicle's scale these seconds and metres are those of its scale.
@@ -81,10 +81,10 @@ def search(
     objectives: int = 1,
     first: dict[str, Any] | None = None,
 ) -> Sequence[Any]:
-    """Minimise with Optuna; interrupted, the same call goes on, and draws what an uninterrupted one draws.
+    """Minimise with Optuna. After an interruption the same call continues, with the draws of an uninterrupted one.
 
     Args:
-        output: folder of the journal ``NAME.journal``, from which Optuna unpickles: go on with none you do not trust.
+        output: folder of the journal ``NAME.journal``, which Optuna unpickles: continue only a journal that you trust.
         name: of the search.
         trials: how many must be complete.
         objective: from a trial to what is minimised.
@@ -120,18 +120,18 @@ def search(
 def tune(
     policy: str, output: Path, trials: int, report: Callable[[int, float], None], vehicle: str | None = None
 ) -> Path:
-    """Search a policy's parameters; interrupted, the same call goes on. Needs the extra ``tune``.
+    """Search a policy's parameters; after an interruption the same call continues. Needs the extra ``tune``.
 
     Writes ``output/POLICY.json`` with the best parameters and ``POLICY.csv`` with every trial, and keeps Optuna's
-    journal beside them, from which Optuna unpickles: go on with none that you do not trust.
+    journal beside them, which Optuna unpickles: continue only a journal that you trust.
 
     Args:
         policy: name of one of ``SPACES``.
         output: folder of the files.
         trials: to reach in all, those before an interruption included.
         report: called with the number of trials done and the best cost [s].
-        vehicle: on which, in its scale (``sea_trial``); the files are then ``POLICY.VEHICLE.json`` and ``.csv``. None:
-            on ``single_obstacle``.
+        vehicle: the vehicle to tune for, in its scale (``sea_trial``); the files are then ``POLICY.VEHICLE.json``
+            and ``.csv``. None: the paper's vehicle on ``single_obstacle``.
     """
     import optuna  # noqa: PLC0415 - an extra
 

@@ -128,7 +128,7 @@ def tune(
 
         for name in policy or SPACES:
             if name not in SPACES:
-                raise PolicyError(f"policy {name!r} has no free gains to tune; there are {', '.join(SPACES)}")
+                raise PolicyError(f"policy {name!r} has no free gains to tune; choose one of {', '.join(SPACES)}")
         with extra("tune", "tuning"), working(f"The finished trials are in {output}", alone=output) as bar:
             for name in policy or SPACES:
                 line = shown(bar, name, trials)

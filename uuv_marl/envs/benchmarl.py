@@ -17,7 +17,7 @@ from uuv_marl.envs.torchrl import GROUP, SwarmEnv
 class SwarmTaskClass(TaskClass):
     """Makes ``uuv_marl.envs.torchrl.SwarmEnv``; ``config`` holds its arguments but for the number of worlds and seed.
 
-    BenchMARL trains on the rows of all vehicles alike, so that scenarios in which one can be lost are refused.
+    BenchMARL trains on the rows of all vehicles alike. A scenario in which a vehicle can be lost is an error.
     """
 
     def get_env_fun(
@@ -55,7 +55,7 @@ class SwarmTaskClass(TaskClass):
         return make_batched_env(**self._arguments).longest_episode
 
     def has_render(self, env: EnvBase) -> bool:  # noqa: ARG002
-        """TorchRL's environment draws nothing; ``uuv_marl.parallel_env`` does."""
+        """False: TorchRL's environment draws nothing; ``uuv_marl.parallel_env`` draws."""
         return False
 
     def group_map(self, env: EnvBase) -> dict[str, list[str]]:
@@ -102,9 +102,9 @@ class SwarmTask(Task):
 
     @staticmethod
     def associated_class() -> type[TaskClass]:
-        """Ours."""
+        """``SwarmTaskClass``."""
         return SwarmTaskClass
 
     def get_from_yaml(self, path: str | None = None) -> TaskClass:
-        """The task with the arguments in a YAML file, by default none: BenchMARL has no file for us."""
+        """The task with the arguments in a YAML file, by default without arguments: BenchMARL has no file of ours."""
         return self.get_task({}) if path is None else super().get_from_yaml(path)

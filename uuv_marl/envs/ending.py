@@ -1,4 +1,4 @@
-"""How an episode ended: what the last infos of every API tell."""
+"""How an episode ended: the entries of the last infos, in every API."""
 
 from typing import Any
 
@@ -6,10 +6,10 @@ from uuv_marl.envs.batched_env import BatchedEnv
 
 
 def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:
-    """Why a world's episode ended, or a vehicle's part in it, as plain Python values.
+    """Why the episode of a world, or of one vehicle, ended; as plain Python values.
 
     Args:
-        batch: as the step left it in which the world, or the vehicle, came to its end.
+        batch: the worlds directly after the step in which the episode of the world, or of the vehicle, ended.
         world: index of the world.
         vehicle: index of the vehicle; None for the world as a whole.
 

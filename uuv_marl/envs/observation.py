@@ -9,7 +9,7 @@ from uuv_marl.sim.compiled import compiled_parallel
 
 
 def observe(percept: Percept) -> Float32:
-    """What all vehicles observe, a new array (world, vehicle, entry): ``Percept.to_observation``, over threads."""
+    """What all vehicles observe, a new array (world, vehicle, entry): ``Percept.to_observation``, threaded."""
     if len(percept.flat) == 1:
         return percept.to_observation()
     observation = np.empty_like(percept.flat)

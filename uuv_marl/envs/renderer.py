@@ -19,7 +19,7 @@ class Renderer:
         render_mode: one of ``modes``, or None.
         modes: ``rgb_array``, and ``human`` where the environment can show a window.
         options: how to draw.
-        sonar_of: whose sonar is drawn where the options name no vehicle.
+        sonar_of: vehicle whose sonar is drawn if the options name none.
     """
 
     def __init__(

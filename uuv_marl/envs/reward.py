@@ -1,10 +1,10 @@
 """The reward: named terms of every vehicle, weighted by the scenario, and their sum.
 
-Sound by construction: terms per second are bounded and at most zero, arrival pays once, whether it ends the episode
-or not, so that arriving earlier never pays less; a lost vehicle is charged the worst that those terms could have cost
-it in the rest of the episode, an arrival, and a collision, so that dying never pays the one who dies (unless it would
-have collided again and again). No term depends on the number of vehicles. One thing remains: where a straggler keeps
-the swarm from arriving, the others gain from its loss.
+Two laws hold by construction. An earlier arrival never pays less: terms per second are bounded and at most zero, and
+arrival pays once, whether it ends the episode or not. A vehicle never gains from its own loss, unless it would have
+collided again and again: a lost vehicle is charged the worst that those terms could have cost it in the rest of the
+episode, an arrival, and a collision. No term depends on the number of vehicles. One weakness remains: if a straggler
+keeps the swarm from arriving, the others gain from its loss.
 """
 
 import math
@@ -34,7 +34,7 @@ def own_reward(function: RewardFunction, swarm: Swarm, present: Bool) -> Float64
         present: vehicles that were there before the step, shape (world, vehicle).
 
     Raises:
-        RewardError: it gives an array of another shape, or numbers that are not finite.
+        RewardError: the function gives an array of another shape, or numbers that are not finite.
     """
     reward = np.asarray(function(swarm), np.float64)
     if reward.shape != present.shape:

@@ -21,10 +21,10 @@ ENV_NAME = "uuv_swarm_v0"
 
 
 class SwarmMultiAgentEnv(MultiAgentEnv):
-    """The PettingZoo environment as RLlib wants it: the same observations and rewards, bit for bit.
+    """The PettingZoo environment in RLlib's form: the same observations and rewards, bit for bit.
 
     A lost vehicle is terminated alone, with its last observation, and never appears again. ``__all__`` is set in
-    ``terminateds`` once the swarm has arrived or nobody is left, in ``truncateds`` at the time limit.
+    ``terminateds`` once the swarm has arrived or no vehicle is left, in ``truncateds`` at the time limit.
 
     Args:
         config: the keyword arguments of ``uuv_marl.parallel_env``; RLlib hands over its ``env_config``.
@@ -58,7 +58,7 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
     ) -> tuple[dict[str, Float32], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """One decision of every agent, as ``SwarmParallelEnv.step``, errors included.
 
-        ``truncateds`` holds ``__all__`` alone: RLlib takes an episode in which every agent is flagged by itself as
+        ``truncateds`` holds only ``__all__``: if every agent had a flag of its own, RLlib would take the episode as
         terminated, and would learn that nothing follows a time limit.
         """
         observations, rewards, terminateds, truncateds, infos = self._env.step(action_dict)
@@ -77,9 +77,9 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
 
 
 def register() -> str:
-    """Make the environment known to RLlib by ``ENV_NAME``, on every node of the cluster; the name.
+    """Make the environment known to RLlib as ``ENV_NAME``, on every node of the cluster; returns the name.
 
-    Call it after ``ray.init``, and again after each further one: Ray forgets registrations when it shuts down.
+    Call it after ``ray.init``, and again after each further ``ray.init``: Ray forgets registrations when it shuts down.
     """
     register_env(ENV_NAME, SwarmMultiAgentEnv)
     return ENV_NAME

@@ -23,7 +23,7 @@ Indices = None | int | Iterable[int]
 
 
 class SharedEnvMixin:
-    """What SB3 asks of a row's own environment, where rows share one."""
+    """What SB3 asks of each row's environment, for rows that share one environment."""
 
     _get_indices: Callable[[Indices], Iterable[int]]
 
@@ -60,9 +60,9 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
 
     Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
     reset in the same step, all its rows at once: ``infos[row]`` then holds ``terminal_observation``,
-    ``TimeLimit.truncated``, ``episode`` (return ``r``, length ``l``, its own seconds ``t``) and how it ended
-    (``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``: ``uuv_marl.envs.ending.ending``). Scenarios in
-    which a vehicle can be lost are refused: SB3 has no row that ends and waits.
+    ``TimeLimit.truncated``, ``episode`` (return ``r``, length ``l``, its own seconds ``t``) and how the episode ended
+    (``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``: ``uuv_marl.envs.ending.ending``). A scenario
+    in which a vehicle can be lost is an error: SB3 has no row that ends and waits.
 
     Args:
         num_worlds: worlds stepped together.
@@ -99,13 +99,13 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
         self._starts = np.full(num_worlds, time.perf_counter())
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """For the next reset: world w starts from ``seed + w``. Returns the seed of every row's world."""
+        """Set the seeds of the next reset: world w starts from ``seed + w``. Returns the seed of every row's world."""
         drawn = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number("seed", seed, 0)
         self._seed = drawn
         return [drawn + world for world in range(self._shape[0]) for _ in range(self._shape[1])]
 
     def reset(self) -> Float32:
-        """Start all worlds; without ``seed`` before it their random streams go on. Shape (row, entry)."""
+        """Start all worlds, shape (row, entry). Unless ``seed`` was called before, their random streams go on."""
         observation = self._batch.reset(self._seed)
         self._seed = None
         self._forget(np.ones(self._shape[0], np.bool_))

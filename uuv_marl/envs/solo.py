@@ -21,16 +21,16 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
 
     Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the swarm
     arrives or the learner is lost, and is truncated by the time limit; others may be lost on the way. The last info
-    tells how it ended: ``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``
+    tells how the episode ended: ``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``
     (``uuv_marl.envs.ending.ending``).
 
     Args:
-        others: name of a policy, or ``module:Class``. The scenario gets the channels and the inner loop that it
-            declares (``uuv_marl.baselines.granted``), for the learner too: with ``sdc`` the observation is longer.
+        others: name of a policy, or ``module:Class``. The scenario gets the channels and the yaw damping that the
+            policy declares (``uuv_marl.baselines.granted``), also for the learner: ``sdc`` makes observations longer.
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
             otherwise.
-        info_terms: put the reward's terms into the info.
+        info_terms: whether the info holds the reward's terms.
         scenario, max_cycles, reward: as for ``uuv_marl.parallel_env``.
         changes: ``num_vehicles``, ``decision_period`` and ``overrides``, likewise.
     """
@@ -63,7 +63,7 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Float32, dict[str, Any]]:
-        """Start an episode: with a seed that of ``parallel_env``, without one its random stream goes on."""
+        """Start an episode: with a seed, the episode of ``parallel_env``; without one, the random stream goes on."""
         super().reset(seed=seed, options=options)
         observation = self._batch.reset(seed)
         # Policies that draw follow the world's seed, and go on from the environment's stream where there is none.

@@ -34,8 +34,8 @@ class SwarmEnv(EnvMixin, EnvBase):
     Args:
         num_worlds: worlds stepped together.
         scenario: a name, a TOML file or a ``Scenario``.
-        seed: of the first reset, world w from ``seed + w``; as ``set_seed``.
-        device: where the tensors go; the water stays on the CPU.
+        seed: of the first reset, in which world w starts from ``seed + w``; as ``set_seed``.
+        device: where the tensors go; the simulation stays on the CPU.
         options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
             for ``uuv_marl.parallel_env``.
     """

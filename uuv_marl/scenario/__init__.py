@@ -1,7 +1,7 @@
-"""Scenarios: everything that fixes a simulation but the seed.
+"""Scenarios: everything that fixes a simulation, except the seed.
 
-``load_scenario`` makes a ``Scenario`` from a name, a TOML file or another scenario. ``*.toml`` hold the shipped ones,
-every number with its source.
+``load_scenario`` makes a ``Scenario`` from a name, a TOML file or another scenario. The ``*.toml`` files hold the
+shipped scenarios, every number with its source.
 """
 
 from uuv_marl.errors import ScenarioError

@@ -1,4 +1,4 @@
-"""What a scenario's sea does, in a few words, for headers of tables, pages and pictures."""
+"""A scenario's disturbances in a few words, for headers of tables, pages and pictures."""
 
 from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.sea import Fault
@@ -8,7 +8,7 @@ IDEAL = "still water, no noise, no delay"
 
 
 def conditions(scenario: Scenario) -> str:
-    """What is on: ``current 0.5 m/s, sonar 0.3 s late``; ``IDEAL`` where nothing is."""
+    """The disturbances that are on, such as ``current 0.5 m/s, sonar 0.3 s late``; ``IDEAL`` if there are none."""
     return ", ".join(disturbances(scenario)) or IDEAL
 
 
@@ -19,7 +19,7 @@ def disturbances(scenario: Scenario) -> list[str]:
 
 
 def hears_ideally(scenario: Scenario) -> bool:
-    """Whether sonars hear everything at once and as it is."""
+    """Whether sonars hear without delay, noise or loss."""
     deaf = any(fault.kind == "array" and fault.share > 0.0 for fault in scenario.faults)
     return not deaf and not any([*_latency(scenario).values(), *_noise(scenario).values()])
 

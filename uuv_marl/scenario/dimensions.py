@@ -1,8 +1,8 @@
 """The dimension of every number of a scenario, and its conversion to other units.
 
 A field's name says its dimension: a unit at its end (``radius_m``, ``speed_mps``), or a symbol of Fossen's, which is a
-force or a moment over velocities (``X_uu``, ``N_r``). What has neither is listed here. A length, a time and a mass that
-are units of their own then convert a whole scenario.
+force or a moment over velocities (``X_uu``, ``N_r``). Names with neither are listed here. Units of length,
+time and mass then convert a whole scenario.
 """
 
 import re
@@ -68,7 +68,7 @@ class Units(NamedTuple):
 
 
 def dimension(field: str) -> Dimension | None:
-    """The dimension of a scenario's number by its name, the last part of its field; None for a name that none has."""
+    """The dimension of a scenario's number by its name, the last part of its field; None for an unknown name."""
     if field in _NUMBERS:
         return NUMBER
     if field in _RATES:
@@ -84,7 +84,7 @@ def dimension(field: str) -> Dimension | None:
 def converted(value: Any, units: Units, keep: Collection[str] = (), field: str = "") -> Any:
     """A scenario, a section or plain data whose numbers are multiplied by the units of their dimensions.
 
-    What is neither a number nor holds one, and numbers of unknown names, stay as they are. Nothing is checked.
+    Numbers of unknown names, and values that hold no number, stay as they are. Nothing is checked.
 
     Args:
         value: a model, a dictionary, a list, or one field's value.

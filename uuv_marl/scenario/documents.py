@@ -1,4 +1,4 @@
-"""TOML files as they are read: text, data, and the comment beside each value."""
+"""TOML files that were read: text, data, and the comment beside each value."""
 
 import tomllib
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What is wrong with a scenario, in one line of our own for one of pydantic's errors."""
+"""Messages on what is wrong with a scenario: one line of ours for each of pydantic's errors."""
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,7 +26,7 @@ _EXPLANATIONS = {
 
 
 def explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
-    """One line of our own for one of pydantic's errors."""
+    """One line of ours for one of pydantic's errors."""
     kind, got = error["type"], error["input"]
     if kind == "value_error":
         return str(error["ctx"]["error"])

@@ -47,7 +47,7 @@ def _step(place: Any, part: str, field: str) -> Any:
         entries = cast(list[Any], place)
         return entries[_index(entries, part, field)]
     if not isinstance(place, dict):
-        raise ScenarioError(f"{short(field)} is unknown: a value comes before {shown(part)}")
+        raise ScenarioError(f"{short(field)} is unknown: {shown(part)} follows a value, not a table")
     return cast(dict[str, Any], place).setdefault(part, {})
 
 

@@ -1,10 +1,10 @@
-"""Scenarios in the scale of a vehicle: what is long, fast and strong for it is so as in the paper for the paper's.
+"""Scenarios in the scale of a vehicle: lengths and speeds are to it as the paper's are to the paper's vehicle.
 
 ``scale = "vehicle"`` in a scenario's file says that its numbers are those for the paper's vehicle. Lengths, speeds and
-times are then multiplied, so that the course looks to the vehicle as the paper's does to the paper's. Hull and
-actuators stay, which are the vehicle's own, and so does the speed of sound. Ranges of the sonar are multiplied too:
-Table 1 gives them for the paper's swarm and of no device, and a vehicle should be warned as early, in its own lengths
-and times, as the paper's is. A device's own range can be set beside (``--set sonar.arrays.bow.range_m=80``).
+times are then multiplied, so that the course is to the vehicle as the paper's is to the paper's vehicle. Hull and
+actuators, which are the vehicle's own, stay as they are; so does the speed of sound. Ranges of the sonar are
+multiplied, too: Table 1's are of no device, and a vehicle should be warned as early, in its own lengths and times, as
+the paper's. A device's own range can be set beside (``--set sonar.arrays.bow.range_m=80``).
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ _HALVINGS = 12
 
 
 class Scale(Section):
-    """A vehicle's scale over the paper's: what the lengths, speeds and times of a scenario were multiplied by."""
+    """A vehicle's scale over the paper's: the factors of a scenario's lengths, speeds and times."""
 
     length: Ratio = 1.0
     """Of lengths; times are multiplied by this over ``speed``."""
@@ -84,10 +84,10 @@ def in_scale(data: dict[str, Any], was: Scale) -> dict[str, Any]:
 
     Args:
         data: as files and overrides give them.
-        was: the scale that they are in.
+        was: the scale that the data are in.
 
     Raises:
-        ValidationError: hull or actuators are none.
+        ValidationError: hull or actuators are not valid.
         ValueError: the vehicle has no scale.
     """
     vehicle, actuators = Vehicle.model_validate(data.get("vehicle")), Actuators.model_validate(data.get("actuators"))

@@ -1,4 +1,4 @@
-"""Scenario: everything that fixes a simulation but the seed; frozen, validated, in SI units and degrees.
+"""Scenario: everything that fixes a simulation, except the seed; frozen, validated, in SI units and degrees.
 
 The numbers and their sources are in the TOML files beside; nothing here has a default value that matters.
 """

@@ -1,4 +1,4 @@
-"""What the physics demands of a vehicle: inertia positive, damping and lift dissipative, no motion too fast.
+"""Checks that a vehicle is physical: inertia is positive, damping and lift take energy, no motion is too fast.
 
 Every message names the field, its value and the remedy.
 """

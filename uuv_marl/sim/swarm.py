@@ -1,4 +1,4 @@
-"""Swarm: any number of worlds, reset one by one and stepped in one call: seeds, draws and checks before an engine."""
+"""Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks; an engine computes."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -30,8 +30,8 @@ _log = logging.getLogger("uuv_marl")
 class Swarm:
     """Worlds of one scenario, each with its own random stream.
 
-    ``state``, ``course`` and ``facts`` hold the arrays, first axis the world; they and the percepts returned are
-    buffers that the next ``step`` or ``reset`` overwrites. A world's run depends on its seed and actions alone.
+    ``state``, ``course`` and ``facts`` hold arrays whose first axis is the world. They and the returned percepts
+    are buffers that the next ``step`` or ``reset`` overwrites. A world's run depends on its seed and actions alone.
 
     Args:
         scenario: what to simulate.
@@ -80,10 +80,10 @@ class Swarm:
 
     @property
     def currents(self) -> Flow | None:
-        """How the water of each world moves; None where nothing disturbs the scenario.
+        """How the water of each world moves; None if nothing disturbs the scenario.
 
-        ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of one's own: the water at the
-        vehicles is read from them at the end of each control hold. A reset draws them anew.
+        ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of your own: the water at the
+        vehicles is computed from them at the end of each control hold. A reset draws them anew.
         """
         return None if self._sea is None else self._sea.flow
 
@@ -104,12 +104,12 @@ class Swarm:
 
     @property
     def duration_s(self) -> NDArray[np.float64]:
-        """Time that l(t) takes to its end, the bound on any task time, shape (world,)."""
+        """Time that l(t) takes to its end [s], no task time is shorter; shape (world,)."""
         return self._duration_s
 
     @property
     def time_limit_s(self) -> NDArray[np.float64]:
-        """When a world is given up, shape (world,)."""
+        """Time at which an episode is cut off [s], shape (world,)."""
         return self.scenario.time_limit.of(self.duration_s)
 
     @property
@@ -123,11 +123,11 @@ class Swarm:
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
     def endings(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """How episodes ended, shape (world,) each; both False for those that go on.
+        """How episodes ended, shape (world,) each; both False for episodes that go on.
 
         Returns:
-            Terminated, by what happened: the swarm arrived (where ``arrival.ends_episode``), or all of it is lost.
-            Truncated, that is cut off: by the time limit, or because the world diverged.
+            Terminated: the swarm arrived (if ``arrival.ends_episode``), or all vehicles are lost.
+            Truncated: the time limit cut the episode off, or the world diverged.
         """
         done = self.arrived & self.scenario.arrival.ends_episode
         terminated = done | ~self.state.alive.any(axis=1)
@@ -153,9 +153,9 @@ class Swarm:
         """Start worlds anew.
 
         Args:
-            seed: world w starts from ``seed + w``; or a seed, or None, for each of ``worlds``; without a seed a
-                world's own stream goes on, from fresh entropy where it has none.
-            worlds: which ones, default all.
+            seed: world w starts from ``seed + w``; or a sequence with a seed or None for each of ``worlds``. Without a
+                seed a world's own stream goes on, or begins from fresh entropy.
+            worlds: indices of the worlds to reset, default all.
         """
         chosen = range(self.num_worlds) if worlds is None else worlds
         for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
@@ -185,10 +185,10 @@ class Swarm:
         self._engine.observe(w)
 
     def observe(self) -> Percept:
-        """Facts and percepts anew, as after a reset, where ``state`` or ``course`` was changed by hand.
+        """Compute facts and percepts anew, as after a reset, once ``state`` or ``course`` was changed by hand.
 
-        At sea, vehicles then know where they are, and their arrays begin to read: drift and readings on their way are
-        forgotten. Current, forces, faults and messages go on.
+        If the sea is switched on, drift and late readings are forgotten: vehicles know their places again, and their
+        arrays begin to read. Current, forces, faults and messages go on.
         """
         self._check_indices(self._arrays())
         for w in range(self.num_worlds):
@@ -196,7 +196,7 @@ class Swarm:
         return self.percept
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All that a later run depends on, copied, for ``restore``: random streams too."""
+        """A copy of all that a later run depends on, random streams included, for ``restore``."""
         return {name: array.copy() for name, array in self._arrays().items()} | {"streams": packed(self._rngs)}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Percept:

@@ -1,1 +1,1 @@
-"""The paper again, research on the model, and learned policies on what they were never trained on."""
+"""The paper again, research on the model, and all policies on held-out seeds and in disturbed water."""

@@ -31,7 +31,7 @@ def where(table: Columns, **values: object) -> Columns:
 
 
 def groups(table: Columns, *names: str) -> dict[tuple[Any, ...], Columns]:
-    """The rows by what they have in these columns, in the order in which that comes."""
+    """The rows grouped by their values in these columns, in the order of first appearance."""
     found = dict.fromkeys(zip(*(table[name].tolist() for name in names), strict=True))
     return {values: where(table, **dict(zip(names, values, strict=True))) for values in found}
 
@@ -54,5 +54,5 @@ def read_columns(path: Path) -> Columns:
 
 
 def written(value: Any) -> Any:
-    """What stands in the file for a number or a text."""
+    """The text in the file for a number or a text."""
     return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) else value

@@ -29,10 +29,10 @@ class Part(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Stands above the picture, see ``parts.toml``."""
+        """The text above the picture, see ``parts.toml``."""
         return _WORDS[self.name]["title"]
 
     @property
     def caption(self) -> str:
-        """Stands below the picture, see ``parts.toml``."""
+        """The text below the picture, see ``parts.toml``."""
         return _WORDS[self.name]["caption"]

@@ -21,14 +21,14 @@ NEEDED = ("identification", "margins", "rest", "critical")
 
 
 def write_page(folder: Path, parts: Sequence[Part]) -> Path:
-    """``report.md`` in the folder of a reproduction, from what lies there."""
+    """Write ``report.md`` into the folder of a reproduction, from the files there."""
     path = folder / "report.md"
     write_text(path, page(folder, parts))
     return path
 
 
 def page(folder: Path, parts: Sequence[Part]) -> str:
-    """The whole page: ``story.md`` with what was found."""
+    """The whole page: ``story.md`` filled with the results."""
     entries = read_ledger(folder / "ledger.json")
     seeds = json.loads((folder / "ledger.json").read_text(encoding="utf-8"))["seeds"]
     tables = {name: read_columns(folder / "data" / f"{name}.csv") for name in NEEDED}
@@ -87,7 +87,7 @@ def _estimate(values: Float64) -> str:
 
 
 def growth_rates(margins: Columns, critical: Columns) -> dict[str, str]:
-    """What the eigenvalues say."""
+    """Texts of the growth rates, from the eigenvalues."""
 
     def growth(parameter: str, value: float, hold: float) -> str:
         found = where(margins, parameter=parameter, value=value, t_r_s=hold)["growth_per_s"]
@@ -105,7 +105,7 @@ def growth_rates(margins: Columns, critical: Columns) -> dict[str, str]:
 
 
 def rest_table(rest: Columns) -> str:
-    """What the swarm does once l(t) rests: means over seeds."""
+    """Table of the swarm's motion once l(t) rests: means over seeds."""
     headers = (
         "variant", "t_r [s]", "yaw damping [N m s]", "yaw rate rms [rad/s]", "speed rms [m/s]", "exponents [1/s]",
     )  # fmt: skip

@@ -38,16 +38,16 @@ _COMPUTED = 20
 
 
 def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> list[Path]:
-    """Make these parts (default all, the ledger and the page); what is done already is kept.
+    """Make these parts (default: all, the ledger and the page); finished work is kept.
 
     Args:
         folder: for runs, data, figures, ledger and page.
         seeds: benchmark seeds 0 to ``seeds - 1``, for cases that name none.
         only: names of parts, or ``ledger``; nothing for all.
-        report: is called with what is being done, and the share of the work that is done.
+        report: is called with the current task, and the share of the work that is done.
 
     Returns:
-        What was made for people to read: pictures, and the ledger and the page.
+        Paths of the pictures, the ledger and the page.
 
     Raises:
         ResultsError: an unknown part, or a folder that other code has used.

@@ -45,7 +45,7 @@ class Case(NamedTuple):
 
     @property
     def folder(self) -> str:
-        """Its name; where it is not shared also what is changed, so that a changed case never finds old runs."""
+        """Its name; unless it is shared, also a mark of the case's changes: a changed case never finds old runs."""
         if self.shared:
             return self.name
         changed = hashlib.sha256(repr((self.load(), self.policy, sorted(self.parameters.items()))).encode())
@@ -79,7 +79,7 @@ class Suite:
             run_missing(self.results(case), [case.load()], [case.policy], self.seeds_of(case), note, how)
 
     def seeds_of(self, case: Case) -> Sequence[int]:
-        """What a case is run on."""
+        """The seeds of a case."""
         return self.seeds if case.seeds is None else case.seeds
 
     def metric(self, case: Case, name: str) -> Float64:
@@ -92,11 +92,11 @@ class Suite:
         return self.results(case).trace(case.scenario, case.policy, seed)
 
     def traces(self, case: Case) -> list[Trace]:
-        """Those of all seeds."""
+        """The traces of all seeds."""
         return [self.trace(case, seed) for seed in self.seeds_of(case)]
 
     def results(self, case: Case) -> Results:
-        """What its folder holds."""
+        """The results in the case's folder."""
         if case.name not in self._open:
             routes = self.seeds if case.routes else ()
             self._open[case.name] = Results(self.folder / case.folder, [case.load()], routes, self._traces)

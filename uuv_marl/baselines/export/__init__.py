@@ -48,8 +48,8 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
     """
     made = make(policy, granted(policy, scenario))
     if made.reader is not None or (made.rudder is not None and not isinstance(made, Filtered)):
-        what = "a scenario in a vehicle's scale" if made.reader is not None else "a network's force on a rudder"
-        raise PolicyError(f"policy {policy!r} on {what} has no form in ONNX; export it for a scenario without")
+        what = "a scenario in a vehicle's scale" if made.reader is not None else "a vehicle with a rudder"
+        raise PolicyError(f"policy {policy!r} has no form in ONNX for {what}; choose another scenario")
     if isinstance(made, Filtered):
         graph = remembering_nodes(made)
     elif isinstance(made, Learned):
@@ -57,7 +57,7 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
         learned_nodes(graph, made, Value(graph, "observation"), "action")
     else:
         raise PolicyError(
-            f"policy {policy!r} is no network, and has no form in ONNX; give a learned policy, such as the folder best "
+            f"policy {policy!r} is no network and has no form in ONNX; give a learned policy, such as the folder best "
             "of a training (uuv-marl train mappo), scout, or guarded: before a learned policy without memory"
         )
     model = _model(made, graph)

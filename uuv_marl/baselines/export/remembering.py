@@ -60,7 +60,8 @@ def remembering_nodes(policy: Filtered) -> Translator:
     if isinstance(policy, Guarded):
         if not isinstance(policy.inner, Learned):
             raise PolicyError(
-                f"policy {policy.name!r}: inside the filter, ONNX has a form for networks without memory alone"
+                f"policy {policy.name!r} has no form in ONNX: inside the filter only networks without memory have one; "
+                "give such a network, or scout"
             )
         inputs.append(learned_nodes(g, policy.inner, Value(g, "observation")).name)
     nodes: list[NodeProto] = []
@@ -88,7 +89,7 @@ def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], l
     elif isinstance(policy, Scout) and type(policy) in (Scout, ScoutPlus, LearnedLaw):
         action = _by_law(g, policy, memory)
     else:
-        raise PolicyError(f"policy {policy.name!r} has no form in ONNX")
+        raise PolicyError(f"policy {policy.name!r} has no form in ONNX; give a learned policy, scout or scout_plus")
     if policy.rudder is not None:
         g.call(steer_by_rudder, seen, policy.layout.offsets, policy.rudder, action)
     g.tensors[cast(Any, memory.action).cells] = g.tensors[action.cells]

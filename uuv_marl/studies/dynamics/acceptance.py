@@ -30,7 +30,7 @@ _FINER = 16
 
 
 class Figure(NamedTuple):
-    """What a source says that a vehicle does."""
+    """A source's number for a vehicle."""
 
     vehicle: str
     quantity: str
@@ -49,7 +49,7 @@ FIGURES = (
 
 
 class Measured(NamedTuple):
-    """What a vehicle does."""
+    """The measured motion of a vehicle."""
 
     top_mps: float
     """Speed ahead at full thrust."""

@@ -39,7 +39,7 @@ def runs(episodes: Sequence[Episode], held: HeldOut, policy: str, trained: bool)
         episodes: of all sets and policies.
         held: the task; seeds beyond its first ``across`` are left out.
         policy: its name.
-        trained: whether its trainings are meant, not the policy of that name that ships.
+        trained: True for its trainings, False for the policy of that name that ships.
     """
     found: dict[int | None, list[Episode]] = {}
     for e in episodes:

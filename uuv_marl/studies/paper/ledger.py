@@ -82,7 +82,7 @@ def difference(ours: float, paper: Sequence[float]) -> float:
 
 
 def verdict(relative: float) -> str:
-    """In words."""
+    """The verdict in words."""
     if abs(relative) <= CLOSE:
         return "matches within 5 %"
     return "matches within 15 %" if abs(relative) <= NEAR else "differs"

@@ -1,1 +1,1 @@
-"""What disturbances of the sea cost: axes of rising severity, success at each level, scores."""
+"""The cost of disturbances: axes of rising severity, success at each level, scores."""

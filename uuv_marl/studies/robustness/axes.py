@@ -1,4 +1,4 @@
-"""The axes: what goes wrong, how badly at each level, and the scenario that this makes. The numbers: ``axes.toml``."""
+"""The axes: each disturbance, its severity at each level, and the changed scenario. Numbers are in ``axes.toml``."""
 
 import math
 import tomllib

@@ -21,7 +21,7 @@ METRICS = (
 
 
 class Plan(NamedTuple):
-    """What is run."""
+    """The episodes to run."""
 
     axes: Sequence[str]
     levels: Sequence[int]
@@ -54,7 +54,7 @@ class Cell(NamedTuple):
 
 
 def cells(plan: Plan) -> list[Cell]:
-    """All that a plan runs, level 0 of each scenario first."""
+    """All cells of a plan, level 0 of each scenario first."""
     return [
         Cell(axis, level, case_of(scenario, axis, level, policy)._replace(seeds=range(plan.seeds)))
         for scenario in plan.scenarios

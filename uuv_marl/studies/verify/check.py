@@ -26,7 +26,7 @@ _HINT = (
 
 
 class Difference(NamedTuple):
-    """A number that is another today."""
+    """A number that differs today."""
 
     field: str
     shipped: str
@@ -34,7 +34,7 @@ class Difference(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What became of a row."""
+    """The outcome of a row."""
 
     row: Row
     differences: Sequence[Difference] = ()
@@ -43,18 +43,18 @@ class Verdict(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Whether it was made again, and every number is the same."""
+        """Whether the episode was run again, and every number is the same."""
         return not self.reason and not self.differences
 
 
 def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
-    """All rows of these files and of those in these folders, and the tables in the folders that are no episodes.
+    """All rows of these files and of the files in these folders; and the folders' tables that hold no episodes.
 
     Args:
         paths: files and folders; empty for the documents of the checkout that holds this package, or of this folder.
 
     Raises:
-        ResultsError: there is nothing, or a file is broken.
+        ResultsError: there are no episodes, or a file is broken.
     """
     rows: list[Row] = []
     others: list[Path] = []
@@ -108,7 +108,7 @@ def fresh_seed() -> int:
 
 
 def draw(rows: Sequence[Row], sample: int, seed: int) -> list[Row]:
-    """So many rows, or all where there are not more, in random order: the first of them are a fair sample, too."""
+    """At most ``sample`` rows in random order, so that the first of them are a fair sample, too."""
     picked = np.random.default_rng(seed).choice(len(rows), min(sample, len(rows)), replace=False)
     return [rows[k] for k in picked.tolist()]
 
@@ -135,7 +135,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
 def _need_trust(policy: str, allowed: Collection[str]) -> None:
     plain = policy.removeprefix(GUARDED)
     if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
-        raise PolicyError(f"policy {policy!r} is somebody's file; --policy {policy} runs it, if you trust it")
+        raise PolicyError(f"policy {policy!r} is not part of the package; if you trust it, give --policy {policy}")
 
 
 def _rerun(row: Row, report: Callable[[float], None]) -> Run:

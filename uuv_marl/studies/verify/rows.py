@@ -1,4 +1,4 @@
-"""Files of episodes: which there are, and what makes each of their rows again."""
+"""Files of episodes, and how each of their rows is made again."""
 
 import csv
 import json
@@ -22,7 +22,7 @@ from uuv_marl.studies.suite import NOTHING, Case
 
 
 class NoEpisodesError(ResultsError):
-    """A table of something else."""
+    """A table that holds no episodes."""
 
 
 Cells = Mapping[str, str]
@@ -40,7 +40,7 @@ class Source(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """What is common to the rows of a file."""
+    """A kind of file, for all of its rows."""
 
     keys: Sequence[str]
     """Columns that say which episode a row is; one of them is ``seed``."""
@@ -205,7 +205,7 @@ def _benchmarked(content: Content, cells: Cells) -> Source:
     try:
         scenario = Scenario.model_validate_json(json.dumps(told))
     except ValueError as error:
-        raise ScenarioError(f"the scenario is described in the words of another version ({error})") from None
+        raise ScenarioError(f"the scenario has the fields of another version ({error})") from None
     if knowledge(policy)["source"] != content["policies"][policy]["source"]:
-        raise PolicyError(f"the file of {policy!r} is not the one that was run")
+        raise PolicyError(f"the file of {policy!r} has changed since the run")
     return Source(scenario, policy)
