@@ -54,9 +54,15 @@ def _nearest(location: Sequence[str | int]) -> str:
     every = [field for field in _fields(Scenario) if not field.startswith("scale.")]  # which nobody writes by hand
     here = dict.fromkeys(field.removeprefix(prefix).partition(".")[0] for field in every if field.startswith(prefix))
     leaves = {field.rpartition(".")[2]: field for field in reversed(every)}
-    near = [leaves[last]] if last in leaves else difflib.get_close_matches(last, here, n=1, cutoff=0.5)
-    near = near or [leaves[name] for name in difflib.get_close_matches(last, leaves, n=1, cutoff=0.5)]
+    told = ".".join(map(str, (*location[:-1], "")))
+    near = [leaves[last]] if last in leaves else _like(last, {name: told + name for name in here})
+    near = near or _like(last, leaves)
     return f"; did you mean {near[0]!r}?" if near else f"; the fields here are {', '.join(here)}"
+
+
+def _like(name: str, there: Mapping[str, str]) -> list[str]:
+    """What stands beside the name that is most like this one, if there is any."""
+    return [there[like] for like in difflib.get_close_matches(name, there, n=1, cutoff=0.5)]
 
 
 def _fields(model: Any, prefix: str = "") -> Iterator[str]:
