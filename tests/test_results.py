@@ -163,6 +163,23 @@ def test_runs_are_sorted_whatever_the_order_in_which_they_came(tmp_path):
     assert straight["runs"] == runs
 
 
+def test_a_policy_that_has_changed_is_run_again_if_asked_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    own = "from uuv_marl.baselines.floors import Idle\n\nclass Own(Idle):\n    pass\n"
+    (tmp_path / "own_policy.py").write_text(own)
+    wanted = "--policy=idle", "--policy=own_policy:Own", "--seeds=2"
+    assert command(*wanted, output=tmp_path)[0].exit_code == 0
+    (tmp_path / "own_policy.py").write_text(own + "# changed\n")
+    done, text = command(*wanted, output=tmp_path)
+    assert done.exit_code == 2
+    assert "give --anew to drop those runs" in text
+    done, text = command(*wanted, "--anew", output=tmp_path)
+    assert done.exit_code == 0, text
+    assert command(*wanted, output=tmp_path)[0].exit_code == 0
+    assert Results(tmp_path, [quick()]).has("single_obstacle", "idle", 1), "the others' runs are kept"
+
+
 def test_the_report_shows_all_that_the_results_hold(tmp_path):
     assert command("--policy=random", "--seeds=2", output=tmp_path)[0].exit_code == 0
     done, text = command("--policy=idle", "--seeds=2", output=tmp_path)

@@ -155,9 +155,15 @@ class Results:
         now = knowledge(policy)
         if self.policies.setdefault(policy, now)["source"] != now["source"]:
             raise ResultsError(
-                f"{self._path} holds runs of {policy!r} as it was before its file changed; "
-                "move it away or give another --output, and benchmark a copy of what is still being trained"
+                f"{self._path} holds runs of {policy!r} as it was before its file changed; give --anew to drop "
+                "those runs, or another --output; while a training still writes the file, benchmark a copy of it"
             )
+
+    def forget_changed(self, policy: str) -> None:
+        """Drop a policy's runs if its file has changed since."""
+        if policy in self.policies and self.policies[policy]["source"] != knowledge(policy)["source"]:
+            del self.policies[policy]
+            self._runs = {key: metrics for key, metrics in self._runs.items() if key[1] != policy}
 
     def has(self, scenario: str, policy: str, seed: int) -> bool:
         """Whether this run is done."""

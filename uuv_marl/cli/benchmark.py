@@ -15,8 +15,12 @@ if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
 
 _WORST = "The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
-_NEXT = """Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}");
-train a policy with uuv-marl train mappo --output runs/mappo, and compare it with --policy runs/mappo/best."""
+_NEXT = (
+    'Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}"), which needs the '
+    'extra "analysis".'
+)
+_TRAIN = """Train a policy for this scenario, and compare it with --policy runs/mine/best:
+  uuv-marl train mappo --scenario {scenario} --steps 2e6 --output runs/mine"""
 
 
 def benchmark(
@@ -38,6 +42,10 @@ def benchmark(
         typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder of results, table and pictures.")] = Path("results/benchmark"),
+    anew: Annotated[
+        bool,
+        typer.Option("--anew", help="Drop the runs of policies whose file has changed since, and run these again."),
+    ] = False,
     ray: Annotated[
         str | None,
         typer.Option(
@@ -55,7 +63,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import granted, make
+        from uuv_marl.baselines import POLICIES, granted, make
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import rich_table
@@ -78,6 +86,8 @@ def benchmark(
             line = functools.cache(lambda name, policy_name: shown(bar, f"{name}: {policy_name}"))
             report = lambda name, policy_name, share: line(name, policy_name)(share)  # noqa: E731
 
+            for name in policies if anew else ():
+                results.forget_changed(name)
             with cluster:
                 runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
             tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
@@ -91,6 +101,8 @@ def benchmark(
         console.print(_WORST.format(worst=worst), markup=False, highlight=False)
         console.print(f"  {again}", markup=False, highlight=False, soft_wrap=True)
         console.print(_NEXT.format(output=output), markup=False, highlight=False)
+        if set(policies) <= {*POLICIES} and names == ["starter"]:
+            console.print(_TRAIN.format(scenario=files[0]), markup=False, highlight=False)
 
 
 def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
