@@ -73,7 +73,7 @@ def draw_trainings(episodes: Sequence[Episode], trained: Sequence[Trained], path
 
 def _held_out(ax: Axes, episodes: Sequence[Episode], colours: dict[str, str]) -> None:
     """By task: every training's success, and that of policies that ship."""
-    shipped = {"scout_plus": GREY, "mappo": PINK, "bio_inspired_plus": SKY}
+    shipped = {"scout": SKY, "scout_plus": GREY, "mappo": PINK}
     compared = tasks(episodes)
     for j, held in enumerate(compared):
         rows = [(f"{name}: one training", name, True, colour, ".") for name, colour in colours.items()]

@@ -25,7 +25,7 @@ _HEADERS = (
     "spacing [m]", "worst", "within Eq. 7", "centre error [m]", "effort",
 )  # fmt: skip
 _GUARDED = "guarded:"
-_BESIDE = "bio_inspired_plus", "scout", "scout_plus", "mappo"
+_BESIDE = "scout", "scout_plus", "mappo"
 """Policies that ship, beside the trainings."""
 _ORDER = (*POLICIES, *(f"{_GUARDED}{name}" for name in POLICIES))
 """Policies in the order of tables."""
@@ -153,15 +153,16 @@ def _across(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     shipped = [p for p in _BESIDE if any(e.policy == p for e in episodes)]
     headers = ["policy", "trainings", *(f"{name}, {held.name}" for name in SCORES for held in compared)]
     rows: list[list[str]] = []
-    found: dict[str, list[list[list[float]]]] = {}
-    for policy in [*algorithms, *shipped]:
-        by_task = [runs(episodes, held, policy, trained=policy in algorithms) for held in compared]
-        found[policy] = scores = [[[score(run) for run in task] for task in by_task] for score in SCORES.values()]
+    pair: list[list[list[list[float]]]] = []
+    for policy, learned in [*((name, True) for name in algorithms), *((name, False) for name in shipped)]:
+        by_task = [runs(episodes, held, policy, trained=learned) for held in compared]
+        scores = [[[score(run) for run in task] for task in by_task] for score in SCORES.values()]
         each = [_interval(".2f", task) for tasks_of_score in scores for task in tasks_of_score]
-        label, count = (labels[policy], f"{len(by_task[0])}") if policy in algorithms else (f"`{policy}`", _NOTHING)
+        label, count = (labels[policy], f"{len(by_task[0])}") if learned else (f"`{policy}`", _NOTHING)
         rows.append([label, count, *each, *(_interval(".2f", *tasks_of_score) for tasks_of_score in scores)])
-    table = markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows)
-    return table + _improvement([found[name] for name in ("mappo", "ppo") if name in algorithms], compared)
+        if learned and policy in ("mappo", "ppo"):
+            pair.append(scores)
+    return markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows) + _improvement(pair, compared)
 
 
 def _improvement(pair: Sequence[list[list[list[float]]]], compared: Sequence[HeldOut]) -> str:
