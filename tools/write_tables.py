@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from decimal import Decimal
 from pathlib import Path
 
 import uuv_marl
@@ -55,7 +56,9 @@ def benchmark() -> str:
             if policy not in DEFAULT_POLICIES:
                 continue
             name = f"`{policy}`" + ("" if extra == "–" else f" with {extra.removesuffix(' 600 N m s')}")
-            closest = f"{float(obstacle):.1f} m, {float(spacing):.1f} m"
+            closest = (
+                f"{Decimal(obstacle):.1f} m, {Decimal(spacing):.1f} m"  # what ends in 5 was rounded before: to even
+            )
             lines.append((name, f"{time.split()[0]} s", closest, collisions))
     closest = "smallest distance to the obstacle, to a vehicle (worst seed)"
     return table(("policy, and what it gets beyond sonar", "task time", closest, "collisions"), lines)
