@@ -102,7 +102,7 @@ def test_unseeded_resets_go_on_and_seeding_returns_every_row():
 
 
 def test_scenarios_that_lose_vehicles_are_refused_with_the_remedy():
-    with pytest.raises(ScenarioError, match=r"'lossy' allows; use .* or override disturbance.loss_times_s=\[\]"):
+    with pytest.raises(ScenarioError, match=r"in scenario 'lossy'; use .* or override disturbance.loss_times_s=\[\]"):
         SwarmVecEnv(1, "lossy")
     with pytest.raises(ScenarioError, match="contact.ends_vehicle=false"):
         SwarmVecEnv(1, overrides={"contact.ends_vehicle": True})
