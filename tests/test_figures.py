@@ -66,6 +66,7 @@ def test_every_policy_has_a_panel_and_the_last_is_the_legends(drawn):
         assert titles == [*POLICIES, ""]
         assert figure.axes[3].get_legend() is not None
         assert "configuration" not in figure.get_suptitle()
+        assert "vehicles (literature_185)" in figure.get_suptitle()
 
 
 def test_distances_inside_the_obstacle_can_be_read_off(drawn):

@@ -67,7 +67,7 @@ def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Se
 def _where(scenario: Scenario, seeds: str) -> str:
     """What a picture is of; in a second line what disturbs it, if anything does."""
     sea = f"\n{conditions(scenario)}" if disturbances(scenario) else ""
-    return f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles, {seeds}{sea}"
+    return f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles ({scenario.vehicle.name}), {seeds}{sea}"
 
 
 def _grid(num: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:

@@ -155,7 +155,7 @@ def _train(output: Path, resume: bool, settings: Any, steps: int | None, device:
     chosen = replace(settings, steps=steps or (steps_before(output) if resume else 0) or settings.steps)
     texts = {
         "reward": "reward {reward:.3f}",
-        "score": "validation: score {score:.3f} (best {best:.3f}), arrived {arrived:.0%}, collisions {collisions}",
+        "score": "validation: score {score:z.3f} (best {best:z.3f}), arrived {arrived:.0%}, collisions {collisions}",
     }
     with _stoppable(output) as stop:
         records = train(output, chosen, resume=resume, device=device, say=console.print, stop=stop)
