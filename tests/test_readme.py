@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from uuv_marl import load_scenario, scenario_names
+from uuv_marl import baselines, load_scenario, scenario_names
+from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import conditions, load_vehicle, vehicle_names
 from uuv_marl.studies.dynamics import acceptance
@@ -126,8 +127,8 @@ CLAIMS = {
     "disturbances": lambda: (
         f"measures what each of {len({r['axis'] for r in table('robustness/episodes.csv')} - {'0'})} disturbances"
     ),
-    "results": lambda: "has {} policies on {} scenarios,".format(
-        *({5: "five", 8: "eight"}.get(n, n) for n in tabled())
+    "results": lambda: "[Results](docs/results.md): {} policies on {} scenarios,".format(
+        *({5: "five", 9: "nine"}.get(n, n) for n in tabled())
     ),
     "held-out seeds": lambda: f"up to {len({e.seed for e in HELD_OUT}):,} seeds that nothing was made with.",
     "speed": lambda: f"about {fast()} million agent-steps/s on two cores, beside MPE2, VMAS and JaxMARL.",
@@ -154,7 +155,16 @@ def measured_again(policy):
 
 @pytest.mark.parametrize("policy", ["bio_inspired", "sff", "sdc", "scout", "mappo"])
 def test_the_table_is_that_of_other_shipped_episodes(policy):
-    rows = measured_again(policy)
+    check_row(policy, measured_again(policy))
+
+
+def test_the_row_of_the_latest_training_is_that_of_its_episodes_run_again():
+    scenario = baselines.granted("mappo_v2", paper_scenario())
+    runs = [event for event in evaluate(scenario, "mappo_v2", range(20)) if isinstance(event, Run)]
+    check_row("mappo_v2", [run.metrics for run in runs])
+
+
+def check_row(policy, rows):
     value = lambda name: np.array([float(row[name]) for row in rows])  # noqa: E731
     collided = np.count_nonzero(value("collisions"))
     middle = np.sort(value("task_time_s"))[len(rows) // 4 : -len(rows) // 4].mean()
@@ -226,7 +236,7 @@ def test_the_index_counts_what_there_is():
     minutes = {re.search(r"\*\*Time\*\*: about (\d) minute", page.read_text())[1] for page in notebooks}
     assert (len(notebooks), minutes) == (6, {"1", "2"})
     assert "Six [notebooks](tutorials/README.md) of one or two minutes each:" in INDEX
-    assert tabled() == (8, 5)
-    assert "eight policies on five scenarios, 20 seeds" in INDEX
+    assert tabled() == (9, 5)
+    assert "nine policies on five scenarios, 20 seeds" in INDEX
     assert "what each of 22 disturbances costs" in INDEX
     assert f"{hostile():,} hostile inputs" in INDEX

@@ -13,7 +13,7 @@ from uuv_marl.benchmark.results import Results, Row
 from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
 from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
 
-DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo")
+DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "mappo_v2")
 """The paper's Table 2, the safest hand-made law, the strongest learned policy; all others by name."""
 
 Report = Callable[[str, str, float], None]
