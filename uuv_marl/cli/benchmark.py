@@ -31,7 +31,8 @@ def benchmark(
         list[str] | None,
         typer.Option(
             help="Name, checkpoint (runs/mappo/best) or module:Class, whose module is looked for in the current folder "
-            "too, after all installed ones; repeat for several. Default: bio_inspired, sff, sdc, scout, mappo and mappo_v2."
+            "too, after all installed ones; repeat for several. "
+            "Default: bio_inspired, sff, sdc, scout, mappo and mappo_v2."
         ),
     ] = None,
     seeds: Annotated[
