@@ -17,11 +17,11 @@ Float32 = NDArray[np.float32]
 Int64 = NDArray[np.int64]
 
 FEED_FORWARD = 1.2
-"""Of ``bio_inspired_plus``: a little more than the drag, since it acts along the reference and not along the bow."""
+"""Feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference, not the bow."""
 MAX_EXPONENT = 50.0
 """exp(length / distance) is bounded here [1]."""
 MIN_DISTANCE_M = 0.5
-"""And distances here."""
+"""Distances in the exponent are at least this [m]."""
 
 
 class Gains(NamedTuple):

@@ -97,7 +97,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     channels: tuple[str, ...] = ()
     """Channels beyond the percept."""
     barrier: Annotated[Gains, pydantic.BeforeValidator(_all_gains)] = BARRIER
-    """Of Eq. 20-21; what an actor without memory says is added to their force."""
+    """Gains of Eq. 20-21, whose force is added to what an actor without memory says."""
     law: Law = Law()
     """Gains of the hand-made law that an actor with memory trims."""
     safety: Barrier = Barrier()
@@ -131,7 +131,7 @@ class Checkpoint(NamedTuple):
     card: Card
     layers: tuple[Layer, ...]
     digest: str
-    """Of the whole file."""
+    """First 16 hexadecimal digits of the whole file's SHA-256."""
 
 
 def rows_of(layout: PerceptLayout) -> tuple[Row, ...]:

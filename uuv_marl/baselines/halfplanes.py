@@ -15,7 +15,7 @@ from uuv_marl.sim.compiled import compiled
 Float64 = NDArray[np.float64]
 
 TOLERANCE = 1e-9
-"""By which a half-plane that counts as kept may be violated [m/s]; assumed: far above rounding, far below any use."""
+"""Largest violation with which a half-plane counts as kept [m/s]; assumed: far above rounding, below any use."""
 _PARALLEL = 1e-12
 """Sine of the angle below which two borders are parallel; assumed: their crossing would lie beyond any speed."""
 

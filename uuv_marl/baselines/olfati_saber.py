@@ -23,11 +23,11 @@ from uuv_marl.sim.views import Fields, Starts, fields
 Float32 = NDArray[np.float32]
 
 EPSILON = 0.1
-"""Of the sigma-norm, in the source's simulations [1]."""
+"""Parameter of the sigma-norm, as in the source's simulations [1]."""
 _H_ALPHA = 0.2
 """Share of the reach up to which neighbours count wholly, in the source's simulations [1]."""
 _H_BETA = 0.9
-"""And of an obstacle's."""
+"""The same share for obstacles [1]."""
 
 
 class Gains(NamedTuple):
@@ -36,13 +36,13 @@ class Gains(NamedTuple):
     unit: float
     """Length that stands for 1 of the source, in which forces change over a length of about 1 [m]."""
     spacing: float
-    """Of the lattice (d) [m]."""
+    """Spacing of the lattice (d) [m]."""
     reach: float
     """Distance at which neighbours' forces end, by the spacing (r / d; 1.2 in the source) [1]."""
     attraction: float
     """Scale of the attraction by a neighbour beyond the spacing (c_1 a), which is about 3 times this [N]."""
     repulsion: float
-    """And of the repulsion within (c_1 b) [N]."""
+    """Scale of the repulsion by a neighbour nearer than the spacing (c_1 b) [N]."""
     obstacle: float
     """Scale of the repulsion by an obstacle (c_1 of beta), which is up to 6 times this [N]."""
     obstacle_range: float
@@ -80,7 +80,7 @@ class OlfatiSaber(Policy):
 
 
 class OlfatiSaberInformed(OlfatiSaber):
-    """The same with alignment: every vehicle also follows its neighbours' velocities."""
+    """``OlfatiSaber`` with alignment: every vehicle also follows its neighbours' velocities."""
 
     channels: ClassVar[tuple[str, ...]] = ("link",)
     tuned_as: ClassVar[str] = "olfati_saber_informed"
@@ -100,7 +100,7 @@ def slope(distance: float) -> float:
 
 @compiled
 def sigma_1(z: float) -> float:
-    """From -1 to 1: z / sqrt(1 + z^2)."""
+    """The source's sigma_1, between -1 and 1: z / sqrt(1 + z^2)."""
     return z / math.sqrt(1.0 + z * z)
 
 

@@ -26,20 +26,20 @@ Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 
 _SHARE = 0.5
-"""Of a change that a vehicle takes; its neighbour takes the other half. Definition of ORCA^tau_A|B."""
+"""Share of a change that a vehicle takes; its neighbour takes the other half. Definition of ORCA^tau_A|B."""
 
 
 class Gains(NamedTuple):
     """Free parameters, found by tuning."""
 
     radius: float
-    """Of the disc that stands for a vehicle: half the distance that two of them keep [m]."""
+    """Radius of the disc that stands for a vehicle: half the distance that two of them keep [m]."""
     clearance: float
     """Kept from obstacles' surfaces [m]."""
     horizon: float
     """tau: how far ahead collisions with neighbours are avoided [s]."""
     obstacle_horizon: float
-    """And with obstacles [s]."""
+    """How far ahead collisions with obstacles are avoided [s]."""
     pull: float
     """Wished velocity per distance to l(t), added to the reference's velocity [1/s]."""
 

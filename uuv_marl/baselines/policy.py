@@ -128,7 +128,7 @@ class Policy:
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.name: str = getattr(self, "name", type(self).__name__)
-        """By which messages call it."""
+        """The policy's name in messages."""
         if type(self).act is Policy.act and type(self).decide is Policy.decide:
             raise PolicyError(f"policy {self.name!r} must define decide(percept), or act(percept) if it has no memory")
         if scenario.scale != Scale():
@@ -147,7 +147,7 @@ class Policy:
         """Where each field starts in a flat percept; the link's fields are the modem's where only that is granted."""
         self.limits = Limits.of(scenario)
         self.rudder = Rudder.of(scenario) if self.wishes_force else None
-        """By which wished forces become actions; None where they are actions."""
+        """Turns wished forces into actions; None where the policy gives actions itself."""
         self.reader: Reader | None = None
         """Takes percepts into the policy's units; None where they are in them. ``make`` sets it."""
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)

@@ -16,7 +16,7 @@ Float32 = NDArray[np.float32]
 
 
 class Gains(NamedTuple):
-    """Of the wished velocity."""
+    """Gains of the wished velocity."""
 
     pull: float = 0.05
     """To l(t) [1/s]; as that of ``scout``."""

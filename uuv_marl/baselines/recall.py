@@ -25,7 +25,7 @@ Float64 = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
 NEIGHBOURS, SURFACES = 6, 4
-"""So many of the nearest neighbours and obstacles are seen."""
+"""How many of the nearest neighbours and obstacles an actor sees."""
 _OWN = 27
 RECALLED = _OWN + 6 * NEIGHBOURS + 5 * SURFACES
 """Features of a vehicle."""

@@ -102,7 +102,7 @@ class Named(NamedTuple):
 
     kind: Kind
     parameters: dict[str, str]
-    """By key, as written."""
+    """Values by parameter, as the user wrote them."""
 
 
 def parse(name: str) -> Named:

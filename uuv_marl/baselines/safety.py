@@ -36,7 +36,7 @@ class Barrier(NamedTuple):
     obstacle_m: float = 13.5
     """Distance kept from surfaces of obstacles [m]."""
     gap_share: float = 0.3
-    """Of the gap between two obstacles, the most that is kept from each of them [1]."""
+    """Largest share of the gap between two obstacles that is kept from each of them [1]."""
     narrowest_m: float = 8.0
     """A gap narrower than this is no way through [m]."""
     obstacle_rate: float = 1.0
@@ -46,9 +46,9 @@ class Barrier(NamedTuple):
     neighbour_rate: float = 1.0
     """How fast that distance may be closed, per metre beyond it [1/s]."""
     noise_margin: float = 3.0
-    """Times the mean error of neighbours' places, which is added to that distance [1]."""
+    """Factor of the mean error of neighbours' places; the product is added to that distance [1]."""
     share: float = 0.6
-    """Of what must change between two neighbours, what each of them does [1]; half would do if both knew all."""
+    """Share of the change that two neighbours need which each of them makes [1]; half would do if both knew all."""
     horizon_m: float = 60.0
     """Neighbours and surfaces farther than this are left out [m]."""
 
@@ -56,7 +56,7 @@ class Barrier(NamedTuple):
 MOST_CLOSED = 0.3
 """Share of the distance left that may be closed in a decision period [1]."""
 GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
-"""Of ``guarded:``: it lets a policy nearer to obstacles than a law that makes room early has to go."""
+"""The filter of ``guarded:``. It lets a policy nearer to obstacles than a law that makes room early has to go."""
 
 
 @compiled

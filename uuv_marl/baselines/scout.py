@@ -28,7 +28,7 @@ Bool = NDArray[np.bool_]
 
 
 class Gains(NamedTuple):
-    """Of the wished velocity and of memory. One set for all scenarios, swarm sizes, echoes and decision periods."""
+    """Gains of the wished velocity and of memory, for all scenarios, swarm sizes, echoes and decision periods."""
 
     pull: float = 0.05
     """To l(t) [1/s], for up to 54 vehicles; divided by g = sqrt(n / 54) for more, which are spread farther."""
@@ -37,16 +37,16 @@ class Gains(NamedTuple):
     push_range: float = 12.0
     """Where pushes end [m]: so near, hearing is mutual, and pushes cancel over the swarm."""
     pull_at_rest: float = 4.0
-    """Times the pull where l(t) rests [1]; times sqrt(g) for larger swarms."""
+    """Factor of the pull while l(t) rests [1]; times sqrt(g) for larger swarms."""
     push_at_rest: float = 2.0
-    """Times the push where l(t) rests [1]; times g for larger swarms: those outside press the others together."""
+    """Factor of the push while l(t) rests [1]; times g for larger swarms: those outside press the others together."""
     together: float = 0.0
     """While l(t) moves, to l(t) from the mean place of the neighbours that a vehicle hears [1/s]; divided by g^3, as in
     a large swarm they are a small part of it. All go the same way, and the swarm is not pressed together."""
     behind_m: float = 0.0
     """How far behind a moving l(t) to go [m]: a swarm coasts on for about 2 m where l(t) stops."""
     steering: float = 1.0
-    """Times the force by which velocities are made good [1]. Less is calmer, and bears actuators that lag."""
+    """Factor of the force that follows the wished velocity [1]. Less is calmer, and bears actuators that lag."""
     kept_s: float = KEPT_S
     """For how long a neighbour is remembered that is heard no more [s]."""
 
@@ -54,7 +54,7 @@ class Gains(NamedTuple):
 PLUS = Gains(
     pull=0.04, push_range=15.0, pull_at_rest=10.0, push_at_rest=6.0, together=0.04, behind_m=1.0, kept_s=2.0
 )  # fmt: skip
-"""Of ``ScoutPlus``: found by hand, a gain at a time, on tuning seeds of random fields and ``single_obstacle``."""
+"""Gains of ``ScoutPlus``, found by hand, a gain at a time, on tuning seeds of random fields and ``single_obstacle``."""
 
 TRIMS = 6
 """Changes of a vehicle's numbers that an actor decides on: five gains (``trimmed``), and the distance kept from

@@ -42,7 +42,7 @@ class Gains(NamedTuple):
     rho_0: float
     """Half width of the funnel at the start [m]."""
     rho_inf: float
-    """And in the end [m]."""
+    """Half width of the funnel in the end [m]."""
     kappa: float
     """How fast it shrinks [1/s]."""
     reference: float
@@ -52,15 +52,15 @@ class Gains(NamedTuple):
     short: float
     """Largest short-range repulsion per neighbour [N]."""
     short_range: float
-    """Where it ends [m]."""
+    """Distance at which the short-range repulsion ends [m]."""
     repulsion: float
     """Largest repulsion from an obstacle [N]."""
     repulsion_range: float
-    """Where it ends [m]."""
+    """Distance to the surface at which the repulsion ends [m]."""
     tangential: float
     """Largest sideways push [N]."""
     tangential_range: float
-    """Where it ends [m]."""
+    """Distance to the surface at which the sideways push ends [m]."""
     drag: float
     """Share of the vehicle's own drag that it makes up for [1]."""
     reference_velocity: float

@@ -38,11 +38,11 @@ class Gains(NamedTuple):
     cluster: float
     """Largest clustering force per neighbour [N]."""
     cluster_distance: float
-    """Where it changes sign [m]."""
+    """Distance at which the clustering force changes its sign [m]."""
     cluster_width: float
     """Length of its transition [m]."""
     cluster_range: float
-    """Where it ends [m]."""
+    """Distance at which the clustering force ends [m]."""
     velocity: float
     """Velocity coordination [N s/m]."""
     blend: float
@@ -50,11 +50,11 @@ class Gains(NamedTuple):
     repulsion: float
     """Largest repulsion from an obstacle [N]."""
     repulsion_range: float
-    """Where it ends [m]."""
+    """Distance to the surface at which the repulsion ends [m]."""
     tangential: float
     """Largest sideways push [N]."""
     tangential_range: float
-    """Where it ends [m]."""
+    """Distance to the surface at which the sideways push ends [m]."""
     drag: float
     """Share of the vehicle's own drag that it makes up for [1]."""
     reference_velocity: float = 0.0

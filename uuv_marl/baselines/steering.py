@@ -15,7 +15,7 @@ _SHARE = 1.5
 """Of a velocity error, what a decision period's force makes good at most [1]. Above 2 it would grow. Tried by hand: 1
 and less keep swarms less well apart, since the surge follows at once, but the sway only as the bow turns."""
 _MOST_RATE = 8.0
-"""And at most so much per second [1/s]; by hand, too."""
+"""Largest share of a velocity error that is made good in a second [1/s]; found by hand, too."""
 
 
 def velocity_gain(scenario: Scenario) -> float:

@@ -24,7 +24,7 @@ _DIMENSIONS = {
     "m": Dimension(1, 0, 0), "m/s": Dimension(1, -1, 0), "rad/s": Dimension(0, -1, 0), "s": Dimension(0, 1, 0),
     "1": NUMBER,
 }  # fmt: skip
-"""By the unit of a percept's field."""
+"""Dimensions by the unit of a percept's field."""
 
 
 def in_own_units(scenario: Scenario) -> Scenario:

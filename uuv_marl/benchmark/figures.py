@@ -138,7 +138,7 @@ def _contacts(trace: Trace, hull_m: float) -> Float32:
 
 
 def _nearest(trace: Trace) -> Float32:
-    """Of all vehicles and obstacles over time [m]; NaN without obstacles."""
+    """Smallest distance of any vehicle to any obstacle over time [m]; NaN without obstacles."""
     distance = trace["obstacle_distance_m"]
     return distance.min(axis=1) if distance.shape[1] else np.full(len(distance), np.nan, np.float32)
 

@@ -29,4 +29,4 @@ PAPER: dict[tuple[str, str], PaperFigure] = {
         task_time_s=527.0, min_obstacle_distance_m=(6.34,), source="section 5.2.2"
     ),
 }
-"""By scenario and policy."""
+"""The paper's numbers by scenario and policy."""

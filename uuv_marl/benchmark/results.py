@@ -52,7 +52,7 @@ class Knowledge(TypedDict):
 
     channels: list[str]
     yaw_damping_nms: float
-    """Of its inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
+    """The policy's inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
     source: str | None
 
 
@@ -271,6 +271,6 @@ def _hash(data: bytes) -> str:
 
 
 def _versions() -> dict[str, str]:
-    """Of all that runs depend on."""
+    """Versions of all that runs depend on."""
     libraries = {library: version(library) for library in _LIBRARIES}
     return {"uuv_marl": __version__, "python": platform.python_version(), **libraries}

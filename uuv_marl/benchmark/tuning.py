@@ -16,10 +16,10 @@ from uuv_marl.scenario import Scenario, load_scenario
 
 TRIALS = 300
 SEEDS = (10_000, 10_001, 10_002, 10_003)
-"""Of the tuning range 10,000-99,999; the benchmark never uses them."""
+"""Seeds of the tuning range 10,000-99,999; the benchmark never uses them."""
 SCENARIO = "single_obstacle"
 SCALED = "sea_trial"
-"""The same in the scale of a vehicle."""
+"""Where policies are tuned in the scale of a vehicle."""
 _COLLISION_COST_S = 50.0
 _CLEARANCE_COST_S_PER_M = 20.0
 

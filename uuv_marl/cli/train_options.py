@@ -22,7 +22,7 @@ class Command(TyperCommand):
     """Says how an option of two values looks."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As a command does, with an example in the message."""
+        """Parse arguments as every command does, with an example in the message."""
         try:
             return super().parse_args(ctx, args)
         except Exception as error:

@@ -74,11 +74,11 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self._batch.max_cycles = value
 
     def observation_space(self, agent: str) -> Space[Any]:
-        """The same object for every call."""
+        """The observation space of an agent, the same object for every call."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Space[Any]:
-        """The same object for every call."""
+        """The action space of an agent, the same object for every call."""
         return self.action_spaces[agent]
 
     def reset(

@@ -68,7 +68,7 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
         return observations, rewards, terminateds, {"__all__": late}, infos
 
     def render(self) -> NDArray[np.uint8] | None:
-        """As ``SwarmParallelEnv.render``."""
+        """Draw the swarm as ``SwarmParallelEnv.render`` does."""
         return self._env.render()
 
     def close(self) -> None:

@@ -24,7 +24,7 @@ _LENGTH_S, _HOLD_S = {".mp4": 20.0, ".gif": 10.0}, 2.0
 """How long a film lasts where no speed is given, and how long it stays at its last picture [s]."""
 _FPS = {".mp4": 20, ".gif": 8}
 _MOMENTS = 4
-"""Of a still, side by side."""
+"""How many moments a still shows side by side."""
 
 
 class Format(NamedTuple):
@@ -100,7 +100,7 @@ def check_format(path: Path) -> str:
 
 
 def _size(suffix: str, num: int) -> tuple[int, int]:
-    """Of the whole picture; a GIF fits a page of GitHub."""
+    """Size of the whole picture; a GIF fits a page of GitHub."""
     if suffix == ".png":
         return 1320, 450 * num
     across = ((560, 414, 276, 206) if suffix == ".gif" else (800, 640, 480, 400))[num - 1]
@@ -161,7 +161,7 @@ def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) 
 
 
 def _write_gif(path: Path, pictures: Iterator[Picture], form: Format) -> None:
-    """In few colours, the same for all frames, so that what stands still takes no room."""
+    """Write a GIF in few colours, the same for all frames, so that what stands still takes no room."""
     palette = Image.new("P", (1, 1))
     palette.putpalette([part for colour in ink.palette() for part in colour])
     frames = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]

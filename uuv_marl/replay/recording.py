@@ -73,7 +73,7 @@ class Recording(NamedTuple):
     position: Float32
     """Shape (time, vehicle, 2)."""
     heading: Float32
-    """In [-pi, pi), clockwise from north [rad], shape (time, vehicle)."""
+    """Heading in [-pi, pi), clockwise from north [rad], shape (time, vehicle)."""
     speed: Float32
     """Over ground [m/s], shape (time, vehicle)."""
     series: dict[str, Float32]
@@ -85,6 +85,6 @@ class Recording(NamedTuple):
     spacing: Float32 | None
     """Smallest distance to another vehicle since the sample before [m], NaN for none, shape (time, vehicle)."""
     inspections: dict[int, Inspection]
-    """By index of the vehicle."""
+    """What single vehicles heard, by index of the vehicle."""
     water: Water | None
     """None in still water."""

@@ -36,7 +36,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "route_heading": ("sample", "vehicle"),
     "route_velocity": ("sample", "vehicle", 2),
 }
-"""Of the arrays that a recording needs; equal names are equal sizes."""
+"""Shapes of the arrays that a recording needs; equal names are equal sizes."""
 
 
 class Saved(NamedTuple):

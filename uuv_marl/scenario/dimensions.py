@@ -21,7 +21,7 @@ class Dimension(NamedTuple):
 
 
 NUMBER = Dimension(0, 0, 0)
-"""Of counts, shares, angles and levels."""
+"""The dimension of counts, shares, angles and levels."""
 _RATE, _FORCE, _MOMENT = Dimension(0, -1, 0), Dimension(1, -2, 1), Dimension(2, -2, 1)
 _UNITS = {
     "m": Dimension(1, 0, 0),
@@ -37,7 +37,7 @@ _UNITS = {
     "deg": NUMBER,
     "db": NUMBER,
 }
-"""By the end of a field's name."""
+"""Dimensions by the end of a field's name."""
 _SYMBOL = re.compile(r"([XYN])_([uvrd]+)")
 """A force or moment over these: u and v [m/s], r [1/s], and a rudder's angle d."""
 _NUMBERS = {

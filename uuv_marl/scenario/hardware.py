@@ -50,7 +50,7 @@ class Vehicle(Section):
     N_rv: Signed
     N_rr: NonNegative
     N_vv: Signed = 0.0
-    """Beside N_v, as a derivative like it: positive adds."""
+    """Beside N_v, the yaw moment N_vv |v| v. Like N_v it is a derivative: a positive one adds."""
     Y_uv: Signed = 0.0
     """Lift of body and fins: the sway force (Y_uv v + Y_ur r) max(u, 0) and the yaw moment (N_uv v + N_ur r) max(u, 0).
     Derivatives, of lift alone: where ``munk_moment`` is on, the added masses' part of a source's sums is in C(nu)."""
@@ -60,7 +60,7 @@ class Vehicle(Section):
     munk_moment: bool = True
     """Whether added masses count in C(nu) (Eq. 4), which turn a hull across its way. Inertia has them always."""
     length_m: Positive | None = None
-    """Of the hull. This and the cruise speed give the vehicle's scale (``uuv_marl.scenario.scale``)."""
+    """Length of the hull. This and the cruise speed give the vehicle's scale (``uuv_marl.scenario.scale``)."""
     cruise_mps: Speed | None = None
     """The speed that it is made for; a rudder's steerage way is a share of it."""
     max_mps: Speed | None = None
@@ -102,7 +102,7 @@ class Actuators(Section):
     thrust_lag_s: Lag
     """Time constant with which thrust follows what is asked; 0: at once."""
     yaw_lag_s: Lag
-    """The same of the torque."""
+    """Time constant with which the torque follows."""
     yaw_authority: Annotated[float, within(0, 1)]
     """Share of the torque, or of the rudder's angle, that reaches the water."""
     kind: Literal["force_torque", "rudder"] = "force_torque"

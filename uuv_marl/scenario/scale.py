@@ -34,9 +34,9 @@ class Scale(Section):
     """A vehicle's scale over the paper's: the factors of a scenario's lengths, speeds and times."""
 
     length: Ratio = 1.0
-    """Of lengths; times are multiplied by this over ``speed``."""
+    """Factor of lengths; times are multiplied by this over ``speed``."""
     speed: Ratio = 1.0
-    """Of speeds."""
+    """Factor of speeds."""
     force: Ratio = 1.0
     """Full thrust over that of the paper's vehicle. Nothing of the scenario is multiplied by it; policies take it as
     their unit of force."""

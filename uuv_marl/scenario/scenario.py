@@ -32,11 +32,11 @@ class Scenario(fields.Section):
     title: str
     """One line."""
     source: str
-    """Where it comes from."""
+    """Where the scenario comes from."""
     version: Annotated[int, fields.within(1, 1_000_000)]
     """Raised by any change of its numbers."""
     scale: Scale = Scale()
-    """Of its vehicle over the paper's, where the file says ``scale = "vehicle"``."""
+    """Scale of its vehicle over the paper's, where the file says ``scale = "vehicle"``."""
     swarm: sections.Swarm
     start: sections.Start
     trajectory: sections.Trajectory

@@ -148,7 +148,7 @@ def compiled(function: F) -> F:
 
 
 def compiled_inline(function: F) -> F:
-    """As ``compiled``, but always copied into its callers: for what loops are to run on vector registers."""
+    """Compile as ``compiled`` does, but copy the function into its callers, so that loops run on vector registers."""
     return _jit(function, forceinline=True)
 
 

@@ -23,7 +23,7 @@ def middle(places: Sequence[Pair]) -> Pair:
 
 
 def squared_distance(a: Row, b: Row) -> float:
-    """Of two points [m2]."""
+    """Squared distance of two points [m2]."""
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1])
 
 

@@ -95,7 +95,7 @@ def choose_sectors(num: int, layer: int, suite: Suite, ear: Listener) -> None:
 
 @compiled_inline
 def keep_nearest(num: int, vehicles: Int64, ear: Listener) -> None:
-    """Of those located keep the nearest in each sub-sector, the lower index of equals. Eq. 14-15."""
+    """Keep the nearest of those located in each sub-sector, the lower index of equals. Eq. 14-15."""
     for q in range(num):
         k = np.uintp(ear.sector[q])
         ear.nearest[k] = ear.squared[q] if ear.squared[q] < ear.nearest[k] else ear.nearest[k]

@@ -41,7 +41,7 @@ class Rules(NamedTuple):
     spread: float
     """Largest distance of a vehicle from the end for arrival; in passage, from where the centre is along the leg."""
     arrival_radii: NDArray[np.float64]
-    """Of the swarm's centre, the scenario's own first, which is infinite in passage, shape (radius,)."""
+    """Radii for the swarm's centre, the scenario's own first, which is infinite in passage, shape (radius,)."""
     loss_ticks: NDArray[np.int64]
     """Control hold at whose end each loss happens, shape (loss,)."""
     cell_side: float

@@ -20,7 +20,7 @@ Int64 = NDArray[np.int64]
 _TINY = 1e-300
 """Keeps the direction of no vector at all from dividing by zero."""
 _MIN_BINS = 1024
-"""So many that few directions fall into a bin with an edge."""
+"""Least number of bins: so many that few directions fall into a bin with an edge."""
 
 
 class Suite(NamedTuple):

@@ -49,7 +49,7 @@ class Swarm:
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
         self._duration_s = np.zeros(num_worlds)
         self.keys = np.zeros(num_worlds, np.uint64)
-        """Of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
+        """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
         self._sizes = _sizes(scenario, num_worlds, self.layout.size)
         self.state, self.course = allocate(State, self._sizes), allocate(Course, self._sizes)
         self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)

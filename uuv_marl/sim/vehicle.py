@@ -59,7 +59,7 @@ class Plant(NamedTuple):
     direct: float
     """1 where the second force is a torque, 0 where it is a rudder's angle."""
     Y_uud: float
-    """Of the rudder; 0 without one."""
+    """Lift of the rudder; 0 without one."""
     N_uud: float
 
 

@@ -23,9 +23,9 @@ class Part(NamedTuple):
     cases: tuple[Case, ...]
     """What must have been run; nothing where the tables are computed by themselves, and take their time."""
     tables: Callable[[Suite, Share], Tables]
-    """From the runs, by name; each becomes ``data/NAME.csv``."""
+    """Makes tables from the runs, by name; each becomes ``data/NAME.csv``."""
     draw: Callable[[Tables], Figure]
-    """From the tables alone."""
+    """Draws the picture from the tables alone."""
 
     @property
     def title(self) -> str:

@@ -30,7 +30,7 @@ PARTS: tuple[Part, ...] = (
     rest.PART,
     *variations.PARTS,
 )
-"""In the order of the page."""
+"""All parts in the order of the page."""
 NAMES = (*(part.name for part in PARTS), LEDGER)
 """What ``--only`` knows."""
 _COMPUTED = 20

@@ -31,7 +31,7 @@ class Case(NamedTuple):
     overrides: Mapping[str, object] = NOTHING
     """Fields of the scenario that are changed."""
     parameters: Mapping[str, object] = NOTHING
-    """Of the policy."""
+    """Parameters of the policy."""
     seeds: Sequence[int] | None = None
     """None for all of the suite's."""
     routes: bool = False

@@ -80,7 +80,7 @@ class Forces:
 
     @staticmethod
     def num_features(scenario: Scenario) -> int:
-        """As in ``Acting``."""
+        """Features that the actor sees."""
         return num_features(scenario.sonar.num_sectors, scenario.sonar.num_active_sectors)
 
     def hear(self, percept: Percept) -> None:
@@ -123,7 +123,7 @@ class Trims:
 
     @staticmethod
     def num_features(scenario: Scenario) -> int:  # noqa: ARG004 - of what is remembered, whatever the sonar
-        """As in ``Acting``."""
+        """Features that the actor sees."""
         return RECALLED
 
     def hear(self, percept: Percept) -> None:
@@ -153,4 +153,4 @@ class Trims:
 
 
 ACTING: dict[Sees, type[Forces] | type[Trims]] = {"percept": Forces, "memory": Trims}
-"""By what an actor sees."""
+"""How actors act, by what they see."""

@@ -36,7 +36,7 @@ class EpisodeStats(NamedTuple):
     arrived: float
     collisions: float
     returns: float
-    """Of the mean over vehicles."""
+    """Return of each episode, the mean over vehicles."""
     decisions: float
 
 

@@ -194,7 +194,7 @@ def steps_before(path: Path) -> int:
 
 
 def versions(libraries: Sequence[str]) -> dict[str, str]:
-    """Of this package and of libraries."""
+    """Versions of this package and of libraries."""
     return {"uuv_marl": __version__, **{library: version(library) for library in libraries}}
 
 

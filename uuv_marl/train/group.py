@@ -40,9 +40,9 @@ class Problem(NamedTuple):
     held_s: float = 0.0
     """An output of the actor is held for so long; 0: for one decision."""
     law: Gains = Gains()
-    """Of the hand-made law that an actor with memory trims."""
+    """Gains of the hand-made law that an actor with memory trims."""
     safety: Barrier = Barrier()
-    """Of the safety filter around it."""
+    """Margins and rates of the safety filter around that law."""
     conditions: Conditions = ()
     """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
 

@@ -30,7 +30,7 @@ with extra("train", "training with MAPPO"):
 
 @dataclass(frozen=True, kw_only=True)
 class Hyperparameters(PPOHyperparameters):
-    """Of the algorithm; see ``Learner`` and ``gae``."""
+    """Numbers of the algorithm; see ``Learner`` and ``gae``."""
 
     name: str = "mappo"
     actor_epochs: int = 3
@@ -46,10 +46,10 @@ class Hyperparameters(PPOHyperparameters):
     """Share of that variance which all vehicles of a world have in common, so that what a swarm does together is
     tried: one vehicle alone moves its centre by 1/n. The objective takes each output as if it were drawn alone."""
     noise_kept: float = 0.0
-    """Of noise, what is left at the next decision [1]: what takes seconds to show is tried for seconds."""
+    """Share of the noise that is left at the next decision [1]: what takes seconds to show is tried for seconds."""
     max_gradient: float = 1.0
     value_decay: float = 0.99
-    """Of the running mean and variance by which returns are normalised."""
+    """Decay of the running mean and variance by which returns are normalised [1]."""
     average: float = 0.98
     """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
 
@@ -85,7 +85,7 @@ class Rollout(NamedTuple):
     observation: Tensor
     action: Tensor
     mean: Tensor
-    """Of the policy that sampled."""
+    """Mean output of the policy that sampled."""
     advantage: Tensor
     returns: Tensor
 
@@ -319,7 +319,7 @@ class Mappo:
         self.env = TrainingEnv(problem, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
         self.learner = Learner(self.env.features, self.env.size, self.env.outputs, by, self._rng, device)
         self.agent_steps = by.horizon * self.env.rows
-        """Of an iteration."""
+        """Agent-steps of an iteration."""
         self.pop_episode_stats = self.env.pop_episode_stats
         self.arrays, self.restore, self.start_from = (
             self.learner.arrays, self.learner.restore, self.learner.start_from

@@ -68,7 +68,7 @@ class Ppo:
         self._env = VecNormalize(self._vec_env, norm_obs=False, gamma=by.gamma)
         first = int(np.random.default_rng(seed).integers(*TRAINING_SEEDS))
         self.agent_steps = by.horizon * self._vec_env.num_envs
-        """Of an iteration."""
+        """Agent-steps of an iteration."""
         self._random = _global_random()
         with self._own_random():
             self.model = self._make(first)

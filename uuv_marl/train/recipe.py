@@ -42,16 +42,16 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
     levels: tuple[int, ...] = (1, 2, 3, 4, 5)
     """Their levels."""
     number: int = pydantic.Field(1, ge=1)
-    """So many different ones are drawn; then they come again."""
+    """Number of different episodes that are drawn; then they come again."""
     validated: int = pydantic.Field(0, ge=0)
-    """So many others are drawn for validation, the same for every seed of a training."""
+    """Number of other episodes that are drawn for validation, the same for every seed of a training."""
 
     def draw(self, scenario: str, seed: int) -> Conditions:
         """Fields of the scenario for each of ``number`` episodes."""
         return tuple(self._drawn(scenario, self.number, self.changes, seed))
 
     def draw_validated(self, scenario: str) -> Conditions:
-        """The same for validation, without ``changes``."""
+        """Fields of the scenario for each of ``validated`` episodes of validation, without ``changes``."""
         return tuple(self._drawn(scenario, self.validated, {}, _VALIDATION_DRAW))
 
     def _drawn(self, scenario: str, number: int, base: dict[str, Any], seed: int) -> Iterator[Mapping[str, object]]:

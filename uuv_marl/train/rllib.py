@@ -46,7 +46,7 @@ class Settings:
     overrides: Mapping[str, object] = field(default_factory=lambda: dict(OVERRIDES))
     """Fields of the scenario."""
     seed: int = 0
-    """From 0. Different seeds start from different worlds and weights."""
+    """Seed of the training, 0 or more. Different seeds start from different worlds and weights."""
     batch: int = 16_384
     """Agent-steps per iteration, at least: every environment ends with a whole decision."""
     minibatch: int = 512

@@ -52,7 +52,7 @@ def in_si_units(scenario: Scenario) -> Scenario:
 
 
 class Weights(NamedTuple):
-    """Of the terms of one decision of 0.5 s; shorter ones are paid in proportion, collisions whole."""
+    """Weights of the terms of one decision of 0.5 s; shorter ones are paid in proportion, collisions whole."""
 
     distance_m: float = 35.0
     """A vehicle pays its distance to l(t) over this [m]; 1e9: nothing."""
@@ -63,15 +63,15 @@ class Weights(NamedTuple):
     """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
     spacing: float = 28.0
     spacing_m: float = 12.0
-    """The same for the distance to the nearest vehicle: rare close approaches would hide in a mean of a linear term."""
+    """Distance to the nearest vehicle below which it costs so, too: a linear term's mean would hide rare close ones."""
     collision: float = 8.0
     """Per contact that begins."""
     effort: float = 0.02
-    """Times the squared action."""
+    """Cost of the squared action."""
     team: float = 0.0
     """All vehicles pay this for each metre from the swarm's centre to l(t), up to 60 m."""
     team_s: float = 1e9
-    """And the less, the longer l(t) still moves: by exp(-time left / team_s)."""
+    """The cost ``team`` is the less, the longer l(t) still moves: by exp(-time left / team_s) [s]."""
     astray_m: float = 1e9
     """A vehicle pays 1 where it is twice as far from l(t), nothing up to here, and at most 3 [m]."""
     late: float = 0.0

@@ -29,7 +29,7 @@ class PPOHyperparameters:
     minibatch: int = 2048
     """Rows of a gradient step, at most."""
     clip: float = 0.2
-    """Of PPO's ratio."""
+    """Clip range of PPO's ratio [1]."""
     kl_stop: float = 0.02
     """The actor's epochs end where a minibatch diverges further from the policy that sampled it."""
     learning_rate: tuple[float, float] = (1.5e-3, 1.5e-4)
@@ -66,5 +66,5 @@ def restore_adam(optimiser: torch.optim.Optimizer, name: str, tensors: Mapping[s
 
 
 def annealed(ends: tuple[float, float], share: float) -> float:
-    """From the first to the second in equal ratios, as ``share`` goes from 0 to 1."""
+    """A number that goes from the first to the second in equal ratios, as ``share`` goes from 0 to 1."""
     return ends[0] * (ends[1] / ends[0]) ** min(share, 1.0)

@@ -78,7 +78,7 @@ class Settings:
     start: str | None = None
     """A folder with a learner to start from: ``best`` or a checkpoint of another training."""
     weights: Weights = field(default_factory=Weights)
-    """Of the training's reward."""
+    """Weights of the training's reward."""
     reward: str | None = None
     """A reward of one's own in its place, ``module:function``: from the swarm after a decision to an array (world,
     vehicle)."""
@@ -88,7 +88,7 @@ class Settings:
     change_cost: float = 0.0
     """With memory: paid for each 0.5 s in which the filter changed a vehicle's action."""
     chosen: Literal["best", "last"] = "best"
-    """Whose policy ``best`` holds: that of the best validation, or of the last one."""
+    """Which policy ``best`` holds: that of the best validation, or the last one."""
     law: Gains = field(default_factory=Gains)
     """With memory: of the hand-made law that the actor trims."""
     safety: Barrier = field(default_factory=Barrier)
@@ -131,7 +131,7 @@ class Settings:
         return in_si_units(load_scenario(self.scenario, overrides=self.overrides))
 
     def load_for_validation(self) -> Scenario:
-        """The same, with the decision period of its own that the benchmark has."""
+        """The scenario that is validated on: that of the training, but with the benchmark's decision period."""
         kept = {name: value for name, value in self.overrides.items() if name != "timing.decision_period_s"}
         return load_scenario(self.scenario, overrides=kept)
 
@@ -146,13 +146,13 @@ class Record(NamedTuple):
     reward: float | None = None
     """Mean per decision and vehicle, of this iteration's samples."""
     kl: float | None = None
-    """From the policy that sampled to the one that learned."""
+    """Divergence from the policy that sampled to the one that learned."""
     explained: float | None = None
     """Share of the returns' variance that the critic explains."""
     best: float | None = None
     """Score of the best validation so far."""
     score: float | None = None
-    """Of this iteration's validation, where there was one; as are the following."""
+    """Score of this iteration's validation, None without one. The fields below are of this validation, too."""
     arrived: float | None = None
     collisions: int | None = None
     lateness_s: float | None = None

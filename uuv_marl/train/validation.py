@@ -30,9 +30,9 @@ class ValidationResult(NamedTuple):
     lateness_s: float | None
     """Mean over arrivals, of the task time beyond l(t)'s own."""
     min_spacing_m: float | None
-    """Of the worst episode."""
+    """Smallest spacing of the worst episode [m]."""
     min_obstacle_distance_m: float | None
-    """Of the worst episode."""
+    """Smallest distance to an obstacle of the worst episode [m]."""
 
 
 def validate(
@@ -74,7 +74,7 @@ def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
 
 
 def cost(metrics: Metrics) -> float:
-    """Of one episode [1]: lateness in minutes (2 where it never arrives), 2 with a collision, and short distances."""
+    """Cost of an episode [1]: lateness in minutes (2 if it never arrives), 2 with a collision, and short distances."""
     late = lateness(metrics)
     total = 2.0 if late is None else min(late / 60.0, 2.0)
     total += 2.0 * min(metrics["collisions"], 1)

@@ -29,7 +29,7 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
     def __init__(self, problem: Problem) -> None:
         self._counts = bool(problem.conditions)
         self.next_seed: int | None = TRAINING_SEEDS[0] if self._counts else None
-        """Of the next world that starts; None where worlds go on with their own streams."""
+        """Seed of the next world that starts; None where worlds go on with their own streams."""
         self.env = TrainingEnv(problem, self._draw)
         self.reward_sum = 0.0
         """Mean reward of the rows, summed over the steps so far."""

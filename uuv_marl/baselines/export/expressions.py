@@ -121,7 +121,7 @@ class Expressions(Numbers, ast.NodeVisitor):
         return [self.visit(part) for part in (it.elts if isinstance(it, ast.Tuple) else (it,))]
 
     def visit_Slice(self, node: ast.Slice) -> slice:
-        """From an entry to another."""
+        """A slice, from one entry to another."""
         return slice(*(None if end is None else self.visit(end) for end in (node.lower, node.upper, node.step)))
 
     def visit_Tuple(self, node: ast.Tuple) -> tuple[Any, ...]:

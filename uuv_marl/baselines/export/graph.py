@@ -103,11 +103,11 @@ class Value:
         return self.graph("ReduceL2", self, np.array([-1]))
 
     def single(self) -> "Value":
-        """In single precision."""
+        """The value in single precision."""
         return self.graph("Cast", self, to=TensorProto.FLOAT)
 
     def double(self) -> "Value":
-        """In double precision."""
+        """The value in double precision."""
         return self.graph("Cast", self, to=TensorProto.DOUBLE)
 
     def shaped(self, *shape: int) -> "Value":

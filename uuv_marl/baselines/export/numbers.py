@@ -53,7 +53,7 @@ class Scalar:
     """A number that is known when the model runs."""
 
     name: str
-    """Of the tensor, which has no axis."""
+    """Name of the tensor, which has no axis."""
     kind: str
     """One of ``TYPES``."""
 
@@ -75,7 +75,7 @@ class Ref:
     offset: "int | Scalar"
     shape: tuple[int, ...]
     strides: tuple[int, ...]
-    """In entries."""
+    """How many entries of the array each axis steps over."""
 
 
 def view_of(cells: Cells, shape: tuple[int, ...], first: int = 0) -> Ref:

@@ -40,7 +40,7 @@ class Remembered(NamedTuple):
 
     name: str
     shape: tuple[int, ...]
-    """Of one vehicle's."""
+    """Shape of one vehicle's part."""
 
 
 def remembered(policy: Filtered) -> Sequence[Remembered]:

@@ -8,11 +8,13 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields
 
 GATE_M, GATE_SHARE = 2.0, 0.1
-"""By which a neighbour may be heard from where it was expected: so much, and this share of its range. Assumed."""
+"""A reading this near to where a neighbour is expected is taken for it: so many metres, and a share of its range.
+
+Assumed."""
 ACCELERATION = 2.0
-"""Of neighbours, a typical one [m/s2]. Assumed: a seventh of what full force makes of the default vehicle."""
+"""A typical acceleration of neighbours [m/s2]. Assumed: a seventh of what full force makes of the default vehicle."""
 MANOEUVRES = 0.005
-"""Of the mean error over range, what neighbours' manoeuvres make; the rest is the sonar's [1]. Assumed."""
+"""Mean error over range that neighbours' manoeuvres make; the rest is the sonar's [1]. Assumed."""
 LEAST_ERROR = 0.0002
 """The sonar's is never taken for smaller than this [1]."""
 KEPT_S = 1.0

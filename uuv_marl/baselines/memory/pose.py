@@ -24,11 +24,11 @@ Float64 = NDArray[np.float64]
 _MOVES_MPS = 0.005
 """l(t) moves if it is faster; scenarios know no speed below 0.01 m/s."""
 _TENTH = 0.1
-"""Of full thrust and torque: so much, since a vehicle that turns further has another direction at the end."""
+"""A tenth of full thrust and torque: no more, since a vehicle that turns further has another direction at the end."""
 FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)
 """A vector to l(t) that is longer is cut, and no fix [m]."""
 _TURN_TOLERANCE = 0.001
-"""By which compass and dead reckoning may differ on a leg, beside what the yaw rate's error makes of it [rad]."""
+"""Compass and dead reckoning may differ by this on a leg, beside what the yaw rate's error makes of it [rad]."""
 
 
 class Reckoning(NamedTuple):

@@ -12,7 +12,7 @@ from uuv_marl.scenario import Scenario
 CAMERAS = ("follow", "map")
 """``follow`` keeps the swarm and l(t) in view, ``map`` the whole course."""
 _MARGIN = 0.12
-"""Of the picture, on each side."""
+"""Share of the picture that stays free on each side."""
 _LEAST_M = 80.0
 """What a camera that follows shows at least."""
 _STRAY = 3.0
@@ -36,7 +36,7 @@ class Camera(NamedTuple):
 
     @property
     def reach(self) -> Float:
-        """From the middle to the edges: north, east [m], shape (2,)."""
+        """Distances from the middle to the edges: north, east [m], shape (2,)."""
         return np.array([self.size[1], self.size[0]]) / (2.0 * self.scale)
 
     def magnified(self, factor: int) -> "Camera":

@@ -23,7 +23,7 @@ CURRENT = (146, 155, 163)
 """QUIET, a third of the way to WATER, as ``palette`` has it."""
 DISC, KEEP_OUT, LOST = (115, 115, 115), (165, 165, 165), (140, 140, 140)
 TRAILS: tuple[Colour, ...] = ((222, 234, 243), (200, 221, 236), (174, 207, 228), (145, 190, 219))
-"""From the oldest to the newest part."""
+"""Colours of trails, from the oldest to the newest part."""
 
 
 def palette() -> list[Colour]:

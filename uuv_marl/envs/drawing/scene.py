@@ -39,7 +39,7 @@ class Scene(NamedTuple):
     reference: Float
     """Position of l(t), shape (2,)."""
     position: Float
-    """Of everybody, of the lost where they were lost, shape (vehicle, 2)."""
+    """Position of every vehicle; a lost one stays where it was lost, shape (vehicle, 2)."""
     heading: Float
     """Clockwise from north [rad], shape (vehicle,)."""
     alive: Bool
@@ -53,7 +53,7 @@ class Scene(NamedTuple):
     arrival_s: float | None
     """When the swarm arrived, None before."""
     collisions: int
-    """So far."""
+    """Collisions so far."""
     min_spacing_m: float
     """Smallest distance between two vehicles; infinite for one alone."""
     clearance_m: float

@@ -59,7 +59,7 @@ def paint_heard(surface: pygame.Surface, scene: Scene, sonar: Sonar, view: Camer
 
 
 def edges(array: SonarArray) -> Float:
-    """Of the sub-sectors, clockwise from the bow [rad], shape (sub-sector + 1,)."""
+    """Edges of the sub-sectors, clockwise from the bow [rad], shape (sub-sector + 1,)."""
     return np.radians(array.mounting_deg + array.aperture_deg * np.linspace(-0.5, 0.5, array.sub_sectors + 1))
 
 

@@ -37,15 +37,15 @@ class Actuation(NamedTuple):
     thrust_half: float
     """Share of the difference between asked and given thrust that remains after half an integration step."""
     thrust_whole: float
-    """The same after a whole one; 0 without a lag."""
+    """Share that remains of the thrust's difference after a whole step; 0 without a lag."""
     yaw_half: float
-    """The same of the torque, after half an integration step."""
+    """Share that remains of the torque's difference after half an integration step."""
     yaw_whole: float
-    """The same of the torque, after a whole one."""
+    """Share that remains of the torque's difference after a whole step."""
     yaw_authority: float
     """Share of the torque that reaches the water."""
     kind: Int64
-    """Of each fault: ``THRUSTER``, ``YAW``, ``ARRAY`` or ``MEMBER``, shape (fault,)."""
+    """Kind of each fault: ``THRUSTER``, ``YAW``, ``ARRAY`` or ``MEMBER``, shape (fault,)."""
     efficiency: Float64
     """What a fault leaves of thrust or torque, shape (fault,)."""
     array: Int64

@@ -33,15 +33,15 @@ class Water(NamedTuple):
     """Numbers of a scenario's current."""
 
     speed: float
-    """Of the mean [m/s]."""
+    """Speed of the mean current [m/s]."""
     direction: float
-    """Where it flows to [rad], NaN where the seed draws it."""
+    """Direction to which the mean current flows [rad], NaN where the seed draws it."""
     deviation: float
     """Standard deviation of the process [m/s]."""
     remains: float
     """Share of the process's value that remains after a control hold."""
     circulation: float
-    """Of an eddy [m2/s]."""
+    """Circulation of an eddy [m2/s]."""
     core: float
     """Radius of an eddy's core [m]."""
     over_ground: bool

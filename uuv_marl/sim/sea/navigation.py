@@ -28,7 +28,7 @@ class Navigation(NamedTuple):
     """Numbers of a scenario's navigation."""
 
     drift_share: float
-    """Of the way made over ground, by which the known position is off."""
+    """Share of the way made over ground by which the known position is off."""
     compass_bias: float
     """Standard deviation of a compass's error [rad]."""
 

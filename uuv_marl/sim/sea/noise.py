@@ -56,11 +56,11 @@ class Noise(NamedTuple):
     false_echo: float
     """Probability of an echo of nothing, per sub-sector and reading."""
     range: Float64
-    """Of each array [m], shape (array,)."""
+    """Range of each array [m], shape (array,)."""
     lower: Float64
     """Lower edge of each sub-sector, a unit vector, shape (sector, 2)."""
     width: Float64
-    """Of the sub-sectors of each array [rad], shape (array,)."""
+    """Width of the sub-sectors of each array [rad], shape (array,)."""
 
 
 @described

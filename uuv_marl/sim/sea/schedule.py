@@ -25,9 +25,9 @@ class Listening(NamedTuple):
     hold_s: float
     """Length of a control hold [s]."""
     holds: int
-    """Of a decision."""
+    """Control holds of a decision."""
     delay: int
-    """From the reception of a reading until a policy has it."""
+    """Control holds from the reception of a reading until a policy has it."""
     holds_per_metre: float
     """That sound takes; 0: none."""
     compensated: bool
@@ -48,11 +48,11 @@ class Reading(NamedTuple):
     a: int
     """The array."""
     number: int
-    """Of those that the array took."""
+    """Number of the reading among those that the array took."""
     tick: int
     """Control hold of its reception."""
     slot: int
-    """Where it is kept."""
+    """Place at which the reading is kept."""
 
 
 def listening(scenario: Scenario) -> Listening:

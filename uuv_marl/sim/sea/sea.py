@@ -42,7 +42,7 @@ class Sea(NamedTuple):
     """What disturbs a batch of worlds: of each room its numbers, made once, and its arrays, that change."""
 
     keys: UInt64
-    """Of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
+    """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
     water: Water
     flow: Flow
     actuation: Actuation

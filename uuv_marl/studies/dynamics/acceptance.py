@@ -25,7 +25,7 @@ STEPS_S = (0.1, 0.05, 0.025, 0.0125, 0.00625)
 SETTLE_S = 120.0
 """After which a vehicle from rest is steady; the slowest, by its drag, needs half of it."""
 TURN_S = 60.0
-"""Of a turn from rest, after which the integration step's error is taken."""
+"""Duration of a turn from rest, after which the integration step's error is taken."""
 _FINER = 16
 
 
@@ -64,7 +64,7 @@ class Measured(NamedTuple):
     step_s: float
     """The longest integration step of ``STEPS_S`` with which the vehicle is accepted."""
     step_error_m: float
-    """Of the place after 60 s from rest with that step, at full thrust and rudder; thrust and torque alike without."""
+    """Error of the place after 60 s from rest with that step, at full thrust and rudder, or full thrust and torque."""
 
 
 def alone(vehicle: str, **overrides: object) -> Scenario:

@@ -160,7 +160,7 @@ def _draw(trial: Any, name: str) -> Value:
 
 
 def _table(found: Sequence[dict[str, Any]]) -> Columns:
-    """From each trial's values and numbers."""
+    """The table of each trial's values and numbers."""
     numbers = [Numbers(*(np.nan if number is None else number for number in one["numbers"])) for one in found]
     return columns(
         {"trial": k, **one["values"], **each._asdict(), **dict(zip(OBJECTIVES, unknowns.errors(each), strict=True))}

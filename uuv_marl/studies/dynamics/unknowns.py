@@ -22,7 +22,7 @@ Value = float | int | str
 SEARCHED = ("single_obstacle", "tracking")
 """The search looks at these alone; the quick one first."""
 SEEDS = (10_000, 10_001, 10_002, 10_003)
-"""Of the tuning range 10,000-99,999; the benchmark never uses them."""
+"""Seeds of the tuning range 10,000-99,999; the benchmark never uses them."""
 OBJECTIVES = ("spacing_error", "distance_error", "time_error")
 """One per published claim: the spacing of 5.1 (the larger error of its two numbers), and Table 2's two columns."""
 _POLICY = "bio_inspired"
@@ -34,7 +34,7 @@ class Unknown(NamedTuple):
     """A number or a reading that the paper doesn't state."""
 
     default: Value
-    """Of the shipped scenarios."""
+    """Value of the shipped scenarios."""
     meaning: str
     unit: str = ""
     low: float = 0.0
@@ -43,7 +43,7 @@ class Unknown(NamedTuple):
     choices: Sequence[Value] = ()
     """Instead of a range."""
     fields: Sequence[str] = ()
-    """Of the scenario; a field of the vehicle is multiplied."""
+    """Fields of the scenario; a field of the vehicle is multiplied."""
 
 
 UNKNOWNS = {name: Unknown(**table) for name, table in read_toml("dynamics", "unknowns.toml").items()}

@@ -23,7 +23,7 @@ def efficiency(episodes: Sequence[Episode]) -> float:
 
 
 SCORES = {"success": success, "efficiency": efficiency}
-"""Of a run on a task, from 0 to 1."""
+"""Scores of a run on a task, from 0 to 1."""
 
 
 def tasks(episodes: Sequence[Episode]) -> list[HeldOut]:

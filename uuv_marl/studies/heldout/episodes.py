@@ -18,7 +18,7 @@ class Episode(NamedTuple):
     set: str
     policy: str
     training_seed: int | None
-    """Of a training; None for a policy that ships."""
+    """Seed of the training; None for a policy that ships."""
     seed: int
     duration_s: float
     """What l(t) takes."""
@@ -113,7 +113,7 @@ def written(episode: Episode) -> list[str]:
 
 
 def write_episodes(episodes: Iterable[Episode], path: Path) -> None:
-    """As CSV, a line for each."""
+    """Write the episodes as CSV, a line for each."""
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(Episode._fields)

@@ -26,7 +26,7 @@ ENDS = {
 
 
 def draw_fields(episodes: Sequence[Episode], name: str, path: Path) -> Path:
-    """Of each policy on a set, the best first: how many episodes end in each of four ways."""
+    """Draw how many episodes of each policy on a set end in each of four ways, the best policy first."""
     shipped = dict.fromkeys(e.policy for e in episodes if e.set == name and e.training_seed is None)
     found = sorted((select(episodes, name, policy) for policy in shipped), key=success, reverse=True)
     figure, (ax,) = panels(1, 1, (8.0, 0.42 * len(found) + 1.5))
@@ -72,7 +72,7 @@ def draw_trainings(episodes: Sequence[Episode], trained: Sequence[Trained], path
 
 
 def _held_out(ax: Axes, episodes: Sequence[Episode], colours: dict[str, str]) -> None:
-    """By task: every training's success, and that of policies that ship."""
+    """Draw every training's success by task, and that of policies that ship."""
     shipped = {"scout": SKY, "scout_plus": GREY, "mappo": PINK}
     compared = tasks(episodes)
     for j, held in enumerate(compared):

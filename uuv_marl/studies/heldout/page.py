@@ -166,7 +166,7 @@ def _across(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
 
 
 def _improvement(pair: Sequence[list[list[list[float]]]], compared: Sequence[HeldOut]) -> str:
-    """Of the first algorithm over the second, by score and task."""
+    """Probability that the first algorithm is better than the second, by score and task."""
     if len(pair) < 2:
         return ""
     rows = [

@@ -11,7 +11,7 @@ from uuv_marl.studies.heldout.sets import LEADING, SETS, HeldOut
 from uuv_marl.studies.robustness.scores import Score, scored
 
 _TUNED = "bio_inspired_plus"
-"""Whose effort is the measure on the paper's scenarios."""
+"""The policy whose effort is the measure on the paper's scenarios."""
 _PAPERS_BEST_M = 12.63
 """The paper's largest distance to an obstacle, Table 2."""
 _SPACING_M = 6.0

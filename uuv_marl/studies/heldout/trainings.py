@@ -18,7 +18,7 @@ class Validation(NamedTuple):
 
     agent_steps: int
     seconds: float
-    """Of training and validation until then."""
+    """Seconds of training and validation until then."""
     score: float
     arrived: float
 
@@ -35,7 +35,7 @@ class Trained(NamedTuple):
     rewards: tuple[tuple[int, float], ...] = ()
     """Agent-steps until the end of each iteration, and its mean reward of a decision, with exploration noise."""
     chosen: str = "best"
-    """Whose policy counts: of the best validation, or of the last one."""
+    """Which policy counts: that of the best validation, or the last one."""
     ablation: bool = False
 
     @property

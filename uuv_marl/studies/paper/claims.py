@@ -25,7 +25,7 @@ class Claim(NamedTuple):
 
     section: str
     says: str
-    """In our words."""
+    """The claim in our words."""
     measured: str
     """What is measured, in words."""
     unit: str
@@ -53,7 +53,7 @@ class Claim(NamedTuple):
             return found[0] / found[1] if self.combined == "ratio" else found[0]
 
     def holds(self, values: Float64) -> NDArray[np.bool_]:
-        """By seed."""
+        """Whether the claim holds, by seed."""
         return (values >= self.least) & (values <= self.most)
 
     def _of(self, suite: Suite, case: Case) -> Float64:
@@ -65,4 +65,4 @@ class Claim(NamedTuple):
 
 
 CLAIMS = tuple(Claim(**table) for table in stated("claim"))
-"""In the paper's order; the last for both forms of the comparators."""
+"""The claims in the paper's order; the last for both forms of the comparators."""

@@ -12,7 +12,7 @@ from uuv_marl.studies.paper.measures import corner_times
 from uuv_marl.studies.suite import Case, Suite, Trace
 
 GROUPS = ((0, BLUE, "starts to port"), (1, ORANGE, "starts to starboard"))
-"""As ``start_groups`` numbers them, with colour and label."""
+"""Groups as ``start_groups`` numbers them, with colour and label."""
 
 
 def plan(ax: Axes, case: Case, title: str = "") -> None:

@@ -34,12 +34,12 @@ class Number(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Of the metric."""
+        """Unit of the metric."""
         return self.metric.rpartition("_")[2]
 
     @property
     def paper(self) -> tuple[float, ...]:
-        """As stated; two values where the paper gives two for the same case, and anything between them matches."""
+        """The paper's value; two where the paper gives two for the same case, and anything between them matches."""
         return PAPER[self.case.scenario, self.case.policy].values(self.metric)
 
 
@@ -62,7 +62,7 @@ class Entry(NamedTuple):
     high: float | None = None
     """95 % bootstrap interval."""
     worst: float | None = None
-    """Of all seeds."""
+    """Value of the worst of all seeds."""
     relative_difference: float | None = None
     verdict: str = ""
     why: str = ""

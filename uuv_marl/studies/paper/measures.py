@@ -13,11 +13,11 @@ from uuv_marl.studies.columns import Float32, Float64, Int64
 from uuv_marl.studies.suite import Trace
 
 SPEED_MPS = 4.0
-"""Of l(t). Section 5.1."""
+"""Speed of l(t) [m/s]. Section 5.1."""
 SETTLED_S = 60.0
 """After this long the two groups have met (assumed; the paper's figure 9 shows no times)."""
 WINDOW_S = 40.0
-"""Before and after a corner that count as near it: the swarm trails l(t) by about 16 s."""
+"""Times this long before and after a corner count as near it [s]: the swarm trails l(t) by about 16 s."""
 LINK_M = 20.0
 """Vehicles nearer than the start's gap belong to one group."""
 
@@ -153,7 +153,7 @@ def sides(trace: Trace) -> float:
 
 
 def distance_travelled(trace: Trace) -> float:
-    """By a vehicle, on average [m]."""
+    """Distance that a vehicle travels, on average [m]."""
     steps: Float64 = np.diff(trace["route_position"].astype(np.float64), axis=0)
     return float(np.linalg.norm(steps, axis=-1).sum(axis=0).mean())
 

@@ -28,7 +28,7 @@ class Axis(NamedTuple):
     source: str
     levels: tuple[int, ...]
     severity: tuple[float, ...]
-    """In the unit; inf or NaN where that can't be said in a number."""
+    """Severity of each level in the unit; inf or NaN where that can't be said in a number."""
     labels: tuple[str, ...]
     channels: frozenset[str]
     """Only policies that use one of these are run; empty for all."""

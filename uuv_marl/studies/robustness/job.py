@@ -25,7 +25,7 @@ class Plan(NamedTuple):
 
     axes: Sequence[str]
     levels: Sequence[int]
-    """Beside level 0."""
+    """Levels to run beside level 0."""
     scenarios: Sequence[str]
     policies: Sequence[str]
     seeds: int
@@ -35,7 +35,7 @@ class Plan(NamedTuple):
 SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
     "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "mappo", "mappo_v2", "mappo_v2_calm",
 ), 20)  # fmt: skip
-"""Whose report is in docs/robustness."""
+"""The plan whose report is in docs/robustness."""
 QUICK = SHIPPED._replace(
     axes=("W1", "S4", "S7", "S9", "N1", "A1", "F3", "X"), scenarios=("single_obstacle", "random_field"), seeds=5,
     policies=("bio_inspired", "bio_inspired_plus", "mappo"),

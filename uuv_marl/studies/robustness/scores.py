@@ -45,7 +45,7 @@ class AxisScore(NamedTuple):
     success: Score
     """Mean over the levels that were run, without level 0."""
     retention: Score | None
-    """Of level 0's success; None where that is below ``WORTH_KEEPING``."""
+    """Share of level 0's success that is kept; None where that success is below ``WORTH_KEEPING``."""
     critical: Score
     """Level up to which success is at least ``ENOUGH``, see ``critical_level``."""
     levels: tuple[int, ...]

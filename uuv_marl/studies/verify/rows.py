@@ -33,10 +33,10 @@ class Source(NamedTuple):
     """What a row is made of, beside its seed."""
 
     scenario: Scenario
-    """Before it grants what the policy declares."""
+    """The scenario before it grants what the policy declares."""
     policy: str
     parameters: Mapping[str, object] = NOTHING
-    """Of the policy."""
+    """Parameters of the policy."""
 
 
 class Kind(NamedTuple):
@@ -57,7 +57,7 @@ class Row(NamedTuple):
 
     file: Path
     line: int
-    """From 1, the head; of a ``results.json`` the place in the list of runs, from 1."""
+    """Line of the file, from 1, the head; in a ``results.json`` the place in the list of runs, from 1."""
     kind: Kind
     cells: Cells
 
