@@ -72,7 +72,7 @@ def heldout(
 ) -> None:
     """Evaluate every policy on seeds that no training, no tuning and no choice has used.
 
-    The sets are 1,000 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 200, echoes of the surface,
+    The sets are 1,000 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 300, echoes of the surface,
     and other decision periods. The command writes report.md, episodes.csv and pictures; with --trainings it also
     compares algorithms over training seeds, and writes marl_eval.json. All sets took about two hours in two processes,
     each with its own --only. Ctrl-C keeps the finished episodes, and the same command continues.
