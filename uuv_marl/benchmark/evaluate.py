@@ -19,7 +19,7 @@ Float32 = NDArray[np.float32]
 BATCH = 8
 """Seeds stepped together: enough for all cores, and few to repeat after a benchmark was stopped."""
 ROUTE_PERIOD_S = 0.5
-"""Between two samples of the routes."""
+"""Time between two samples of the routes [s]."""
 MOST_SAMPLES = 1_500_000
 """Most samples (times x vehicles) of a run's routes; longer or larger runs are sampled less often."""
 
@@ -34,7 +34,7 @@ class Routes(NamedTuple):
     heading: Float32
     """Shape (time, vehicle) [rad], in [-pi, pi), clockwise from north."""
     velocity: Float32
-    """Over ground, shape (time, vehicle, 2) [m/s]."""
+    """Velocity over ground, shape (time, vehicle, 2) [m/s]."""
 
 
 class Run(NamedTuple):
@@ -45,7 +45,7 @@ class Run(NamedTuple):
     series: dict[str, Float32]
     """Samples over time, see ``MetricsRecorder.series``."""
     routes: Routes
-    """Sampled in time."""
+    """Routes of all vehicles, sampled in time."""
     obstacles: Float32
     """Centre north, east and radius [m], shape (obstacle, 3)."""
     waypoints: Float32

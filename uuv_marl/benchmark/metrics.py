@@ -163,7 +163,7 @@ class MetricsRecorder:
 
 
 def _mean(values: Float64) -> float | None:
-    """Over the samples at which there was something to measure."""
+    """Mean over the samples at which there was something to measure."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else None
 

@@ -35,7 +35,7 @@ _SOURCES = (
 )  # fmt: skip
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
 _LONGEST_NAME = 200
-"""Bytes of a run's name, of which file systems allow 255."""
+"""Longest name of a run [bytes]; file systems allow 255."""
 
 
 class Row(NamedTuple):

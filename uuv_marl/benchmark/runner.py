@@ -14,7 +14,7 @@ from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown
 from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "mappo_v2")
-"""The paper's Table 2, the safest hand-made law, the strongest learned policy; all others by name."""
+"""The paper's Table 2, the safest hand-made law, and the learned policies of 0.1.0 and of today; all others by name."""
 
 Report = Callable[[str, str, float], None]
 """Called with scenario, policy and the share of that pair's work that is done."""

@@ -14,7 +14,7 @@ from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
 
 GRACE_S = 60.0
-"""After l(t)'s end, when everybody should be there. Assumed: the time beyond l(t)'s that ``base.toml`` allows."""
+"""When vehicles are judged, after l(t)'s end [s]. Assumed: the time beyond l(t)'s that ``base.toml`` allows."""
 CENTRE_M = 20.0
 """Of the healthy vehicles' centre from l(t)'s end in a swarm's success. Assumed: a law without integral action stands
 off by less in 1 m/s of current."""

@@ -20,7 +20,7 @@ _RESAMPLES = 2000
 _NOTHING = "–"
 
 _FEWEST_SEEDS = 5
-"""For an interval: of fewer seeds the bootstrap tells nothing."""
+"""Fewest seeds for an interval: of fewer the bootstrap tells nothing."""
 _NARROW = 110
 """Columns of a terminal below which its table leaves out intervals and the time mean."""
 

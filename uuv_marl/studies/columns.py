@@ -14,7 +14,7 @@ Float64 = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int64 = NDArray[np.int64]
 Columns = dict[str, NDArray[Any]]
-"""All of one length; numbers or texts. NaN stands for nothing measured."""
+"""Columns of one length, numbers or texts. NaN stands for nothing measured."""
 _DIGITS = 6
 
 

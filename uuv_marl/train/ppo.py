@@ -31,7 +31,7 @@ Arrays = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class Hyperparameters(PPOHyperparameters):
-    """Of Stable-Baselines3's PPO; ``minibatch`` becomes the largest factor of the batch below it, as SB3 asks for."""
+    """Numbers of Stable-Baselines3's PPO; ``minibatch`` becomes the largest factor of the batch below it, for SB3."""
 
     name: str = "ppo"
     epochs: int = 3

@@ -40,7 +40,7 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
     axes: tuple[str, ...] = ()
     """Disturbances: axes of the robustness suite. Its groups come equally often."""
     levels: tuple[int, ...] = (1, 2, 3, 4, 5)
-    """Their levels."""
+    """Levels of these axes."""
     number: int = pydantic.Field(1, ge=1)
     """Number of different episodes that are drawn; then they come again."""
     validated: int = pydantic.Field(0, ge=0)

@@ -57,7 +57,7 @@ class Weights(NamedTuple):
     distance_m: float = 35.0
     """A vehicle pays its distance to l(t) over this [m]; 1e9: nothing."""
     centre: float = 0.4
-    """Per metre of a vehicle's ``lead``."""
+    """Pay per metre of a vehicle's ``lead``."""
     obstacle: float = 28.0
     obstacle_m: float = 30.0
     """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
@@ -65,7 +65,7 @@ class Weights(NamedTuple):
     spacing_m: float = 12.0
     """Distance to the nearest vehicle below which it costs so, too: a linear term's mean would hide rare close ones."""
     collision: float = 8.0
-    """Per contact that begins."""
+    """Cost of each contact that begins."""
     effort: float = 0.02
     """Cost of the squared action."""
     team: float = 0.0

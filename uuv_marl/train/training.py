@@ -68,7 +68,7 @@ class Settings:
     scenario: str = "random_field"
     """Name or TOML file."""
     overrides: Mapping[str, object] = field(default_factory=lambda: dict(OVERRIDES))
-    """Fields of the scenario."""
+    """Fields of the scenario that differ from its file."""
     sizes: Sizes = ()
     """Vehicles and worlds of each swarm. If empty: 10 to 100 vehicles at once (``MIXED``), or only swarms of the
     scenario's own size where that is another than the shipped ones'."""

@@ -19,11 +19,11 @@ from uuv_marl.sim.sea.actuation import actuation
 from uuv_marl.sim.vehicle import STILL, plant
 
 SPEEDS_MPS = (0.5, 1.0, 1.5, 2.0)
-"""At which the stability of going straight is tabled."""
+"""Speeds at which the stability of going straight is tabled."""
 STEPS_S = (0.1, 0.05, 0.025, 0.0125, 0.00625)
 """Integration steps that are tried, the first is the paper's."""
 SETTLE_S = 120.0
-"""After which a vehicle from rest is steady; the slowest, by its drag, needs half of it."""
+"""Time after which a vehicle from rest is steady; the slowest, by its drag, needs half of it."""
 TURN_S = 60.0
 """Duration of a turn from rest, after which the integration step's error is taken."""
 _FINER = 16

@@ -29,7 +29,7 @@ class Formation(NamedTuple):
     """Places of steady tracking, and whom each vehicle hears there."""
 
     places: Float64
-    """Relative to l(t) [m], shape (vehicle, 2)."""
+    """Places relative to l(t) [m], shape (vehicle, 2)."""
     heard: Int32
     """Index of the vehicle heard, -1 for none, shape (vehicle, sector)."""
     residual_n: float
