@@ -30,7 +30,7 @@ def cos_sin(angle: float) -> Pair:
 
 
 def wrap(angle: float) -> float:
-    """The same angle [rad] in [-pi, pi)."""
+    """An angle [rad] brought into [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 

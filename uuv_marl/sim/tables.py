@@ -32,12 +32,12 @@ class Row(NamedTuple):
 
     dtype: type[np.generic]
     axes: tuple[str, ...]
-    """Each a name or a number."""
+    """Axes, each a name or a number."""
     meaning: str
     bounds: Bounds | None
 
     def shape(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
-        """With axes of these lengths."""
+        """Shape of the array, with axes of these lengths."""
         return tuple(int(axis) if axis.isdigit() else sizes[axis] for axis in self.axes)
 
 

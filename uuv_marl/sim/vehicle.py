@@ -235,7 +235,7 @@ def advance(state: State6, tau: Vector2, flow: Vector2, h: float, p: Plant) -> S
 
 @compiled_inline
 def wrap(angle: float) -> float:
-    """The same angle [rad] in [-pi, pi)."""
+    """An angle [rad] brought into [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 

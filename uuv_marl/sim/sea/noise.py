@@ -44,7 +44,7 @@ class Noise(NamedTuple):
     passive_ranges: bool
     """Whether passive arrays measure ranges."""
     nominal_range: float
-    """Where a vehicle is put that is heard by its bearing alone [m]."""
+    """Distance at which a vehicle is put that is heard by its bearing alone [m]."""
     half_range: Float64
     """Range at which an array detects every second time [m], 0: always detects; shape (array,)."""
     decades: Float64
@@ -65,7 +65,7 @@ class Noise(NamedTuple):
 
 @described
 class Ears(NamedTuple):
-    """What lasts."""
+    """Errors that last longer than a reading."""
 
     factor: Annotated[Float64, "world vehicle", "On ranges that its passive arrays take."]
     silent: Annotated[

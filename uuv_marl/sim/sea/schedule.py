@@ -29,11 +29,11 @@ class Listening(NamedTuple):
     delay: int
     """Control holds from the reception of a reading until a policy has it."""
     holds_per_metre: float
-    """That sound takes; 0: none."""
+    """Control holds that sound takes for a metre; 0: none."""
     compensated: bool
     """Whether readings are carried to the present pose."""
     every: Float64
-    """Between two readings of each array, at least 1, shape (array,)."""
+    """Control holds between two readings of each array, at least 1, shape (array,)."""
     first: Int64
     """First sub-sector of each array, and their number, shape (array + 1,)."""
     active: Int64
@@ -44,9 +44,9 @@ class Reading(NamedTuple):
     """One reading of an array, by all vehicles of a world."""
 
     w: int
-    """The world."""
+    """Index of the world."""
     a: int
-    """The array."""
+    """Index of the array."""
     number: int
     """Number of the reading among those that the array took."""
     tick: int
