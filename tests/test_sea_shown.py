@@ -139,4 +139,4 @@ def test_replays_and_figures_say_it_too(sailed):
     (episode,) = payload([sailed])["episodes"]
     assert episode["conditions"].startswith("current 0.7 m/s")
     assert _where(sailed.scenario, "seed 0").endswith(f"seed 0\n{episode['conditions']}")
-    assert _where(load_scenario("starter"), "seed 0") == "starter, 5 vehicles, seed 0"
+    assert _where(load_scenario("starter"), "seed 0") == "starter, 5 vehicles (literature_185), seed 0"
