@@ -50,7 +50,7 @@ class Vehicle(Section):
     N_rv: Signed
     N_rr: NonNegative
     N_vv: Signed = 0.0
-    """Beside N_v, the yaw moment N_vv |v| v. Like N_v it is a derivative: a positive one adds."""
+    """Beside N_v, the yaw moment ``N_vv |v| v``. Like N_v it is a derivative: a positive one adds."""
     Y_uv: Signed = 0.0
     """Lift of body and fins: the sway force (Y_uv v + Y_ur r) max(u, 0) and the yaw moment (N_uv v + N_ur r) max(u, 0).
     Derivatives, of lift alone: where ``munk_moment`` is on, the added masses' part of a source's sums is in C(nu)."""
