@@ -21,7 +21,7 @@ from uuv_marl.baselines.export.kernels import Translator
 from uuv_marl.baselines.export.numbers import KernelError, Scalar
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.scout import TRIMS, Gains
+from uuv_marl.baselines.scout import ALL_TRIMS, Gains
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.swarm import Swarm
@@ -64,12 +64,13 @@ class Model:
         return action
 
 
-def of_memory(folder, scale):
+def of_memory(folder, scale, trims=ALL_TRIMS):
     """A checkpoint with memory and random weights."""
     scenario, rng = granted("scout", load_scenario("random_field")), np.random.default_rng(0)
-    sizes = itertools.pairwise((RECALLED, 16, 16, TRIMS))
+    sizes = itertools.pairwise((RECALLED, 16, 16, len(trims)))
     layers = [Layer(*(scale * rng.standard_normal(shape, np.float32) for shape in ((a, b), b))) for a, b in sizes]
-    card = Card(percept=rows_of(PerceptLayout.of(scenario)), features="memory", law=Gains(together=0.04, behind_m=1.0))
+    law = Gains(together=0.04, behind_m=1.0)
+    card = Card(percept=rows_of(PerceptLayout.of(scenario)), features="memory", law=law, trims=trims)
     save_checkpoint(folder / WEIGHTS_FILE, card, layers)
     return str(folder)
 
@@ -78,14 +79,21 @@ def of_memory(folder, scale):
     ("name", "overrides"),
     [
         *((name, overrides) for name in ("scout", "memory", "guarded:mappo") for overrides in (CALM, ROUGH)),
+        ("steering", ROUGH),
         ("scout", TORPEDO),
         ("scout", RUDDER),
     ],
-    ids=[*(f"{name}-{sea}" for name in ("scout", "memory", "mappo") for sea in ("calm", "rough")), "lift", "rudder"],
+    ids=[
+        *(f"{name}-{sea}" for name in ("scout", "memory", "mappo") for sea in ("calm", "rough")),
+        "steering",
+        "lift",
+        "rudder",
+    ],
 )
 def test_it_remembers_and_acts_as_the_policy_does(name, overrides, tmp_path):
     """Not once in step with the policy: its own memory from the beginning."""
-    policy = of_memory(tmp_path, 0.3) if name == "memory" else name
+    trims = {"memory": ALL_TRIMS, "steering": ("push", "steering")}
+    policy = of_memory(tmp_path, 0.3, trims[name]) if name in trims else name
     scenario = granted(policy, load_scenario("random_field", num_vehicles=8, overrides=overrides))
     model, made, swarm = Model(policy, scenario, tmp_path), make(policy, scenario), Swarm(scenario)
     # Near an obstacle, so that echoes, discs and the filter come up at once.

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains, trimmed, widened
+from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, trimmed, widened
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -61,6 +62,29 @@ def actions(policy, seed=10_007, decisions=150, worlds=1, overrides=FEW):
 def test_an_actor_that_says_nothing_is_scout(saved):
     np.testing.assert_array_equal(actions(saved(0.0)), actions("scout"))
     assert not np.array_equal(actions(saved(0.3)), actions("scout"))
+
+
+def test_an_actor_may_trim_a_part(saved, tmp_path):
+    whole = load_checkpoint(Path(saved(0.3)))
+    *first, last = whole.layers
+    columns = [ALL_TRIMS.index(name) for name in ("steering", "push")]
+    silent = np.isin(np.arange(TRIMS), columns)
+    told = {"all": (ALL_TRIMS, last.weight * silent, last.bias * silent)}
+    told["part"] = ("steering", "push"), last.weight[:, columns], last.bias[columns]
+    for name, (trims, weight, bias) in told.items():
+        card = whole.card.model_copy(update={"trims": trims})
+        save_checkpoint(tmp_path / name / WEIGHTS_FILE, card, [*first, Layer(weight, bias)])
+    lagging = FEW | LAG
+    part = actions(str(tmp_path / "part"), overrides=lagging)
+    np.testing.assert_allclose(part, actions(str(tmp_path / "all"), overrides=lagging), rtol=0, atol=1e-6)
+    assert not np.allclose(part, actions("scout", overrides=lagging), rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("trims", [[], ["steering", "steering"], ["thrust"]])
+def test_a_card_names_each_trim_once(trims, saved):
+    card = load_checkpoint(Path(saved(0.3))).card.model_dump()
+    with pytest.raises(ValueError, match="each once|'steering'"):
+        Card.model_validate({**card, "trims": trims})
 
 
 @pytest.mark.parametrize(

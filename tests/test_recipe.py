@@ -14,6 +14,7 @@ from uuv_marl.baselines.scout import PLUS
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.studies.robustness.axes import AXES
 
 pytestmark = pytest.mark.needs("torch")
 
@@ -44,6 +45,19 @@ def test_a_recipe_draws_what_it_says():
         assert 0.02 < len(calm) / len(loaded) < 0.25
         assert {scenario.sonar.echo_reports for scenario in loaded} == {"centre", "surface"}
         assert {scenario.timing.decision_period_s for scenario in loaded} == {0.1, 0.2, 0.5}
+
+
+def test_a_recipe_may_disturb_an_episode_twice():
+    from uuv_marl.train.recipe import load_recipe
+
+    settings = load_recipe("mappo_v3").settings(0)
+    episodes, speed = load_recipe("mappo_v3").episodes, load_scenario(settings.scenario).trajectory.speed_mps
+    group_of = {field: axis.group for axis in map(AXES.get, episodes.axes) for field in axis.overrides(1, speed)}
+    groups = [{group_of[field] for field in c if field in group_of} for c in settings.conditions]
+    assert {len(names) for names in groups} == {0, 2}
+    assert sum("A" in names for names in groups) > 0.5 * len(groups), "most of what is learned from"
+    for changes in settings.conditions:
+        load_scenario(settings.scenario, overrides={**settings.overrides, **changes})
 
 
 def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
@@ -117,8 +131,8 @@ def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
 
     told = json.loads(json.dumps(dataclasses.asdict(load_recipe(recipe).settings(seed))))
     card = POLICIES[name].checkpoint.card
-    # It was chosen by hand what the recipe says since, and the filter's margins had no field.
-    said = {"chosen": "last", "safety": list(card.safety), **card.training}
+    # It was chosen by hand what the recipe says since; the filter's margins and the trims had no field.
+    said = {"chosen": "last", "safety": list(card.safety), "trims": list(card.trims), **card.training}
     assert {field: said[field] for field in told} == told
     assert card.law == PLUS
 

@@ -23,7 +23,7 @@ from uuv_marl.baselines.features import BARRIER, num_features
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import TRIMS
+from uuv_marl.baselines.scout import ALL_TRIMS, Trim
 from uuv_marl.baselines.scout import Gains as Law
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
@@ -79,6 +79,16 @@ def _all_gains(gains: Any) -> Any:
     return cast(Any, gains)
 
 
+def _distinct(trims: tuple[Trim, ...]) -> tuple[Trim, ...]:
+    if len(set(trims)) < max(len(trims), 1):
+        raise ValueError(f"must name some of {', '.join(ALL_TRIMS)}, each once, got {trims}")
+    return trims
+
+
+Trims = Annotated[tuple[Trim, ...], pydantic.AfterValidator(_distinct)]
+"""Names of what an actor trims, in the order of its outputs."""
+
+
 class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Facts about a policy and its training, in the header of its checkpoint."""
 
@@ -100,6 +110,8 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """Gains of Eq. 20-21, whose force is added to what an actor without memory says."""
     law: Law = Law()
     """Gains of the hand-made law that an actor with memory trims."""
+    trims: Trims = ALL_TRIMS
+    """What such an actor trims."""
     safety: Barrier = Barrier()
     """Margins and rates of the filter around it."""
     vehicle: dict[str, float | str] = pydantic.Field(default_factory=lambda: _numbers(load_vehicle(_FIRST_VEHICLE)))
@@ -192,7 +204,7 @@ def _check(card: Card, layers: Sequence[Layer]) -> None:
         raise ValueError(f"its card's decision_period_s must be [shortest, longest], got {card.decision_period_s}")
     remembers = card.features == "memory"
     width = RECALLED if remembers else num_features(sizes["heard"], sizes.get("echo", 0))
-    last = TRIMS if remembers else 2
+    last = len(card.trims) if remembers else 2
     for k, (weight, bias) in enumerate(layers):
         outputs = weight.shape[-1] if weight.ndim == 2 and k < len(layers) - 1 else last
         for name, array, shape in (("weight", weight, (width, outputs)), ("bias", bias, (outputs,))):

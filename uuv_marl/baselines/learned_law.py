@@ -4,21 +4,40 @@ Each vehicle has gains of its own at each decision. The network changes them in 
 (``memory.doubt``): hardly at all in still water with exact echoes. If the network gives zeros, the policy is the law.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from uuv_marl.baselines.checkpoint import Checkpoint
 from uuv_marl.baselines.learned import forward, need_same
 from uuv_marl.baselines.recall import RECALLED, recall
-from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Scout
+from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, Scout, Trim
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
 
 
 class TrimmedLaw(Scout):
-    """``scout``'s law, which an actor trims. Arguments as for ``Scout``."""
+    """``scout``'s law, which an actor trims.
+
+    Args:
+        scenario: gives the vehicle, the decision period and the percept's layout.
+        num_worlds: first axis of the percepts.
+        gains: of the law.
+        barrier: margins and rates of the filter.
+        trims: what the actor changes, in the order of its outputs; the rest is as in the law.
+    """
 
     num_trims = TRIMS
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None,
+        trims: Sequence[Trim] = ALL_TRIMS,
+    ) -> None:  # fmt: skip
+        super().__init__(scenario, num_worlds, gains=gains, barrier=barrier)
+        self.columns = [ALL_TRIMS.index(name) for name in trims]
+        """Where the actor's output stands among all trims."""
 
     def look(self, features: Float32) -> None:
         """Fill the features of the memory that an actor sees, shape (world, vehicle, ``RECALLED``)."""
@@ -28,8 +47,8 @@ class TrimmedLaw(Scout):
         )  # fmt: skip
 
     def trim(self, output: Float32) -> Float32:
-        """The actions, shape (world, vehicle, 2), for an actor's output, shape (world, vehicle, TRIMS)."""
-        np.clip(output, -MOST_TRIM, MOST_TRIM, out=self._trims)
+        """The actions, shape (world, vehicle, 2), for an actor's output, shape (world, vehicle, trim)."""
+        self._trims[:, :, self.columns] = np.clip(output, -MOST_TRIM, MOST_TRIM)
         return self._decided()
 
 
@@ -52,7 +71,7 @@ class LearnedLaw(TrimmedLaw):
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
         self.declare_as(card)
-        super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety)
+        super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety, trims=card.trims)
         need_same(self, card, any_vehicle)
         self._features = np.zeros((*self._trims.shape[:2], RECALLED), np.float32)
 
@@ -60,7 +79,7 @@ class LearnedLaw(TrimmedLaw):
         """Actions of shape (world, vehicle, 2)."""
         self.look(self._features)
         acting = np.flatnonzero(self.active)
-        output = np.zeros_like(self._trims)
+        output = np.zeros((*self._trims.shape[:2], len(self.columns)), np.float32)
         rows = self._features[acting].reshape(-1, RECALLED)
-        output[acting] = forward(self.checkpoint.layers, rows).reshape(len(acting), *self._trims.shape[1:])
+        output[acting] = forward(self.checkpoint.layers, rows).reshape(len(acting), *output.shape[1:])
         return self.trim(output)

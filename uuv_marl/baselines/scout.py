@@ -5,7 +5,7 @@ round remembered obstacles and made safe; the vehicle then steers to it.
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +56,12 @@ PLUS = Gains(
 )  # fmt: skip
 """Gains of ``ScoutPlus``, found by hand, a gain at a time, on tuning seeds of random fields and ``single_obstacle``."""
 
-TRIMS = 6
-"""Changes of a vehicle's numbers that an actor decides on: five gains (``trimmed``), and the distance kept from
-neighbours (``widened``)."""
+Trim = Literal["pull", "together", "push", "behind_m", "steering", "neighbour_m"]
+"""A number of a vehicle that an actor may change: one of five gains (``trimmed``), or the distance kept from neighbours
+(``widened``)."""
+ALL_TRIMS: tuple[Trim, ...] = get_args(Trim)
+"""All of them, in the order in which the law takes them."""
+TRIMS = len(ALL_TRIMS)
 MOST_TRIM = 3.0
 """They are bounded here [1]. Assumed: a factor of 20 is more than any gain should change."""
 _TRIM_STEERING, _TRIM_PER_S, _TRIM_M, _TRIM_KEEP_M = 8.0, 0.04, 2.0, 1.0

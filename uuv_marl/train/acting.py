@@ -1,6 +1,6 @@
 """How the actor in training sees a swarm and drives it: as the policies do that its checkpoints become."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -10,7 +10,7 @@ from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_fea
 from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Gains
+from uuv_marl.baselines.scout import MOST_TRIM, Gains, Trim
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32
@@ -25,8 +25,6 @@ class Acting(Protocol):
 
     size: int
     """Features of a vehicle, see ``num_features``."""
-    outputs: int
-    """Numbers that the actor gives for a vehicle."""
     most: float
     """Outputs mean no more beyond this."""
     changed: Float32
@@ -35,6 +33,11 @@ class Acting(Protocol):
     @staticmethod
     def num_features(scenario: Scenario) -> int:
         """Features of a vehicle in a scenario."""
+        ...
+
+    @staticmethod
+    def num_outputs(trims: Sequence[Trim]) -> int:
+        """Numbers that the actor gives for a vehicle."""
         ...
 
     def hear(self, percept: Percept) -> None:
@@ -46,7 +49,7 @@ class Acting(Protocol):
         ...
 
     def actions(self, output: Float32) -> Float32:
-        """The actions, shape (world, vehicle, 2), for an output, shape (world, vehicle, ``outputs``)."""
+        """The actions, shape (world, vehicle, 2), for an output, shape (world, vehicle, ``num_outputs``)."""
         ...
 
     def snapshot(self) -> Arrays:
@@ -66,12 +69,14 @@ class Forces:
         num_worlds: of the swarm.
         law: of the hand-made law, which it does not use.
         safety: of the safety filter, which it does not use.
+        trims: of an actor with memory.
     """
 
-    outputs = 2
     most = MOST_BARRIER
 
-    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier) -> None:  # noqa: ARG002
+    def __init__(
+        self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]  # noqa: ARG002
+    ) -> None:  # fmt: skip
         self._features = Features(scenario, BARRIER)
         self.size = self._features.size
         shape = num_worlds, scenario.swarm.num_vehicles
@@ -82,6 +87,11 @@ class Forces:
     def num_features(scenario: Scenario) -> int:
         """Features that the actor sees."""
         return num_features(scenario.sonar.num_sectors, scenario.sonar.num_active_sectors)
+
+    @staticmethod
+    def num_outputs(trims: Sequence[Trim]) -> int:  # noqa: ARG004
+        """A force, forward and to starboard."""
+        return 2
 
     def hear(self, percept: Percept) -> None:
         """The barrier's force from what is perceived."""
@@ -111,20 +121,25 @@ class Trims:
         num_worlds: of the swarm.
         law: gains of the hand-made law.
         safety: margins and rates of the safety filter.
+        trims: what the actor changes.
     """
 
     size = RECALLED
-    outputs = TRIMS
     most = MOST_TRIM
 
-    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier) -> None:
-        self._policy = TrimmedLaw(scenario, num_worlds, gains=law, barrier=safety)
+    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]) -> None:
+        self._policy = TrimmedLaw(scenario, num_worlds, gains=law, barrier=safety, trims=trims)
         self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
 
     @staticmethod
     def num_features(scenario: Scenario) -> int:  # noqa: ARG004 - of what is remembered, whatever the sonar
         """Features that the actor sees."""
         return RECALLED
+
+    @staticmethod
+    def num_outputs(trims: Sequence[Trim]) -> int:
+        """One for each trim."""
+        return len(trims)
 
     def hear(self, percept: Percept) -> None:
         """Remember what is perceived."""

@@ -61,7 +61,7 @@ class TrainingEnv:
         if turns:
             sizes = [(n, 1) for n, worlds in sizes for _ in range(worlds)]
         acting = ACTING[problem.sees]
-        self.features, self.outputs = acting.num_features(problem.scenario), acting.outputs
+        self.features, self.outputs = acting.num_features(problem.scenario), acting.num_outputs(problem.trims)
         self.size = self.features + PRIVILEGED_SIZE
         ends = np.cumsum([0, *(n * worlds for n, worlds in sizes)]).tolist()
         self.rows: int = ends[-1]

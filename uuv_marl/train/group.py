@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import Gains
+from uuv_marl.baselines.scout import ALL_TRIMS, Gains, Trim
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.scenario import Scenario, load_scenario
@@ -43,6 +43,8 @@ class Problem(NamedTuple):
     """Gains of the hand-made law that an actor with memory trims."""
     safety: Barrier = Barrier()
     """Margins and rates of the safety filter around that law."""
+    trims: Sequence[Trim] = ALL_TRIMS
+    """What such an actor changes."""
     conditions: Conditions = ()
     """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
 
@@ -89,7 +91,7 @@ class Group:
         scenario = load_scenario(problem.scenario, num_vehicles=self.num_vehicles, overrides=changes)
         refuse_losses(scenario, "training")
         self.swarm = Swarm(scenario, self.num_worlds)
-        self.acting = ACTING[problem.sees](scenario, self.num_worlds, problem.law, problem.safety)
+        self.acting = ACTING[problem.sees](scenario, self.num_worlds, problem.law, problem.safety, problem.trims)
         self._held = max(1, round(problem.held_s / scenario.timing.decision_period_s))
 
     def start(self, seeds: Seeds, worlds: Bool) -> None:
@@ -110,7 +112,7 @@ class Group:
     def step(self, output: Float32) -> Outcome:
         """Act on an output of the actor, shape (world x vehicle, outputs), and fill the rows with what comes of it."""
         swarm, by = self.swarm, self._problem
-        output = output.reshape(self.num_worlds, self.num_vehicles, self.acting.outputs)
+        output = output.reshape(self.num_worlds, self.num_vehicles, -1)
         reward = np.zeros((self.num_worlds, self.num_vehicles))
         for decision in range(self._held):
             running = ~swarm.ended

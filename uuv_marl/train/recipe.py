@@ -9,8 +9,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pydantic
 
+from uuv_marl.baselines.checkpoint import Trims
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import Gains
+from uuv_marl.baselines.scout import ALL_TRIMS, Gains
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.robustness.axes import AXES, known
@@ -41,6 +42,8 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
     """Disturbances: axes of the robustness suite. Its groups come equally often."""
     levels: tuple[int, ...] = (1, 2, 3, 4, 5)
     """Levels of these axes."""
+    at_once: int = pydantic.Field(1, ge=1)
+    """Number of disturbances in a disturbed episode, each of another group."""
     number: int = pydantic.Field(1, ge=1)
     """Number of different episodes that are drawn; then they come again."""
     validated: int = pydantic.Field(0, ge=0)
@@ -65,9 +68,9 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
             changes = {**base, "timing.decision_period_s": float(rng.choice(self.periods_s))}
             if echo:
                 changes["sonar.echo_reports"] = "surface"
-            if disturbed and groups:
-                axes = groups[str(rng.choice(list(groups)))]
-                axis = AXES[str(rng.choice(axes))]
+            left = dict(groups) if disturbed else {}
+            for _ in range(min(self.at_once, len(left))):
+                axis = AXES[str(rng.choice(left.pop(str(rng.choice(list(left))))))]
                 changes |= axis.overrides(int(rng.choice([k for k in axis.levels if k in self.levels])), speed)
             yield changes
 
@@ -88,6 +91,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     validate_every: int = pydantic.Field(Settings.validate_every, ge=1)
     law: dict[str, float] = {}
     safety: dict[str, float] = {}
+    trims: Trims = ALL_TRIMS
     weights: dict[str, float] = {}
     mappo: dict[str, Any] = {}
     ppo: dict[str, Any] = {}
@@ -111,7 +115,9 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
         )
 
 
-_TAKEN = ("scenario", "sees", "sizes", "validation", "steps", "held_s", "change_cost", "chosen", "validate_every")
+_TAKEN = (
+    "scenario", "sees", "trims", "sizes", "validation", "steps", "held_s", "change_cost", "chosen", "validate_every",
+)  # fmt: skip
 
 
 def recipes() -> Sequence[str]:

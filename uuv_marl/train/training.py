@@ -21,7 +21,7 @@ from uuv_marl.atomic import writing
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
 from uuv_marl.baselines.features import BARRIER
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import Gains
+from uuv_marl.baselines.scout import ALL_TRIMS, Gains, Trim
 from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import ResultsError, RewardError
 from uuv_marl.extras import extra
@@ -93,6 +93,8 @@ class Settings:
     """With memory: of the hand-made law that the actor trims."""
     safety: Barrier = field(default_factory=Barrier)
     """With memory: margins and rates of the safety filter; with a horizon of 0 m it changes nothing."""
+    trims: tuple[Trim, ...] = ALL_TRIMS
+    """With memory: what the actor changes."""
     held_s: float = 0.0
     """An output of the actor is held for so long; 0: for one decision."""
     conditions: Conditions = ()
@@ -181,6 +183,7 @@ class Trainer:
                 settings.held_s,
                 settings.law,
                 settings.safety,
+                settings.trims,
                 settings.conditions,
             ),
             settings.seed,
@@ -222,6 +225,7 @@ class Trainer:
             features=self.settings.sees,
             barrier=BARRIER,
             law=self.settings.law,
+            trims=self.settings.trims,
             safety=self.settings.safety,
             vehicle=vehicle_of(self.scenario),
             training=training,

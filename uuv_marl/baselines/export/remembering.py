@@ -21,7 +21,7 @@ from uuv_marl.baselines.memory import Surroundings, listen
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.recall import RECALLED, recall
 from uuv_marl.baselines.rudder import steer_by_rudder
-from uuv_marl.baselines.scout import MOST_TRIM, TRIMS, Scout, ScoutPlus, decide_all
+from uuv_marl.baselines.scout import MOST_TRIM, Scout, ScoutPlus, decide_all
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.views import Fields, Starts, fields
@@ -119,7 +119,8 @@ def _by_law(g: Translator, policy: Scout, memory: Surroundings) -> Ref:
         seen = Value(g, g.tensors[features.cells]).single().shaped(1, RECALLED)
         output = forward_nodes(g, seen, policy.checkpoint.layers)
         bounds = (np.array(bound, np.float32) for bound in (-MOST_TRIM, MOST_TRIM))
-        trims = _array(g, g("Clip", output, *bounds).double(), (TRIMS,), single=True)
+        places = np.eye(policy.num_trims, dtype=np.float32)[policy.columns]
+        trims = _array(g, g("MatMul", g("Clip", output, *bounds), places).double(), places.shape[1:], single=True)
     action = g.zeros((1, 1, 2), single=True)
     g.call(decide_all, _ONE, *by, policy.gain, memory, planes, trims, action)
     return action
