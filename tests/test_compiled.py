@@ -268,3 +268,19 @@ def test_inner_functions_refuse_python_and_do_not_crash():
     swarm.step(np.zeros((1, 5, 2)))
     with pytest.raises(TypeError, match="clear_facts can be called by compiled code only"):
         world.clear_facts(0, swarm.facts)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="GNU's OpenMP says what it was told")
+@pytest.mark.parametrize(("told", "taken"), [({}, "PASSIVE"), ({"OMP_WAIT_POLICY": "active"}, "ACTIVE")])
+def test_threads_without_work_leave_their_core_to_others(told, taken):
+    environment = {key: value for key, value in os.environ.items() if key != "OMP_WAIT_POLICY"}
+    code = "import os, uuv_marl.sim.swarm, numba.np.ufunc.omppool; print(os.environ.get('OMP_WAIT_POLICY'))"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**environment, **told, "OMP_DISPLAY_ENV": "true"},
+    )
+    assert f"OMP_WAIT_POLICY = '{taken}'" in done.stderr
+    assert done.stdout.strip() == str(told.get("OMP_WAIT_POLICY")), "the environment of the process stays as it is"

@@ -6,6 +6,7 @@ checkout or version it belongs to: who edits a kernel compiles what uses it, and
 
 import contextlib
 import functools
+import importlib
 import logging
 import os
 import tempfile
@@ -26,6 +27,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _log = logging.getLogger("uuv_marl")
 _UNUSED_S = 30 * 86400.0
 """Compiled code that nobody loaded for so long is deleted."""
+_WAITING = "OMP_WAIT_POLICY"
 _QUIET_S = 60.0
 """One message is enough for functions that are compiled closer together than this."""
 _settings, caching = cast(Any, _config), cast(Any, _caching)
@@ -181,7 +183,25 @@ def interpreted(function: F) -> F:
 
 def compiled_parallel(function: F) -> F:
     """Compile with Numba, ``prange`` running over threads."""
+    _let_waiting_threads_sleep()
     return _jit(function, parallel=True)
+
+
+@functools.cache
+def _let_waiting_threads_sleep() -> None:
+    """Load the pool of threads that Numba takes from OpenMP so that a thread without work sleeps.
+
+    By default it spins, and takes the core from other programs: beside two of them, a benchmark took ten times as long.
+    ``OMP_WAIT_POLICY``, which is read when the pool is loaded, has the last word where a user has set it.
+    """
+    if _WAITING not in os.environ:
+        os.environ[_WAITING] = "passive"
+        try:
+            importlib.import_module("numba.np.ufunc.omppool")
+        except ImportError:
+            _log.debug("Numba has no OpenMP on this machine, so its threads wait in their own way.")
+        finally:
+            del os.environ[_WAITING]
 
 
 def _jit(function: F, **options: object) -> F:
