@@ -27,7 +27,7 @@ def robustness(
         list[str] | None,
         typer.Option(
             help="Name, checkpoint or module:Class. Repeat it for several. Default: bio_inspired, bio_inspired_plus "
-            "and mappo; without --quick also scout, scout_plus, mappo_v2 and mappo_v2_calm."
+            "and mappo; without --quick also scout, scout_plus, mappo_v2, mappo_v3 and mappo_v2_calm."
         ),
     ] = None,
     scenario: Annotated[

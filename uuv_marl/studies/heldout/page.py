@@ -72,8 +72,10 @@ def _targets(episodes: Sequence[Episode]) -> str:
         for policy in policies
         for mine in [[t for t in found if t.policy == policy]]
     ]
-    rows = [(t.set, f"`{t.policy}`", t.demand, t.measured, "met" if t.met else "**missed**") for t in found]
-    return f"{'; '.join(words)}.\n\n" + markdown_table(("set", "policy", "demand", "measured", ""), rows)
+    cells = {(t.set, t.demand, t.policy): t.measured if t.met else f"**{t.measured}**" for t in found}
+    demands = dict.fromkeys((t.set, t.demand) for t in found)
+    rows = [(*of, *(cells.get((*of, policy), _NOTHING) for policy in policies)) for of in demands]
+    return f"{'; '.join(words)}.\n\n" + markdown_table(("set", "demand", *policies), rows)
 
 
 def _glance(episodes: Sequence[Episode]) -> str:

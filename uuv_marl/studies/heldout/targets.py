@@ -12,6 +12,8 @@ from uuv_marl.studies.robustness.scores import Score, scored
 
 _TUNED = "bio_inspired_plus"
 """The policy whose effort is the measure on the paper's scenarios."""
+_RIVALS = "scout", "scout_plus", "mappo"
+"""Whose task times are the measure on random fields: the strongest laws, and the learned policy of version 0.1.0."""
 _PAPERS_BEST_M = 12.63
 """The paper's largest distance to an obstacle, Table 2."""
 _SPACING_M = 6.0
@@ -41,7 +43,7 @@ def targets(episodes: Sequence[Episode]) -> list[Target]:
         tuned = select(episodes, held.name, _TUNED)
         runs = {policy: mine for policy in LEADING if (mine := select(episodes, held.name, policy))}
         for policy, mine in runs.items():
-            rivals = {name: other for name, other in runs.items() if name != policy}
+            rivals = {name: runs[name] for name in _RIVALS if name in runs and name != policy}
             found += [Target(held.name, policy, *demand) for demand in _demands(held, mine, rivals, tuned)]
     return found
 
@@ -53,7 +55,7 @@ def _demands(
     count = len(mine)
     collided, arrived = sum(e.collisions > 0 for e in mine), sum(e.arrived for e in mine)
     if count < _MANY:
-        yield "collisions", "no collision", f"in {collided} of {count} episodes", collided == 0
+        yield "collisions", "no collision", f"in {collided} of {count}", collided == 0
     else:
         bound, demand = upper_bound(collided, count), f"share of episodes with a collision surely below {_COLLIDED:.1%}"
         yield "collisions", demand, f"{collided} of {count}: below {bound:.2%}", bound < _COLLIDED

@@ -33,7 +33,7 @@ class Plan(NamedTuple):
 
 
 SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
-    "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "mappo", "mappo_v2", "mappo_v2_calm",
+    "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "mappo", "mappo_v2", "mappo_v3", "mappo_v2_calm",
 ), 20)  # fmt: skip
 """The plan whose report is in docs/robustness."""
 QUICK = SHIPPED._replace(

@@ -29,8 +29,8 @@ from uuv_marl.studies.robustness.scores import (
 
 _NOTHING = "–"
 _LEARNED: dict[str, tuple[frozenset[str], frozenset[int]]] = {
-    name: (frozenset(("W1", "W2", "W3", "S1", "S2", "S3", "S5", "S7", "S8", "S9", "A1", "A2")), frozenset((1, 2, 3)))
-    for name in ("mappo_v2", "mappo_v2_seed1")
+    name: (frozenset(("W1", "W2", "W3", "S1", "S2", "S3", "S5", "S7", "S8", "S9", "A1", *others)), frozenset((1, 2, 3)))
+    for name, others in (("mappo_v2", ("A2",)), ("mappo_v2_seed1", ("A2",)), ("mappo_v3", ()), ("mappo_v3_seed1", ()))
 }
 """Axes and levels that a learned policy was trained with; all others were tuned or trained in still water."""
 
