@@ -271,16 +271,17 @@ def test_inner_functions_refuse_python_and_do_not_crash():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="GNU's OpenMP says what it was told")
-@pytest.mark.parametrize(("told", "taken"), [({}, "PASSIVE"), ({"OMP_WAIT_POLICY": "active"}, "ACTIVE")])
-def test_threads_without_work_leave_their_core_to_others(told, taken):
-    environment = {key: value for key, value in os.environ.items() if key != "OMP_WAIT_POLICY"}
-    code = "import os, uuv_marl.sim.swarm, numba.np.ufunc.omppool; print(os.environ.get('OMP_WAIT_POLICY'))"
+@pytest.mark.parametrize(("told", "taken"), [({}, "2000"), ({"GOMP_SPINCOUNT": "77"}, "77")], ids=["ours", "user's"])
+def test_threads_without_work_soon_leave_their_core_to_others(told, taken):
+    spins = "GOMP_SPINCOUNT", "OMP_WAIT_POLICY"
+    environment = {key: value for key, value in os.environ.items() if key not in spins}
+    code = "import os, uuv_marl.sim.swarm, numba.np.ufunc.omppool; print(os.environ.get('GOMP_SPINCOUNT'))"
     done = subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
         check=True,
-        env={**environment, **told, "OMP_DISPLAY_ENV": "true"},
+        env={**environment, **told, "OMP_DISPLAY_ENV": "verbose"},
     )
-    assert f"OMP_WAIT_POLICY = '{taken}'" in done.stderr
-    assert done.stdout.strip() == str(told.get("OMP_WAIT_POLICY")), "the environment of the process stays as it is"
+    assert f"GOMP_SPINCOUNT = '{taken}'" in done.stderr
+    assert done.stdout.strip() == str(told.get("GOMP_SPINCOUNT")), "the environment of the process stays as it is"
