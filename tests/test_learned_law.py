@@ -80,6 +80,12 @@ def test_an_actor_may_trim_a_part(saved, tmp_path):
     assert not np.allclose(part, actions("scout", overrides=lagging), rtol=0, atol=1e-3)
 
 
+def test_mappo_v3_is_its_law_where_nothing_lags():
+    law = "scout_plus,pull_at_rest=6,push_at_rest=3"
+    np.testing.assert_allclose(actions("mappo_v3"), actions(law), rtol=0, atol=1e-4)
+    assert np.abs(actions("mappo_v3", overrides=FEW | LAG) - actions(law, overrides=FEW | LAG)).max() > 0.1
+
+
 @pytest.mark.parametrize("trims", [[], ["steering", "steering"], ["thrust"]])
 def test_a_card_names_each_trim_once(trims, saved):
     card = load_checkpoint(Path(saved(0.3))).card.model_dump()

@@ -169,10 +169,10 @@ def test_a_filter_that_sees_nothing_changes_nothing():
         scenario = load_scenario("random_field", num_vehicles=10, overrides=settings.overrides)
         swarm, changed[name] = Swarm(scenario, 1), 0.0
         swarm.reset([100_000])
-        acting = ACTING["memory"](scenario, 1, settings.law, settings.safety)
+        acting = ACTING["memory"](scenario, 1, settings.law, settings.safety, settings.trims)
         for _ in range(100):
             acting.hear(swarm.percept)
-            swarm.step(acting.actions(np.zeros((1, 10, acting.outputs), np.float32)))
+            swarm.step(acting.actions(np.zeros((1, 10, acting.num_outputs(settings.trims)), np.float32)))
             changed[name] += acting.changed.sum()
     assert changed["mappo_v2"] > 0.0 == changed["mappo_v2_unfiltered"]
 
@@ -181,8 +181,9 @@ def test_the_robustness_page_marks_what_was_trained_with():
     from uuv_marl.studies.robustness.page import _LEARNED
     from uuv_marl.train.recipe import load_recipe
 
-    episodes = load_recipe("mappo_v2").episodes
-    assert set(_LEARNED.values()) == {(frozenset(episodes.axes), frozenset(episodes.levels))}
+    for policy, told in _LEARNED.items():
+        episodes = load_recipe(policy.removesuffix("_seed1")).episodes
+        assert told == (frozenset(episodes.axes), frozenset(episodes.levels)), policy
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,9 @@ POLICIES: dict[str, Kind] = {
     "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on random_field: as mappo, an actor plus a barrier."),
     "mappo_v2": shipped("mappo_v2", "Trained by MAPPO: an actor that corrects scout_plus by what vehicles remember."),
     "mappo_v2_seed1": shipped("mappo_v2_seed1", "The same recipe as mappo_v2 with another training seed."),
-    "mappo_v3": shipped("mappo_v3", "Trained by MAPPO: scout_plus, steered more softly where a vehicle's actuators lag."),
+    "mappo_v3": shipped(
+        "mappo_v3", "Trained by MAPPO: scout_plus, steered more softly where a vehicle's actuators lag."
+    ),
     "mappo_v3_seed1": shipped("mappo_v3_seed1", "The same recipe as mappo_v3 with another training seed."),
     "mappo_v2_calm": shipped("mappo_v2_calm", "The recipe of mappo_v2 without disturbances, for comparison."),
     "random": Random,
