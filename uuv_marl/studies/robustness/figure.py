@@ -3,6 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
+import itertools
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -13,19 +14,22 @@ from uuv_marl.studies.robustness.axes import AXES, CALM, Axis
 from uuv_marl.studies.robustness.scores import ENOUGH, scored
 
 _LINES = ("-", "--", ":", "-.")
+_MARKERS = (".", "x", "^")
+"""Of the policies that come first, and of those for which no new colour is left."""
 
 
 def draw(table: Any) -> Figure:
     """The picture of a table of ``scores.by_seed``."""
     axes = [axis for name, axis in AXES.items() if name in table]
     policies, scenarios = (list(table.index.unique(name)) for name in ("policy", "scenario"))
-    colours = dict(zip(policies, COLOURS * len(policies), strict=False))
+    looks = dict(zip(policies, itertools.product(_MARKERS * len(policies), COLOURS), strict=False))
     lines = dict(zip(scenarios, _LINES * len(scenarios), strict=False))
     figure, fields = panels(len(axes) + 1, 5, (4.0, 2.9), sharey=True)
     for ax, axis in zip(fields, axes, strict=False):
         for (scenario, policy), own in table.groupby(level=["scenario", "policy"], sort=False):
             label = policy if len(scenarios) == 1 else f"{policy}, {scenario}"
-            _draw_line(ax, axis, own, color=colours[policy], linestyle=lines[scenario], label=label)
+            marker, colour = looks[policy]
+            _draw_line(ax, axis, own, marker=marker, color=colour, linestyle=lines[scenario], label=label)
         ax.axhline(ENOUGH, color=BLACK, linestyle=":", linewidth=0.8, label=f"success of {ENOUGH:g}")
         ax.set_xticks([0, *axis.levels], axis.labels, fontsize=8, rotation=25 if max(map(len, axis.labels)) > 6 else 0)
         ax.set_xlabel(axis.unit, fontsize=8)
@@ -48,4 +52,4 @@ def _draw_line(ax: Axes, axis: Axis, own: Any, **style: Any) -> None:
     if len(scores) > 1:
         values, lows, highs = zip(*scores.values(), strict=True)
         ax.fill_between(list(scores), lows, highs, color=style["color"], alpha=0.15, lw=0)
-        ax.plot(list(scores), values, marker=".", **style)
+        ax.plot(list(scores), values, **style)
