@@ -128,7 +128,7 @@ CLAIMS = {
         f"measures what each of {len({r['axis'] for r in table('robustness/episodes.csv')} - {'0'})} disturbances"
     ),
     "results": lambda: "[Results](docs/results.md): {} policies on {} scenarios,".format(
-        *({5: "five", 9: "nine"}.get(n, n) for n in tabled())
+        *({5: "five", 10: "ten"}.get(n, n) for n in tabled())
     ),
     "held-out seeds": lambda: f"up to {len({e.seed for e in HELD_OUT}):,} seeds that nothing was made with.",
     "speed": lambda: f"about {fast()} million agent-steps/s on two cores, beside MPE2, VMAS and JaxMARL.",
@@ -236,7 +236,7 @@ def test_the_index_counts_what_there_is():
     minutes = {re.search(r"\*\*Time\*\*: about (\d) minute", page.read_text())[1] for page in notebooks}
     assert (len(notebooks), minutes) == (6, {"1", "2"})
     assert "Six [notebooks](tutorials/README.md) of one or two minutes each:" in INDEX
-    assert tabled() == (9, 5)
-    assert "nine policies on five scenarios, 20 seeds" in INDEX
+    assert tabled() == (10, 5)
+    assert "ten policies on five scenarios, 20 seeds" in INDEX
     assert "what each of 22 disturbances costs" in INDEX
     assert f"{hostile():,} hostile inputs" in INDEX

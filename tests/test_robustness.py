@@ -121,12 +121,12 @@ def test_plans():
 # Scores
 
 
-def table(**cells):
-    """Success by seed of one policy: ``W1_3=[...]`` is axis W1 at level 3, ``calm=[...]`` level 0."""
+def table(policy="p", **cells):
+    """Success by seed of a policy: ``W1_3=[...]`` is axis W1 at level 3, ``calm=[...]`` level 0."""
     import pandas
 
     rows = [
-        {"scenario": "s", "policy": "p", "seed": seed, "success_share": value, "axis": axis, "level": level}
+        {"scenario": "s", "policy": policy, "seed": seed, "success_share": value, "axis": axis, "level": level}
         for name, values in cells.items()
         for axis, level in [(CALM, 0) if name == "calm" else (name[:2].rstrip("_"), int(name[-1]))]
         for seed, value in enumerate(values)
@@ -150,6 +150,17 @@ def test_what_is_the_same_share_of_level_0_in_each_seed_has_no_doubt():
     found = scores.axis_score(table(calm=calm, W1_1=calm / 2), "W1")
     assert found.retention.high - found.retention.low < 1e-12
     assert found.success.high - found.success.low > 0.01
+
+
+@pytest.mark.parametrize(("best", "cells"), [("a", {}), ("b", {"W1_1": [0.9] * 6})], ids=["X alone", "groups"])
+def test_who_is_best_is_told_by_the_groups_and_by_x_where_there_is_no_other(best, cells):
+    import pandas
+
+    mine = table("a", calm=[1.0] * 6, X_3=[0.8] * 6, **{name: [0.5] * 6 for name in cells})
+    other = table("b", calm=[1.0] * 6, X_3=[0.6] * 6, **cells)
+    words = page._best(pandas.concat([mine, other]))
+    assert f"{best} - {'b' if best == 'a' else 'a'}" in words
+    assert ("+0.200" if best == "a" else "-0.200") in words
 
 
 def test_few_seeds_have_no_interval():
