@@ -329,6 +329,21 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(kept_
     assert age_of(0, 0, policy.memory) == 0.0, "and says nothing of the sonar by then"
 
 
+def test_distances_are_those_of_the_places_and_infinite_where_there_is_none():
+    scenario = granted("scout", load_scenario("random_field"))
+    swarm, policy = Swarm(scenario, 2), make("scout", scenario, 2)
+    percept = swarm.reset([10_500, 10_501])
+    policy.reset([0, 0])
+    for k in range(200):
+        percept = swarm.step(policy.act(percept))
+        if k % 40 == 39:
+            m, here = policy.memory, policy.memory.pose[:, :, None, :2]
+            for places, there, kept in ((m.place, m.known, m.away), (m.disc[..., :2], m.score, m.disc_away)):
+                away = np.where(there > 0.0, np.linalg.norm(places - here, axis=3), np.inf)
+                np.testing.assert_allclose(kept, away, rtol=1e-12)
+    assert np.isfinite(m.disc_away).any() and np.isfinite(m.away).any()
+
+
 def test_one_world_is_forgotten_and_another_does_not_count():
     scenario = granted("scout", load_scenario("starter"))
     swarm, policy = Swarm(scenario, 3), make("scout", scenario, 3)

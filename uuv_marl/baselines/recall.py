@@ -56,7 +56,7 @@ def recall(
                 if kept.begun[w, i] > 0.0:
                     features[w, i, _OWN - 1] = 0.5 * math.sqrt(num_vehicles / NOMINAL_VEHICLES)
                     _own(w, i, period, g, barrier, limits, kept, planes, features[w, i])
-                    _neighbours(w, i, kept, planes[:, 0], features[w, i])
+                    _neighbours(w, i, kept, features[w, i])
                     _surfaces(w, i, barrier, kept, planes[:, 0], features[w, i])
 
 
@@ -118,22 +118,19 @@ def _nearest(away: Float64, num: int, least: float) -> int:
 
 
 @compiled
-def _neighbours(w: int, i: int, kept: Surroundings, away: Float64, out: Float32) -> None:
+def _neighbours(w: int, i: int, kept: Surroundings, out: Float32) -> None:
     """The nearest neighbours, in order: where they are, and how they move beside the vehicle.
 
     Args:
         w: index of the world.
         i: index of the vehicle.
         kept: what is remembered.
-        away: room for distances, shape (at least sector,).
         out: the vehicle's features; six for each neighbour are filled.
     """
-    known, place, velocity, pose = kept.known[w, i], kept.place[w, i], kept.velocity[w, i], kept.pose[w, i]
-    for k in range(known.shape[0]):
-        away[k] = math.hypot(place[k, 0] - pose[0], place[k, 1] - pose[1]) if known[k] > 0.0 else math.inf
+    away, place, velocity, pose = kept.away[w, i], kept.place[w, i], kept.velocity[w, i], kept.pose[w, i]
     least = -1.0
     for rank in range(NEIGHBOURS):
-        k = _nearest(away, known.shape[0], least)
+        k = _nearest(away, away.shape[0], least)
         if k < 0:
             break
         least, first = away[k], _OWN + 6 * rank
@@ -160,7 +157,7 @@ def _surfaces(w: int, i: int, barrier: Barrier, kept: Surroundings, left: Float6
     score, disc, pose = kept.score[w, i], kept.disc[w, i], kept.pose[w, i]
     for d in range(score.shape[0]):
         gone = score[d] < CONFIRMED
-        left[d] = math.inf if gone else math.hypot(disc[d, 0] - pose[0], disc[d, 1] - pose[1]) - disc[d, 2]
+        left[d] = math.inf if gone else kept.disc_away[w, i, d] - disc[d, 2]
     least = -math.inf
     for rank in range(SURFACES):
         d = _nearest(left, score.shape[0], least)

@@ -73,7 +73,10 @@ def margin(w: int, i: int, d: int, barrier: Barrier, kept: Surroundings) -> floa
     disc, least = kept.disc[w, i], barrier.obstacle_m
     for e in range(kept.score.shape[2]):
         if e != d and kept.score[w, i, e] >= CONFIRMED:
-            apart = math.hypot(disc[e, 0] - disc[d, 0], disc[e, 1] - disc[d, 1]) - disc[e, 2] - disc[d, 2]
+            x, y, radii = disc[e, 0] - disc[d, 0], disc[e, 1] - disc[d, 1], disc[e, 2] + disc[d, 2]
+            if barrier.gap_share * (max(abs(x), abs(y)) - radii) > least + 1e-6:
+                continue  # too far apart to count, which needs no root
+            apart = math.hypot(x, y) - disc[e, 2] - disc[d, 2]
             if apart > barrier.narrowest_m:
                 least = min(least, barrier.gap_share * apart)
     return least
@@ -101,21 +104,18 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surrounding
     for d in range(kept.score.shape[2]):
         if kept.score[w, i, d] < CONFIRMED:
             continue
-        n_x, n_y = kept.disc[w, i, d, 0] - x, kept.disc[w, i, d, 1] - y
-        away = max(math.hypot(n_x, n_y), 1e-6)
+        away = max(kept.disc_away[w, i, d], 1e-6)
         left = away - kept.disc[w, i, d, 2]
         if left < barrier.horizon_m:
+            n_x, n_y = kept.disc[w, i, d, 0] - x, kept.disc[w, i, d, 1] - y
             planes[num, 0], planes[num, 1] = n_x / away, n_y / away
             planes[num, 2] = rate * (left - margin(w, i, d, barrier, kept))
             num += 1
     rate = min(barrier.neighbour_rate, MOST_CLOSED / period)
     for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] == 0.0:
-            continue
-        n_x, n_y = kept.place[w, i, k, 0] - x, kept.place[w, i, k, 1] - y
-        away = max(math.hypot(n_x, n_y), 1e-6)
+        away = max(kept.away[w, i, k], 1e-6)
         if away < barrier.horizon_m:
-            n_x, n_y = n_x / away, n_y / away
+            n_x, n_y = (kept.place[w, i, k, 0] - x) / away, (kept.place[w, i, k, 1] - y) / away
             own = n_x * v_x + n_y * v_y
             closing = own - n_x * kept.velocity[w, i, k, 0] - n_y * kept.velocity[w, i, k, 1]
             planes[num, 0], planes[num, 1] = n_x, n_y

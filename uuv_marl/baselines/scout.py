@@ -189,9 +189,9 @@ def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
         m_x, m_y, _ = middle(w, i, kept)
         w_x, w_y = w_x + together * (to_x - m_x), w_y + together * (to_y - m_y)
     for k in range(kept.known.shape[2]):
-        d_x, d_y = pose[0] - kept.place[w, i, k, 0], pose[1] - kept.place[w, i, k, 1]
-        away = max(math.hypot(d_x, d_y), 1e-6)
-        if kept.known[w, i, k] > 0.0 and away < g.push_range:
+        away = max(kept.away[w, i, k], 1e-6)
+        if away < g.push_range:
+            d_x, d_y = pose[0] - kept.place[w, i, k, 0], pose[1] - kept.place[w, i, k, 1]
             share = push * (1.0 / away - 1.0 / g.push_range)
             w_x, w_y = w_x + share * d_x, w_y + share * d_y
     return w_x, w_y
@@ -217,7 +217,7 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
         if kept.score[w, i, d] < CONFIRMED:
             continue
         n_x, n_y = kept.pose[w, i, 0] - kept.disc[w, i, d, 0], kept.pose[w, i, 1] - kept.disc[w, i, d, 1]
-        away = max(math.hypot(n_x, n_y), 1e-6)
+        away = max(kept.disc_away[w, i, d], 1e-6)
         n_x, n_y = n_x / away, n_y / away
         outwards, past = n_x * w_x + n_y * w_y, n_x * w_y - n_y * w_x
         if outwards < 0.0:

@@ -78,7 +78,7 @@ def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
     for k in range(kept.known.shape[2]):
         if kept.known[w, i, k] > 0.0:
             d_x, d_y = kept.place[w, i, k, 0] - pose[0], kept.place[w, i, k, 1] - pose[1]
-            near = _FAR_M / max(_FAR_M, math.hypot(d_x, d_y))
+            near = _FAR_M / max(_FAR_M, kept.away[w, i, k])
             x, y, num = x + near * d_x, y + near * d_y, num + 1
     return x / max(num, 1), y / max(num, 1), num
 
@@ -134,7 +134,7 @@ def _match(x: float, y: float, reach: float, w: int, i: int, kept: Surroundings)
     for k in range(known.shape[0]):
         dx, dy = x - place[k, 0], y - place[k, 1]
         squared = dx * dx + dy * dy
-        if known[k] < 0.0 and squared < least:
+        if squared < least and known[k] < 0.0:
             best, least = k, squared
     return best
 
@@ -144,7 +144,7 @@ def _is_heard(x: float, y: float, w: int, i: int, kept: Surroundings) -> bool:
     """Whether another sub-sector, which overlaps, has heard the same at this decision. Arguments as for ``_match``."""
     for k in range(kept.known.shape[2]):
         dx, dy = x - kept.reading[w, i, k, 0], y - kept.reading[w, i, k, 1]
-        if kept.known[w, i, k] > 0.0 and dx * dx + dy * dy < _SAME_M * _SAME_M:
+        if dx * dx + dy * dy < _SAME_M * _SAME_M and kept.known[w, i, k] > 0.0:
             return True
     return False
 

@@ -1,5 +1,6 @@
 """A percept taken into what a vehicle remembers: where it is, the obstacles, the neighbours."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -68,3 +69,24 @@ def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept_s: float,
             pose.keep_motion(w, i, see, kept)
             discs.listen(w, i, see, model.sectors, kept)
             neighbours.listen(w, i, see, model.own.period_s, kept_s, kept)
+            _keep_distances(w, i, kept)
+
+
+@compiled
+def _keep_distances(w: int, i: int, kept: Surroundings) -> None:
+    """How far a vehicle is from what it remembers, once for all that decides by it.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        kept: what is remembered; the distances are brought up to date.
+    """
+    x, y = kept.pose[w, i, 0], kept.pose[w, i, 1]
+    for d in range(kept.score.shape[2]):
+        there = kept.score[w, i, d] > 0.0
+        disc = kept.disc[w, i, d]
+        kept.disc_away[w, i, d] = math.hypot(disc[0] - x, disc[1] - y) if there else math.inf
+    for k in range(kept.known.shape[2]):
+        there = kept.known[w, i, k] > 0.0
+        place = kept.place[w, i, k]
+        kept.away[w, i, k] = math.hypot(place[0] - x, place[1] - y) if there else math.inf

@@ -41,7 +41,11 @@ class Surroundings(NamedTuple):
         "Decisions at which each was heard less those at which it was not though it should have been; 0 for none.",
     ]
     unheard: Annotated[Float64, "world vehicle 12", "Time since each was heard [s]."]
+    disc_away: Annotated[
+        Float64, "world vehicle 12", "Distance of each one's centre from the vehicle [m], infinite for none."
+    ]
     place: Annotated[Float64, "world vehicle sector 2", "Neighbours: place in the map [m]."]
+    away: Annotated[Float64, "world vehicle sector", "Their distance from the vehicle [m], infinite for none."]
     velocity: Annotated[Float64, "world vehicle sector 2", "Their velocity [m/s]."]
     reading: Annotated[Float64, "world vehicle sector 2", "Where each was heard last, in the map [m]."]
     known: Annotated[Float64, "world vehicle sector", "Decisions at which each was heard, 0 for none."]
