@@ -341,7 +341,8 @@ def test_distances_are_those_of_the_places_and_infinite_where_there_is_none():
             for places, there, kept in ((m.place, m.known, m.away), (m.disc[..., :2], m.score, m.disc_away)):
                 away = np.where(there > 0.0, np.linalg.norm(places - here, axis=3), np.inf)
                 np.testing.assert_allclose(kept, away, rtol=1e-12)
-    assert np.isfinite(m.disc_away).any() and np.isfinite(m.away).any()
+    assert np.isfinite(m.disc_away).any()
+    assert np.isfinite(m.away).any()
 
 
 def test_one_world_is_forgotten_and_another_does_not_count():
