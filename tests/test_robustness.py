@@ -272,8 +272,9 @@ def test_what_cannot_be_run_is_refused_with_the_remedy(tmp_path, args, message):
 
 
 @pytest.mark.docs
-@pytest.mark.parametrize("folder", [DOCS, DOCS / "comparators", DOCS / "medium"], ids=["main", "comparators", "medium"])
-def test_the_shipped_pages_are_made_of_the_shipped_episodes(folder, tmp_path):
+@pytest.mark.parametrize("name", [".", "comparators", "medium", "full"])
+def test_the_shipped_pages_are_made_of_the_shipped_episodes(name, tmp_path):
+    folder = DOCS / name
     shutil.copy(folder / job.EPISODES, tmp_path)
     page.write_report(tmp_path)
     assert (tmp_path / "report.md").read_text() == (folder / "report.md").read_text()
