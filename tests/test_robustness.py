@@ -163,6 +163,19 @@ def test_who_is_best_is_told_by_the_groups_and_by_x_where_there_is_no_other(best
     assert ("+0.200" if best == "a" else "-0.200") in words
 
 
+def test_who_was_trained_with_disturbances_is_compared_with_each_other_policy_once():
+    import pandas
+
+    success = {"scout": 0.9, "mappo_v2": 0.8, "mappo_v3": 0.7, "pull": 0.6}
+    words = page._best(pandas.concat([table(name, calm=[1.0] * 6, W1_1=[s] * 6) for name, s in success.items()]))
+    pairs = [row.split(" | ")[0].removeprefix("| ") for row in words.splitlines()[2:]]
+    assert pairs == [
+        *(f"scout - {other}" for other in ("mappo_v2", "mappo_v3", "pull")),
+        *(f"mappo_v2 - {other}" for other in ("mappo_v3", "pull")),
+        "mappo_v3 - pull",
+    ]
+
+
 def test_few_seeds_have_no_interval():
     found = scores.axis_score(table(calm=[1.0, 1.0], W1_1=[0.5, 0.7]), "W1")
     assert math.isnan(found.success.low)

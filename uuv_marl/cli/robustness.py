@@ -14,7 +14,7 @@ def robustness(
         bool, typer.Option("--quick", help="Eight axes, two scenarios, 5 seeds: about ten minutes.")
     ] = False,
     full: Annotated[
-        bool, typer.Option("--full", help="All levels, three scenarios, 50 seeds: several hours; see --ray.")
+        bool, typer.Option("--full", help="All levels, three scenarios, 50 seeds: most of a day on two cores; see --ray.")
     ] = False,
     axis: Annotated[
         list[str] | None, typer.Option(help="Only this axis, such as W1 or S7. Repeat it for several. Default: all.")
@@ -27,7 +27,7 @@ def robustness(
         list[str] | None,
         typer.Option(
             help="Name, checkpoint or module:Class. Repeat it for several. Default: bio_inspired, bio_inspired_plus "
-            "and mappo; without --quick also scout, scout_plus, mappo_v2, mappo_v3 and mappo_v2_calm."
+            "and mappo; without --quick all that docs/robustness compares."
         ),
     ] = None,
     scenario: Annotated[
@@ -55,8 +55,8 @@ def robustness(
 
     Each axis is one disturbance in five levels (uuv_marl/studies/robustness/axes.toml, with sources). The command
     writes report.md (scores, critical severities, every cell), figures/severity.png and episodes.csv (a row for each
-    episode). Without --quick or --full it makes the report that ships in docs/robustness, in more than an hour on two
-    cores. It needs the extra "analysis". Ctrl-C keeps the finished episodes, and the same command continues.
+    episode). Without --quick or --full it makes the report that ships in docs/robustness, in about two hours on
+    two cores. It needs the extra "analysis". Ctrl-C keeps the finished episodes, and the same command continues.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """

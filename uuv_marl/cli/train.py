@@ -71,10 +71,11 @@ def train_mappo(
 
     Vehicles decide every 0.5 s, with yaw damping, whatever the scenario says. Noise and rates fall over --steps. This
     needs the extra "train". It writes config.json (settings, seeds, versions), progress.csv (a row per iteration),
-    checkpoints/, tensorboard/ and best/, the policy that was best on validation seeds. Compare this policy with
-    uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops the training after the current iteration, with a checkpoint;
-    the same command with --resume continues exactly. A killed training leaves its last checkpoint, which is written
-    every 20 iterations. With --resume and more --steps a finished training continues with its last noise and rates.
+    checkpoints/, tensorboard/ and best/: the policy that was best on validation seeds, or the last if the recipe says
+    so. Compare it with uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops the training after the current iteration,
+    with a checkpoint; the same command with --resume continues exactly. A killed training leaves its last checkpoint,
+    which is written every 20 iterations. With --resume and more --steps a finished training continues with its last
+    noise and rates.
 
     Example: uuv-marl train mappo --scenario starter --steps 2e6 --output runs/starter
     """

@@ -79,7 +79,7 @@ Sees = Annotated[
     typer.Option(
         metavar="percept|memory",
         help="percept: the actor sees the latest percept and gives a force. memory: the actor sees what vehicles "
-        "remember, and corrects the velocity that scout asks for, inside the safety filter.",
+        "remember, and trims the gains of a law such as scout, inside the safety filter.",
     ),
 ]
 Device = Annotated[

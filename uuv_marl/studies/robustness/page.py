@@ -98,8 +98,8 @@ def _scenario(name: str, episodes: Any, table: Any) -> str:
     parts = (
         ("Scores", "Mean success over the levels that were run. `all`: the mean over the groups, without X.",
          _groups(policies)),
-        ("Who is best", "By how much the policy with the highest mean over all groups (of X, where only X was run) "
-         "is above each other, paired by seed.", _best(table)),
+        ("Who is best", "By how much the policy with the highest mean over all groups (of X, where only X was run), "
+         "and each that was trained with disturbances, is above each other, paired by seed.", _best(table)),
         ("Axes", f"Mean success over the levels that were run; then what it keeps of level 0's success, where that "
          f"is at least {WORTH_KEEPING:g}.{star}", _axes(policies)),
         ("Critical severity", f"Where success falls below {ENOUGH:g} first, linear between the levels that were run, "
@@ -122,17 +122,18 @@ def _groups(policies: dict[str, Any]) -> str:
 
 
 def _best(table: Any) -> str:
-    """The policy that is best over all groups (in X where no other was run), minus each other."""
+    """Who is best over all groups (in X where no other was run), and who was trained disturbed, minus each other."""
     known: dict[str, float] = {}
     for group in (EVERY, "X"):
         scores = {name: group_score(own, group) for name, own in table.groupby(level="policy", sort=False)}
         known = known or {name: score.value for name, score in scores.items() if score}
-    best = max(known, key=known.__getitem__, default="")
+    firsts = list(dict.fromkeys([*sorted(known, key=known.__getitem__)[-1:], *(n for n in known if n in _LEARNED)]))
     rows = [
-        (f"{best} - {name}", *(f"{more:+.3f}" if more else _NOTHING for more in found))
+        (f"{first} - {name}", *(f"{more:+.3f}" if more else _NOTHING for more in found))
+        for k, first in enumerate(firsts)
         for name in known
-        if name != best
-        for found in [[difference(table, best, name, group) for group in (EVERY, "X")]]
+        if name not in firsts[: k + 1]
+        for found in [[difference(table, first, name, group) for group in (EVERY, "X")]]
     ]
     return markdown_table(("policies", EVERY, f"{GROUPS['X']} (X)"), rows) if rows else "There is one policy.\n"
 
