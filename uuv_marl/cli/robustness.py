@@ -14,7 +14,8 @@ def robustness(
         bool, typer.Option("--quick", help="Eight axes, two scenarios, 5 seeds: about ten minutes.")
     ] = False,
     full: Annotated[
-        bool, typer.Option("--full", help="All levels, three scenarios, 50 seeds: most of a day on two cores; see --ray.")
+        bool,
+        typer.Option("--full", help="All levels, three scenarios, 50 seeds: most of a day, two cores; see --ray."),
     ] = False,
     axis: Annotated[
         list[str] | None, typer.Option(help="Only this axis, such as W1 or S7. Repeat it for several. Default: all.")

@@ -14,22 +14,27 @@ from uuv_marl.studies.robustness.axes import AXES, CALM, Axis
 from uuv_marl.studies.robustness.scores import ENOUGH, scored
 
 _LINES = ("-", "--", ":", "-.")
-_MARKERS = (".", "x", "^")
-"""Of the policies that come first, and of those for which no new colour is left."""
+_AGAIN = ((".", "-"), ("x", "--"), ("^", ":"))
+"""Marker and line of the policies that come first, and of those for which no new colour is left."""
+_CROWD = 8
+"""Of more lines than this a panel shows no intervals."""
 
 
 def draw(table: Any) -> Figure:
     """The picture of a table of ``scores.by_seed``."""
     axes = [axis for name, axis in AXES.items() if name in table]
     policies, scenarios = (list(table.index.unique(name)) for name in ("policy", "scenario"))
-    looks = dict(zip(policies, itertools.product(_MARKERS * len(policies), COLOURS), strict=False))
+    looks = dict(zip(policies, itertools.product(_AGAIN * len(policies), COLOURS), strict=False))
     lines = dict(zip(scenarios, _LINES * len(scenarios), strict=False))
+    intervals = len(policies) * len(scenarios) <= _CROWD
     figure, fields = panels(len(axes) + 1, 5, (4.0, 2.9), sharey=True)
     for ax, axis in zip(fields, axes, strict=False):
         for (scenario, policy), own in table.groupby(level=["scenario", "policy"], sort=False):
-            label = policy if len(scenarios) == 1 else f"{policy}, {scenario}"
-            marker, colour = looks[policy]
-            _draw_line(ax, axis, own, marker=marker, color=colour, linestyle=lines[scenario], label=label)
+            (marker, line), colour = looks[policy]
+            alone = len(scenarios) == 1
+            label = policy if alone else f"{policy}, {scenario}"
+            line = line if alone else lines[scenario]
+            _draw_line(ax, axis, own, intervals, marker=marker, color=colour, linestyle=line, label=label)
         ax.axhline(ENOUGH, color=BLACK, linestyle=":", linewidth=0.8, label=f"success of {ENOUGH:g}")
         ax.set_xticks([0, *axis.levels], axis.labels, fontsize=8, rotation=25 if max(map(len, axis.labels)) > 6 else 0)
         ax.set_xlabel(axis.unit, fontsize=8)
@@ -39,17 +44,19 @@ def draw(table: Any) -> Figure:
         ax.set_axis_off()
     figure.supylabel("success: share of the healthy\nvehicles that are safe and done")
     where = ", ".join(scenarios)
-    figure.suptitle(f"Success over severity on {where}:\nmean over seeds and its 95 % bootstrap interval")
+    what = "mean over seeds" + " and its 95 % bootstrap interval" * intervals
+    figure.suptitle(f"Success over severity on {where}:\n{what}")
     return legend(figure, fields[len(axes)])
 
 
-def _draw_line(ax: Axes, axis: Axis, own: Any, **style: Any) -> None:
-    """A policy on a scenario: success at every level that was run."""
+def _draw_line(ax: Axes, axis: Axis, own: Any, intervals: bool, **style: Any) -> None:
+    """A policy on a scenario: success at every level that was run, and perhaps its intervals."""
     if axis.name not in own or CALM not in own:
         return
     cells = own[[CALM, axis.name]].dropna(axis="columns", how="all")
     scores = {level: scored(cells[name, level].dropna().to_numpy()) for name, level in cells}
     if len(scores) > 1:
         values, lows, highs = zip(*scores.values(), strict=True)
-        ax.fill_between(list(scores), lows, highs, color=style["color"], alpha=0.15, lw=0)
+        if intervals:
+            ax.fill_between(list(scores), lows, highs, color=style["color"], alpha=0.15, lw=0)
         ax.plot(list(scores), values, **style)
