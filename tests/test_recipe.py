@@ -152,6 +152,7 @@ def test_a_recipe_like_another_says_only_what_differs(tmp_path):
         one = load_recipe(name)
         assert one.mappo | {"noise": 0} == whole.mappo | {"noise": 0}
         assert (one == whole) == (name == "mappo_v2")
+    assert load_recipe("shipped") == load_recipe("mappo_v3")
     calm = load_recipe("mappo_v2_calm")
     assert calm.episodes == whole.episodes.model_copy(update={"calm": 1.0})
     (tmp_path / "own.toml").write_text('title = "own"\nlike = "mappo_v2_calm"\nsteps = 7\n', encoding="utf-8")
