@@ -50,14 +50,15 @@ def robustness(
             help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
         ),
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder for results, page and picture.")] = Path("results/robustness"),
+    output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
 
     Each axis is one disturbance in five levels (uuv_marl/studies/robustness/axes.toml, with sources). The command
-    writes report.md (scores, critical severities, every cell), figures/severity.png and episodes.csv (a row for each
-    episode). Without --quick or --full it makes the report that ships in docs/robustness, in about two hours on
-    two cores. It needs the extra "analysis". Ctrl-C keeps the finished episodes, and the same command continues.
+    writes report.md (scores, critical severities, every cell), a picture of each scenario (in figures) and episodes.csv
+    (a row for each episode). Without --quick or --full it makes the report that ships in docs/robustness, in about two
+    hours on two cores. It needs the extra "analysis". Ctrl-C keeps the finished episodes, and the same command
+    continues.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """

@@ -1,4 +1,4 @@
-"""The picture: success over severity, a panel for every axis, a line for every policy and scenario."""
+"""A scenario's picture: success over severity, a panel for every axis, a line for every policy."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
@@ -13,7 +13,6 @@ from uuv_marl.benchmark.style import BLACK, COLOURS, legend, panels
 from uuv_marl.studies.robustness.axes import AXES, CALM, Axis
 from uuv_marl.studies.robustness.scores import ENOUGH, scored
 
-_LINES = ("-", "--", ":", "-.")
 _AGAIN = ((".", "-"), ("x", "--"), ("^", ":"))
 """Marker and line of the policies that come first, and of those for which no new colour is left."""
 _CROWD = 8
@@ -21,20 +20,16 @@ _CROWD = 8
 
 
 def draw(table: Any) -> Figure:
-    """The picture of a table of ``scores.by_seed``."""
+    """The picture of one scenario's rows of ``scores.by_seed``."""
     axes = [axis for name, axis in AXES.items() if name in table]
-    policies, scenarios = (list(table.index.unique(name)) for name in ("policy", "scenario"))
+    policies: list[str] = list(table.index.unique("policy"))
     looks = dict(zip(policies, itertools.product(_AGAIN * len(policies), COLOURS), strict=False))
-    lines = dict(zip(scenarios, _LINES * len(scenarios), strict=False))
-    intervals = len(policies) * len(scenarios) <= _CROWD
+    intervals = len(policies) <= _CROWD
     figure, fields = panels(len(axes) + 1, 5, (4.0, 2.9), sharey=True)
     for ax, axis in zip(fields, axes, strict=False):
-        for (scenario, policy), own in table.groupby(level=["scenario", "policy"], sort=False):
+        for policy, own in table.groupby(level="policy", sort=False):
             (marker, line), colour = looks[policy]
-            alone = len(scenarios) == 1
-            label = policy if alone else f"{policy}, {scenario}"
-            line = line if alone else lines[scenario]
-            _draw_line(ax, axis, own, intervals, marker=marker, color=colour, linestyle=line, label=label)
+            _draw_line(ax, axis, own, intervals, marker=marker, color=colour, linestyle=line, label=policy)
         ax.axhline(ENOUGH, color=BLACK, linestyle=":", linewidth=0.8, label=f"success of {ENOUGH:g}")
         ax.set_xticks([0, *axis.levels], axis.labels, fontsize=8, rotation=25 if max(map(len, axis.labels)) > 6 else 0)
         ax.set_xlabel(axis.unit, fontsize=8)
@@ -43,14 +38,14 @@ def draw(table: Any) -> Figure:
     for ax in fields[len(axes) :]:
         ax.set_axis_off()
     figure.supylabel("success: share of the healthy\nvehicles that are safe and done")
-    where = ", ".join(scenarios)
+    where = ", ".join(table.index.unique("scenario"))
     what = "mean over seeds" + " and its 95 % bootstrap interval" * intervals
     figure.suptitle(f"Success over severity on {where}:\n{what}")
     return legend(figure, fields[len(axes)])
 
 
 def _draw_line(ax: Axes, axis: Axis, own: Any, intervals: bool, **style: Any) -> None:
-    """A policy on a scenario: success at every level that was run, and perhaps its intervals."""
+    """A policy: success at every level that was run, and perhaps its intervals."""
     if axis.name not in own or CALM not in own:
         return
     cells = own[[CALM, axis.name]].dropna(axis="columns", how="all")

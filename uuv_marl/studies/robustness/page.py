@@ -36,12 +36,13 @@ _LEARNED: dict[str, tuple[frozenset[str], frozenset[int]]] = {
 
 
 def write_report(folder: Path) -> list[Path]:
-    """``report.md`` and its picture from the folder's ``EPISODES``; the paths, that of the page first."""
+    """``report.md`` and its pictures from the folder's ``EPISODES``; the paths, that of the page first."""
     episodes = read_episodes(folder / EPISODES)
     page = folder / "report.md"
     write_text(page, report(episodes))
     with house_style():
-        return [page, save(draw(by_seed(episodes)), folder / "figures" / "severity.png")]
+        scenarios = by_seed(episodes).groupby(level="scenario", sort=False)
+        return [page, *(save(draw(own), folder / _picture(name)) for name, own in scenarios)]
 
 
 def report(episodes: Any) -> str:
@@ -60,6 +61,11 @@ def report(episodes: Any) -> str:
             [(a.name, a.title, a.unit, a.labels[0], "; ".join(a.labels[1:]), a.source) for a in AXES.values()],
         ),
     )
+
+
+def _picture(scenario: str) -> str:
+    """Where a scenario's picture is, seen from the page."""
+    return f"figures/{scenario}.png"
 
 
 def _calm(scenarios: list[str]) -> str:
@@ -92,7 +98,7 @@ def _missing(episodes: Any) -> Iterator[str]:
 
 
 def _scenario(name: str, episodes: Any, table: Any) -> str:
-    """A scenario's tables."""
+    """A scenario's picture and tables."""
     policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
     star = " A star: trained with it." if any(_mark(name, "A1", 1) for name in policies) else ""
     parts = (
@@ -108,7 +114,9 @@ def _scenario(name: str, episodes: Any, table: Any) -> str:
          "faulty vehicles too." + star,
          _cells(episodes[episodes["scenario"] == name], policies)),
     )  # fmt: skip
-    return f"## {name}\n\n" + "\n".join(f"### {title}\n\n{words}\n\n{rows}" for title, words, rows in parts)
+    picture = f"![Success over severity on {name}]({_picture(name)})"
+    tables = "\n".join(f"### {title}\n\n{words}\n\n{rows}" for title, words, rows in parts)
+    return f"## {name}\n\n{picture}\n\n{tables}"
 
 
 def _groups(policies: dict[str, Any]) -> str:
