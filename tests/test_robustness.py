@@ -270,6 +270,16 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     assert before == [path.read_bytes() for path in page.write_report(tmp_path)]
 
 
+def test_the_page_says_which_policy_lacks_a_scenario(tmp_path):
+    path = job.run(tmp_path, TINY._replace(axes=("A1",), levels=(5,)), silent)
+    thrice = job.read_episodes(path).loc[[0, 1] * 3]
+    places = ("starter", "bio_inspired"), ("tracking", "bio_inspired"), ("starter", "scout")
+    scenarios, policies = zip(*(place for place in places for _ in range(2)), strict=True)
+    text = page.report(thrice.assign(scenario=scenarios, policy=policies))
+    assert "- Not run for `scout`: scenarios tracking." in text
+    assert "Not run for `bio_inspired`: scenarios" not in text
+
+
 @pytest.mark.parametrize(
     ("args", "message"),
     [

@@ -80,7 +80,10 @@ def _missing(episodes: Any) -> Iterator[str]:
         if absent := [str(one) for one in whole if one not in set(episodes[column])]:
             yield f"Not run: {column}s {', '.join(absent)} (of {', '.join(map(str, whole))})"
     absent, idle = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
+    scenarios = episodes["scenario"].unique()
     for policy, own in episodes.groupby("policy", sort=False):
+        if elsewhere := [name for name in scenarios if name not in set(own["scenario"])]:
+            yield f"Not run for `{policy}`: scenarios {', '.join(elsewhere)}"
         for name in AXES.keys() - set(own["axis"]):
             unused = policy.removeprefix("guarded:") in POLICIES and not AXES[name].concerns(policy)
             (idle if unused else absent)[name].append(f"`{policy}`")
