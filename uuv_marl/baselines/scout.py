@@ -15,12 +15,14 @@ from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.neighbours import KEPT_S, middle
+from uuv_marl.baselines.memory.response import lead
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.vehicle import project
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -49,6 +51,9 @@ class Gains(NamedTuple):
     """Factor of the force that follows the wished velocity [1]. Less is calmer, and bears actuators that lag."""
     kept_s: float = KEPT_S
     """For how long a neighbour is remembered that is heard no more [s]."""
+    lead: float = 0.0
+    """Share of its actuators' lag that a vehicle makes up for, by asking for more at first (``response.lead``) [1]. Not
+    with a rudder, whose angle is chosen later."""
 
 
 PLUS = Gains(
@@ -148,7 +153,7 @@ def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
     together, behind_m = share * _TRIM_PER_S * trims[1], share * _TRIM_M * trims[3]
     return Gains(
         g.pull * math.exp(pull), g.push * math.exp(push), g.push_range, g.pull_at_rest, g.push_at_rest,
-        max(g.together + together, 0.0), g.behind_m + behind_m, g.steering * math.exp(steering), g.kept_s,
+        max(g.together + together, 0.0), g.behind_m + behind_m, g.steering * math.exp(steering), g.kept_s, g.lead,
     )  # fmt: skip
 
 
@@ -229,6 +234,22 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
 
 
 @compiled
+def _lead(w: int, i: int, share: float, kept: Surroundings, action: Float32) -> None:
+    """Change an action so that it acts sooner where actuators lag.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        share: of the lag that is made up for.
+        kept: what is remembered.
+        action: shares of full thrust and torque, shape (world, vehicle, 2); the vehicle's are changed.
+    """
+    a_x, a_y = lead(w, i, 0, action[w, i, 0], share, kept), lead(w, i, 1, action[w, i, 1], share, kept)
+    a_x, a_y = project(a_x, a_y)
+    action[w, i, 0], action[w, i, 1] = a_x, a_y
+
+
+@compiled
 def decide_all(
     worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
     planes: Float64, trims: Float32, action: Float32,
@@ -259,3 +280,5 @@ def decide_all(
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, keep, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain * own.steering, limits, kept, action)
+                if g.lead > 0.0 and limits.helm == 0.0:
+                    _lead(w, i, g.lead, kept, action)
