@@ -10,6 +10,7 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.learned import forward
 from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
@@ -84,6 +85,29 @@ def test_mappo_v3_is_its_law_where_nothing_lags():
     law = "scout_plus,pull_at_rest=6,push_at_rest=3"
     np.testing.assert_allclose(actions("mappo_v3"), actions(law), rtol=0, atol=1e-4)
     assert np.abs(actions("mappo_v3", overrides=FEW | LAG) - actions(law, overrides=FEW | LAG)).max() > 0.1
+
+
+@pytest.mark.parametrize("trims", [ALL_TRIMS, ("steering",)], ids=["all", "steering"])
+@pytest.mark.parametrize("overrides", [FEW, FEW | LAG], ids=["calm", "lag"])
+def test_the_network_is_asked_only_where_its_output_counts(trims, overrides, tmp_path):
+    *first, last = actor(0.3)
+    columns = [ALL_TRIMS.index(name) for name in trims]
+    scenario = granted("scout", load_scenario("random_field", overrides=overrides))
+    card = Card(percept=rows_of(PerceptLayout.of(scenario)), features="memory", trims=trims)
+    save_checkpoint(tmp_path / WEIGHTS_FILE, card, [*first, Layer(last.weight[:, columns], last.bias[columns])])
+    swarm, policy, asked = Swarm(scenario), make(str(tmp_path), scenario), []
+    percept, features = swarm.reset(10_007), np.zeros((1, 12, RECALLED), np.float32)
+    for _ in range(100):
+        policy.hear(percept)
+        action = policy.decide(percept).copy()
+        asked.append(policy._heeded.mean())
+        policy.look(features)
+        everywhere = forward(policy.checkpoint.layers, features[0])[None]
+        np.testing.assert_array_equal(action, policy.trim(everywhere))
+        policy.acted(action, policy.active)
+        percept = swarm.step(action)
+    if trims == ("steering",):
+        assert (np.mean(asked) > 0.9) == (overrides != FEW), "hardly anybody's in calm water, nearly all where they lag"
 
 
 @pytest.mark.parametrize("trims", [[], ["steering", "steering"], ["thrust"]])
@@ -262,16 +286,19 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
     trainer = trainings.Trainer(settings(4))
     env = trainer.algorithm.env if algorithm == "mappo" else trainer.algorithm._vec_env.env
     swarm, acting = env._groups[0].swarm, env._groups[0].acting
-    policy = make(str(tmp_path / "whole" / "best"), swarm.scenario, swarm.num_worlds)
+    policy, seen = make(str(tmp_path / "whole" / "best"), swarm.scenario, swarm.num_worlds), 0
     for _ in range(10):
         percept = swarm.percept
         features = env.observation[env._rows[0], : env.features]
         used = policy.act(percept)
-        np.testing.assert_array_equal(policy._features.reshape(-1, RECALLED), features)
+        asked = policy._heeded.reshape(-1)
+        np.testing.assert_array_equal(policy._features.reshape(-1, RECALLED)[asked], features[asked])
+        seen += asked.sum()
         rows = np.zeros((env.rows, TRIMS), np.float32)
         rows[env._rows[0]] = policy._trims.reshape(-1, TRIMS)
         env.step(rows)
         np.testing.assert_array_equal(acting._policy.memory.action, used)
+    assert seen > 0
 
 
 @pytest.mark.needs("torch")

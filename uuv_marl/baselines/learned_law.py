@@ -12,10 +12,12 @@ from uuv_marl.baselines.checkpoint import Checkpoint
 from uuv_marl.baselines.learned import forward, need_same
 from uuv_marl.baselines.recall import RECALLED, recall
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, Scout, Trim
+from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, Scout, Trim, heeded
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.sim.arrays import Bool, Float32
+
+_STEERING = ALL_TRIMS.index("steering")
 
 
 class TrimmedLaw(Scout):
@@ -39,10 +41,17 @@ class TrimmedLaw(Scout):
         self.columns = [ALL_TRIMS.index(name) for name in trims]
         """Where the actor's output stands among all trims."""
 
-    def look(self, features: Float32) -> None:
-        """Fill the features of the memory that an actor sees, shape (world, vehicle, ``RECALLED``)."""
+    def look(self, features: Float32, rows: Bool | None = None) -> None:
+        """Fill the features of the memory that an actor sees.
+
+        Args:
+            features: filled, shape (world, vehicle, ``RECALLED``).
+            rows: the vehicles that are looked at, shape (world, vehicle); all of the running worlds unless given.
+        """
+        if rows is None:
+            rows = np.broadcast_to(self.active[:, None], features.shape[:2]).copy()
         recall(
-            self.active, self.scenario.swarm.num_vehicles, self.model.own.period_s, self.grown(), self.barrier,
+            rows, self.scenario.swarm.num_vehicles, self.model.own.period_s, self.grown(), self.barrier,
             self.limits, self.memory, self.planes, features,
         )  # fmt: skip
 
@@ -73,13 +82,14 @@ class LearnedLaw(TrimmedLaw):
         self.declare_as(card)
         super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety, trims=card.trims)
         need_same(self, card, any_vehicle)
-        self._features = np.zeros((*self._trims.shape[:2], RECALLED), np.float32)
+        worlds_and_vehicles = self._trims.shape[:2]
+        self._features = np.zeros((*worlds_and_vehicles, RECALLED), np.float32)
+        self._heeded = np.zeros(worlds_and_vehicles, np.bool_)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
-        """Actions of shape (world, vehicle, 2)."""
-        self.look(self._features)
-        acting = np.flatnonzero(self.active)
-        output = np.zeros((*self._trims.shape[:2], len(self.columns)), np.float32)
-        rows = self._features[acting].reshape(-1, RECALLED)
-        output[acting] = forward(self.checkpoint.layers, rows).reshape(len(acting), *output.shape[1:])
+        """Actions of shape (world, vehicle, 2). The network is asked only where its output counts."""
+        heeded(self.active, self.columns == [_STEERING], self.memory, self._heeded)
+        self.look(self._features, self._heeded)
+        output = np.zeros((*self._heeded.shape, len(self.columns)), np.float32)
+        output[self._heeded] = forward(self.checkpoint.layers, self._features[self._heeded])
         return self.trim(output)

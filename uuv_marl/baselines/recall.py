@@ -33,13 +33,13 @@ RECALLED = _OWN + 6 * NEIGHBOURS + 5 * SURFACES
 
 @compiled
 def recall(
-    worlds: Bool, num_vehicles: int, period: float, g: Gains, barrier: Barrier, limits: Limits, kept: Surroundings,
+    rows: Bool, num_vehicles: int, period: float, g: Gains, barrier: Barrier, limits: Limits, kept: Surroundings,
     planes: Float64, features: Float32,
 ) -> None:  # fmt: skip
-    """Fill the features of every vehicle: its motion, l(t), the hand-made law's wish, who and what is near.
+    """Fill the features of vehicles: their motion, l(t), the hand-made law's wish, who and what is near.
 
     Args:
-        worlds: those that run, shape (world,).
+        rows: the vehicles, shape (world, vehicle).
         num_vehicles: of the swarm.
         period: between two decisions [s].
         g: gains of the hand-made law.
@@ -51,7 +51,7 @@ def recall(
     """
     for w in range(features.shape[0]):
         for i in range(features.shape[1]):
-            if worlds[w]:
+            if rows[w, i]:
                 features[w, i, :] = 0.0
                 if kept.begun[w, i] > 0.0:
                     features[w, i, _OWN - 1] = 0.5 * math.sqrt(num_vehicles / NOMINAL_VEHICLES)

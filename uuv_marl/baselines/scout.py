@@ -174,6 +174,24 @@ def widened(by: Barrier, trims: Float32, share: float) -> Barrier:
 
 
 @compiled
+def heeded(worlds: Bool, steering_alone: bool, kept: Surroundings, out: Bool) -> None:
+    """Whose trims count at all: steering where actuators lag, all others where a vehicle doubts.
+
+    Args:
+        worlds: those that run, shape (world,).
+        steering_alone: whether steering is all that is trimmed.
+        kept: what vehicles remember.
+        out: filled, shape (world, vehicle).
+    """
+    for w in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            out[w, i] = False
+            if worlds[w] and kept.begun[w, i] > 0.0:
+                lags, share = doubt(w, i, kept)
+                out[w, i] = lags > 0.0 or (share > 0.0 and not steering_alone)
+
+
+@compiled
 def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
     """The velocity that a vehicle wishes where there are no obstacles, in its map [m/s].
 

@@ -115,7 +115,7 @@ def _by_law(g: Translator, policy: Scout, memory: Surroundings) -> Ref:
     planes, trims = g.zeros(policy.planes.shape), g.zeros((1, 1, policy.num_trims), single=True)
     if isinstance(policy, LearnedLaw):
         features = g.zeros((1, 1, RECALLED), single=True)
-        g.call(recall, _ONE, policy.scenario.swarm.num_vehicles, *by, memory, planes, features)
+        g.call(recall, _ONE[None], policy.scenario.swarm.num_vehicles, *by, memory, planes, features)
         seen = Value(g, g.tensors[features.cells]).single().shaped(1, RECALLED)
         output = forward_nodes(g, seen, policy.checkpoint.layers)
         bounds = (np.array(bound, np.float32) for bound in (-MOST_TRIM, MOST_TRIM))
