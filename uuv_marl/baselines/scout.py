@@ -60,6 +60,8 @@ PLUS = Gains(
     pull=0.04, push_range=15.0, pull_at_rest=10.0, push_at_rest=6.0, together=0.04, behind_m=1.0, kept_s=2.0
 )  # fmt: skip
 """Gains of ``ScoutPlus``, found by hand, a gain at a time, on tuning seeds of random fields and ``single_obstacle``."""
+LEAD = PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0, kept_s=3.0, lead=1.0)
+"""Gains of ``ScoutLead``, found in the same way, in a disturbed sea too."""
 
 Trim = Literal["pull", "together", "push", "behind_m", "steering", "neighbour_m"]
 """A number of a vehicle that an actor may change: one of five gains (``trimmed``), or the distance kept from neighbours
@@ -86,6 +88,8 @@ class Scout(Filtered):
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
+    usual: ClassVar[Gains] = Gains()
+    """The gains, unless others are given."""
     num_trims: ClassVar[int] = 0
     """Changes of each vehicle's numbers."""
 
@@ -93,7 +97,7 @@ class Scout(Filtered):
         self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
     ) -> None:
         super().__init__(scenario, num_worlds, barrier or Barrier())
-        self.gains = gains or Gains()
+        self.gains = gains or self.usual
         self._growth = growth(scenario.swarm.num_vehicles)
         self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, self.num_trims), np.float32)
 
@@ -130,10 +134,16 @@ class ScoutPlus(Scout):
     Arguments as for ``Scout``.
     """
 
-    def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
-    ) -> None:
-        super().__init__(scenario, num_worlds, gains=gains or PLUS, barrier=barrier)
+    usual = PLUS
+
+
+class ScoutLead(Scout):
+    """``scout_plus`` that makes up for actuators that lag, as far as a vehicle sees it, with weaker gains at rest.
+
+    Arguments as for ``Scout``.
+    """
+
+    usual = LEAD
 
 
 @compiled
