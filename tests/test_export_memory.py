@@ -32,6 +32,7 @@ ROUGH = CALM | {
     "sonar.echo_reports": "surface", "noise.bearing_deg": 2.0, "noise.range_share": 0.02, "current.speed_mps": 0.5,
     "noise.silence_probability": 0.05, "noise.silence_readings": 5, "timing.decision_period_s": 0.2,
 }  # fmt: skip
+LAGGING = {"actuators.thrust_lag_s": 0.3, "actuators.yaw_lag_s": 0.3}
 TORPEDO = CALM | {
     "vehicle.Y_uv": -60.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "actuators.max_astern_n": 100.0,
     "timing.decision_period_s": 0.2,
@@ -80,12 +81,14 @@ def of_memory(folder, scale, trims=ALL_TRIMS):
     [
         *((name, overrides) for name in ("scout", "memory", "guarded:mappo") for overrides in (CALM, ROUGH)),
         ("steering", ROUGH),
+        ("scout_lead", ROUGH | LAGGING),
         ("scout", TORPEDO),
         ("scout", RUDDER),
     ],
     ids=[
         *(f"{name}-{sea}" for name in ("scout", "memory", "mappo") for sea in ("calm", "rough")),
         "steering",
+        "lead",
         "lift",
         "rudder",
     ],
@@ -105,7 +108,8 @@ def test_it_remembers_and_acts_as_the_policy_does(name, overrides, tmp_path):
         wanted = made.act(percept)
         np.testing.assert_allclose(model.act(percept.to_observation()[0]), wanted[0], rtol=0, atol=1e-5)
         percept = swarm.step(wanted)
-    within = 1e-8 if name == "scout" else 1e-3  # networks round otherwise, and vehicles reckon from their actions
+    # Networks round otherwise, and vehicles reckon from their actions.
+    within = 1e-8 if name.startswith("scout") else 1e-3
     for part, array in made.memory._asdict().items():
         np.testing.assert_allclose(model.kept[KEPT + part], array[0], rtol=0, atol=within, err_msg=part)
     assert (made.memory.score[0] > 0.0).any(), "discs are remembered"

@@ -11,7 +11,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import age_of
-from uuv_marl.baselines.memory.response import follow, lead, remains
+from uuv_marl.baselines.memory.response import follow, remains
 from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
@@ -130,22 +130,6 @@ def test_what_remains_is_found_from_any_actions(a, share, drift, seed):
         assert found == pytest.approx(a, abs=1e-3)
     assert found >= a - 1e-3
     assert remains(0, 0, 0, kept) == 0.0, "the other component"
-
-
-@given(a=st.floats(0.0, 0.9), wished=st.floats(-0.5, 0.5), share=st.floats(0.0, 1.0), seed=st.integers(0, 99))
-def test_with_a_lead_what_is_wished_acts_at_once(a, wished, share, seed):
-    """f = c + a (f - c), for actions c that show what remains, and then one decision that makes up for it."""
-    kept, (rng, acted) = room(), (np.random.default_rng(seed), 0.0)
-    for asked in rng.uniform(-1.0, 1.0, 400):
-        acted = asked + a * (acted - asked)
-        follow(0, 0, 1, asked, acted - asked, 0.01, kept)
-    asked = lead(0, 0, 1, wished, share, kept)
-    assert abs(asked) <= 1.0
-    left = a * (1.0 - share) / (1.0 - a * share)  # of the difference, where a share of the lag is made up for
-    if abs(asked) < 1.0:
-        assert asked + a * (acted - asked) == pytest.approx(wished + left * (acted - wished), abs=0.02)
-    assert lead(0, 0, 1, wished, 0.0, kept) == pytest.approx(wished, abs=1e-12)
-    assert lead(0, 0, 0, wished, share, kept) == pytest.approx(wished, abs=1e-12), "the other component does not lag"
 
 
 def room():

@@ -41,6 +41,8 @@ class Limits(NamedTuple):
     X_uu: float
     helm: float
     """Sideways force over the sine of the angle to a wished velocity [N] that a rudder makes good; 0 without one."""
+    yaw_damping: float
+    """The inner loop's torque, as a share of the full one, over the yaw rate [s]."""
 
     @staticmethod
     def of(scenario: Scenario) -> "Limits":
@@ -49,7 +51,7 @@ class Limits(NamedTuple):
         helm = actuators.max_torque_nm / actuators.lever_arm_m / FULL_RUDDER
         return Limits(
             actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, vehicle.X_u, vehicle.X_uu,
-            helm if actuators.kind == "rudder" else 0.0,
+            helm if actuators.kind == "rudder" else 0.0, actuators.yaw_damping_nms / actuators.max_torque_nm,
         )  # fmt: skip
 
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
+from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.neighbours import KEPT_S, middle
-from uuv_marl.baselines.memory.response import lead
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
 from uuv_marl.percept import Percept
@@ -52,8 +52,8 @@ class Gains(NamedTuple):
     kept_s: float = KEPT_S
     """For how long a neighbour is remembered that is heard no more [s]."""
     lead: float = 0.0
-    """Share of its actuators' lag that a vehicle makes up for, by asking for more at first (``response.lead``) [1]. Not
-    with a rudder, whose angle is chosen later."""
+    """Share of its actuators' lag and weakness that a vehicle makes up for, as it sees them (``memory.actuators``) [1].
+    Not with a rudder, whose angle is chosen later."""
 
 
 PLUS = Gains(
@@ -262,18 +262,21 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
 
 
 @compiled
-def _lead(w: int, i: int, share: float, kept: Surroundings, action: Float32) -> None:
-    """Change an action so that it acts sooner where actuators lag.
+def _lead(w: int, i: int, share: float, limits: Limits, kept: Surroundings, action: Float32) -> None:
+    """Change an action so that it acts in spite of actuators that lag or are weak.
 
     Args:
         w: index of the world.
         i: index of the vehicle.
-        share: of the lag that is made up for.
+        share: of lag and weakness that is made up for.
+        limits: of the actuators.
         kept: what is remembered.
         action: shares of full thrust and torque, shape (world, vehicle, 2); the vehicle's are changed.
     """
-    a_x, a_y = lead(w, i, 0, action[w, i, 0], share, kept), lead(w, i, 1, action[w, i, 1], share, kept)
-    a_x, a_y = project(a_x, a_y)
+    damping = limits.yaw_damping * kept.motion[w, i, 2]
+    torque = lead(w, i, 1, min(max(action[w, i, 1] - damping, -1.0), 1.0), share, kept) + damping
+    thrust = lead(w, i, 0, float(action[w, i, 0]), share, kept)
+    a_x, a_y = project(thrust, min(max(torque, -1.0), 1.0))
     action[w, i, 0], action[w, i, 1] = a_x, a_y
 
 
@@ -309,4 +312,4 @@ def decide_all(
                 num = planes_of(w, i, period, keep, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain * own.steering, limits, kept, action)
                 if g.lead > 0.0 and limits.helm == 0.0:
-                    _lead(w, i, g.lead, kept, action)
+                    _lead(w, i, g.lead, limits, kept, action)

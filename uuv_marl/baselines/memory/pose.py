@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.memory.actuators import identify
 from uuv_marl.baselines.memory.response import follow
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
@@ -144,8 +145,12 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
     speed, half = math.hypot(v_x, v_y), 0.5 * own.period_s
     x, y, psi, u, v, r = reckoned(motion, kept.action[w, i], own)
     wrong = see.yaw_rate[w, i, 0] - r
-    follow(w, i, 0, kept.action[w, i, 0], (see.velocity[w, i, 0] - u) / own.surge, own.period_s, kept)
-    follow(w, i, 1, kept.action[w, i, 1], wrong / own.yaw, own.period_s, kept)
+    surge_off, yaw_off = (see.velocity[w, i, 0] - u) / own.surge, wrong / own.yaw
+    follow(w, i, 0, kept.action[w, i, 0], surge_off, own.period_s, kept)
+    follow(w, i, 1, kept.action[w, i, 1], yaw_off, own.period_s, kept)
+    torque = kept.action[w, i, 1] - own.plant.yaw_damping / own.plant.max_torque * motion[2]
+    identify(w, i, 0, kept.action[w, i, 0], surge_off, own.period_s, kept)
+    identify(w, i, 1, min(max(torque, -1.0), 1.0), yaw_off, own.period_s, kept)
     turn_c, turn_s = cos_sin(psi + half * wrong)
     c, s = to_map_axes(turn_c, turn_s, pose)
     moves, moved = speed > _MOVES_MPS, math.hypot(at[2], at[3]) > 0.0

@@ -16,9 +16,6 @@ _KEPT_S = 5.0
 """Time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg."""
 _NOTHING = 0.01
 """Squared changes of an action, summed, that are too small to say anything: one of a tenth, a hundred of 1 %."""
-_MOST_LEFT = 0.95
-"""A share that remains is made up for as if it were no larger [1]. Assumed: 20 times the change is more than actuators
-can mostly give."""
 
 
 @compiled
@@ -55,22 +52,3 @@ def remains(w: int, i: int, axis: int, kept: Surroundings) -> float:
     """
     at = kept.response[w, i, axis]
     return min(max(at[PRODUCTS] / (at[SQUARES] + _NOTHING), 0.0), 1.0)
-
-
-@compiled
-def lead(w: int, i: int, axis: int, asked: float, share: float, kept: Surroundings) -> float:
-    """What to ask of a component so that what acts comes to ``asked`` sooner: a lead compensator, -1 to 1.
-
-    Where a share s of the difference between what acts, f, and what is asked, a, remains after a period, asking for
-    f + (a - f) / (1 - s) lets a act after it, as far as the actuators' limits allow.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        axis: 0 thrust, 1 torque.
-        asked: the share of full thrust or torque that is to act.
-        share: of the lag that is made up for: 0 asks for ``asked`` itself, 1 makes up for all that the vehicle sees.
-        kept: what is remembered.
-    """
-    acts, left = kept.response[w, i, axis, ACTED], min(share * remains(w, i, axis, kept), _MOST_LEFT)
-    return min(max(acts + (asked - acts) / (1.0 - left), -1.0), 1.0)

@@ -1,0 +1,105 @@
+"""How a vehicle's actuators answer, as it identifies it from its own motion, and what to ask for to make up for it.
+
+A component is thrust, or torque with the inner loop's. It follows what is asked, g, with a lag T, and a share s of it
+comes: F' = (s g - F) / T, all as shares of full thrust or torque. With e = exp(-period / T), and m for the mean of
+exp(-t / T) over a period, the means f of F over two periods that follow one another obey
+
+    f_k = e f_(k-1) + s (1 - m) g_k + s (m - e) g_(k-1).
+
+The three coefficients follow from recursive least squares with exponential forgetting (Ljung, System identification,
+1999, section 11.2) on what changes from one decision to the next, so that what is constant (a current, drag that is
+off) does not count. A regularization keeps them at those of actuators that answer at once, unless more is seen.
+"""
+
+import math
+
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.sim.compiled import compiled
+
+ASKED, ACTED, ASKED_BEFORE, ACTED_BEFORE, SQUARES, PRODUCTS = 0, 1, 2, 3, 4, 10
+"""Columns of ``Surroundings.actuators``: g and f of the latest period and of that before, six sums of products of the
+regressors (f_(k-1), g_k, g_(k-1)), and three of the regressors with f_k - g_k."""
+_KEPT_S = 5.0
+"""Time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg."""
+_NOTHING = 1e-3
+"""Squared changes, summed, that are too small to say anything: one of 3 % of full thrust or torque."""
+_LONGEST = 0.97
+"""Bound of e. Assumed: a lag of 3 s at a decision every 0.1 s, which no actuator of the catalogue has."""
+_LEAST, _MOST = 0.05, 1.5
+"""Bounds of s. Assumed: what is as weak as 5 % can't be made up for."""
+
+
+@compiled
+def identify(w: int, i: int, axis: int, asked: float, off: float, period: float, kept: Surroundings) -> None:
+    """Take what one period showed of a component into the estimate.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        axis: 0 thrust, 1 torque.
+        asked: the share that was asked for, with the inner loop's.
+        off: by how much more the motion shows, as a share of full thrust or torque.
+        period: between two decisions [s].
+        kept: what is remembered; actuators is brought up to date.
+    """
+    at = kept.actuators[w, i, axis]
+    f, g, h = at[ACTED] - at[ACTED_BEFORE], asked - at[ASKED], at[ASKED] - at[ASKED_BEFORE]
+    y = off - (at[ACTED] - at[ASKED])
+    share = max(1.0 - period / _KEPT_S, 0.0)
+    at[SQUARES] = share * at[SQUARES] + f * f
+    at[SQUARES + 1] = share * at[SQUARES + 1] + f * g
+    at[SQUARES + 2] = share * at[SQUARES + 2] + f * h
+    at[SQUARES + 3] = share * at[SQUARES + 3] + g * g
+    at[SQUARES + 4] = share * at[SQUARES + 4] + g * h
+    at[SQUARES + 5] = share * at[SQUARES + 5] + h * h
+    at[PRODUCTS] = share * at[PRODUCTS] + f * y
+    at[PRODUCTS + 1] = share * at[PRODUCTS + 1] + g * y
+    at[PRODUCTS + 2] = share * at[PRODUCTS + 2] + h * y
+    at[ACTED_BEFORE], at[ASKED_BEFORE] = at[ACTED], at[ASKED]
+    at[ACTED], at[ASKED] = asked + off, asked
+
+
+@compiled
+def answer(w: int, i: int, axis: int, kept: Surroundings) -> tuple[float, float]:
+    """What remains of a difference after a period, e, and the share of what is asked that comes, s; 0 and 1 at first.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        axis: 0 thrust, 1 torque.
+        kept: what is remembered.
+    """
+    at = kept.actuators[w, i, axis]
+    d_0 = at[SQUARES] + _NOTHING  # L D L' of the sums
+    l_1, l_2 = at[SQUARES + 1] / d_0, at[SQUARES + 2] / d_0
+    d_1 = at[SQUARES + 3] + _NOTHING - l_1 * at[SQUARES + 1]
+    between = at[SQUARES + 4] - l_1 * at[SQUARES + 2]
+    l_3 = between / d_1
+    d_2 = at[SQUARES + 5] + _NOTHING - l_2 * at[SQUARES + 2] - l_3 * between
+    y_1 = at[PRODUCTS + 1] - l_1 * at[PRODUCTS]
+    y_2 = at[PRODUCTS + 2] - l_2 * at[PRODUCTS] - l_3 * y_1
+    c_2 = y_2 / d_2
+    c_1 = (y_1 - between * c_2) / d_1
+    e = (at[PRODUCTS] - at[SQUARES + 1] * c_1 - at[SQUARES + 2] * c_2) / d_0
+    e = min(max(e, 0.0), _LONGEST)
+    return e, min(max((1.0 + c_1 + c_2) / (1.0 - e), _LEAST), _MOST)
+
+
+@compiled
+def lead(w: int, i: int, axis: int, wanted: float, share: float, kept: Surroundings) -> float:
+    """What to ask of a component so that what is wanted acts at the end of the period: the answer, inverted.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        axis: 0 thrust, 1 torque.
+        wanted: share of full thrust or torque, with the inner loop's.
+        share: of the change that is made: 0 asks for what is wanted, 1 for what makes up for lag and weakness.
+        kept: what is remembered.
+    """
+    at = kept.actuators[w, i, axis]
+    e, s = answer(w, i, axis, kept)
+    m = (1.0 + 4.0 * math.sqrt(e) + e) / 6.0  # Simpson's rule for the mean of exp(-t / T)
+    acts = s * at[ASKED] + (at[ACTED] - s * at[ASKED]) * e / m
+    asked = (wanted - e * acts) / max(s * (1.0 - e), 1.0 - _LONGEST)
+    return wanted + share * (min(max(asked, -1.0), 1.0) - wanted)
