@@ -43,10 +43,11 @@ def test_lag_and_weakness_of_actuators_are_identified_from_any_actions(lag_s, sh
     rng, component = np.random.default_rng(seed), Component(lag_s, share, drift)
     for asked in rng.uniform(-1.0, 1.0, 200):
         component.step(asked)
-    e, found = answer(0, 0, 1, component.kept)
+    e, found, at_once = answer(0, 0, 1, component.kept)
     assert e == pytest.approx(component.e, abs=0.05)
     assert found * (1.0 - e) == pytest.approx(share * (1.0 - component.e), abs=0.03)
-    assert answer(0, 0, 0, component.kept) == (0.0, 1.0), "the other component"
+    assert at_once == pytest.approx(share * (1.0 - component.mean), abs=0.03)
+    assert answer(0, 0, 0, component.kept) == (0.0, 1.0, 1.0), "the other component"
 
 
 @given(lag_s=LAGS, share=SHARES, wanted=st.floats(-0.5, 0.5), seed=st.integers(0, 99))
@@ -57,7 +58,7 @@ def test_with_a_lead_what_is_wanted_acts_after_one_period(lag_s, share, wanted, 
     asked = lead(0, 0, 1, wanted, 1.0, component.kept)
     assert abs(asked) <= 1.0
     component.step(asked)
-    if abs(asked) < 1.0:
+    if abs(asked) < 1.0 and answer(0, 0, 1, component.kept)[2] < 0.7:
         assert component.acts == pytest.approx(wanted, abs=0.02)
     assert lead(0, 0, 1, wanted, 0.0, component.kept) == wanted, "no lead asks for what is wanted"
 

@@ -25,6 +25,9 @@ _NOTHING = 1e-3
 """Squared changes, summed, that are too small to say anything: one of 3 % of full thrust or torque."""
 _LONGEST = 0.97
 """Bound of e. Assumed: a lag of 3 s at a decision every 0.1 s, which no actuator of the catalogue has."""
+_MISSING = 0.3
+"""Where so much of what is asked does not come at once, the correction counts fully [1]. Assumed: nothing is missing in
+a current (0.97 to 1.05 come at once, on a tuning field), and a lag of 0.1 s leaves 0.6."""
 _LEAST, _MOST = 0.05, 1.5
 """Bounds of s. Assumed: what is as weak as 5 % can't be made up for."""
 
@@ -60,8 +63,10 @@ def identify(w: int, i: int, axis: int, asked: float, off: float, period: float,
 
 
 @compiled
-def answer(w: int, i: int, axis: int, kept: Surroundings) -> tuple[float, float]:
-    """What remains of a difference after a period, e, and the share of what is asked that comes, s; 0 and 1 at first.
+def answer(w: int, i: int, axis: int, kept: Surroundings) -> tuple[float, float, float]:
+    """What remains of a difference after a period, e; the share of what is asked that comes, s, and that comes at once.
+
+    They are 0, 1 and 1 at first.
 
     Args:
         w: index of the world.
@@ -82,12 +87,14 @@ def answer(w: int, i: int, axis: int, kept: Surroundings) -> tuple[float, float]
     c_1 = (y_1 - between * c_2) / d_1
     e = (at[PRODUCTS] - at[SQUARES + 1] * c_1 - at[SQUARES + 2] * c_2) / d_0
     e = min(max(e, 0.0), _LONGEST)
-    return e, min(max((1.0 + c_1 + c_2) / (1.0 - e), _LEAST), _MOST)
+    return e, min(max((1.0 + c_1 + c_2) / (1.0 - e), _LEAST), _MOST), 1.0 + c_1
 
 
 @compiled
 def lead(w: int, i: int, axis: int, wanted: float, share: float, kept: Surroundings) -> float:
     """What to ask of a component so that what is wanted acts at the end of the period: the answer, inverted.
+
+    It counts as far as less than all comes at once. Where all does, a slowly changing current looks like a lag.
 
     Args:
         w: index of the world.
@@ -98,8 +105,9 @@ def lead(w: int, i: int, axis: int, wanted: float, share: float, kept: Surroundi
         kept: what is remembered.
     """
     at = kept.actuators[w, i, axis]
-    e, s = answer(w, i, axis, kept)
+    e, s, at_once = answer(w, i, axis, kept)
     m = (1.0 + 4.0 * math.sqrt(e) + e) / 6.0  # Simpson's rule for the mean of exp(-t / T)
     acts = s * at[ASKED] + (at[ACTED] - s * at[ASKED]) * e / m
     asked = (wanted - e * acts) / max(s * (1.0 - e), 1.0 - _LONGEST)
-    return wanted + share * (min(max(asked, -1.0), 1.0) - wanted)
+    counts = share * min(max(1.0 - at_once, 0.0) / _MISSING, 1.0)
+    return wanted + counts * (min(max(asked, -1.0), 1.0) - wanted)
