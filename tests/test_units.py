@@ -25,7 +25,7 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.shaping import in_si_units, overrides_for
 
 POLICIES = (
-    "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "sff", "sdc", "apf", "olfati_saber", "orca_informed",
+    "bio_inspired", "bio_inspired_plus", "scout", "sff", "sdc", "apf", "olfati_saber", "orca_informed",
     "pull", "mappo", "guarded:bio_inspired_plus", "guarded:mappo",
 )  # fmt: skip
 RUDDER = {
@@ -33,6 +33,7 @@ RUDDER = {
     "actuators.Y_uud": 100.0, "actuators.N_uud": -90.0, "actuators.rudder_max_deg": 20.0,
     "actuators.max_astern_n": 100.0, "arrival.by": "passage",
 }  # fmt: skip
+LAGGING = {"actuators.thrust_lag_s": 0.25, "actuators.yaw_lag_s": 0.25, "actuators.yaw_authority": 0.5}
 SHORT = {"random_field.legs": [1, 1], "random_field.leg_length_m": [250.0, 250.0]}
 
 
@@ -46,7 +47,9 @@ def alike(scenario, length, speed, force):
 
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 16.0), (0.5, 2.0, 1.0), (4.0, 0.5, 0.25)])
-@pytest.mark.parametrize(("policy", "vehicle"), [*((name, {}) for name in POLICIES), ("scout", RUDDER)])
+@pytest.mark.parametrize(
+    ("policy", "vehicle"), [*((name, {}) for name in POLICIES), ("scout_lead", LAGGING), ("scout", RUDDER)]
+)
 def test_a_vehicle_that_is_alike_swims_alike_bit_for_bit(policy, vehicle, scale):
     """By powers of two, so that nothing is rounded otherwise: the same places over L and velocities over V."""
     plain = load_scenario("random_field", num_vehicles=9, overrides={**SHORT, **vehicle})
