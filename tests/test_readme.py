@@ -18,6 +18,8 @@ from uuv_marl.studies.heldout.episodes import read_episodes, select
 from uuv_marl.studies.heldout.targets import later
 from uuv_marl.studies.paper.ledger import read_ledger
 from uuv_marl.studies.reproduce import NAMES
+from uuv_marl.studies.robustness import job
+from uuv_marl.studies.robustness.scores import EVERY, by_seed, group_score
 
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
@@ -87,6 +89,12 @@ def earlier():
     return value
 
 
+def strongest():
+    """The policy with the highest score over all groups of disturbances."""
+    policies = by_seed(job.read_episodes(DOCS / "robustness" / job.EPISODES)).groupby(level="policy")
+    return max(policies, key=lambda pair: group_score(pair[1], EVERY).value)[0]
+
+
 def hostile():
     rows = re.findall(r"^\| [a-z ]+ \| (\d+) \| \d+ \| \d+ \|", (DOCS / "reliability.md").read_text(), re.M)
     return round(sum(map(int, rows)), -3)
@@ -122,6 +130,10 @@ CLAIMS = {
     "mappo_v3, held out": lambda: (
         f"Two trainings of [`mappo_v3`](docs/mappo.md#card-of-mappo_v3) do the same {earlier()} s earlier."
         * all(outcome(name) == (1000, 1000, 0) for name in TRAININGS)
+    ),
+    "scout_lead, disturbed": lambda: (
+        "[`scout_lead`](docs/guarded.md#scout_lead) has the highest score in the robustness suite:"
+        * (strongest() == "scout_lead")
     ),
     "passive arrays": lambda: (
         f"positions from passive arrays at up to "
