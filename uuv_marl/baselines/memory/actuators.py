@@ -27,7 +27,7 @@ _LONGEST = 0.97
 """Bound of e. Assumed: a lag of 3 s at a decision every 0.1 s, which no actuator of the catalogue has."""
 _MISSING = 0.3
 """Where so much of what is asked does not come at once, the correction counts fully [1]. Assumed: nothing is missing in
-a current (0.97 to 1.05 come at once, on a tuning field), and a lag of 0.1 s leaves 0.6."""
+a current (0.97 to 1.05 come at once, on a tuning field), and 0.63 with a lag of 0.1 s."""
 _LEAST, _MOST = 0.05, 1.5
 """Bounds of s. Assumed: what is as weak as 5 % can't be made up for."""
 
