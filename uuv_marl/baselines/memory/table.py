@@ -25,7 +25,7 @@ class Surroundings(NamedTuple):
         Float64, "world vehicle 2 5", "How its thrust and its torque follow its actions: see ``memory.response``."
     ]
     actuators: Annotated[
-        Float64, "world vehicle 2 13", "The same, identified with the inner loop's torque: see ``memory.actuators``."
+        Float64, "world vehicle 2 13", "How thrust, and torque with the inner loop's, lag: see ``memory.actuators``."
     ]
     reference: Annotated[Float64, "world vehicle 4", "Place of l(t) [m], unit vector of its leg, 0 where it rests."]
     reference_speed: Annotated[Float64, "world vehicle", "Speed of l(t) [m/s]."]
