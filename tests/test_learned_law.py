@@ -12,11 +12,11 @@ from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
 from uuv_marl.baselines.learned import forward
 from uuv_marl.baselines.learned_law import TrimmedLaw
-from uuv_marl.baselines.memory.doubt import doubt
+from uuv_marl.baselines.memory.doubt import doubt, say
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, trimmed, widened
+from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, trimmed, wary, widened
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -149,6 +149,48 @@ def test_old_readings_do_not_make_a_vehicle_steer_softly(saved):
     moves, whole = np.mean(doubts, axis=(0, 1))
     assert moves < 0.05
     assert whole > 0.4
+
+
+@pytest.mark.parametrize(("noise_deg", "least", "most"), [(0.0, 0.9, 1.0), (10.0, 0.0, 0.1)], ids=["exact", "noisy"])
+def test_who_makes_up_for_its_lag_steers_softly_only_where_it_hears_well(noise_deg, least, most):
+    rough = LAG | {"noise.bearing_deg": noise_deg}
+    scenario = granted("scout_lead", load_scenario("random_field", num_vehicles=20, overrides=rough))
+    swarm, policy, told = Swarm(scenario), make("scout_lead", scenario), []
+    percept = swarm.reset(10_007)
+    for k in range(300):
+        percept = swarm.step(policy.act(percept))
+        if k > 100:
+            told += [
+                [*say(0, i, lead, policy.memory), *doubt(0, i, policy.memory)] for i in range(20) for lead in (0, 1)
+            ]
+    without, made_up = np.array(told[::2]), np.array(told[1::2])
+    np.testing.assert_array_equal(without[:, :2], without[:, 2:])
+    np.testing.assert_array_equal(made_up[:, 1], made_up[:, 3])
+    assert least <= made_up[:, 0].sum() / made_up[:, 2].sum() <= most
+
+
+def test_who_does_not_doubt_has_the_gains_of_the_law():
+    law = Gains(pull_in_doubt=-0.3, push_in_doubt=0.7)
+    assert wary(law, 0.0) == law
+    assert wary(law, 1.0) == law._replace(pull=law.pull * math.exp(-0.3), push=law.push * math.exp(0.7))
+
+
+@pytest.mark.parametrize(("noise_deg", "least", "most"), [(0.0, 0.7, 1.3), (5.0, 0.0, 0.5)], ids=["exact", "noisy"])
+def test_who_doubts_keeps_farther_from_others_where_it_is_told_to(noise_deg, least, most):
+    """How often a neighbour is nearer than 10 m, beside the law without; 0.95 and 0.11 to 0.14 on three seeds."""
+    overrides = {"noise.bearing_deg": noise_deg}
+    near = []
+    for push in (0.0, 1.1):
+        law = f"scout_lead,push_in_doubt={push}"
+        scenario = granted(law, load_scenario("single_obstacle", overrides=overrides))
+        swarm, policy, spacings = Swarm(scenario), make(law, scenario), []
+        percept = swarm.reset(10_007)
+        for k in range(600):
+            percept = swarm.step(policy.act(percept))
+            if k > 200:
+                spacings.append(swarm.facts.spacing.copy())
+        near.append(np.mean(np.array(spacings) < 10.0))
+    assert least <= near[1] / near[0] <= most
 
 
 def test_a_run_depends_on_its_seed_alone(saved):

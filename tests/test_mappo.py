@@ -129,6 +129,14 @@ def test_values_of_a_steady_income(cut_off, values):
     assert values[0] * 0.95 < value < values[1] * 1.05
 
 
+def test_an_actor_begins_with_the_outputs_that_it_is_given():
+    observation = np.random.default_rng(1).standard_normal((20, 2), np.float32)
+    for first in ((), (0.2, -0.15)):
+        by = dataclasses.replace(TINY, first_outputs=first)
+        action = Learner(2, 3, 2, by, np.random.default_rng(0)).act(observation)
+        np.testing.assert_allclose(action, np.broadcast_to(first or (0.0, 0.0), (20, 2)), rtol=0, atol=0.05)
+
+
 def test_a_new_scale_of_returns_keeps_values():
     learner = Learner(2, 3, 2, TINY, np.random.default_rng(0))
     observation = np.random.default_rng(1).standard_normal((20, 3), np.float32)

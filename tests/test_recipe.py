@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import load_checkpoint
-from uuv_marl.baselines.scout import PLUS
+from uuv_marl.baselines.scout import LEAD, PLUS
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 from uuv_marl.sim.swarm import Swarm
@@ -130,6 +130,8 @@ def test_a_recipe_can_choose_the_last_policy(tmp_path):
         ("mappo_v2_calm", 0, "mappo_v2_calm"),
         ("mappo_v3", 0, "mappo_v3"),
         ("mappo_v3", 1, "mappo_v3_seed1"),
+        ("mappo_v4", 0, "mappo_v4"),
+        ("mappo_v4", 1, "mappo_v4_seed1"),
     ],
 )
 def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
@@ -137,12 +139,13 @@ def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
 
     told = json.loads(json.dumps(dataclasses.asdict(load_recipe(recipe).settings(seed))))
     card = POLICIES[name].checkpoint.card
-    # It was chosen by hand what the recipe says since; the filter's margins, the trims and a law's lead had no field.
+    # It was chosen by hand what the recipe says since; some numbers had no field.
     said = {"chosen": "last", "safety": list(card.safety), "trims": list(card.trims), **card.training}
-    said["law"] = list(card.law)
+    said |= {"law": list(card.law), "algorithm": {"first_outputs": [], **card.training["algorithm"]}}
     assert {field: said[field] for field in told} == told
-    at_rest = {} if recipe.startswith("mappo_v2") else {"pull_at_rest": 6.0, "push_at_rest": 3.0}
-    assert card.law == PLUS._replace(**at_rest)
+    at_rest = PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0)
+    wary = LEAD._replace(pull_in_doubt=-0.7, push_in_doubt=1.1)
+    assert card.law == {"mappo_v3": at_rest, "mappo_v4": wary}.get(recipe, PLUS)
 
 
 def test_a_recipe_like_another_says_only_what_differs(tmp_path):
@@ -151,9 +154,9 @@ def test_a_recipe_like_another_says_only_what_differs(tmp_path):
     whole = load_recipe("mappo_v2")
     for name in recipes():
         one = load_recipe(name)
-        assert one.mappo | {"noise": 0} == whole.mappo | {"noise": 0}
+        assert one.mappo | {"noise": 0, "first_outputs": 0} == whole.mappo | {"noise": 0, "first_outputs": 0}
         assert (one == whole) == (name == "mappo_v2")
-    assert load_recipe("shipped") == load_recipe("mappo_v3")
+    assert load_recipe("shipped") == load_recipe("mappo_v4")
     calm = load_recipe("mappo_v2_calm")
     assert calm.episodes == whole.episodes.model_copy(update={"calm": 1.0})
     (tmp_path / "own.toml").write_text('title = "own"\nlike = "mappo_v2_calm"\nsteps = 7\n', encoding="utf-8")
@@ -197,6 +200,7 @@ def test_the_robustness_page_marks_what_was_trained_with():
         ({"held_s": -1}, "held_s"),
         ({"ppo": "{ noise = [0.4, 0.2] }"}, "noise"),
         ({"mappo": "{ noize = [0.4, 0.2] }"}, "noize"),
+        ({"mappo": "{ first_outputs = [0.1] }"}, "first_outputs must have a number for each of 6 outputs, got 1"),
         ({"safety": "{ horizon_km = 0.0 }"}, "horizon_km"),
         ({"like": '"nowhere"'}, "like = 'nowhere' must name another recipe"),
     ],

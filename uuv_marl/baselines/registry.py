@@ -59,6 +59,10 @@ POLICIES: dict[str, Kind] = {
         "mappo_v3", "Trained by MAPPO: scout_plus, steered more softly where a vehicle's actuators lag."
     ),
     "mappo_v3_seed1": shipped("mappo_v3_seed1", "The same recipe as mappo_v3 with another training seed."),
+    "mappo_v4": shipped(
+        "mappo_v4", "Trained by MAPPO: scout_lead, wary where it doubts, steered more softly where its actuators lag."
+    ),
+    "mappo_v4_seed1": shipped("mappo_v4_seed1", "The same recipe as mappo_v4 with another training seed."),
     "mappo_v2_calm": shipped("mappo_v2_calm", "The recipe of mappo_v2 without disturbances, for comparison."),
     "random": Random,
     "idle": Idle,

@@ -14,7 +14,7 @@ from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.doubt import doubt
+from uuv_marl.baselines.memory.doubt import doubt, say
 from uuv_marl.baselines.memory.neighbours import KEPT_S, middle
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
@@ -54,6 +54,11 @@ class Gains(NamedTuple):
     lead: float = 0.0
     """Share of its actuators' lag and weakness that a vehicle makes up for, as it sees them (``memory.actuators``) [1].
     Not with a rudder, whose angle is chosen later."""
+    pull_in_doubt: float = 0.0
+    """While l(t) moves, added to the logarithm of the pull of a vehicle that doubts in full (``memory.doubt``); less in
+    proportion [1]."""
+    push_in_doubt: float = 0.0
+    """The same for its push [1]: who knows less where the others are keeps farther from them."""
 
 
 PLUS = Gains(
@@ -147,6 +152,21 @@ class ScoutLead(Scout):
 
 
 @compiled
+def wary(g: Gains, share: float) -> Gains:
+    """Gains of a vehicle that doubts: pull and push, changed.
+
+    Args:
+        g: the law's.
+        share: how much it doubts, 0 to 1.
+    """
+    pull, push = math.exp(share * g.pull_in_doubt), math.exp(share * g.push_in_doubt)
+    return Gains(
+        g.pull * pull, g.push * push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m, g.steering,
+        g.kept_s, g.lead, g.pull_in_doubt, g.push_in_doubt,
+    )  # fmt: skip
+
+
+@compiled
 def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
     """Gains of one vehicle, changed: pull, push and steering by factors, together and behind_m by sums.
 
@@ -164,6 +184,7 @@ def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
     return Gains(
         g.pull * math.exp(pull), g.push * math.exp(push), g.push_range, g.pull_at_rest, g.push_at_rest,
         max(g.together + together, 0.0), g.behind_m + behind_m, g.steering * math.exp(steering), g.kept_s, g.lead,
+        g.pull_in_doubt, g.push_in_doubt,
     )  # fmt: skip
 
 
@@ -300,13 +321,17 @@ def decide_all(
             counts as a vehicle doubts (of steering: as its actuators lag); or (world, vehicle, 0) for none.
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
+    doubts = trims.shape[2] > 0 or g.pull_in_doubt != 0.0 or g.push_in_doubt != 0.0
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
                 own, keep = g, barrier
-                if trims.shape[2] > 0:
-                    lags, share = doubt(w, i, kept)
-                    own, keep = trimmed(g, trims[w, i], share, lags), widened(barrier, trims[w, i], share)
+                if doubts:
+                    lags, share = say(w, i, g.lead, kept)
+                    if kept.reference_speed[w, i] > 0.0:
+                        own = wary(own, share)
+                    if trims.shape[2] > 0:
+                        own, keep = trimmed(own, trims[w, i], share, lags), widened(barrier, trims[w, i], share)
                 w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, keep, kept, planes)

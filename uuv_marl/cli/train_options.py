@@ -90,9 +90,9 @@ Recipe = Annotated[
     typer.Option(
         metavar="NAME|FILE",
         help="A file with all settings of a training: scenario, sizes, disturbances, reward and algorithm. These "
-        "recipes ship: mappo_v3, also named shipped; mappo_v2, and without one of its parts mappo_v2_calm, "
-        "mappo_v2_one_size, mappo_v2_percept and mappo_v2_unfiltered. Only --seed, --steps, --device, "
-        "--output and --resume may stand beside it.",
+        "recipes ship: mappo_v4, also named shipped; mappo_v3; mappo_v2, and without one of its parts "
+        "mappo_v2_calm, mappo_v2_one_size, mappo_v2_percept and mappo_v2_unfiltered. Only --seed, --steps, "
+        "--device, --output and --resume may stand beside it.",
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of worlds, weights and noise. It fixes the training.")]

@@ -47,6 +47,9 @@ class Hyperparameters(PPOHyperparameters):
     tried: one vehicle alone moves its centre by 1/n. The objective takes each output as if it were drawn alone."""
     noise_kept: float = 0.0
     """Share of the noise that is left at the next decision [1]: what takes seconds to show is tried for seconds."""
+    first_outputs: tuple[float, ...] = ()
+    """Outputs of the actor before it has learned [1]; zeros unless given. A trim that is bounded on one side can't be
+    learned from beyond its bound, where it changes nothing: begin on the side where it does."""
     max_gradient: float = 1.0
     value_decay: float = 0.99
     """Decay of the running mean and variance by which returns are normalised [1]."""
@@ -125,7 +128,7 @@ class Learner:
         self, features: int, size: int, outputs: int, by: Hyperparameters, rng: np.random.Generator, device: str = "cpu"
     ) -> None:
         self.by, self._rng, self._features, self._device = by, rng, features, device
-        self.actor = network((features, *by.hidden, outputs), 0.01, rng).to(device)
+        self.actor = network((features, *by.hidden, outputs), 0.01, rng, by.first_outputs).to(device)
         self.critic = network((size, *by.hidden, 1), 1.0, rng).to(device)
         self._optimisers = [torch.optim.Adam(net.parameters(), eps=1e-5) for net in (self.actor, self.critic)]
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
@@ -348,8 +351,10 @@ class Mappo:
         self._rng.bit_generator.state = state
 
 
-def network(sizes: Sequence[int], last_gain: float, rng: np.random.Generator) -> nn.Sequential:
-    """Linear layers with tanh between them, orthogonal weights, zero biases."""
+def network(
+    sizes: Sequence[int], last_gain: float, rng: np.random.Generator, last_biases: Sequence[float] = ()
+) -> nn.Sequential:
+    """Linear layers with tanh between them, orthogonal weights, zero biases but for the last layer's, if given."""
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     layers: list[nn.Module] = []
     for k, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
@@ -357,6 +362,8 @@ def network(sizes: Sequence[int], last_gain: float, rng: np.random.Generator) ->
         is_last = k == len(sizes) - 2
         nn.init.orthogonal_(linear.weight, last_gain if is_last else math.sqrt(2.0), generator=generator)
         nn.init.zeros_(linear.bias)
+        if is_last and last_biases:
+            linear.bias.data.copy_(torch.tensor(last_biases))
         layers += [linear] if is_last else [linear, nn.Tanh()]
     return nn.Sequential(*layers)
 

@@ -28,7 +28,7 @@ from uuv_marl.extras import extra
 from uuv_marl.modules import named_object
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, conditions, load_scenario
-from uuv_marl.train.acting import Sees
+from uuv_marl.train.acting import ACTING, Sees
 from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
 from uuv_marl.train.group import Conditions, Problem
@@ -113,6 +113,9 @@ class Settings:
         n = self.load().swarm.num_vehicles
         sizes = self.sizes or (MIXED if n == load_scenario(type(self).scenario).swarm.num_vehicles else swarms_of([n]))
         validation = self.validation or (MIXED_VALIDATION if sizes == MIXED else tuple((n, 4) for n, _ in sizes))
+        outputs, first = ACTING[self.sees].num_outputs(self.trims), getattr(self.algorithm, "first_outputs", ())
+        if len(first) not in (0, outputs):
+            raise ValueError(f"first_outputs must have a number for each of {outputs} outputs, got {len(first)}")
         object.__setattr__(self, "sizes", sizes)
         object.__setattr__(self, "validation", validation)
 

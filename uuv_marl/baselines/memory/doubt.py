@@ -10,6 +10,9 @@ REMAINS = 0.4
 NOISE = 0.02
 """So large errors of neighbours' places over their range do the same [1]. Assumed: those of 2 degrees. Exact echoes
 make none, but at slow decisions, when neighbours are not where they were expected."""
+DEAF = 0.03
+"""Up to so large errors a vehicle that makes up for its lag is trimmed for it in full, from twice as large ones not at
+all [1]. Assumed: vehicles that swing with a lag of 1.5 s make 0.02 themselves; 2 degrees and pings every 0.5 s 0.06."""
 USUAL_AGE_S, OLD_S = 0.15, 0.2
 """So old are readings on the mean where nothing is wrong; so much more does the same [s]. In still water 95 % of the
 means are below 0.12 s, of neighbours that are heard no more and kept for a while; the second number is assumed."""
@@ -30,3 +33,21 @@ def doubt(w: int, i: int, kept: Surroundings) -> tuple[float, float]:
     thrust, torque = remains(w, i, 0, kept), remains(w, i, 1, kept)
     moves = max(thrust, torque) / REMAINS
     return min(thrust, torque), min(moves + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)
+
+
+@compiled
+def say(w: int, i: int, lead: float, kept: Surroundings) -> tuple[float, float]:
+    """As ``doubt``; but a vehicle that makes up for its lag is trimmed the less for it, the less it trusts its sonar.
+
+    Soft steering bears a lag, and lets vehicles touch that do not know well where the others are.
+
+    Args:
+        w: index of the world.
+        i: index of the vehicle.
+        lead: share of the lag that is made up for.
+        kept: what is remembered.
+    """
+    lags, share = doubt(w, i, kept)
+    if lead > 0.0:
+        lags *= min(max(2.0 - noise_of(w, i, kept) / DEAF, 0.0), 1.0)
+    return lags, share

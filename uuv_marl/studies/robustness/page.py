@@ -29,8 +29,16 @@ from uuv_marl.studies.robustness.scores import (
 
 _NOTHING = "–"
 _LEARNED: dict[str, tuple[frozenset[str], frozenset[int]]] = {
-    name: (frozenset(("W1", "W2", "W3", "S1", "S2", "S3", "S5", "S7", "S8", "S9", "A1", *others)), frozenset((1, 2, 3)))
-    for name, others in (("mappo_v2", ("A2",)), ("mappo_v2_seed1", ("A2",)), ("mappo_v3", ()), ("mappo_v3_seed1", ()))
+    f"{name}{training}": (
+        frozenset(("W1", "W2", "W3", "S1", "S2", "S3", "S5", "S7", "S8", "S9", "A1", *others)),
+        frozenset(levels),
+    )
+    for name, others, levels in (
+        ("mappo_v2", ("A2",), (1, 2, 3)),
+        ("mappo_v3", (), (1, 2, 3)),
+        ("mappo_v4", (), (2, 3, 4, 5)),
+    )
+    for training in ("", "_seed1")
 }
 """Axes and levels that a learned policy was trained with; all others were tuned or trained in still water."""
 
