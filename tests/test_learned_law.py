@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines import POLICIES, PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
 from uuv_marl.baselines.learned import forward
 from uuv_marl.baselines.learned_law import TrimmedLaw
-from uuv_marl.baselines.memory.doubt import doubt, say
+from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, trimmed, wary, widened
+from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, Scout, trimmed, wary, widened
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -85,6 +85,18 @@ def test_mappo_v3_is_its_law_where_nothing_lags():
     law = "scout_plus,pull_at_rest=6,push_at_rest=3"
     np.testing.assert_allclose(actions("mappo_v3"), actions(law), rtol=0, atol=1e-4)
     assert np.abs(actions("mappo_v3", overrides=FEW | LAG) - actions(law, overrides=FEW | LAG)).max() > 0.1
+
+
+def test_mappo_v4_is_its_law_where_nothing_lags():
+    card, done = POLICIES["mappo_v4"].checkpoint.card, []
+    scenario = granted("mappo_v4", load_scenario("random_field", overrides=FEW))
+    for policy in (make("mappo_v4", scenario), Scout(scenario, gains=card.law, barrier=card.safety)):
+        swarm = Swarm(scenario)
+        percept = swarm.reset(10_007)
+        for _ in range(150):
+            percept = swarm.step(policy.act(percept))
+        done.append(swarm.state.eta.copy())
+    np.testing.assert_allclose(*done, rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize("trims", [ALL_TRIMS, ("steering",)], ids=["all", "steering"])
@@ -161,7 +173,9 @@ def test_who_makes_up_for_its_lag_steers_softly_only_where_it_hears_well(noise_d
         percept = swarm.step(policy.act(percept))
         if k > 100:
             told += [
-                [*say(0, i, lead, policy.memory), *doubt(0, i, policy.memory)] for i in range(20) for lead in (0, 1)
+                [*trim_weights(0, i, lead, policy.memory), *doubt(0, i, policy.memory)]
+                for i in range(20)
+                for lead in (0, 1)
             ]
     without, made_up = np.array(told[::2]), np.array(told[1::2])
     np.testing.assert_array_equal(without[:, :2], without[:, 2:])

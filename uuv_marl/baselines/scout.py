@@ -14,7 +14,7 @@ from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.doubt import doubt, say
+from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.neighbours import KEPT_S, middle
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
@@ -327,7 +327,7 @@ def decide_all(
             if worlds[w] and kept.begun[w, i] > 0.0:
                 own, keep = g, barrier
                 if doubts:
-                    lags, share = say(w, i, g.lead, kept)
+                    lags, share = trim_weights(w, i, g.lead, kept)
                     if kept.reference_speed[w, i] > 0.0:
                         own = wary(own, share)
                     if trims.shape[2] > 0:

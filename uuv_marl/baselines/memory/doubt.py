@@ -10,7 +10,7 @@ REMAINS = 0.4
 NOISE = 0.02
 """So large errors of neighbours' places over their range do the same [1]. Assumed: those of 2 degrees. Exact echoes
 make none, but at slow decisions, when neighbours are not where they were expected."""
-DEAF = 0.03
+UNSURE = 0.03
 """Up to so large errors a vehicle that makes up for its lag is trimmed for it in full, from twice as large ones not at
 all [1]. Assumed: vehicles that swing with a lag of 1.5 s make 0.02 themselves; 2 degrees and pings every 0.5 s 0.06."""
 USUAL_AGE_S, OLD_S = 0.15, 0.2
@@ -36,10 +36,11 @@ def doubt(w: int, i: int, kept: Surroundings) -> tuple[float, float]:
 
 
 @compiled
-def say(w: int, i: int, lead: float, kept: Surroundings) -> tuple[float, float]:
-    """As ``doubt``; but a vehicle that makes up for its lag is trimmed the less for it, the less it trusts its sonar.
+def trim_weights(w: int, i: int, lead: float, kept: Surroundings) -> tuple[float, float]:
+    """How far trims count, 0 to 1: that of steering, and all others. They are ``doubt``'s, with one exception.
 
-    Soft steering bears a lag, and lets vehicles touch that do not know well where the others are.
+    Soft steering bears a lag, but lets vehicles touch that do not know well where the others are. So where a law makes
+    up for the lag itself, the trim of steering counts the less, the less well neighbours are heard.
 
     Args:
         w: index of the world.
@@ -49,5 +50,5 @@ def say(w: int, i: int, lead: float, kept: Surroundings) -> tuple[float, float]:
     """
     lags, share = doubt(w, i, kept)
     if lead > 0.0:
-        lags *= min(max(2.0 - noise_of(w, i, kept) / DEAF, 0.0), 1.0)
+        lags *= min(max(2.0 - noise_of(w, i, kept) / UNSURE, 0.0), 1.0)
     return lags, share
