@@ -88,7 +88,7 @@ class LearnedLaw(TrimmedLaw):
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2). The network is asked only where its output counts."""
-        heeded(self.active, self.columns == [_STEERING], self.memory, self._heeded)
+        heeded(self.active, self.columns == [_STEERING], float(self.gains.lead), self.memory, self._heeded)
         self.look(self._features, self._heeded)
         output = np.zeros((*self._heeded.shape, len(self.columns)), np.float32)
         output[self._heeded] = forward(self.checkpoint.layers, self._features[self._heeded])

@@ -14,7 +14,7 @@ from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.doubt import doubt, trim_weights
+from uuv_marl.baselines.memory.doubt import trim_weights
 from uuv_marl.baselines.memory.neighbours import KEPT_S, middle
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
@@ -205,12 +205,13 @@ def widened(by: Barrier, trims: Float32, share: float) -> Barrier:
 
 
 @compiled
-def heeded(worlds: Bool, steering_alone: bool, kept: Surroundings, out: Bool) -> None:
+def heeded(worlds: Bool, steering_alone: bool, share: float, kept: Surroundings, out: Bool) -> None:
     """Whose trims count at all: steering where actuators lag, all others where a vehicle doubts.
 
     Args:
         worlds: those that run, shape (world,).
         steering_alone: whether steering is all that is trimmed.
+        share: of the lag that the law makes up for.
         kept: what vehicles remember.
         out: filled, shape (world, vehicle).
     """
@@ -218,8 +219,8 @@ def heeded(worlds: Bool, steering_alone: bool, kept: Surroundings, out: Bool) ->
         for i in range(out.shape[1]):
             out[w, i] = False
             if worlds[w] and kept.begun[w, i] > 0.0:
-                lags, share = doubt(w, i, kept)
-                out[w, i] = lags > 0.0 or (share > 0.0 and not steering_alone)
+                lags, others = trim_weights(w, i, share, kept)
+                out[w, i] = lags > 0.0 or (others > 0.0 and not steering_alone)
 
 
 @compiled

@@ -113,7 +113,8 @@ class Settings:
         n = self.load().swarm.num_vehicles
         sizes = self.sizes or (MIXED if n == load_scenario(type(self).scenario).swarm.num_vehicles else swarms_of([n]))
         validation = self.validation or (MIXED_VALIDATION if sizes == MIXED else tuple((n, 4) for n, _ in sizes))
-        outputs, first = ACTING[self.sees].num_outputs(self.trims), getattr(self.algorithm, "first_outputs", ())
+        first = self.algorithm.first_outputs if isinstance(self.algorithm, Hyperparameters) else ()
+        outputs = ACTING[self.sees].num_outputs(self.trims)
         if len(first) not in (0, outputs):
             raise ValueError(f"first_outputs must have a number for each of {outputs} outputs, got {len(first)}")
         object.__setattr__(self, "sizes", sizes)
