@@ -308,6 +308,7 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
     import importlib
 
     from uuv_marl.train import training as trainings
+    from uuv_marl.train.settings import Settings
     from uuv_marl.train.validation import ValidationResult
 
     verdict = ValidationResult(-1.0, 1.0, 0, 1.0, 7.0, 15.0)
@@ -321,7 +322,7 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
     }
 
     def settings(steps):
-        return trainings.Settings(
+        return Settings(
             sizes=((3, 3), (6, 2)), steps=steps * 8 * 21, algorithm=by, overrides=overrides, sees="memory",
             checkpoint_every=1, validation=((3, 1),), change_cost=0.1,
         )  # fmt: skip

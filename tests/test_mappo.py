@@ -32,9 +32,10 @@ from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.folder import steps_before
 from uuv_marl.train.group import Problem
 from uuv_marl.train.mappo import Hyperparameters, Learner, Mappo, gae
+from uuv_marl.train.settings import Settings
 from uuv_marl.train.shaping import OVERRIDES, PRIVILEGED_SIZE, Weights, lead, privileged_observation, shaped_reward
 from uuv_marl.train.shared import annealed
-from uuv_marl.train.training import Record, Settings, Trainer, train
+from uuv_marl.train.training import Record, Trainer, train
 from uuv_marl.train.validation import VALIDATION_SEEDS, cost, validation_result
 
 OPEN_WATER = {

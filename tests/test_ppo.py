@@ -18,8 +18,9 @@ from uuv_marl.train import training as trainings
 from uuv_marl.train.env import TrainingEnv
 from uuv_marl.train.group import Problem
 from uuv_marl.train.ppo import Hyperparameters, Ppo
+from uuv_marl.train.settings import Settings
 from uuv_marl.train.shaping import Weights
-from uuv_marl.train.training import Settings, train
+from uuv_marl.train.training import train
 from uuv_marl.train.validation import validation_result
 from uuv_marl.train.vec_env import TrainingVecEnv
 

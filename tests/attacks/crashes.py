@@ -26,7 +26,9 @@ TRAINING = """
 import json
 from dataclasses import replace
 from uuv_marl.train.mappo import Hyperparameters
-from uuv_marl.train.training import OVERRIDES, Settings, train
+from uuv_marl.train.settings import Settings
+from uuv_marl.train.shaping import OVERRIDES
+from uuv_marl.train.training import train
 shorter = {"time_limit.extra_s": 5.0, "time_limit.factor": 0.2}
 settings = Settings(
     scenario="starter", overrides={**OVERRIDES, **shorter}, sizes=((5, 2),), steps=480, checkpoint_every=1,

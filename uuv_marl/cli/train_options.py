@@ -117,8 +117,8 @@ class Task(NamedTuple):
 
     def settings(self, algorithm: Any) -> Any:
         """The settings of a training with this algorithm."""
+        from uuv_marl.train.settings import Settings, swarms_of
         from uuv_marl.train.shaping import overrides_for
-        from uuv_marl.train.training import Settings, swarms_of
 
         size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
         sizes = whole_numbers("--sizes", self.sizes)

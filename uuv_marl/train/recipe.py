@@ -19,8 +19,8 @@ from uuv_marl.train import ppo
 from uuv_marl.train.acting import Sees
 from uuv_marl.train.group import Conditions
 from uuv_marl.train.mappo import Hyperparameters
+from uuv_marl.train.settings import Settings
 from uuv_marl.train.shaping import Weights, overrides_for
-from uuv_marl.train.training import Settings
 
 Algorithm = Literal["mappo", "ppo"]
 _VALIDATION_DRAW = 2**31
