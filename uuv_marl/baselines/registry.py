@@ -21,7 +21,7 @@ from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_granted
 from uuv_marl.baselines.pull import Pull
 from uuv_marl.baselines.safety import GUARD, Barrier
-from uuv_marl.baselines.scout import Scout, ScoutLead, ScoutPlus
+from uuv_marl.baselines.scout import Scout, ScoutLead, ScoutPlus, ScoutWary
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
 from uuv_marl.baselines.units import Reader, in_own_units
@@ -40,6 +40,7 @@ POLICIES: dict[str, Kind] = {
     "scout": Scout,
     "scout_plus": ScoutPlus,
     "scout_lead": ScoutLead,
+    "scout_wary": ScoutWary,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,
@@ -60,7 +61,7 @@ POLICIES: dict[str, Kind] = {
     ),
     "mappo_v3_seed1": shipped("mappo_v3_seed1", "The same recipe as mappo_v3 with another training seed."),
     "mappo_v4": shipped(
-        "mappo_v4", "Trained by MAPPO: scout_lead, wary where it doubts, steered more softly where its actuators lag."
+        "mappo_v4", "Trained by MAPPO: scout_wary, steered more softly where a vehicle's actuators lag."
     ),
     "mappo_v4_seed1": shipped("mappo_v4_seed1", "The same recipe as mappo_v4 with another training seed."),
     "mappo_v2_calm": shipped("mappo_v2_calm", "The recipe of mappo_v2 without disturbances, for comparison."),

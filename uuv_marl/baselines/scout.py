@@ -67,6 +67,8 @@ PLUS = Gains(
 """Gains of ``ScoutPlus``, found by hand, a gain at a time, on tuning seeds of random fields and ``single_obstacle``."""
 LEAD = PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0, kept_s=3.0, lead=1.0)
 """Gains of ``ScoutLead``, found in the same way, in a disturbed sea too."""
+WARY = LEAD._replace(pull_in_doubt=-0.7, push_in_doubt=1.1)
+"""Gains of ``ScoutWary``: those two were chosen on 8 tuning fields at hard levels of disturbances."""
 
 Trim = Literal["pull", "together", "push", "behind_m", "steering", "neighbour_m"]
 """A number of a vehicle that an actor may change: one of five gains (``trimmed``), or the distance kept from neighbours
@@ -95,13 +97,15 @@ class Scout(Filtered):
     yaw_damping_nms: ClassVar[float] = 600.0
     usual: ClassVar[Gains] = Gains()
     """The gains, unless others are given."""
+    usual_barrier: ClassVar[Barrier] = Barrier()
+    """The same of margins and rates of the filter."""
     num_trims: ClassVar[int] = 0
     """Changes of each vehicle's numbers."""
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
     ) -> None:
-        super().__init__(scenario, num_worlds, barrier or Barrier())
+        super().__init__(scenario, num_worlds, barrier or self.usual_barrier)
         self.gains = gains or self.usual
         self._growth = growth(scenario.swarm.num_vehicles)
         self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, self.num_trims), np.float32)
@@ -149,6 +153,16 @@ class ScoutLead(Scout):
     """
 
     usual = LEAD
+
+
+class ScoutWary(Scout):
+    """``scout_lead`` that keeps farther from others where a vehicle doubts its model or its sonar, and from obstacles.
+
+    Arguments as for ``Scout``.
+    """
+
+    usual = WARY
+    usual_barrier = Barrier(obstacle_m=13.7)
 
 
 @compiled

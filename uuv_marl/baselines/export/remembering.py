@@ -21,7 +21,7 @@ from uuv_marl.baselines.memory import Surroundings, listen
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.recall import RECALLED, recall
 from uuv_marl.baselines.rudder import steer_by_rudder
-from uuv_marl.baselines.scout import MOST_TRIM, Scout, ScoutLead, ScoutPlus, decide_all
+from uuv_marl.baselines.scout import MOST_TRIM, Scout, ScoutLead, ScoutPlus, ScoutWary, decide_all
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.views import Fields, Starts, fields
@@ -86,7 +86,7 @@ def _vehicle(g: Translator, policy: Filtered) -> tuple[list["ValueInfoProto"], l
     if isinstance(policy, Guarded):
         heads.append(_info("wish", TensorProto.FLOAT, (2,)))
         action = _guarded(g, policy, memory)
-    elif isinstance(policy, Scout) and type(policy) in (Scout, ScoutPlus, ScoutLead, LearnedLaw):
+    elif isinstance(policy, Scout) and type(policy) in (Scout, ScoutPlus, ScoutLead, ScoutWary, LearnedLaw):
         action = _by_law(g, policy, memory)
     else:
         raise PolicyError(f"policy {policy.name!r} has no form in ONNX; give a learned policy or scout")
