@@ -81,7 +81,7 @@ def of_memory(folder, scale, trims=ALL_TRIMS):
     [
         *((name, overrides) for name in ("scout", "memory", "guarded:mappo") for overrides in (CALM, ROUGH)),
         ("steering", ROUGH),
-        ("scout_lead", ROUGH | LAGGING),
+        ("scout_wary", ROUGH | LAGGING),
         ("mappo_v4", ROUGH | LAGGING),
         ("scout", TORPEDO),
         ("scout", RUDDER),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
 from uuv_marl.baselines.learned import forward
 from uuv_marl.baselines.learned_law import TrimmedLaw
@@ -16,7 +16,7 @@ from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, Scout, trimmed, wary, widened
+from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, trimmed, wary, widened
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -88,10 +88,10 @@ def test_mappo_v3_is_its_law_where_nothing_lags():
 
 
 def test_mappo_v4_is_its_law_where_nothing_lags():
-    card, done = POLICIES["mappo_v4"].checkpoint.card, []
-    scenario = granted("mappo_v4", load_scenario("random_field", overrides=FEW))
-    for policy in (make("mappo_v4", scenario), Scout(scenario, gains=card.law, barrier=card.safety)):
-        swarm = Swarm(scenario)
+    done = []
+    for name in ("mappo_v4", "scout_wary"):
+        scenario = granted(name, load_scenario("random_field", overrides=FEW))
+        swarm, policy = Swarm(scenario), make(name, scenario)
         percept = swarm.reset(10_007)
         for _ in range(150):
             percept = swarm.step(policy.act(percept))

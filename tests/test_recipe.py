@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import load_checkpoint
-from uuv_marl.baselines.scout import LEAD, PLUS
+from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.scout import PLUS, ScoutWary
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 from uuv_marl.sim.swarm import Swarm
@@ -144,8 +145,8 @@ def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
     said |= {"law": list(card.law), "algorithm": {"first_outputs": [], **card.training["algorithm"]}}
     assert {field: said[field] for field in told} == told
     at_rest = PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0)
-    wary = LEAD._replace(pull_in_doubt=-0.7, push_in_doubt=1.1)
-    assert card.law == {"mappo_v3": at_rest, "mappo_v4": wary}.get(recipe, PLUS)
+    assert card.law == {"mappo_v3": at_rest, "mappo_v4": ScoutWary.usual}.get(recipe, PLUS)
+    assert card.safety == {"mappo_v4": ScoutWary.usual_barrier}.get(recipe, Barrier())
 
 
 def test_a_recipe_like_another_says_only_what_differs(tmp_path):
