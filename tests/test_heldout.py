@@ -35,7 +35,7 @@ def episode(**changes):
 
 def test_seeds_are_held_out_and_sets_are_told_apart():
     assert len({held.name for held in SETS}) == len(SETS)
-    trained = ("mappo", "mappo_v2", "mappo_v2_seed1", "mappo_v3", "mappo_v3_seed1")
+    trained = ("mappo", "mappo_v2", "mappo_v2_seed1", "mappo_v3", "mappo_v3_seed1", "mappo_v4")
     assert ("scout", "scout_plus", "scout_lead", *trained) == LEADING
     for held in SETS:
         cases = held.cases(["a", "b"], None)
