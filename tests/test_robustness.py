@@ -280,6 +280,13 @@ def test_the_page_says_which_policy_lacks_a_scenario(tmp_path):
     assert "Not run for `bio_inspired`: scenarios" not in text
 
 
+def test_the_page_says_which_policy_has_fewer_seeds(tmp_path):
+    path = job.run(tmp_path, TINY._replace(axes=("A1",), levels=(5,)), silent)
+    thrice = job.read_episodes(path).loc[[0, 1] * 3]
+    text = page.report(thrice.assign(policy=["bio_inspired"] * 4 + ["scout"] * 2, seed=[0, 0, 1, 1, 0, 0]))
+    assert "- Not complete: 2 cells of `scout` with fewer than 2 seeds. Compare" in text
+
+
 @pytest.mark.parametrize(
     ("args", "message"),
     [

@@ -104,8 +104,12 @@ def _missing(episodes: Any) -> Iterator[str]:
             yield f"{words} {', '.join(policies)}: {', '.join(names)}"
     count = episodes.groupby(["scenario", "axis", "level", "policy"]).size()
     if count.min() < count.max():
-        few = counted(int((count < count.max()).sum()), "cell")
-        yield f"Not complete: {few} with fewer than {counted(int(count.max()), 'seed')}"
+        few, most = count[count < count.max()], counted(int(count.max()), "seed")
+        names = ", ".join(f"`{name}`" for name in dict.fromkeys(few.index.get_level_values("policy")))
+        yield (
+            f"Not complete: {counted(len(few), 'cell')} of {names} with fewer than {most}. "
+            'Compare these policies with others only where seeds are paired, in "Who is best"'
+        )
 
 
 def _scenario(name: str, episodes: Any, table: Any) -> str:
