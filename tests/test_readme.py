@@ -253,7 +253,7 @@ def test_the_index_counts_what_there_is():
     minutes = {re.search(r"\*\*Time\*\*: about (\d) minute", page.read_text())[1] for page in notebooks}
     assert (len(notebooks), minutes) == (6, {"1", "2"})
     assert "Six [notebooks](tutorials/README.md) of one or two minutes each:" in INDEX
-    assert tabled() == (10, 5)
-    assert "ten policies on five scenarios, 20 seeds" in INDEX
+    assert tabled() == (12, 5)
+    assert "twelve policies on five scenarios, 20 seeds" in INDEX
     assert "what each of 22 disturbances costs" in INDEX
     assert f"{hostile():,} hostile inputs" in INDEX
