@@ -19,9 +19,10 @@ from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, rows_of, sa
 from uuv_marl.baselines.export import KEPT, NEXT, write_onnx
 from uuv_marl.baselines.export.kernels import Translator
 from uuv_marl.baselines.export.numbers import KernelError, Scalar
+from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.scout import ALL_TRIMS, Gains
+from uuv_marl.baselines.trims import ALL_TRIMS
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.swarm import Swarm

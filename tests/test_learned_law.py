@@ -10,13 +10,14 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.learned import forward
 from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, trimmed, wary, widened
+from uuv_marl.baselines.trims import ALL_TRIMS, MOST_TRIM, TRIMS, trimmed, wary, widened
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import replacing
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.baselines.features import BARRIER, num_features
+from uuv_marl.baselines.gains import Gains as Law
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, Trim
-from uuv_marl.baselines.scout import Gains as Law
+from uuv_marl.baselines.trims import ALL_TRIMS, Trim
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
 from uuv_marl.scenario.hardware import Actuators, Vehicle

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from uuv_marl.baselines.checkpoint import Checkpoint
+from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.learned import forward, need_same
 from uuv_marl.baselines.recall import RECALLED, recall
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, MOST_TRIM, TRIMS, Gains, Scout, Trim, heeded
+from uuv_marl.baselines.scout import Scout
+from uuv_marl.baselines.trims import ALL_TRIMS, MOST_TRIM, TRIMS, Trim, heeded
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Bool, Float32

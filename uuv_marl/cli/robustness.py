@@ -15,7 +15,7 @@ def robustness(
     ] = False,
     full: Annotated[
         bool,
-        typer.Option("--full", help="All levels, three scenarios, 50 seeds: most of a day, two cores; see --ray."),
+        typer.Option("--full", help="All levels, three scenarios, 50 seeds: days on two cores; see --ray."),
     ] = False,
     axis: Annotated[
         list[str] | None, typer.Option(help="Only this axis, such as W1 or S7. Repeat it for several. Default: all.")
@@ -56,9 +56,9 @@ def robustness(
 
     Each axis is one disturbance in five levels (uuv_marl/studies/robustness/axes.toml, with sources). The command
     writes report.md (scores, critical severities, every cell), a picture of each scenario (in figures) and episodes.csv
-    (a row for each episode). Without --quick or --full it makes the report that ships in docs/robustness, in about two
-    hours on two cores. It needs the extra "analysis". Ctrl-C keeps the finished episodes, and the same command
-    continues.
+    (a row for each episode). Without --quick or --full it makes the report that ships in docs/robustness: 30 to 50
+    minutes of one core for each of its policies with memory. It needs the extra "analysis". Ctrl-C keeps the finished
+    episodes, and the same command continues.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """

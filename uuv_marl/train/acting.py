@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_features
+from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import MOST_TRIM, Gains, Trim
+from uuv_marl.baselines.trims import MOST_TRIM, Trim
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32

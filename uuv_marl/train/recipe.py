@@ -10,8 +10,9 @@ import numpy as np
 import pydantic
 
 from uuv_marl.baselines.checkpoint import Trims
+from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, Gains
+from uuv_marl.baselines.trims import ALL_TRIMS
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.robustness.axes import AXES, known

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, cast
 
+from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ALL_TRIMS, Gains, Trim
+from uuv_marl.baselines.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import RewardError
 from uuv_marl.modules import named_object

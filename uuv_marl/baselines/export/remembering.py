@@ -21,7 +21,8 @@ from uuv_marl.baselines.memory import Surroundings, listen
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.recall import RECALLED, recall
 from uuv_marl.baselines.rudder import steer_by_rudder
-from uuv_marl.baselines.scout import MOST_TRIM, Scout, ScoutLead, ScoutPlus, ScoutWary, decide_all
+from uuv_marl.baselines.scout import Scout, ScoutLead, ScoutPlus, ScoutWary, decide_all
+from uuv_marl.baselines.trims import MOST_TRIM
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.views import Fields, Starts, fields
