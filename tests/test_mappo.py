@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import safetensors.numpy
 import torch
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
@@ -24,7 +25,7 @@ from uuv_marl.baselines.features import BARRIER, Features
 from uuv_marl.baselines.learned import forward
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
-from uuv_marl.errors import ResultsError, RewardError
+from uuv_marl.errors import ResultsError, RewardError, ScenarioError
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import group as group_module
 from uuv_marl.train import training as trainings
@@ -446,6 +447,54 @@ def test_the_best_policy_is_kept_and_can_be_started_from(tmp_path, monkeypatch):
         Trainer(settings(start=str(tmp_path / "nowhere")))
 
 
+def test_a_resumed_training_does_not_ask_for_what_it_started_from(tmp_path, no_validation):
+    list(train(tmp_path / "first", settings(validate_every=1, steps=1)))
+    begun = train(tmp_path / "a", settings(start=str(tmp_path / "first" / "best")))
+    for _ in range(3):
+        next(begun)
+    begun.close()
+    shutil.rmtree(tmp_path / "first")
+    rest = train(tmp_path / "a", settings(start=str(tmp_path / "first" / "best")), resume=True)
+    assert [record.iteration for record in rest] == [3, 4, 5]
+
+
+def test_tensorboard_shows_every_iteration_once_after_a_resume(tmp_path, no_validation):
+    first = train(tmp_path, settings())
+    for _ in range(3):
+        next(first)
+    first.close()  # the checkpoint is that of the second iteration
+    list(train(tmp_path, settings(), resume=True))
+    shown = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    assert [event.step for event in shown.Scalars("train/reward")] == [168, 336, 504, 672, 840]
+
+
+def test_how_many_vehicles_are_trained_on_is_what_was_said():
+    mixed = Settings().sizes
+    assert [n for n, _ in mixed] == [10, 25, 54, 100]
+    for n in (53, 54):
+        assert [size for size, _ in Settings(overrides={**OVERRIDES, "swarm.num_vehicles": n}).sizes] == [n]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"overrides": {"timing.decision_period_s": 1.0}},
+        {"conditions": ({"timing.decision_period_s": 1.0},)},
+        {"validation_conditions": ({"timing.decision_period_s": 1.0},)},
+    ],
+)
+def test_periods_that_policies_do_not_run_with_are_refused_before_the_training(wrong):
+    with pytest.raises(ScenarioError, match="is 1, but trained policies decide every 0.1 to 0.5 s; choose a period"):
+        Settings(**wrong)
+
+
+def test_a_slow_scenario_is_refused_though_training_decides_faster(tmp_path):
+    slow = tmp_path / "slow.toml"
+    slow.write_text('extends = "starter"\nname = "slow"\nversion = 1\n[timing]\ndecision_period_s = 1.0\n')
+    with pytest.raises(ScenarioError, match="'slow' is 1, but trained policies decide every 0.1 to 0.5 s"):
+        Settings(scenario=str(slow))
+
+
 def test_a_policy_is_validated_by_the_benchmark_itself(tmp_path):
     (record,) = train(tmp_path / "a", settings(steps=1))
     assert record.score < -1.0
@@ -732,11 +781,15 @@ def test_the_command(tmp_path, monkeypatch):
     stopped = CliRunner().invoke(app, [*command, "--resume"])
     assert stopped.exit_code == 130
     assert "Stopping after this iteration" in stopped.output
-    assert "with --resume continues" in " ".join(stopped.output.split())
+    assert "Stopped. Nothing was written yet; the same command begins again." in " ".join(stopped.output.split())
     seed = 2
+    (tmp_path / "config.json").write_text("{}")
     at_once = CliRunner().invoke(app, [*command, "--resume"])
     assert at_once.exit_code == 130
     assert "Stopped. There is no checkpoint yet, only settings" in " ".join(at_once.output.split())
+    (tmp_path / "checkpoints" / "000001").mkdir(parents=True)
+    at_once = CliRunner().invoke(app, [*command, "--resume"])
+    assert "the same command with --resume continues." in " ".join(at_once.output.split())
     assert signal.getsignal(signal.SIGINT) is before
 
 
@@ -753,7 +806,9 @@ def test_the_command(tmp_path, monkeypatch):
         (["--num-vehicles=0"], "Invalid value for '--num-vehicles'"),
         (["--sizes=5,x"], "--sizes must be whole numbers from 1 on, such as 96,96; got '5,x'"),
         (["--network=0"], "--network must be whole numbers from 1 on"),
-        (["--sizes=5", "--num-vehicles=5"], "--num-vehicles is the size of every swarm; leave out this"),
+        (["--sizes=5", "--num-vehicles=5"], "--num-vehicles and --sizes each say how many vehicles a swarm has"),
+        (["--sizes=5", "--set=swarm.num_vehicles=5"], "--sizes and --set swarm.num_vehicles each say how many"),
+        (["--set=timing.decision_period_s=1"], "'random_field' is 1, but trained policies decide every 0.1 to 0.5 s"),
         (["--set", "sonar.echo_report=surface"], "sonar.echo_report"),
         (["--reward=nowhere:reward"], "reward 'nowhere:reward' can't be imported"),
         (["--sees=nothing"], "--sees must be percept or memory, got 'nothing'"),

@@ -1,6 +1,7 @@
 """Stable-Baselines3's PPO on problems with known answers, through the rows of several SwarmVecEnv."""
 
 import itertools
+import random
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import ppo as ppos
 from uuv_marl.train import training as trainings
-from uuv_marl.train.env import TrainingEnv
+from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv
 from uuv_marl.train.group import Problem
 from uuv_marl.train.ppo import Hyperparameters, Ppo
 from uuv_marl.train.settings import Settings
@@ -121,6 +122,15 @@ def test_endings_are_told_as_sb3_wants_them():
         assert (episodes.number, episodes.arrived, episodes.decisions) == (2, 2 * arrived, 24)
 
 
+def test_training_worlds_are_not_those_of_validation():
+    """Seeds that count on beyond the training range begin again at its start."""
+    env = TrainingVecEnv(Problem(open_water(), SIZES, Weights()))
+    low, high = TRAINING_SEEDS
+    env.seed(high - 2)
+    assert [*env._draw(3)] == [high - 2, high - 1, low]
+    assert [*env._draw(2)] == [low + 1, low + 2]
+
+
 def test_streams_go_on_from_a_snapshot():
     streams = [np.random.default_rng(3), None]
     streams[0].integers(2, dtype=np.uint32)  # leaves half a number behind
@@ -164,9 +174,10 @@ def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, monkeypatch):
     result = validation_result([{"task_time_s": None, "duration_s": 1.0, "collisions": 0, "min_spacing_m": 7.0,
                       "min_obstacle_distance_m": None}])  # fmt: skip
     monkeypatch.setattr(trainings, "validate", lambda *_: result._replace(score=next(scores)))
-    before = torch.get_rng_state()
+    before = torch.get_rng_state(), random.getstate()
     records = list(train(tmp_path / "whole", settings()))
-    assert torch.equal(torch.get_rng_state(), before), "the global generators are left as they were"
+    assert torch.equal(torch.get_rng_state(), before[0]), "the global generators are left as they were"
+    assert random.getstate() == before[1]
     for stop in (2, 3):
         first = train(tmp_path / f"{stop}", settings())
         for _ in range(stop):

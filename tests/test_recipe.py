@@ -204,6 +204,9 @@ def test_the_robustness_page_marks_what_was_trained_with():
         ({"mappo": "{ noize = [0.4, 0.2] }"}, "noize"),
         ({"mappo": "{ first_outputs = [0.1] }"}, "first_outputs must have a number for each of 6 outputs, got 1"),
         ({"safety": "{ horizon_km = 0.0 }"}, "horizon_km"),
+        ({"mappo": "{ noise_kept = 1.2 }"}, "noise_kept"),
+        ({"mappo": "{ horizon = 0 }"}, "horizon"),
+        ({"ppo": "{ epochs = 0 }"}, "epochs"),
         ({"like": '"nowhere"'}, "like = 'nowhere' must name another recipe"),
     ],
 )
@@ -213,6 +216,23 @@ def test_bad_recipes_are_refused_by_name(tmp_path, changes, told):
 
     with pytest.raises(ResultsError, match=told):
         load_recipe(recipe(tmp_path / "bad.toml", **changes))
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ('axes = ["W1", "X"]\nlevels = [2, 4]', r"axis X has the levels \[1, 3, 5\]; add one of them to levels"),
+        ("periods_s = [1.0]", "decision_period_s of scenario 'random_field' is 1, but trained policies decide every"),
+    ],
+)
+def test_episodes_that_cannot_be_drawn_or_run_are_refused(tmp_path, line, told):
+    from uuv_marl.errors import ResultsError
+    from uuv_marl.train.recipe import load_recipe
+
+    path = tmp_path / "bad.toml"
+    path.write_text(f'title = "bad"\n[episodes]\n{line}\n', encoding="utf-8")
+    with pytest.raises(ResultsError, match=told):
+        load_recipe(str(path))
 
 
 def test_the_command_trains_what_a_recipe_says_and_nothing_else_beside_it(tmp_path):

@@ -324,6 +324,17 @@ def test_the_train_command(tmp_path, address, monkeypatch):
     assert not ray.is_initialized()
 
 
+def test_the_train_command_gives_a_vehicle_its_own_inner_loop(tmp_path, monkeypatch):
+    """With that of the paper's vehicle the scenario is refused: a rudder has none."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "tracking"\nname = "mine"\nversion = 1\nvehicle = "lauv"\n')
+    seen = []
+    monkeypatch.setattr(rllib, "train", lambda output, steps, settings, **_: iter(seen.append(settings.load()) or ()))
+    done = CliRunner().invoke(app, ["train", "rllib", f"--scenario={mine}", f"--output={tmp_path / 'out'}"])
+    assert done.exit_code == 0, done.output
+    assert (seen[0].actuators.yaw_damping_nms, seen[0].timing.decision_period_s) == (0.0, 0.5)
+
+
 def benchmark(folder, policies, *more):
     names = [f"--policy={name}" for name in policies]
     done = CliRunner().invoke(app, ["benchmark", *names, "--seeds=3", f"--output={folder}", *FEW, *more])

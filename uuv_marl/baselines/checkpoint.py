@@ -48,6 +48,8 @@ _NOT_THE_VEHICLE = {
     "actuators.yaw_lag_s",
     "actuators.yaw_authority",
 }
+PERIODS_S = (0.1, 0.5)
+"""Shortest and longest period between decisions that a policy of a training may be run with [s]."""
 _FIRST_VEHICLE = "literature_185"
 """The vehicle of version 0.1.0, which wrote checkpoints without saying so."""
 
@@ -100,7 +102,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     ``memory``, what ``recall`` makes of what is remembered, and the last trims the gains of ``law``."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every field of the percept."""
-    decision_period_s: tuple[float, float] = (0.1, 0.5)
+    decision_period_s: tuple[float, float] = PERIODS_S
     """Shortest and longest period between decisions that it may be run with [s]."""
     yaw_damping_nms: float = 600.0
     """Inner loop that it was trained with [N m s]."""

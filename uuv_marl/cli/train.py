@@ -209,9 +209,13 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
     finally:
         signal.signal(signal.SIGINT, before)
     if noted:
-        kept = any((output / "checkpoints").glob("[0-9]*[0-9]"))
-        rest = "The last checkpoint is" if kept else "There is no checkpoint yet, only settings"
-        console.print(f"Stopped. {rest} in {output}; the same command with --resume continues.")
+        if any((output / "checkpoints").glob("[0-9]*[0-9]")):
+            rest = f"The last checkpoint is in {output}; the same command with --resume continues."
+        elif (output / "config.json").exists():
+            rest = f"There is no checkpoint yet, only settings in {output}; give the command with --resume."
+        else:
+            rest = "Nothing was written yet; the same command begins again."
+        console.print(f"Stopped. {rest}")
         raise typer.Exit(130)
 
 
@@ -241,8 +245,10 @@ def train_rllib(
     with explained():
         with extra("distributed", "training with RLlib"):
             from uuv_marl.train.rllib import Settings, train
+            from uuv_marl.train.shaping import overrides_for
 
-        settings = Settings(scenario=scenario, num_vehicles=num_vehicles, seed=seed)
+        changes = overrides_for(scenario, {})
+        settings = Settings(scenario=scenario, num_vehicles=num_vehicles, overrides=changes, seed=seed)
         texts = {
             "agent_steps": "{agent_steps:,} agent-steps",
             "episode_return": "last return per vehicle {episode_return:.1f}",

@@ -120,15 +120,18 @@ class Task(NamedTuple):
         from uuv_marl.train.settings import Settings, swarms_of
         from uuv_marl.train.shaping import overrides_for
 
+        own = changes_of(self.overrides or [])
         size = {} if self.num_vehicles is None else {"swarm.num_vehicles": self.num_vehicles}
         sizes = whole_numbers("--sizes", self.sizes)
-        if sizes and size:
-            raise typer.BadParameter("--num-vehicles is the size of every swarm; leave out this option or --sizes")
+        given = {"--num-vehicles": size, "--sizes": sizes, "--set swarm.num_vehicles": "swarm.num_vehicles" in own}
+        named = [name for name, value in given.items() if value]
+        if len(named) > 1:
+            raise typer.BadParameter(f"{' and '.join(named)} each say how many vehicles a swarm has; give one of them")
         if self.sees not in ("percept", "memory"):
             raise typer.BadParameter(f"--sees must be percept or memory, got {self.sees!r}")
         if self.reward:
             find_modules([self.reward])
-        changes = overrides_for(self.scenario, {**size, **changes_of(self.overrides or [])})
+        changes = overrides_for(self.scenario, {**size, **own})
         return Settings(
             scenario=self.scenario, overrides=changes, sizes=swarms_of(sizes) if sizes else (), reward=self.reward,
             sees=self.sees, seed=self.seed, start=None if self.start is None else str(self.start), algorithm=algorithm,

@@ -39,7 +39,7 @@ class Problem(NamedTuple):
     change_cost: float = 0.0
     """Paid for each 0.5 s in which the safety filter changed a vehicle's action."""
     held_s: float = 0.0
-    """An output of the actor is held for so long; 0: for one decision."""
+    """An output of the actor is held for so long, rounded to whole decisions; 0: for one decision."""
     law: Gains = Gains()
     """Gains of the hand-made law that an actor with memory trims."""
     safety: Barrier = Barrier()
@@ -68,7 +68,7 @@ class Group:
         problem: what is trained on.
         num_vehicles: of each world.
         num_worlds: one, where ``problem`` has conditions.
-        turn: index of the first episode's condition.
+        turn: index of a condition; each start goes on to the next one.
         rows: filled with what the critic sees of each vehicle, shape (world x vehicle, entry); the actor sees the first
             entries.
 

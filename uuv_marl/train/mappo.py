@@ -21,7 +21,7 @@ from uuv_marl.extras import extra
 from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.group import Problem
-from uuv_marl.train.shared import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
+from uuv_marl.train.shared import Count, PPOHyperparameters, Share, Update, adam_arrays, annealed, restore_adam
 
 with extra("train", "training with MAPPO"):
     import torch
@@ -33,27 +33,27 @@ class Hyperparameters(PPOHyperparameters):
     """Numbers of the algorithm; see ``Learner`` and ``gae``."""
 
     name: str = "mappo"
-    actor_epochs: int = 3
-    critic_epochs: int = 2
+    actor_epochs: Count = 3
+    critic_epochs: Count = 2
     critic_rate: float = 1.0
     """The critic's learning rate, in the actor's."""
-    critic_first: float = 0.0
+    critic_first: Share = 0.0
     """Share of the training in which the critic learns alone: an actor that begins well is spoilt by a critic that
     knows nothing (Silver, Allen, Tenenbaum and Kaelbling, Residual policy learning, 2018)."""
     noise: tuple[float, float] = (0.4, 0.08)
     """Standard deviation of outputs [1], at the start and at the end."""
-    shared_noise: float = 0.0
+    shared_noise: Share = 0.0
     """Share of that variance which all vehicles of a world have in common, so that what a swarm does together is
     tried: one vehicle alone moves its centre by 1/n. The objective takes each output as if it were drawn alone."""
-    noise_kept: float = 0.0
+    noise_kept: Share = 0.0
     """Share of the noise that is left at the next decision [1]: what takes seconds to show is tried for seconds."""
     first_outputs: tuple[float, ...] = ()
     """Outputs of the actor before it has learned [1]; zeros unless given. A trim that is bounded on one side can't be
     learned from beyond its bound, where it changes nothing: begin on the side where it does."""
     max_gradient: float = 1.0
-    value_decay: float = 0.99
+    value_decay: Share = 0.99
     """Decay of the running mean and variance by which returns are normalised [1]."""
-    average: float = 0.98
+    average: Share = 0.98
     """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
 
     def begin(self, problem: Problem, seed: int, device: str = "cpu") -> "Mappo":

@@ -4,6 +4,7 @@ What differs is the algorithm: the critic sees what the actor sees, and action n
 """
 
 import math
+import random
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats
 from uuv_marl.train.group import Problem
-from uuv_marl.train.shared import PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
+from uuv_marl.train.shared import Count, PPOHyperparameters, Update, adam_arrays, annealed, restore_adam
 from uuv_marl.train.vec_env import TrainingVecEnv
 
 with extra("train", "training with Stable-Baselines3"):
@@ -34,7 +35,7 @@ class Hyperparameters(PPOHyperparameters):
     """Numbers of Stable-Baselines3's PPO; ``minibatch`` becomes the largest factor of the batch below it, for SB3."""
 
     name: str = "ppo"
-    epochs: int = 3
+    epochs: Count = 3
     noise: float = 0.4
     """Standard deviation of actions at the start [full force]; then it is learned."""
 
@@ -52,8 +53,8 @@ class Hyperparameters(PPOHyperparameters):
 class Ppo:
     """Stable-Baselines3's model with its environment, taken an iteration at a time.
 
-    SB3 draws from the global generators of NumPy and torch. Their states are swapped in while it works, so that nothing
-    outside is disturbed and a seed fixes a training.
+    SB3 draws from the global generators of NumPy and torch, and seeds Python's. Their states are swapped in while it
+    works, so that nothing outside is disturbed and a seed fixes a training.
 
     Args:
         by: the algorithm's numbers.
@@ -167,13 +168,14 @@ class Ppo:
 
     @contextmanager
     def _own_random(self) -> Iterator[None]:
-        outside = _global_random()
+        outside, pythons = _global_random(), random.getstate()
         _set_global_random(self._random)
         try:
             yield
         finally:
             self._random = _global_random()
             _set_global_random(outside)
+            random.setstate(pythons)
 
 
 def _global_random() -> Any:

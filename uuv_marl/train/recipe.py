@@ -50,6 +50,13 @@ class Episodes(pydantic.BaseModel, frozen=True, extra="forbid"):
     validated: int = pydantic.Field(0, ge=0)
     """Number of other episodes that are drawn for validation, the same for every seed of a training."""
 
+    @pydantic.model_validator(mode="after")
+    def _levels_there(self) -> "Episodes":
+        for axis in known(self.axes):
+            if not {*AXES[axis].levels} & {*self.levels}:
+                raise ValueError(f"axis {axis} has the levels {[*AXES[axis].levels]}; add one of them to levels")
+        return self
+
     def draw(self, scenario: str, seed: int) -> Conditions:
         """Fields of the scenario for each of ``number`` episodes."""
         return tuple(self._drawn(scenario, self.number, self.changes, seed))

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, cast
 
+from uuv_marl.baselines.checkpoint import PERIODS_S
 from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.reward import RewardFunction
-from uuv_marl.errors import RewardError
+from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.modules import named_object
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.acting import ACTING, Sees
@@ -33,6 +34,10 @@ def swarms_of(sizes: Sequence[int]) -> Sizes:
     return tuple((n, max(1, round(share / n))) for n in sizes)
 
 
+def _usual_size() -> int:
+    return load_scenario(Settings.scenario).swarm.num_vehicles
+
+
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """What is trained, and how."""
@@ -43,7 +48,7 @@ class Settings:
     """Fields of the scenario that differ from its file."""
     sizes: Sizes = ()
     """Vehicles and worlds of each swarm. If empty: 10 to 100 vehicles at once (``MIXED``), or only swarms of the
-    scenario's own size where that is another than the shipped ones'."""
+    scenario's own size where ``overrides`` name it, or it is another than the shipped ones'."""
     steps: int = 30_000_000
     """Agent-steps: one is one decision of one vehicle. Annealing ends here."""
     seed: int = 0
@@ -68,7 +73,7 @@ class Settings:
     trims: tuple[Trim, ...] = ALL_TRIMS
     """With memory: what the actor changes."""
     held_s: float = 0.0
-    """An output of the actor is held for so long; 0: for one decision."""
+    """An output of the actor is held for so long, rounded to whole decisions; 0: for one decision."""
     conditions: Conditions = ()
     """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
     algorithm: "Hyperparameters | ppo.Hyperparameters" = field(default_factory=Hyperparameters)
@@ -82,8 +87,11 @@ class Settings:
     """Fields of the scenario of further validation episodes."""
 
     def __post_init__(self) -> None:
-        n = self.load().swarm.num_vehicles
-        sizes = self.sizes or (MIXED if n == load_scenario(type(self).scenario).swarm.num_vehicles else swarms_of([n]))
+        scenario = self.load()
+        self._check_periods(scenario)
+        n = scenario.swarm.num_vehicles
+        usual = "swarm.num_vehicles" not in self.overrides and n == _usual_size()
+        sizes = self.sizes or (MIXED if usual else swarms_of([n]))
         validation = self.validation or (MIXED_VALIDATION if sizes == MIXED else tuple((n, 4) for n, _ in sizes))
         first = self.algorithm.first_outputs if isinstance(self.algorithm, Hyperparameters) else ()
         outputs = ACTING[self.sees].num_outputs(self.trims)
@@ -91,6 +99,18 @@ class Settings:
             raise ValueError(f"first_outputs must have a number for each of {outputs} outputs, got {len(first)}")
         object.__setattr__(self, "sizes", sizes)
         object.__setattr__(self, "validation", validation)
+
+    def _check_periods(self, scenario: Scenario) -> None:
+        """Raise ScenarioError where a policy would be trained or validated at a period that it can't be run with."""
+        field, (shortest, longest) = "timing.decision_period_s", PERIODS_S
+        drawn = [float(str(c[field])) for c in (*self.conditions, *self.validation_conditions) if field in c]
+        own = scenario.timing.decision_period_s, self.load_for_validation().timing.decision_period_s
+        for period in {*own, *drawn}:
+            if not shortest - 1e-9 <= period <= longest + 1e-9:
+                raise ScenarioError(
+                    f"{field} of scenario {scenario.name!r} is {period:g}, but trained policies decide every "
+                    f"{shortest:g} to {longest:g} s; choose a period in this range"
+                )
 
     def paid(self) -> RewardFunction:
         """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""

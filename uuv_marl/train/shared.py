@@ -3,12 +3,17 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+import pydantic
 from numpy.typing import NDArray
 
 from uuv_marl.extras import extra
+
+Count = Annotated[int, pydantic.Field(ge=1)]
+Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
+"""Bounds that a recipe's numbers are checked against."""
 
 with extra("train", "training"):
     import torch
@@ -19,14 +24,14 @@ with extra("train", "training"):
 class PPOHyperparameters:
     """Numbers that every PPO has, for a network that all vehicles share."""
 
-    hidden: tuple[int, ...] = (96, 96)
+    hidden: tuple[Count, ...] = (96, 96)
     """Units of the actor's and of the critic's layers, tanh."""
-    gamma: float = 0.98
+    gamma: Share = 0.98
     """Discount per decision; with 0.5 s a horizon of 25 s, about the time that passing an obstacle takes."""
-    gae_lambda: float = 0.95
-    horizon: int = 48
+    gae_lambda: Share = 0.95
+    horizon: Count = 48
     """Decisions between updates."""
-    minibatch: int = 2048
+    minibatch: Count = 2048
     """Rows of a gradient step, at most."""
     clip: float = 0.2
     """Clip range of PPO's ratio [1]."""

@@ -72,9 +72,10 @@ class Trainer:
     Args:
         settings: of the training.
         device: torch's name of where networks and batches are; worlds are on the CPU.
+        checkpoint: where to go on, see ``restore``; else the training begins, from ``settings.start`` if there is one.
     """
 
-    def __init__(self, settings: Settings, device: str = "cpu") -> None:
+    def __init__(self, settings: Settings, device: str = "cpu", checkpoint: Path | None = None) -> None:
         self.settings = settings
         self.scenario = settings.load()
         self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
@@ -93,7 +94,9 @@ class Trainer:
             settings.seed,
             device,
         )
-        if settings.start is not None:
+        if checkpoint is not None:
+            self.restore(checkpoint)
+        elif settings.start is not None:
             remedy = "give a folder best or a checkpoint of the same algorithm and sizes of network"
             with _reading(Path(settings.start) / _LEARNER_FILE, remedy) as data:
                 self.algorithm.start_from(_learned(data))
@@ -160,7 +163,8 @@ def train(
     """Train to ``settings.steps``; a record for each iteration.
 
     Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
-    come without the break, bit for bit. Uses two threads of torch: actor and critic learn side by side.
+    come without the break, on the CPU bit for bit (of a GPU, PPO's generator of noise is not kept). Uses two threads of
+    torch: actor and critic learn side by side.
 
     Args:
         output: a new or empty folder, or with ``resume`` that of an earlier training.
@@ -190,13 +194,13 @@ def train(
         own = f"{len(settings.conditions)} conditions, an episode each" if settings.conditions else conditions(scenario)
         say(f"Training on swarms of {sizes}; {own}.")
         torch.set_num_threads(1)  # sums in another order give other bits
-        trainer = Trainer(settings, device)
-        if folder.checkpoint:
-            trainer.restore(folder.checkpoint)
+        trainer = Trainer(settings, device, folder.checkpoint)
         folder.begin({"seed": settings.seed, "steps": until, "device": device}, _LIBRARIES)
-        with writing(output), SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps) as board:
+        # TensorBoard hides what was written from the purge step on: what a break has left after the checkpoint.
+        with writing(output), SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps + 1) as board:
             while record.agent_steps < until and not stopped:
                 record = trainer.iterate(record)
+                episodes = trainer.algorithm.pop_episode_stats()
                 done = record.agent_steps >= until
                 if done or record.iteration % settings.validate_every == 0:
                     record = _validated(trainer, record, output)
@@ -204,7 +208,7 @@ def train(
                 stopped = stop()
                 if done or stopped or record.iteration % settings.checkpoint_every == 0:
                     folder.keep(record, lambda path, record=record: trainer.save(path, record))
-                _show(board, record, trainer.algorithm.pop_episode_stats())
+                _show(board, record, episodes)
                 yield record
 
 

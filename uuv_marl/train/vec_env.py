@@ -42,8 +42,6 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
         if self.next_seed is None:
             return None
         first, self.next_seed = self.next_seed, self.next_seed + num
-        if not self._counts:
-            return range(first, first + num)
         low, high = TRAINING_SEEDS
         return [low + (seed - low) % (high - low) for seed in range(first, first + num)]
 
