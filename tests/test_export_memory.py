@@ -134,7 +134,8 @@ def test_the_file_says_what_it_remembers(tmp_path):
     scenario = load_scenario("random_field", overrides={"timing.decision_period_s": 0.2})
     write_onnx("scout", scenario, tmp_path / "scout.onnx")
     model = onnx.load(tmp_path / "scout.onnx")
-    assert "every 0.2 s" in model.doc_string
+    assert "every vehicle of a swarm of 54. It decides every 0.2 s" in model.doc_string
+    assert {entry.key: entry.value for entry in model.metadata_props}["num_vehicles"] == "54"
     kept = {each.name: each for each in model.graph.input}
     assert "centre in the map" in kept["kept_disc"].doc_string
     assert [each.name for each in model.graph.output][:2] == ["action", "next_pose"]

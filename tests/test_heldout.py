@@ -1,22 +1,23 @@
 """The held-out evaluation: what is run, what its numbers mean, and that the shipped page is made of its episodes."""
 
 import csv
+import importlib.util
 import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import trim_mean
 from typer.testing import CliRunner
 
 from uuv_marl import baselines
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.benchmark.tables import shown
 from uuv_marl.cli import app
+from uuv_marl.errors import ResultsError
 from uuv_marl.studies.heldout import across, figures, job, page, sets
-from uuv_marl.studies.heldout.across import efficiency, improvement, success
+from uuv_marl.studies.heldout.across import efficiency, improvement, overall, success
 from uuv_marl.studies.heldout.episodes import Episode, read_episodes, write_episodes
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
 from uuv_marl.studies.heldout.sets import GROUPS, LEADING, SETS, HeldOut
@@ -56,12 +57,21 @@ def test_scores_by_hand():
 def test_runs_are_resampled_within_their_tasks():
     """Two tasks whose scores are far apart: tasks that were resampled too would make a wide interval."""
     easy, hard = [0.90, 0.91, 0.92, 0.93, 0.94], [0.10, 0.11, 0.12, 0.13, 0.14]
-    e = estimate(easy, hard)
-    assert e.iqm == pytest.approx(trim_mean(easy + hard, 0.25))
-    assert e.low < e.iqm < e.high
+    e = overall([easy, hard])
+    assert e.value == pytest.approx(np.mean([0.92, 0.12]))
+    assert e.low < e.value < e.high
     assert e.high - e.low < 0.05
-    assert estimate(easy).iqm == pytest.approx(np.mean(easy[1:4]))
-    assert estimate([0.5], [0.7]) == (0.6, 0.6, 0.6)
+
+
+def test_the_hardest_of_four_tasks_counts():
+    assert overall([[1.0] * 3, [1.0] * 3, [1.0] * 3, [0.0] * 3]) == (0.75, 0.75, 0.75)
+
+
+def test_few_runs_have_no_interval():
+    assert shown([1.0, 2.0, 3.0, 4.0], ".1f") == "2.5"
+    assert shown([1.0, 2.0, 3.0, 4.0, 5.0], ".1f").startswith("3.0 [")
+    assert f"{overall([[0.5], [0.7]]):.1f}" == "0.6"
+    assert f"{improvement([[0.5, 0.7, 0.9]], [[0.6, 0.7, 0.1]]):.2f}" == "0.72", "6.5 of 9"
 
 
 def test_the_probability_of_improvement_by_hand():
@@ -72,7 +82,8 @@ def test_the_probability_of_improvement_by_hand():
     assert (one.low + back.high, one.high + back.low) == (pytest.approx(1.0, abs=0.05), pytest.approx(1.0, abs=0.05))
     assert one.low < one.value < one.high
     assert improvement(mine[:1], other[:1]).value - 0.5 == pytest.approx(2 * (one.value - 0.5)), "ties count half"
-    assert improvement([[1.0, 0.9]], [[0.1, 0.2]]) == (1.0, 1.0, 1.0)
+    five = [1.0, 0.9, 0.8, 0.9, 1.0]
+    assert improvement([five], [[0.1, 0.2, 0.3, 0.1, 0.2]]) == (1.0, 1.0, 1.0)
 
 
 def test_ablations_stand_beside_the_comparison(tmp_path):
@@ -225,6 +236,58 @@ def check_marl_eval(data):
                     assert np.isfinite(step[metric]).all()
             counts = [run[name]["step_count"] for name in run if name != "absolute_metrics"]
             assert counts == sorted(counts)
+
+
+def test_the_page_shows_what_was_asked_for_and_not_what_else_is_there(tmp_path, quick):
+    where = trainings(tmp_path / "trainings", SHIPPED)
+    command = ["heldout", f"--output={tmp_path / 'out'}"]
+    assert CliRunner().invoke(app, [*command, f"--trainings={where}"]).exit_code == 0
+    done = CliRunner().invoke(app, [*command, "--seeds=1"])
+    assert done.exit_code == 0, done.output
+    rows = read_episodes(tmp_path / "out" / "episodes.csv")
+    assert {(e.policy, e.training_seed) for e in rows} == {
+        (name, None) for name in ("bio_inspired", "bio_inspired_plus", "mappo", "guarded:mappo")
+    }
+    assert {e.seed for e in rows} == {5000}
+
+
+def test_a_training_that_went_on_is_run_anew_where_that_is_said(tmp_path, quick):
+    where = trainings(tmp_path / "trainings", SHIPPED)
+    command = ["heldout", f"--output={tmp_path / 'out'}", f"--trainings={where}", "--seeds=1"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    other = SHIPPED.with_name("ppo.safetensors")
+    shutil.copyfile(other, where / "mappo-0" / "best" / WEIGHTS_FILE)
+    refused = CliRunner().invoke(app, command)
+    assert refused.exit_code == 2
+    assert "give --anew to drop those runs" in " ".join(refused.output.split())
+    assert CliRunner().invoke(app, [*command, "--anew"]).exit_code == 0
+
+
+def test_ablations_alone_make_a_page(tmp_path, quick):
+    where = trainings(tmp_path / "ablations", SHIPPED)
+    done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", f"--trainings={where}", "--seeds=1"])
+    assert done.exit_code == 0, done.output
+    assert "| mappo-0* | 1 |" in (tmp_path / "out" / "report.md").read_text()
+    assert not (tmp_path / "out" / "marl_eval.json").exists()
+
+
+def test_two_trainings_of_one_name_and_seed_are_refused(tmp_path):
+    folder = trainings(tmp_path, SHIPPED)
+    shutil.copytree(folder / "ppo-0", folder / "ppo-again")
+    with pytest.raises(ResultsError, match="ppo-again.* are both ppo with seed 1.*move one of them out of the folder"):
+        find_trainings(folder)
+
+
+def test_what_is_shipped_is_found_again(tmp_path, monkeypatch):
+    spec = importlib.util.spec_from_file_location("ship_heldout", DOCS.parent.parent / "tools" / "ship_heldout.py")
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    monkeypatch.setattr(tool, "TARGET", tmp_path)
+    monkeypatch.setattr(tool, "write_page", lambda *_: None)
+    tool.ship(DOCS, DOCS / "trainings")
+    names = [[one.policy.relative_to(folder) for one in find_trainings(folder / "trainings")]
+             for folder in (DOCS, tmp_path)]  # fmt: skip
+    assert names[0] == names[1]
 
 
 def test_without_trainings_the_command_ends_with_its_report(tmp_path, quick):

@@ -490,7 +490,7 @@ def test_periods_that_policies_do_not_run_with_are_refused_before_the_training(w
 
 def test_a_slow_scenario_is_refused_though_training_decides_faster(tmp_path):
     slow = tmp_path / "slow.toml"
-    slow.write_text('extends = "starter"\nname = "slow"\nversion = 1\n[timing]\ndecision_period_s = 1.0\n')
+    slow.write_text('extends = "starter"\nversion = 1\n[timing]\ndecision_period_s = 1.0\n')
     with pytest.raises(ScenarioError, match="'slow' is 1, but trained policies decide every 0.1 to 0.5 s"):
         Settings(scenario=str(slow))
 

@@ -14,7 +14,7 @@ from uuv_marl import load_scenario
 from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.success import GRACE_S
 from uuv_marl.cli import app
-from uuv_marl.scenario import disturbances
+from uuv_marl.scenario import ScenarioError, disturbances
 from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.sea.actuation import victims
 from uuv_marl.sim.swarm import Swarm
@@ -268,6 +268,26 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     assert kept["runs"][0]["metrics"]["success_share"] == pytest.approx(rows["success_share"][2])
     before = [path.read_bytes() for path in page.write_report(tmp_path)]
     assert before == [path.read_bytes() for path in page.write_report(tmp_path)]
+
+
+def test_scenarios_of_one_name_are_refused(tmp_path):
+    twice = []
+    for k, num in enumerate((3, 4)):
+        twice.append(tmp_path / f"{k}" / "mine.toml")
+        twice[-1].parent.mkdir()
+        twice[-1].write_text(f'extends = "starter"\nversion = 1\n[swarm]\nnum_vehicles = {num}\n')
+    with pytest.raises(ScenarioError, match="need different names, got mine, mine; rename a file"):
+        job.run(tmp_path / "out", TINY._replace(scenarios=tuple(map(str, twice))), silent)
+
+
+def test_success_is_judged_in_a_vehicle_s_scale_too(tmp_path):
+    """There l(t), and the time after which a swarm is judged, take longer."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "starter"\nversion = 1\nvehicle = "lauv"\nscale = "vehicle"\n')
+    path = job.run(tmp_path / "out", TINY._replace(axes=("N2",), levels=(1,), scenarios=(str(mine),)), silent)
+    found = job.read_episodes(path)
+    assert found["axis"].tolist() == ["0", "N2"]
+    assert found["success_share"].notna().all()
 
 
 def test_the_page_says_which_policy_lacks_a_scenario(tmp_path):

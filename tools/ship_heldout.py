@@ -10,7 +10,7 @@ from pathlib import Path
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
 from uuv_marl.studies.heldout.episodes import read_episodes
 from uuv_marl.studies.heldout.page import write_page
-from uuv_marl.studies.heldout.trainings import find_trainings
+from uuv_marl.studies.heldout.trainings import ABLATIONS, find_trainings
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "heldout"
 
@@ -19,7 +19,8 @@ def ship(results: Path, trainings: Path) -> None:
     """The page is written anew from the copies."""
     episodes = read_episodes(results / "episodes.csv")
     for one in find_trainings(trainings):
-        source, target = one.policy.parent, TARGET / "trainings" / f"{one.algorithm}-{one.seed}"
+        name = f"{ABLATIONS}/{one.algorithm}" if one.ablation else f"{one.algorithm}-{one.seed}"
+        source, target = one.policy.parent, TARGET / "trainings" / name
         (target / "best").mkdir(parents=True, exist_ok=True)
         for name in ("config.json", "progress.csv", f"best/{WEIGHTS_FILE}"):
             shutil.copyfile(source / name, target / name)

@@ -35,7 +35,7 @@ from tests import contract
 from uuv_marl.baselines import make
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.distributed import chunks, connected, evaluate_on_cluster
-from uuv_marl.benchmark.results import Results, ResultsError
+from uuv_marl.benchmark.results import Results, ResultsError, origin
 from uuv_marl.cli import app
 from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
 from uuv_marl.errors import ClusterError
@@ -327,7 +327,7 @@ def test_the_train_command(tmp_path, address, monkeypatch):
 def test_the_train_command_gives_a_vehicle_its_own_inner_loop(tmp_path, monkeypatch):
     """With that of the paper's vehicle the scenario is refused: a rudder has none."""
     mine = tmp_path / "mine.toml"
-    mine.write_text('extends = "tracking"\nname = "mine"\nversion = 1\nvehicle = "lauv"\n')
+    mine.write_text('extends = "tracking"\nversion = 1\nvehicle = "lauv"\n')
     seen = []
     monkeypatch.setattr(rllib, "train", lambda output, steps, settings, **_: iter(seen.append(settings.load()) or ()))
     done = CliRunner().invoke(app, ["train", "rllib", f"--scenario={mine}", f"--output={tmp_path / 'out'}"])
@@ -407,10 +407,12 @@ def test_a_stopped_benchmark_keeps_its_seeds_and_goes_on(tmp_path, joined):
 
 
 def test_other_code_on_a_node_is_refused(joined, monkeypatch):
-    monkeypatch.setattr("uuv_marl.benchmark.distributed.source_fingerprint", lambda: "of another version")
     scenario = uuv_marl.load_scenario("tracking", num_vehicles=5, overrides=SHORT)
-    with pytest.raises(ClusterError, match="other code of uuv_marl"):
-        list(evaluate_on_cluster(scenario, "idle", [0]))
+    for what in ("code of uuv_marl", "numpy", "mappo"):
+        other = {**origin("mappo"), what: "another"}
+        monkeypatch.setattr("uuv_marl.benchmark.distributed.origin", lambda _, other=other: other)
+        with pytest.raises(ClusterError, match=f"has {what} .*, not another as this machine; install the same"):
+            list(evaluate_on_cluster(scenario, "mappo", [0]))
 
 
 def test_chunks_hold_every_seed_once_and_are_enough_for_all_cores():

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from uuv_marl.benchmark.evaluate import BATCH, Run, evaluate
-from uuv_marl.benchmark.results import source_fingerprint
+from uuv_marl.benchmark.results import origin
 from uuv_marl.errors import ClusterError
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
@@ -101,12 +101,12 @@ def evaluate_on_cluster(scenario: Scenario, policy: str, seeds: Sequence[int], *
         parameters: go to the policy.
 
     Raises:
-        ClusterError: a node has other code of uuv_marl, or a worker died repeatedly.
+        ClusterError: a node has other code, libraries or weights, or a worker died repeatedly.
         PolicyError: a node can't import the policy.
     """
     task = ray.remote(num_cpus=1)(_chunk)
     pending = [
-        task.remote(scenario, policy, chunk, parameters, source_fingerprint())
+        task.remote(scenario, policy, chunk, parameters, origin(policy))
         for chunk in chunks(seeds, int(ray.cluster_resources().get("CPU", 1)))
     ]
     try:
@@ -125,7 +125,7 @@ def chunks(seeds: Sequence[int], num_cpus: int) -> list[Sequence[int]]:
 
 
 def _chunk(
-    scenario: Scenario, policy: str, seeds: Sequence[int], parameters: dict[str, object], fingerprint: str
+    scenario: Scenario, policy: str, seeds: Sequence[int], parameters: dict[str, object], wanted: dict[str, str | None]
 ) -> list[Run]:
     """The runs of a few seeds, on a node of the cluster.
 
@@ -134,11 +134,14 @@ def _chunk(
         policy: its name, see ``uuv_marl.baselines.make``.
         seeds: of the episodes, one each.
         parameters: go to the policy.
-        fingerprint: of the code that the node must have.
+        wanted: ``origin`` of the policy, which the node must have too.
     """
-    if source_fingerprint() != fingerprint:
+    here = origin(policy)
+    others = [f"{name} {here.get(name)}, not {value}" for name, value in wanted.items() if here.get(name) != value]
+    if others:
         raise ClusterError(
-            f"node {os.uname().nodename} has other code of uuv_marl than this machine; install the same on all"
+            f"node {os.uname().nodename} has {others[0]} as this machine; install the same versions and copy the same "
+            "files to all"
         )
     return [event for event in evaluate(scenario, policy, seeds, **parameters) if isinstance(event, Run)]
 

@@ -19,8 +19,8 @@ _CONFIDENCE = 0.95
 _RESAMPLES = 2000
 _NOTHING = "–"
 
-_FEWEST_SEEDS = 5
-"""Fewest seeds for an interval: of fewer the bootstrap tells nothing."""
+FEWEST = 5
+"""Fewest values for an interval: of fewer the bootstrap tells nothing."""
 _NARROW = 110
 """Columns of a terminal below which its table leaves out intervals and the time mean."""
 
@@ -71,18 +71,15 @@ class Estimate(NamedTuple):
         return f"{self.iqm:{spec}} [{self.low:{spec}}, {self.high:{spec}}]"
 
 
-def estimate(*samples: Sequence[float]) -> Estimate:
-    """Interquartile mean and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable.
-
-    Several samples, such as one of a value for each seed, give one estimate; each sample is resampled by itself.
-    """
-    data = [np.asarray(sample, np.float64) for sample in samples]
-    whole = float(_iqm(*data))
-    if min(map(len, data)) < 2 or all(np.ptp(sample) == 0.0 for sample in data):
+def estimate(sample: Sequence[float]) -> Estimate:
+    """Interquartile mean and its percentile-bootstrap interval (Agarwal et al. 2021); repeatable."""
+    data = np.asarray(sample, np.float64)
+    whole = float(_iqm(data))
+    if len(data) < 2 or np.ptp(data) == 0.0:
         return Estimate(whole, whole, whole)
     resample: Any = bootstrap
     interval = resample(
-        tuple(data),
+        (data,),
         _iqm,
         confidence_level=_CONFIDENCE,
         n_resamples=_RESAMPLES,
@@ -93,8 +90,16 @@ def estimate(*samples: Sequence[float]) -> Estimate:
     return Estimate(whole, float(interval.low), float(interval.high))
 
 
-def _iqm(*data: Float64, axis: int = -1) -> Float64:
-    return np.asarray(trim_mean(np.concatenate(data, axis=axis), 0.25, axis=axis), np.float64)
+def _iqm(data: Float64, axis: int = -1) -> Float64:
+    return np.asarray(trim_mean(data, 0.25, axis=axis), np.float64)
+
+
+def shown(sample: Sequence[float], spec: str) -> str:
+    """An estimate as text, each number as ``spec`` says: without interval for few values, a dash for none."""
+    if not sample:
+        return _NOTHING
+    e = estimate(sample)
+    return f"{e:{spec}}" if len(sample) >= FEWEST else f"{e.iqm:{spec}}"
 
 
 def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Cells]:
@@ -133,23 +138,17 @@ def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigur
     collided = sum(count > 0 for count in collisions)
     shares = [run.metrics["constraint_share"] for run in runs]
 
-    def shown(values: Sequence[float], digits: int) -> str:
-        if not values:
-            return _NOTHING
-        e = estimate(values)
-        return f"{e if len(runs) >= _FEWEST_SEEDS else e.iqm:.{digits}f}"
-
     return Cells(
         policy=policy,
         knows=_knows(known),
         arrived=f"{len(times)}/{len(runs)}",
-        time=shown(times, 1),
+        time=shown(times, ".1f"),
         slowest=f"{max(times):.1f}" if times else _NOTHING,
-        distance=shown(distances, 2),
+        distance=shown(distances, ".2f"),
         nearest=f"{min(distances):.2f}" if distances else _NOTHING,
-        spacing=shown(spacings, 2),
+        spacing=shown(spacings, ".2f"),
         closest=f"{min(spacings):.2f}" if spacings else _NOTHING,
-        mean=shown(_values(runs, "mean_min_spacing_m"), 2),
+        mean=shown(_values(runs, "mean_min_spacing_m"), ".2f"),
         within=", ".join(f"{name} {np.mean([s[name] for s in shares]):.0%}" for name in ("s_l", "s_o", "s_u")),
         collisions=f"{sum(collisions)} in {counted(collided, 'seed')}" if collided else "0",
         paper=_paper_cell(paper),

@@ -16,6 +16,14 @@ def export(
     scenario: Annotated[
         str, typer.Option(help="Name or TOML file; the model keeps its sonar suite, vehicle and decision period.")
     ] = "random_field",
+    num_vehicles: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Vehicles of the swarm, on which the gains of policies with memory depend. Default: those of the "
+            "scenario.",
+        ),
+    ] = None,
 ) -> None:
     """Write a policy as an ONNX model, from an agent's observation to its action. Needs the extra "onnx".
 
@@ -29,5 +37,5 @@ def export(
 
         from uuv_marl.scenario import load_scenario
 
-        write_onnx(policy, load_scenario(scenario), output)
+        write_onnx(policy, load_scenario(scenario, num_vehicles=num_vehicles), output)
         console.print(f"Model: {output}")

@@ -50,6 +50,9 @@ def robustness(
             help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
         ),
     ] = None,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="Drop runs of policies whose file has changed since, and make them again.")
+    ] = False,
     output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
@@ -90,7 +93,7 @@ def robustness(
             if pilot:
                 written = findings.run(output, seeds or job.SHIPPED.seeds, report, evaluator)
             else:
-                episodes = job.run(output, plan, report, evaluator)
+                episodes = job.run(output, plan, report, evaluator, anew=anew)
                 written = [*page.write_report(output), episodes]
             report("robustness", 1.0)
         for path in written:

@@ -68,6 +68,9 @@ def heldout(
     trainings: Annotated[
         Path | None, typer.Option(help="Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
     ] = None,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="Drop runs of policies whose file has changed since, and make them again.")
+    ] = False,
     output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/heldout"),
 ) -> None:
     """Evaluate every policy on seeds that no training, no tuning and no choice has used.
@@ -81,14 +84,14 @@ def heldout(
     """
     with explained():
         from uuv_marl.atomic import locked
-        from uuv_marl.studies.heldout.episodes import episodes_of
         from uuv_marl.studies.heldout.job import run
         from uuv_marl.studies.heldout.page import write_page
 
         with working(f"The finished episodes are in {output}") as bar:
             report = shown(bar, "held out")
-            results, trained = run(output, trainings, only or [], seeds, lambda what, share: report(share, what[-60:]))
+            told = lambda what, share: report(share, what[-60:])  # noqa: E731
+            episodes, trained = run(output, trainings, only or [], seeds, told, anew)
             report(1.0)
         with locked(output, wait_s=60.0):
-            for path in write_page(output, episodes_of(results, trained), trained):
+            for path in write_page(output, episodes, trained):
                 console.print(f"  {path}", highlight=False)

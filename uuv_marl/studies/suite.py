@@ -67,14 +67,26 @@ class Suite:
         self.seeds = range(seeds)
         self._open: dict[str, Results] = {}
 
-    def run(self, cases: Sequence[Case], report: Report, evaluator: Evaluate = evaluate) -> None:
-        """Run what is missing of these cases, here or where the evaluator does."""
+    def run(self, cases: Sequence[Case], report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> None:
+        """Run what is missing of these cases, here or where the evaluator does.
+
+        Args:
+            cases: in the order in which they are run.
+            report: called as it goes on.
+            evaluator: runs a policy over seeds.
+            anew: drop the runs of policies whose file has changed since, and make them again.
+
+        Raises:
+            ResultsError: the folder holds other results, or those of a policy before its file changed.
+        """
         work = [case.load().swarm.num_vehicles * len(self.seeds_of(case)) for case in cases]
         for k, case in enumerate(cases):
 
             def note(_scenario: str, policy: str, share: float, k: int = k, name: str = case.name) -> None:
                 report(f"{name}: {policy}", (sum(work[:k]) + share * work[k]) / sum(work))
 
+            if anew:
+                self.results(case).forget_changed(case.policy)
             how = partial(evaluator, **case.parameters)
             run_missing(self.results(case), [case.load()], [case.policy], self.seeds_of(case), note, how)
 

@@ -38,7 +38,8 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
 
     Args:
         policy: name of a learned policy, or path of its checkpoint; ``scout``; ``guarded:`` before a learned one.
-        scenario: gives the percept's layout, the vehicle's limits and the decision period, which the model keeps.
+        scenario: gives the percept's layout, the vehicle's limits, the decision period and, where the policy remembers,
+            the number of vehicles, by which its gains go; the model keeps them.
         path: the file.
 
     Raises:
@@ -82,8 +83,8 @@ def _model(policy: Policy, graph: Graph) -> onnx.ModelProto:
         opset_imports=opset,
         ir_version=helper.find_min_ir_version_for(opset),
         producer_name="uuv_marl",
-        doc_string=f"A policy of uuv_marl, {policy.name}, for every vehicle of a swarm. It decides every "
-        f"{_periods(policy)} s, beside an inner loop with a yaw damping of {damping:g} N m s.",
+        doc_string=f"A policy of uuv_marl, {policy.name}, for every vehicle of a swarm{_size(policy)}. It decides "
+        f"every {_periods(policy)} s, beside an inner loop with a yaw damping of {damping:g} N m s.",
     )
     helper.set_model_props(model, _said(policy))
     return model
@@ -121,9 +122,15 @@ def _periods(policy: Policy) -> str:
     return f"{shortest:g} to {longest:g}"
 
 
+def _size(policy: Policy) -> str:
+    return f" of {policy.scenario.swarm.num_vehicles}" if isinstance(policy, Filtered) else ""
+
+
 def _said(policy: Policy) -> dict[str, str]:
-    """Metadata: the vehicle's limits, and card and digest of a checkpoint."""
+    """Metadata: the vehicle's limits, how many vehicles a policy counts on, and card and digest of a checkpoint."""
     checkpoint, said = _network(policy), {"limits": json.dumps(policy.limits._asdict())}
+    if isinstance(policy, Filtered):
+        said["num_vehicles"] = f"{policy.scenario.swarm.num_vehicles}"
     if checkpoint is not None:
         said |= {"card": checkpoint.card.model_dump_json(), "checkpoint": checkpoint.digest}
     return said

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
+from uuv_marl.benchmark.tables import FEWEST
 from uuv_marl.studies.heldout.episodes import Episode
 from uuv_marl.studies.heldout.sets import FIRST, SETS, HeldOut
 from uuv_marl.studies.robustness.scores import Score
@@ -52,24 +53,45 @@ def runs(episodes: Sequence[Episode], held: HeldOut, policy: str, trained: bool)
     return list(found.values())
 
 
+def overall(scores: Sequence[Sequence[float]]) -> Score:
+    """Mean over tasks of the mean over runs: with few tasks a trimmed mean would leave out the hardest.
+
+    The interval is of a bootstrap over runs within each task, repeatable; it is unknown for fewer than ``FEWEST`` runs.
+
+    Args:
+        scores: of the runs, for each task.
+    """
+    return _bootstrapped(_mean, scores)
+
+
 def improvement(mine: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> Score:
     """Probability that a run of mine scores higher than one of the other's; a tie counts half.
 
-    The mean over tasks, with its interval by a bootstrap over runs within each task (Agarwal et al. 2021); repeatable.
+    The mean over tasks, with an interval as in ``overall`` (Agarwal et al. 2021).
 
     Args:
         mine: scores of an algorithm's runs, for each task.
         other: the same of another algorithm.
     """
-    samples = [np.asarray(scores, np.float64) for scores in (*mine, *other)]
-    value = float(_higher(*samples))
-    if min(map(len, samples)) < 2 or all(np.ptp(np.concatenate(both)) == 0.0 for both in zip(mine, other, strict=True)):
-        return Score(value, value, value)
+    return _bootstrapped(_higher, [*mine, *other], 2 * FEWEST)
+
+
+def _bootstrapped(statistic: Any, scores: Sequence[Sequence[float]], fewest: int = FEWEST) -> Score:
+    """A statistic of samples with its interval, which is unknown for fewer values in all."""
+    samples = [np.asarray(one, np.float64) for one in scores]
+    value = float(statistic(*samples))
+    if min(map(len, samples)) < 2 or sum(map(len, samples)) < fewest:
+        return Score(value, np.nan, np.nan)
     resample: Any = bootstrap
-    interval = resample(
-        samples, _higher, vectorized=True, n_resamples=2000, method="percentile", rng=np.random.default_rng(0)
-    ).confidence_interval
-    return Score(value, float(interval.low), float(interval.high))
+    found = resample(
+        samples, statistic, vectorized=True, n_resamples=2000, method="percentile", rng=np.random.default_rng(0)
+    ).bootstrap_distribution
+    low, high = np.percentile(found, [2.5, 97.5])
+    return Score(value, float(low), float(high))
+
+
+def _mean(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
+    return np.mean([x.mean(axis=axis) for x in samples], axis=0)
 
 
 def _higher(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:  # noqa: ARG001 - scipy names it

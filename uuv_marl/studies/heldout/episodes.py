@@ -1,15 +1,15 @@
 """Episodes as rows: what the page and the files are made of."""
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from pydantic import TypeAdapter
 
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.benchmark.results import Results
 from uuv_marl.studies.heldout.trainings import Trained
+from uuv_marl.studies.suite import Case, Suite
 
 
 class Episode(NamedTuple):
@@ -77,15 +77,16 @@ def measured(episodes: Sequence[Episode], name: str) -> list[float]:
     return [value for e in episodes if (value := getattr(e, name)) is not None]
 
 
-def episodes_of(results: Mapping[str, Results], trained: Sequence[Trained]) -> list[Episode]:
-    """All that the results hold, in their order."""
+def episodes_of(suite: Suite, cases: Sequence[Case], trained: Sequence[Trained]) -> list[Episode]:
+    """The episodes of these cases, by set in their order, policy and seed; not what else the suite's folder holds."""
     trainings = {str(one.policy): (one.algorithm, one.seed) for one in trained}
+    sets = list(dict.fromkeys(case.name for case in cases))
     rows: list[Episode] = []
-    for name, kept in results.items():
-        for row in sorted(kept.rows, key=lambda row: (row.policy, row.seed)):
-            policy, training_seed = trainings.get(row.policy, (row.policy, None))
-            limit_s = kept.scenarios[row.scenario].time_limit.of(row.metrics["duration_s"])
-            rows.append(episode_of(name, policy, training_seed, row.seed, limit_s, row.metrics))
+    for case in sorted(cases, key=lambda case: (sets.index(case.name), case.policy)):
+        scenario, (policy, training_seed) = case.load(), trainings.get(case.policy, (case.policy, None))
+        for row in suite.results(case).select(scenario.name, case.policy, suite.seeds_of(case)):
+            limit_s = scenario.time_limit.of(row.metrics["duration_s"])
+            rows.append(episode_of(case.name, policy, training_seed, row.seed, limit_s, row.metrics))
     return rows
 
 

@@ -6,26 +6,28 @@ from pathlib import Path
 
 from uuv_marl.atomic import locked
 from uuv_marl.baselines.registry import policy_class
-from uuv_marl.benchmark.results import Results, ResultsError
+from uuv_marl.errors import ResultsError
+from uuv_marl.studies.heldout.episodes import Episode, episodes_of
 from uuv_marl.studies.heldout.sets import SETS
 from uuv_marl.studies.heldout.trainings import Trained, find_trainings
 from uuv_marl.studies.suite import Report, Suite
 
 
 def run(
-    output: Path, trainings: Path | None, only: Sequence[str], seeds: int | None, report: Report
-) -> tuple[dict[str, Results], list[Trained]]:
+    output: Path, trainings: Path | None, only: Sequence[str], seeds: int | None, report: Report, anew: bool = False
+) -> tuple[list[Episode], list[Trained]]:
     """Run what is missing.
 
     Args:
-        output: folder with a benchmark's results for every set.
+        output: folder with a benchmark's results for every set; what else it holds is left out.
         trainings: folder of trainings (``find_trainings``), or None.
         only: names of sets; empty for all.
         seeds: at most so many of every set; all if None.
         report: called as it goes on.
+        anew: drop the runs of trainings whose policy has changed since, and make them again.
 
     Returns:
-        Results by set, and the trainings.
+        All episodes asked for, and the trainings.
 
     Raises:
         ResultsError: there is no such set, or a folder holds other results.
@@ -43,5 +45,5 @@ def run(
     with ExitStack() as locks:
         for folder in dict.fromkeys(output / case.folder for case in cases):
             locks.enter_context(locked(folder))
-        suite.run(cases, report)
-    return {case.name: suite.results(case) for case in cases}, trained
+        suite.run(cases, report, anew=anew)
+    return episodes_of(suite, cases, trained), trained

@@ -7,9 +7,9 @@ import numpy as np
 
 from uuv_marl.baselines import POLICIES
 from uuv_marl.benchmark.style import house_style
-from uuv_marl.benchmark.tables import estimate, markdown_table
+from uuv_marl.benchmark.tables import markdown_table, shown
 from uuv_marl.studies.data import read_text
-from uuv_marl.studies.heldout.across import SCORES, improvement, runs, tasks
+from uuv_marl.studies.heldout.across import SCORES, improvement, overall, runs, tasks
 from uuv_marl.studies.heldout.episodes import Episode, measured, read_episodes, select, write_episodes
 from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
@@ -43,22 +43,22 @@ def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trai
             written.append(draw_fields(episodes, "random_field", folder / "figures" / "random_field.png"))
         if trained:
             written.append(draw_trainings(episodes, trained, folder / "figures" / "training.png"))
-    if tasks(episodes):
+    page.write_text(report(episodes, trained), encoding="utf-8")
+    if tasks(episodes) and not all(one.ablation for one in trained):
         write_marl_eval(episodes, trained, raw)
         written.append(raw)
-    page.write_text(report(episodes, trained), encoding="utf-8")
     return written
 
 
 def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     """The page's text."""
-    shown = {e.set for e in episodes if e.training_seed is None}
+    sets = {e.set for e in episodes if e.training_seed is None}
     return read_text("heldout", "story.md").format(
         first=FIRST,
         targets=_targets(episodes),
         glance=_glance(episodes),
         guarded=_guarded(episodes),
-        sets="\n".join(_set(held, episodes) for held in SETS if held.name in shown),
+        sets="\n".join(_set(held, episodes) for held in SETS if held.name in sets),
         across=_across(episodes, trained),
         trainings=_trainings(trained),
     )
@@ -128,21 +128,17 @@ def _cells(mine: Sequence[Episode]) -> tuple[str, ...]:
     return (
         f"{len(times)}/{len(mine)}",
         f"{sum(e.collisions > 0 for e in mine)}",
-        _interval(".1f", times),
+        shown(times, ".1f"),
         f"{max(times):.1f}" if times else _NOTHING,
         f"{late:.1f}",
-        _interval(".2f", obstacle),
+        shown(obstacle, ".2f"),
         f"{min(obstacle):.2f}" if obstacle else _NOTHING,
-        _interval(".2f", spacing),
+        shown(spacing, ".2f"),
         f"{min(spacing):.2f}" if spacing else _NOTHING,
         f"{np.mean([e.within_eq7 for e in mine]):.0%}",
         f"{np.mean(measured(mine, 'centre_error_m')):.1f}",
         f"{np.mean([e.effort for e in mine]):.2f}",
     )
-
-
-def _interval(spec: str, *samples: Sequence[float]) -> str:
-    return f"{estimate(*samples):{spec}}" if all(samples) else _NOTHING
 
 
 def _across(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
@@ -159,9 +155,10 @@ def _across(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     for policy, learned in [*((name, True) for name in algorithms), *((name, False) for name in shipped)]:
         by_task = [runs(episodes, held, policy, trained=learned) for held in compared]
         scores = [[[score(run) for run in task] for task in by_task] for score in SCORES.values()]
-        each = [_interval(".2f", task) for tasks_of_score in scores for task in tasks_of_score]
+        each = [shown(task, ".2f") for tasks_of_score in scores for task in tasks_of_score]
+        mean = [f"{overall(every):.2f}" if all(every) else _NOTHING for every in scores]
         label, count = (labels[policy], f"{len(by_task[0])}") if learned else (f"`{policy}`", _NOTHING)
-        rows.append([label, count, *each, *(_interval(".2f", *tasks_of_score) for tasks_of_score in scores)])
+        rows.append([label, count, *each, *mean])
         if learned and policy in ("mappo", "ppo"):
             pair.append(scores)
     return markdown_table([*headers, *(f"{name}, all" for name in SCORES)], rows) + _improvement(pair, compared)

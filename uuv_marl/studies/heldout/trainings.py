@@ -45,7 +45,11 @@ class Trained(NamedTuple):
 
 
 def find_trainings(folder: Path) -> list[Trained]:
-    """The trainings in ``folder`` by algorithm and seed, then its ablations. Raises ResultsError if there is none."""
+    """The trainings in ``folder`` by algorithm and seed, then its ablations.
+
+    Raises:
+        ResultsError: there is none, or two have the same algorithm and seed.
+    """
     paths = [*folder.glob("*/config.json"), *folder.glob(f"{ABLATIONS}/*/config.json")]
     read = [_read(path.parent) for path in paths if (path.parent / "best").is_dir()]
     found = [one for one in read if one.validations]
@@ -53,6 +57,15 @@ def find_trainings(folder: Path) -> list[Trained]:
         raise ResultsError(
             f"{folder} holds no trainings with a best policy; give a folder of outputs of uuv-marl train"
         )
+    places: dict[tuple[object, ...], Path] = {}
+    for one in found:
+        name = one.algorithm, one.seed, one.ablation
+        if name in places:
+            raise ResultsError(
+                f"{places[name]} and {one.policy.parent} are both {one.algorithm} with seed {one.seed}, whose episodes "
+                "would be taken for one training's; move one of them out of the folder"
+            )
+        places[name] = one.policy.parent
     return sorted(found, key=lambda one: (one.ablation, one.algorithm, one.seed))
 
 

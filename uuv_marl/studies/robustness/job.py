@@ -8,7 +8,7 @@ from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.frame import need_pandas
 from uuv_marl.benchmark.runner import Evaluate
-from uuv_marl.scenario import load_scenario
+from uuv_marl.scenario import ScenarioError, load_scenario
 from uuv_marl.studies.robustness.axes import AXES, CALM, overrides
 from uuv_marl.studies.suite import Case, Report, Suite
 
@@ -78,7 +78,7 @@ def _places(plan: Plan) -> Iterator[tuple[str, int]]:
         yield from ((axis, level) for level in plan.levels if level in AXES[axis].levels)
 
 
-def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate) -> Path:
+def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> Path:
     """Run what is missing of a plan, and write all its episodes to ``EPISODES``, a row each.
 
     Args:
@@ -86,19 +86,24 @@ def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate
         plan: what to run.
         report: called as it goes on.
         evaluator: runs a policy over seeds, here or elsewhere.
+        anew: drop the runs of policies whose file has changed since, and make them again.
 
     Returns:
         The file.
 
     Raises:
         PolicyError: a policy does not exist, or cannot be run on one of the scenarios.
+        ScenarioError: two scenarios have the same name.
         ResultsError: the folder holds other results.
     """
+    names = [load_scenario(scenario).name for scenario in plan.scenarios]
+    if len(set(names)) < len(names):
+        raise ScenarioError(f"scenarios of one report need different names, got {', '.join(names)}; rename a file")
     planned = cells(plan)
     for cell in planned:
         make(cell.case.policy, granted(cell.case.policy, cell.case.load()))  # refused now, not after hours
     suite = Suite(folder / "cells", traces=False)
-    suite.run([cell.case for cell in planned], report, evaluator)
+    suite.run([cell.case for cell in planned], report, evaluator, anew=anew)
     path = folder / EPISODES
     write_episodes(path, (row for cell in planned for row in _rows(suite, cell)))
     return path
