@@ -439,7 +439,7 @@ def test_light_commands_import_nothing_heavy():
 def test_a_scenario_names_its_vehicle_whose_numbers_stand_in_a_file(tmp_path):
     scenario = load_scenario("tracking")
     assert scenario.vehicle.name == "literature_185"
-    assert load_scenario(scenario, overrides={"vehicle.m_kg": 200.0, "vehicle": "literature_185"}) == scenario
+    assert load_scenario(scenario, overrides={"vehicle": "literature_185"}) == scenario
     shown = show("tracking")
     assert 'name = "literature_185"' in shown
     assert "m_kg = 185.0  # Repoulias and Papadopoulos 2007" in shown
@@ -475,3 +475,36 @@ def test_a_vehicle_file_that_is_not_whole_is_refused(tmp_path, before, after, me
 def test_an_unknown_vehicle_names_the_nearest():
     with pytest.raises(ScenarioError, match=r"vehicle 'literature_18' is unknown; did you mean 'literature_185'\?"):
         load_scenario("tracking", overrides={"vehicle": "literature_18"})
+
+
+def test_overrides_count_in_whatever_order_they_are_given():
+    """A vehicle before its numbers, a table before its entries."""
+    pairs = [
+        {"actuators.max_force_n": 40.0, "vehicle": "bluerov2_heavy"},
+        {"faults.0.share": 0.25, "faults": [{"kind": "yaw", "share": 0.5}]},
+    ]
+    for one in pairs:
+        other = dict(reversed(one.items()))
+        assert load_scenario("sea_trial", overrides=one) == load_scenario("sea_trial", overrides=other)
+    assert load_scenario("sea_trial", overrides=pairs[0]).actuators.max_force_n == 40.0
+
+
+def test_overrides_of_a_caller_stay_as_they_are():
+    mine = {"faults": [{"kind": "yaw", "share": 0.5}], "faults.0.share": 0.25}
+    assert load_scenario("tracking", overrides=mine).faults[0].share == 0.25
+    assert mine["faults"] == [{"kind": "yaw", "share": 0.5}]
+
+
+def test_a_file_s_name_is_the_scenario_s(tmp_path):
+    path = tmp_path / "my scenario.toml"
+    path.write_text('extends = "starter"\n')
+    with pytest.raises(ScenarioError, match="'my scenario.toml' must have a name of letters.*rename the file"):
+        load_scenario(path)
+
+
+def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
+    """Read back from its TOML, which can't say that a number is unknown."""
+    own = load_scenario("starter", overrides={"vehicle.cruise_mps": None, "vehicle.source": None})
+    path = tmp_path / "mine.toml"
+    path.write_text(to_toml(own))
+    assert load_scenario(path).vehicle == own.vehicle

@@ -1,6 +1,7 @@
 """Messages: who hears what of whom, when, and what is lost."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, granted, make
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
 from uuv_marl.percept import PerceptLayout
+from uuv_marl.replay import traces
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -131,3 +133,14 @@ class Both(Policy):
     """Compares what it is told with what is true."""
 
     channels = ("link", "modem")
+
+
+@pytest.mark.parametrize(("policy", "source", "told"), [("sdc", None, "modem"), ("runs/mine/best", "1f", "link")])
+def test_results_say_what_a_policy_got_instead_of_the_link(policy, source, told):
+    """A checkpoint knows only the channels of its training."""
+    scenario = load_scenario("starter", overrides={"sonar.channels": ["modem"]})
+    known = {"channels": ["compass", "link"], "yaw_damping_nms": 600.0, "source": source}
+    content = {"scenarios": {"starter": scenario.model_dump(mode="json")}, "policies": {policy: known}}
+    assert traces._scenario(SimpleNamespace(content=content), "starter", policy).sonar.channels == ("compass", told)
+    if source is None:
+        assert granted(policy, scenario).sonar.channels == ("compass", told)

@@ -18,6 +18,7 @@ from packaging.version import Version
 import uuv_marl
 from uuv_marl import baselines
 from uuv_marl.envs.solo import SoloEnv
+from uuv_marl.scenario import ScenarioError
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
 
@@ -428,3 +429,39 @@ def test_solo_says_what_is_wrong():
 def test_a_controller_for_many_worlds_is_made_for_the_scenario():
     with pytest.raises(baselines.PolicyError, match=r"SwarmVectorEnv has no agents by name; make the policy with make"):
         baselines.make("bio_inspired", short())
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            {"sonar.channels": ["compass"]},
+            "sonar.channels can't hold compass: .* 'bio_inspired' declares",
+        ),
+        ({"actuators.yaw_damping_nms": 600.0}, "yaw_damping_nms can't be 600: policy 'bio_inspired' declares 0, for"),
+    ],
+)
+def test_solo_drops_no_override(overrides, message):
+    with pytest.raises(ScenarioError, match=message):
+        SoloEnv("starter", overrides=overrides)
+    assert SoloEnv("starter", "sdc", overrides={"sonar.channels": ["modem"]}).scenario.sonar.channels == (
+        "compass",
+        "modem",
+    )
+
+
+def test_solo_takes_an_engine_and_actions_that_can_t_be_written_to(monkeypatch):
+    env = SoloEnv("starter", engine="plain")
+    env.reset(seed=0)
+    act = env._others.act
+    monkeypatch.setattr(env._others, "act", lambda percept: np.broadcast_to(act(percept), (1, 5, 2)))
+    assert np.isfinite(env.step(np.zeros(2, np.float32))[0]).all()
+
+
+@pytest.mark.parametrize("make", [uuv_marl.vector_env, uuv_marl.parallel_env])
+def test_an_argument_that_is_not_there_is_named(make):
+    args = (2, "starter") if make is uuv_marl.vector_env else ("starter",)
+    with pytest.raises(TypeError, match="num_vehicle"):
+        make(*args, num_vehicle=3)
+    with pytest.raises(TypeError, match="no argument num_vehicle; did you mean num_vehicles"):
+        uuv_marl.vector_env(2, "starter", num_vehicle=3)

@@ -166,6 +166,12 @@ def _kind(name: str) -> Kind:
     return POLICIES[name]
 
 
+def channels_in(scenario: Scenario, declared: Sequence[str]) -> list[str]:
+    """What a hand-made policy gets that declares these channels: ``modem`` for ``link`` where the scenario has it."""
+    told = "modem" if "modem" in scenario.sonar.channels and "modem" not in declared else "link"
+    return [told if channel == "link" else channel for channel in declared]
+
+
 def granted(name: str, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels and the inner loop (``inner_loop_nms``) that a policy declares.
 
@@ -173,12 +179,11 @@ def granted(name: str, scenario: Scenario) -> Scenario:
     policy that declares both, and a trained policy, which knows only the channels of its training.
     """
     policy = policy_class(name)
-    either = "modem" not in policy.channels and not isinstance(policy, Trained)
-    told = "modem" if either and "modem" in scenario.sonar.channels else "link"
+    trained = isinstance(policy, Trained)
     return load_scenario(
         scenario,
         overrides={
-            "sonar.channels": [told if channel == "link" else channel for channel in policy.channels],
+            "sonar.channels": list(policy.channels) if trained else channels_in(scenario, policy.channels),
             "actuators.yaw_damping_nms": inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario),
         },
     )

@@ -1,5 +1,6 @@
 """The core of every environment API: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
 
+import difflib
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -186,22 +187,26 @@ class EnvOptions(Changes, total=False):
     engine: EngineName
 
 
-def changed(
-    scenario: ScenarioLike,
-    num_vehicles: int | None = None,
-    decision_period: float | None = None,
-    overrides: Mapping[str, object] | None = None,
-) -> Scenario:
+def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
     """The scenario, changed by the arguments of an environment.
 
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
-        num_vehicles: replaces the scenario's number of vehicles.
-        decision_period: time between decisions [s], replaces ``timing.decision_period_s``.
-        overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
+        changes: ``num_vehicles`` replaces the scenario's number of vehicles, ``decision_period`` the time between
+            decisions [s], and ``overrides`` any field, as in ``{"sonar.echo_reports": "surface"}``.
+
+    Raises:
+        TypeError: there is no such argument.
     """
-    period = {} if decision_period is None else {"timing.decision_period_s": decision_period}
-    return load_scenario(scenario, num_vehicles=num_vehicles, overrides={**(overrides or {}), **period})
+    for name in changes.keys() - Changes.__annotations__.keys():
+        near = difflib.get_close_matches(name, EnvOptions.__annotations__, n=1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise TypeError(f"this environment has no argument {name}; {hint}fields of the scenario go into overrides")
+    period = changes.get("decision_period")
+    more = {} if period is None else {"timing.decision_period_s": period}
+    return load_scenario(
+        scenario, num_vehicles=changes.get("num_vehicles"), overrides={**(changes.get("overrides") or {}), **more}
+    )
 
 
 def make_batched_env(

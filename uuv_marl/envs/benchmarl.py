@@ -95,6 +95,8 @@ class SwarmTask(Task):
     ``get_task(config={"num_vehicles": 10, "decision_period": 0.5})`` takes the arguments of ``parallel_env``.
     """
 
+    STARTER = None
+    SEA_TRIAL = None
     TRACKING = None
     SINGLE_OBSTACLE = None
     MULTI_OBSTACLE = None

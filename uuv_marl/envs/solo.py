@@ -1,5 +1,6 @@
 """``SoloEnv``: one learner among vehicles that follow a policy, a plain Gymnasium environment."""
 
+from collections.abc import Mapping
 from typing import Any, Unpack
 
 import gymnasium
@@ -12,8 +13,10 @@ from uuv_marl.envs.batched_env import Changes, Reward, ScenarioLike, StepResult,
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
+from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.sim.arguments import action_array
 from uuv_marl.sim.arrays import Float32
+from uuv_marl.sim.engine import EngineName
 
 
 class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
@@ -31,8 +34,11 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
             otherwise.
         info_terms: whether the info holds the reward's terms.
-        scenario, max_cycles, reward: as for ``uuv_marl.parallel_env``.
+        scenario, max_cycles, reward, engine: as for ``uuv_marl.parallel_env``.
         changes: ``num_vehicles``, ``decision_period`` and ``overrides``, likewise.
+
+    Raises:
+        ScenarioError: the overrides ask for channels or a yaw damping that the policy does not declare.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
@@ -47,12 +53,12 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         info_terms: bool = False,
         max_cycles: int | None = None,
         reward: Reward = "individual",
+        engine: EngineName = "numba",
         **changes: Unpack[Changes],
     ) -> None:
-        suited = granted(others, changed(scenario, **changes))
-        self._wrap(
-            make_batched_env(suited, max_cycles=max_cycles, reward=reward), render_mode, render_options, sonar_of=0
-        )
+        suited = _suited(others, changed(scenario, **changes), changes.get("overrides") or {})
+        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, engine=engine)
+        self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
         self._info_terms = info_terms
         layout = self.swarm.layout
@@ -79,7 +85,7 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         own = action_array(action, (2,), "the action")
         if not np.isfinite(own).all():
             raise ValueError(f"the action must be finite, got {own.tolist()}")
-        actions = self._others.act(self.swarm.percept)
+        actions = np.array(self._others.act(self.swarm.percept), np.float32)
         actions[0, 0] = own
         result = self._batch.step(actions)
         self._running = bool(result.acting[0, 0])
@@ -97,3 +103,21 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         if self._info_terms:
             info["reward_terms"] = {name: float(term[0, 0]) for name, term in result.terms.items()}
         return info
+
+
+def _suited(others: str, asked: Scenario, overrides: Mapping[str, object]) -> Scenario:
+    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for."""
+    suited = granted(others, asked)
+    dropped = set(asked.sonar.channels) - {*suited.sonar.channels}
+    if "sonar.channels" in overrides and dropped:
+        raise ScenarioError(
+            f"sonar.channels can't hold {', '.join(sorted(dropped))}: the learner hears what policy {others!r} "
+            "declares; leave it out, or choose other others"
+        )
+    damping = suited.actuators.yaw_damping_nms
+    if "actuators.yaw_damping_nms" in overrides and damping != asked.actuators.yaw_damping_nms:
+        raise ScenarioError(
+            f"actuators.yaw_damping_nms can't be {asked.actuators.yaw_damping_nms:g}: policy {others!r} declares "
+            f"{damping:g}, for the learner too; leave it out, or choose other others"
+        )
+    return suited

@@ -29,7 +29,8 @@ Speed = Annotated[float, within(0, 100)]
 Radius = Annotated[float, within(0.001, MAX_RANGE_M)]
 Clock = Annotated[float, within(0.0001, 3_600)]
 Lag = Annotated[float, within(0, 3_600)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
+NAME = "^[A-Za-z0-9_-]+$"
+Name = Annotated[str, Field(pattern=NAME, max_length=100)]
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(\+[A-Za-z0-9_-]+)*$", max_length=100)]
 """A vehicle's, with a plus before each variant."""
 

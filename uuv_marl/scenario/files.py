@@ -2,6 +2,7 @@
 
 import difflib
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
@@ -12,11 +13,12 @@ from pydantic import ValidationError
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario.documents import File, items, merged, parse
+from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
 from uuv_marl.scenario.overrides import assign
 from uuv_marl.scenario.scale import Scale, in_scale
 from uuv_marl.scenario.scenario import Scenario
-from uuv_marl.scenario.vehicle_files import load_vehicle, variant_comments, vehicle_file
+from uuv_marl.scenario.vehicle_files import left_out, load_vehicle, variant_comments, vehicle_file
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
@@ -55,7 +57,9 @@ def load_scenario(
     data: dict[str, Any] = {}
     try:
         data = _data(scenario)
-        changes = {str(field): value for field, value in (overrides or {}).items()}
+        # Whole tables before their entries, and a vehicle before its numbers, however they are ordered.
+        ordered = sorted((overrides or {}).items(), key=lambda one: (str(one[0]) != "vehicle", str(one[0]).count(".")))
+        changes = {str(field): value for field, value in ordered}
         own = {field: changes.pop(field) for field in list(changes) if field.partition(".")[0] in _OWN}
         for field, value in own.items():
             if field == "vehicle" and isinstance(value, str):
@@ -183,8 +187,16 @@ def _data(scenario: Any) -> dict[str, Any]:
     if isinstance(scenario, Scenario):
         return scenario.model_dump(mode="json", exclude_none=True)
     path = _find(scenario)
+    if not re.fullmatch(NAME, path.stem):
+        raise ScenarioError(
+            f"scenario file {shown(path.name)} must have a name of letters, digits, _ and - only, since it is the "
+            "scenario's name; rename the file"
+        )
     data: dict[str, Any] = {}
     for file in _layers(path):
+        below = left_out(file.data.get("vehicle"))
+        if below is not None:
+            data["vehicle"] = below
         if isinstance(file.data.get("scale"), str) and isinstance(data.get("scale"), dict):
             raise ScenarioError(f"{file.path} extends a scenario that is in scale already; leave scale out")
         data = merged(data, file.data)

@@ -1,5 +1,6 @@
 """Fields of a scenario by name: ``field=value`` on the command line, and where in nested tables a field lies."""
 
+import copy
 import tomllib
 from collections.abc import Sequence
 from typing import Any, cast
@@ -34,10 +35,10 @@ def assign(data: dict[str, Any], field: str, value: object) -> None:
     for part in path:
         place = _step(place, part, field)
     if isinstance(place, dict):
-        cast(dict[str, Any], place)[last] = value
+        cast(dict[str, Any], place)[last] = copy.deepcopy(value)  # what lies in it may be set next
     elif isinstance(place, list):
         entries = cast(list[Any], place)
-        entries[_index(entries, last, field)] = value
+        entries[_index(entries, last, field)] = copy.deepcopy(value)
     else:
         raise ScenarioError(f"{short(field)} is unknown: {short('.'.join(path))} is a value, not a table")
 

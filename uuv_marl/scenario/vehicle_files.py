@@ -87,6 +87,13 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
     return file._replace(data=data, variants=chosen)
 
 
+def left_out(vehicle: object) -> dict[str, Any] | None:
+    """What a whole vehicle may leave out, and what it is then; None for a table with only some numbers of a vehicle."""
+    needed = _GIVEN["vehicle"] - _OPTIONAL["vehicle"].keys()
+    whole = isinstance(vehicle, dict) and needed <= cast(dict[str, Any], vehicle).keys()
+    return dict(_OPTIONAL["vehicle"]) if whole else None
+
+
 def _variant(file: File, name: str) -> dict[str, Any]:
     """What a variant of a vehicle changes."""
     every = file.data.get("variants", {})

@@ -70,8 +70,9 @@ class Memory:
 
     def __init__(self, batch: BatchedEnv) -> None:
         swarm = batch.swarm
-        self._every = max(1, round(1.0 / swarm.scenario.timing.decision_period_s))
-        self._trail: deque[Float] = deque(maxlen=round(TRAIL_S))
+        period = swarm.scenario.timing.decision_period_s
+        self._every = max(1, round(1.0 / period))
+        self._trail: deque[Float] = deque(maxlen=max(1, round(TRAIL_S / (self._every * period))))
         self._hits: list[list[tuple[float, float, float]]] = [[] for _ in range(swarm.num_worlds)]
         self._keys, self._time_s, self._steps = swarm.keys.copy(), np.full(swarm.num_worlds, -1.0), 0
 
