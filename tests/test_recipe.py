@@ -222,7 +222,7 @@ def test_bad_recipes_are_refused_by_name(tmp_path, changes, told):
     ("line", "told"),
     [
         ('axes = ["W1", "X"]\nlevels = [2, 4]', r"axis X has the levels \[1, 3, 5\]; add one of them to levels"),
-        ("periods_s = [1.0]", "decision_period_s of scenario 'random_field' is 1, but trained policies decide every"),
+        ("periods_s = [1.0]", "decision_period_s of an episode is 1, but trained policies decide every 0.1 to 0.5 s"),
     ],
 )
 def test_episodes_that_cannot_be_drawn_or_run_are_refused(tmp_path, line, told):

@@ -508,3 +508,19 @@ def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(to_toml(own))
     assert load_scenario(path).vehicle == own.vehicle
+
+
+@pytest.mark.parametrize("wrong", [iter([1]), type(re)])
+def test_an_override_that_can_t_be_copied_is_named(wrong):
+    with pytest.raises(ScenarioError, match=r"swarm.num_vehicles must be"):
+        load_scenario("starter", overrides={"swarm.num_vehicles": wrong})
+
+
+def test_show_gives_no_default_the_source_of_the_vehicle_below(tmp_path):
+    numbers = load_scenario("starter").vehicle.model_dump(exclude_none=True, exclude={"name", "source", "munk_moment"})
+    (tmp_path / "below.toml").write_text('extends = "sea_trial"\nvehicle = "bluerov2_heavy"\nscale = "vehicle"\n')
+    path = tmp_path / "mine.toml"
+    stated = "".join(f"{name} = {value}\n" for name, value in numbers.items())
+    path.write_text(f'extends = "below.toml"\n[vehicle]\nname = "mine"\n{stated}')
+    assert "munk_moment = true  # " in show(tmp_path / "below.toml")
+    assert "munk_moment = true\n" in show(path)

@@ -135,12 +135,18 @@ class Both(Policy):
     channels = ("link", "modem")
 
 
-@pytest.mark.parametrize(("policy", "source", "told"), [("sdc", None, "modem"), ("runs/mine/best", "1f", "link")])
-def test_results_say_what_a_policy_got_instead_of_the_link(policy, source, told):
+@pytest.mark.parametrize(
+    ("policy", "told"),
+    [
+        ("sdc", "modem"), ("guarded:sdc", "modem"), ("mine:Own", "modem"), ("runs/mine/best", "link"),
+        ("guarded:runs/12:30/best", "link"), ("mappo", "link"),
+    ],
+)  # fmt: skip
+def test_results_say_what_a_policy_got_instead_of_the_link(policy, told):
     """A checkpoint knows only the channels of its training."""
     scenario = load_scenario("starter", overrides={"sonar.channels": ["modem"]})
-    known = {"channels": ["compass", "link"], "yaw_damping_nms": 600.0, "source": source}
+    known = {"channels": ["compass", "link"], "yaw_damping_nms": 600.0, "source": None}
     content = {"scenarios": {"starter": scenario.model_dump(mode="json")}, "policies": {policy: known}}
     assert traces._scenario(SimpleNamespace(content=content), "starter", policy).sonar.channels == ("compass", told)
-    if source is None:
+    if policy == "sdc":
         assert granted(policy, scenario).sonar.channels == ("compass", told)

@@ -411,7 +411,7 @@ def test_other_code_on_a_node_is_refused(joined, monkeypatch):
     for what in ("code of uuv_marl", "numpy", "mappo"):
         other = {**origin("mappo"), what: "another"}
         monkeypatch.setattr("uuv_marl.benchmark.distributed.origin", lambda _, other=other: other)
-        with pytest.raises(ClusterError, match=f"has {what} .*, not another as this machine; install the same"):
+        with pytest.raises(ClusterError, match=rf"has other {what} \(.*\) than this machine \(another\); install"):
             list(evaluate_on_cluster(scenario, "mappo", [0]))
 
 

@@ -3,6 +3,7 @@
 import difflib
 import inspect
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, overload
@@ -164,6 +165,12 @@ def _kind(name: str) -> Kind:
             "and paths of checkpoints"
         )
     return POLICIES[name]
+
+
+def is_trained(name: str) -> bool:
+    """Whether a name is that of a trained policy: one that ships, or the path of a checkpoint, which may be gone."""
+    plain = name.removeprefix(GUARDED).partition(",")[0]
+    return isinstance(POLICIES[plain], Trained) if plain in POLICIES else not re.fullmatch(r"[\w.]+:\w+", plain)
 
 
 def channels_in(scenario: Scenario, declared: Sequence[str]) -> list[str]:

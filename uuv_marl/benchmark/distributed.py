@@ -137,12 +137,12 @@ def _chunk(
         wanted: ``origin`` of the policy, which the node must have too.
     """
     here = origin(policy)
-    others = [f"{name} {here.get(name)}, not {value}" for name, value in wanted.items() if here.get(name) != value]
-    if others:
-        raise ClusterError(
-            f"node {os.uname().nodename} has {others[0]} as this machine; install the same versions and copy the same "
-            "files to all"
-        )
+    for name, value in wanted.items():
+        if here.get(name) != value:
+            raise ClusterError(
+                f"node {os.uname().nodename} has other {name} ({here.get(name)}) than this machine ({value}); install "
+                "the same versions and copy the same files to all"
+            )
     return [event for event in evaluate(scenario, policy, seeds, **parameters) if isinstance(event, Run)]
 
 

@@ -258,11 +258,6 @@ def knowledge(policy: str) -> Knowledge:
     return Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
 
 
-def is_trained(policy: str, known: Knowledge) -> bool:
-    """Whether a policy of these results is a checkpoint's: it has a file, and is no class of a user's."""
-    return known["source"] is not None and ":" not in policy
-
-
 def origin(policy: str) -> dict[str, str | None]:
     """All that a policy's numbers come from, by name: code, libraries, and its file if it has one."""
     return {"code of uuv_marl": source_fingerprint(), policy: knowledge(policy)["source"], **_versions()}

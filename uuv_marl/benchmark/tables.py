@@ -10,9 +10,9 @@ from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
 from uuv_marl.baselines.policy import Policy, inner_loop_nms
-from uuv_marl.baselines.registry import channels_in
+from uuv_marl.baselines.registry import channels_in, is_trained
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
-from uuv_marl.benchmark.results import Knowledge, Results, Row, is_trained
+from uuv_marl.benchmark.results import Knowledge, Results, Row
 from uuv_marl.scenario import differences
 
 Float64 = NDArray[np.float64]
@@ -121,7 +121,7 @@ def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Seq
             paper = PAPER.get((scenario, policy)) if as_in_paper else None
             known = results.policies[policy]
             damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, loaded)
-            told = known["channels"] if is_trained(policy, known) else channels_in(loaded, known["channels"])
+            told = known["channels"] if is_trained(policy) else channels_in(loaded, known["channels"])
             rows.append(_cells(policy, {**known, "channels": told, "yaw_damping_nms": damping}, runs, paper))
     return rows
 

@@ -1,6 +1,5 @@
 """``SoloEnv``: one learner among vehicles that follow a policy, a plain Gymnasium environment."""
 
-from collections.abc import Mapping
 from typing import Any, Unpack
 
 import gymnasium
@@ -56,7 +55,7 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         engine: EngineName = "numba",
         **changes: Unpack[Changes],
     ) -> None:
-        suited = _suited(others, changed(scenario, **changes), changes.get("overrides") or {})
+        suited = _suited(others, changed(scenario), changed(scenario, **changes))
         batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, engine=engine)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
@@ -105,19 +104,26 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         return info
 
 
-def _suited(others: str, asked: Scenario, overrides: Mapping[str, object]) -> Scenario:
-    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for."""
+def _suited(others: str, plain: Scenario, asked: Scenario) -> Scenario:
+    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for.
+
+    Args:
+        others: name of their policy.
+        plain: the scenario before the overrides.
+        asked: the scenario after them.
+    """
     suited = granted(others, asked)
-    dropped = set(asked.sonar.channels) - {*suited.sonar.channels}
-    if "sonar.channels" in overrides and dropped:
+    remedy = "leave it out, or choose other others"
+    heard = suited.sonar.channels
+    dropped = {*asked.sonar.channels} - {*heard} - ({"link"} if "modem" in heard else set())
+    if dropped and asked.sonar.channels != plain.sonar.channels:
         raise ScenarioError(
-            f"sonar.channels can't hold {', '.join(sorted(dropped))}: the learner hears what policy {others!r} "
-            "declares; leave it out, or choose other others"
+            f"sonar.channels can't hold {', '.join(sorted(dropped))}: with {others!r} the learner has "
+            f"{', '.join(heard) or 'no channels'}; {remedy}"
         )
-    damping = suited.actuators.yaw_damping_nms
-    if "actuators.yaw_damping_nms" in overrides and damping != asked.actuators.yaw_damping_nms:
+    wanted, damping = asked.actuators.yaw_damping_nms, suited.actuators.yaw_damping_nms
+    if wanted not in (plain.actuators.yaw_damping_nms, damping):
         raise ScenarioError(
-            f"actuators.yaw_damping_nms can't be {asked.actuators.yaw_damping_nms:g}: policy {others!r} declares "
-            f"{damping:g}, for the learner too; leave it out, or choose other others"
+            f"actuators.yaw_damping_nms can't be {wanted:g}: with {others!r} all vehicles have {damping:g}; {remedy}"
         )
     return suited

@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from uuv_marl.baselines.policy import Policy, inner_loop_nms
-from uuv_marl.baselines.registry import channels_in
+from uuv_marl.baselines.registry import channels_in, is_trained
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.benchmark.results import FILE, Content, is_trained, load_trace, read_content, trace_path
+from uuv_marl.benchmark.results import FILE, Content, load_trace, read_content, trace_path
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.command import command
 from uuv_marl.replay.events import arrival, losses, near_misses
@@ -184,7 +184,7 @@ def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
         ) from None
     known = saved.content["policies"][policy]
     damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, scenario)
-    channels = known["channels"] if is_trained(policy, known) else channels_in(scenario, known["channels"])
+    channels = known["channels"] if is_trained(policy) else channels_in(scenario, known["channels"])
     return load_scenario(scenario, overrides={"sonar.channels": channels, "actuators.yaw_damping_nms": damping})
 
 

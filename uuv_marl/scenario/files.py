@@ -127,6 +127,8 @@ def show(name: str | os.PathLike[str]) -> str:
     document = tomlkit.parse(to_toml(load_scenario(name)))
     sources: dict[str, str] = {}
     for file in _layers(_find(name)):
+        if left_out(file.data.get("vehicle")) is not None:
+            sources = {field: source for field, source in sources.items() if not field.startswith("vehicle.")}
         own = "" if file.path.is_relative_to(_FOLDER) else f"# {file.path.name}"
         sources |= {field: item.trivia.comment or own for field, item in items(tomlkit.parse(file.text))}
         sources |= variant_comments(file)

@@ -1,6 +1,5 @@
 """Fields of a scenario by name: ``field=value`` on the command line, and where in nested tables a field lies."""
 
-import copy
 import tomllib
 from collections.abc import Sequence
 from typing import Any, cast
@@ -35,12 +34,19 @@ def assign(data: dict[str, Any], field: str, value: object) -> None:
     for part in path:
         place = _step(place, part, field)
     if isinstance(place, dict):
-        cast(dict[str, Any], place)[last] = copy.deepcopy(value)  # what lies in it may be set next
+        cast(dict[str, Any], place)[last] = _copied(value)
     elif isinstance(place, list):
         entries = cast(list[Any], place)
-        entries[_index(entries, last, field)] = copy.deepcopy(value)
+        entries[_index(entries, last, field)] = _copied(value)
     else:
         raise ScenarioError(f"{short(field)} is unknown: {short('.'.join(path))} is a value, not a table")
+
+
+def _copied(value: object) -> object:
+    """Tables and lists of one's own, so that entries can be set in them."""
+    if isinstance(value, dict):
+        return {key: _copied(entry) for key, entry in cast(dict[str, Any], value).items()}
+    return [_copied(entry) for entry in cast(list[Any], value)] if isinstance(value, list) else value
 
 
 def _step(place: Any, part: str, field: str) -> Any:

@@ -102,14 +102,16 @@ class Settings:
 
     def _check_periods(self, scenario: Scenario) -> None:
         """Raise ScenarioError where a policy would be trained or validated at a period that it can't be run with."""
-        field, (shortest, longest) = "timing.decision_period_s", PERIODS_S
+        field, validated = "timing.decision_period_s", self.load_for_validation()
         drawn = [float(str(c[field])) for c in (*self.conditions, *self.validation_conditions) if field in c]
-        own = scenario.timing.decision_period_s, self.load_for_validation().timing.decision_period_s
-        for period in {*own, *drawn}:
-            if not shortest - 1e-9 <= period <= longest + 1e-9:
+        of = f"{field} of scenario {scenario.name!r}"
+        periods = [(scenario.timing.decision_period_s, of), *((period, f"{field} of an episode") for period in drawn)]
+        periods.append((validated.timing.decision_period_s, f"{of}, with which policies are validated,"))
+        for period, what in periods:
+            if not PERIODS_S[0] - 1e-9 <= period <= PERIODS_S[1] + 1e-9:
                 raise ScenarioError(
-                    f"{field} of scenario {scenario.name!r} is {period:g}, but trained policies decide every "
-                    f"{shortest:g} to {longest:g} s; choose a period in this range"
+                    f"{what} is {period:g}, but trained policies decide every {PERIODS_S[0]:g} to {PERIODS_S[1]:g} s; "
+                    "choose a period in this range"
                 )
 
     def paid(self) -> RewardFunction:

@@ -51,7 +51,10 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
         return self.env.observation[:, : self.env.features].copy()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """For the next reset: worlds are counted on through all swarms, and world w starts from ``seed + w``."""
+        """For the next reset: world w, counted on through all swarms, starts from ``seed + w``.
+
+        After the last training seed comes the first one again.
+        """
         self.next_seed = seed
         return [seed] * self.num_envs
 

@@ -56,7 +56,8 @@ def runs(episodes: Sequence[Episode], held: HeldOut, policy: str, trained: bool)
 def overall(scores: Sequence[Sequence[float]]) -> Score:
     """Mean over tasks of the mean over runs: with few tasks a trimmed mean would leave out the hardest.
 
-    The interval is of a bootstrap over runs within each task, repeatable; it is unknown for fewer than ``FEWEST`` runs.
+    The interval is of a bootstrap over runs within each task, repeatable; it is unknown where all tasks have fewer than
+    ``FEWEST`` runs together.
 
     Args:
         scores: of the runs, for each task.
