@@ -327,7 +327,8 @@ def test_the_train_command(tmp_path, address, monkeypatch):
 def test_the_train_command_gives_a_vehicle_its_own_inner_loop(tmp_path, monkeypatch):
     """With that of the paper's vehicle the scenario is refused: a rudder has none."""
     mine = tmp_path / "mine.toml"
-    mine.write_text('extends = "tracking"\nversion = 1\nvehicle = "lauv"\n')
+    slow = "[trajectory]\nspeed_mps = 1.5\n[start]\nspeed_max_mps = 1.5\n"
+    mine.write_text(f'extends = "tracking"\nversion = 1\nvehicle = "lauv"\n{slow}')
     seen = []
     monkeypatch.setattr(rllib, "train", lambda output, steps, settings, **_: iter(seen.append(settings.load()) or ()))
     done = CliRunner().invoke(app, ["train", "rllib", f"--scenario={mine}", f"--output={tmp_path / 'out'}"])
