@@ -30,6 +30,7 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import group as group_module
 from uuv_marl.train import training as trainings
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
+from uuv_marl.train.exploration import exploration
 from uuv_marl.train.folder import steps_before
 from uuv_marl.train.group import Problem
 from uuv_marl.train.mappo import Hyperparameters, Learner, Mappo, gae
@@ -826,22 +827,18 @@ def test_options_that_cannot_work_are_explained(options, message, tmp_path):
 
 def test_noise_is_standard_and_shared_and_kept_as_it_should_be():
     """10,000 draws: a correlation's standard error is 0.01; five of them."""
-    rows = 6
-    problem = Toy(lambda observation, _: np.ones(len(observation)))
-    problem.rows, problem.world = rows, np.array([0, 0, 0, 1, 1, 1])
+    world = np.array([0, 0, 0, 1, 1, 1])
     for shared, kept in ((0.0, 0.0), (0.0, 0.9), (0.5, 0.0), (0.5, 0.9)):
-        by = dataclasses.replace(TINY, shared_noise=shared, noise_kept=kept)
-        learner = Learner(2, 3, 2, by, np.random.default_rng(0))
-        drawn = np.array([next(noise) for noise in (learner._noise(problem) for _ in range(10_000))])[:, :, 0]
+        rng = np.random.default_rng(0)
+        begun = (exploration(rng, world, 2, shared, kept) for _ in range(10_000))
+        pairs = np.array([[next(noise)[:, 0], next(noise)[:, 0]] for noise in begun])
+        drawn = pairs[:, 0]
         found = np.corrcoef(drawn.T)
-        expected = np.where(problem.world[:, None] == problem.world, shared, 0.0)
+        expected = np.where(world[:, None] == world, shared, 0.0)
         np.fill_diagonal(expected, 1.0)
         np.testing.assert_allclose(found, expected, atol=0.05)
         np.testing.assert_allclose(drawn.var(axis=0), 1.0, atol=0.08)
-        pairs = np.array(
-            [[next(noise)[0, 0], next(noise)[0, 0]] for noise in (learner._noise(problem) for _ in range(10_000))]
-        )
-        assert np.corrcoef(pairs.T)[0, 1] == pytest.approx(kept, abs=0.05)
+        assert np.corrcoef(pairs[:, :, 0].T)[0, 1] == pytest.approx(kept, abs=0.05)
 
 
 def test_the_critic_may_learn_alone_first():

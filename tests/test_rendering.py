@@ -176,6 +176,18 @@ def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
     assert not np.allclose(start[1], memory.scene(batch, 1, None).position)
 
 
+@pytest.mark.parametrize("period", [0.1, 0.7, 1.5])
+def test_trails_last_as_long_at_every_decision_period(period):
+    batch = make_batched_env("starter", decision_period=period, overrides={"timing.control_hold_s": 0.1})
+    memory = Memory(batch)
+    batch.reset(0)
+    for _ in range(round(40.0 / period)):
+        batch.step(np.zeros((1, 5, 2), np.float32))
+        memory.note(batch)
+    spacing = max(1, round(1.0 / period)) * period
+    assert len(memory.scene(batch, 0, None).trail) * spacing == pytest.approx(TRAIL_S, abs=1.0)
+
+
 def test_a_collision_is_marked_and_counted_in_its_colour():
     scene, _, _ = played(seconds=5.0)
     at = scene.reference + np.array([-20.0, 20.0])

@@ -104,9 +104,9 @@ def evaluate_on_cluster(scenario: Scenario, policy: str, seeds: Sequence[int], *
         ClusterError: a node has other code, libraries or weights, or a worker died repeatedly.
         PolicyError: a node can't import the policy.
     """
-    task = ray.remote(num_cpus=1)(_chunk)
+    task, wanted = ray.remote(num_cpus=1)(_chunk), origin(policy)
     pending = [
-        task.remote(scenario, policy, chunk, parameters, origin(policy))
+        task.remote(scenario, policy, chunk, parameters, wanted)
         for chunk in chunks(seeds, int(ray.cluster_resources().get("CPU", 1)))
     ]
     try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, shown, working
+from uuv_marl.cli.console import Anew, changes_of, console, explained, extra, find_modules, shown, working
 
 if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
@@ -43,10 +43,7 @@ def benchmark(
         typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder of results, table and pictures.")] = Path("results/benchmark"),
-    anew: Annotated[
-        bool,
-        typer.Option("--anew", help="Drop the runs of policies whose file has changed since, and run these again."),
-    ] = False,
+    anew: Anew = False,
     ray: Annotated[
         str | None,
         typer.Option(

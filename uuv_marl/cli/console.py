@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -20,6 +21,9 @@ from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all 
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
 errors = Console(stderr=True)
+Anew = Annotated[
+    bool, typer.Option("--anew", help="Drop the runs of policies whose file has changed since, and run these again.")
+]
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)

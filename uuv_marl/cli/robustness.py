@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl.cli.benchmark import evaluator_at
-from uuv_marl.cli.console import console, explained, find_modules, working
+from uuv_marl.cli.console import Anew, console, explained, find_modules, working
 
 
 def robustness(
@@ -50,9 +50,7 @@ def robustness(
             help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
         ),
     ] = None,
-    anew: Annotated[
-        bool, typer.Option("--anew", help="Drop runs of policies whose file has changed since, and make them again.")
-    ] = False,
+    anew: Anew = False,
     output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.

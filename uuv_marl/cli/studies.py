@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import console, explained, extra, shown, working
+from uuv_marl.cli.console import Anew, console, explained, extra, shown, working
 
 
 def reproduce(
@@ -68,9 +68,7 @@ def heldout(
     trainings: Annotated[
         Path | None, typer.Option(help="Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
     ] = None,
-    anew: Annotated[
-        bool, typer.Option("--anew", help="Drop runs of policies whose file has changed since, and make them again.")
-    ] = False,
+    anew: Anew = False,
     output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/heldout"),
 ) -> None:
     """Evaluate every policy on seeds that no training, no tuning and no choice has used.
@@ -89,8 +87,9 @@ def heldout(
 
         with working(f"The finished episodes are in {output}") as bar:
             report = shown(bar, "held out")
-            told = lambda what, share: report(share, what[-60:])  # noqa: E731
-            episodes, trained = run(output, trainings, only or [], seeds, told, anew)
+            episodes, trained = run(
+                output, trainings, only or [], seeds, lambda what, share: report(share, what[-60:]), anew
+            )
             report(1.0)
         with locked(output, wait_s=60.0):
             for path in write_page(output, episodes, trained):

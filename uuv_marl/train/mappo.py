@@ -20,6 +20,7 @@ from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
+from uuv_marl.train.exploration import exploration
 from uuv_marl.train.group import Problem
 from uuv_marl.train.shared import Count, PPOHyperparameters, Share, Update, adam_arrays, annealed, restore_adam
 
@@ -159,7 +160,8 @@ class Learner:
         observation = np.empty((by.horizon + 1, env.rows, env.size), np.float32)
         action, mean = np.empty((2, *shape, env.outputs), np.float32)
         reward, paid, ended = np.empty(shape, np.float32), 0.0, np.empty(shape, np.bool_)
-        for t, drawn in zip(range(by.horizon), self._noise(env), strict=False):
+        tried = exploration(self._rng, env.world, env.outputs, by.shared_noise, by.noise_kept)
+        for t, drawn in zip(range(by.horizon), tried, strict=False):
             observation[t] = env.observation
             mean[t] = self.act(observation[t])
             action[t] = mean[t] + np.float32(noise) * drawn
@@ -174,29 +176,6 @@ class Learner:
         arrays = (observation[:-1], action, mean, advantage, advantage + value[:-1])
         rows = (torch.from_numpy(array.reshape(-1, *array.shape[2:])) for array in arrays)
         return Rollout(*(array.to(self._device) for array in rows)), paid
-
-    def _noise(self, env: Environment) -> Iterator[Float32]:
-        """Standard normal numbers for the outputs of each decision, shape (row, output); a world's rows share some."""
-        own, shared = self._kept_noise((env.rows, env.outputs)), self.by.shared_noise
-        if shared == 0.0:
-            yield from own
-        common = self._kept_noise((int(env.world[-1]) + 1, env.outputs))
-        for mine, ours in zip(own, common, strict=True):
-            drawn = ours[env.world]
-            drawn *= math.sqrt(shared)
-            drawn += math.sqrt(1.0 - shared) * mine
-            yield drawn
-
-    def _kept_noise(self, shape: tuple[int, int]) -> Iterator[Float32]:
-        """Standard normal numbers of a shape, of which ``noise_kept`` is left at the next decision."""
-        kept = self.by.noise_kept
-        noise = self._rng.standard_normal(shape, np.float32)
-        while True:
-            yield noise
-            fresh = self._rng.standard_normal(shape, np.float32)
-            fresh *= math.sqrt(1.0 - kept * kept)
-            fresh += kept * noise
-            noise = fresh
 
     def update(self, batch: Rollout, noise: float, learning_rate: float, actor_learns: bool = True) -> Update:
         """Some epochs of PPO on a batch, if the actor learns, and of regression to its returns, side by side."""

@@ -84,11 +84,10 @@ def _bootstrapped(statistic: Any, scores: Sequence[Sequence[float]], fewest: int
     if min(map(len, samples)) < 2 or sum(map(len, samples)) < fewest:
         return Score(value, np.nan, np.nan)
     resample: Any = bootstrap
-    found = resample(
+    interval = resample(
         samples, statistic, vectorized=True, n_resamples=2000, method="percentile", rng=np.random.default_rng(0)
-    ).bootstrap_distribution
-    low, high = np.percentile(found, [2.5, 97.5])
-    return Score(value, float(low), float(high))
+    ).confidence_interval
+    return Score(value, float(interval.low), float(interval.high))
 
 
 def _mean(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
