@@ -43,6 +43,18 @@ def pytest_runtest_setup(item):
         pytest.importorskip(*mark.args)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def compiled_by_halves(worker_id):
+    """Of two processes that find nothing compiled, one begins with calm water and the other with the sea."""
+    halves = {"gw0": {}, "gw1": {"current.speed_mps": 0.1}}
+    if worker_id in halves:
+        scenario = load_scenario("starter", overrides=halves[worker_id])
+        for worlds in (1, 2):
+            swarm = Swarm(scenario, worlds)
+            swarm.reset(0)
+            swarm.step(np.zeros((worlds, scenario.swarm.num_vehicles, 2), np.float32))
+
+
 @pytest.fixture(params=SCENARIOS)
 def scenario_name(request):
     return request.param

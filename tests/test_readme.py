@@ -14,7 +14,7 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import conditions, load_vehicle, vehicle_names
 from uuv_marl.studies.dynamics import acceptance
-from uuv_marl.studies.heldout.episodes import read_episodes, select
+from uuv_marl.studies.heldout.episodes import ByPolicy, read_episodes
 from uuv_marl.studies.heldout.targets import later
 from uuv_marl.studies.paper.ledger import read_ledger
 from uuv_marl.studies.reproduce import NAMES
@@ -27,6 +27,7 @@ DOCS = ROOT / "docs"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 README, INDEX = (" ".join(page.read_text().split()) for page in (ROOT / "README.md", DOCS / "README.md"))
 HELD_OUT = read_episodes(DOCS / "heldout" / "episodes.csv")
+BY_POLICY = ByPolicy(HELD_OUT)
 VEHICLE = "literature_185"
 
 
@@ -36,7 +37,7 @@ def table(name):
 
 
 def fields(policy):
-    return select(HELD_OUT, "random_field", policy)
+    return BY_POLICY.select("random_field", policy)
 
 
 def outcome(policy):

@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 
 from uuv_marl.benchmark.style import AMBER, BLACK, BLUE, GREEN, GREY, ORANGE, PINK, SKY, legend, panels, save
 from uuv_marl.studies.heldout.across import runs, success, tasks
-from uuv_marl.studies.heldout.episodes import Episode, select
+from uuv_marl.studies.heldout.episodes import ByPolicy, Episode
 from uuv_marl.studies.heldout.trainings import Trained
 
 ENDS = {
@@ -28,7 +28,8 @@ ENDS = {
 def draw_fields(episodes: Sequence[Episode], name: str, path: Path) -> Path:
     """Draw how many episodes of each policy on a set end in each of four ways, the best policy first."""
     shipped = dict.fromkeys(e.policy for e in episodes if e.set == name and e.training_seed is None)
-    found = sorted((select(episodes, name, policy) for policy in shipped), key=success, reverse=True)
+    by_policy = ByPolicy(episodes)
+    found = sorted((by_policy.select(name, policy) for policy in shipped), key=success, reverse=True)
     figure, (ax,) = panels(1, 1, (8.0, 0.42 * len(found) + 1.5))
     for k, mine in enumerate(found):
         left = 0.0

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from uuv_marl.studies.heldout.across import tasks
-from uuv_marl.studies.heldout.episodes import Episode, select
+from uuv_marl.studies.heldout.episodes import ByPolicy, Episode
 from uuv_marl.studies.heldout.trainings import Trained, Validation
 
 ENVIRONMENT = "uuv_marl"
@@ -30,11 +30,12 @@ def write_marl_eval(episodes: Sequence[Episode], trained: Sequence[Trained], pat
             runs.setdefault(one.algorithm, []).append(one)
     fewest, steps = min(map(len, runs.values())), min(len(one.validations) for one in trained if not one.ablation)
     data: dict[str, Any] = {ENVIRONMENT: {held.name: {} for held in tasks(episodes)}, VALIDATION: {"validation": {}}}
+    by_policy = ByPolicy(episodes)
     for algorithm, found in runs.items():
         named = {f"run_{k + 1}": one for k, one in enumerate(found[:fewest])}
         data[VALIDATION]["validation"][algorithm] = {name: _training(one, steps) for name, one in named.items()}
         for task, algorithms in data[ENVIRONMENT].items():
-            algorithms[algorithm] = {name: _evaluation(one, task, episodes) for name, one in named.items()}
+            algorithms[algorithm] = {name: _evaluation(one, task, by_policy) for name, one in named.items()}
     path.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
@@ -48,8 +49,8 @@ def _validated(one: Validation) -> dict[str, list[float]]:
     return {"score": [round(one.score, 4)], "arrived": [round(one.arrived, 4)], "elapsed_time": [round(one.seconds, 1)]}
 
 
-def _evaluation(one: Trained, task: str, episodes: Sequence[Episode]) -> dict[str, Any]:
-    mine = select(episodes, task, one.algorithm, one.seed)
+def _evaluation(one: Trained, task: str, episodes: ByPolicy) -> dict[str, Any]:
+    mine = episodes.select(task, one.algorithm, one.seed)
     metrics = {
         "success": [float(e.succeeded) for e in mine],
         "efficiency": [round(e.efficiency, 4) for e in mine],

@@ -10,7 +10,7 @@ from uuv_marl.benchmark.style import house_style
 from uuv_marl.benchmark.tables import markdown_table, shown
 from uuv_marl.studies.data import read_text
 from uuv_marl.studies.heldout.across import SCORES, improvement, overall, runs, tasks
-from uuv_marl.studies.heldout.episodes import Episode, measured, read_episodes, select, write_episodes
+from uuv_marl.studies.heldout.episodes import ByPolicy, Episode, measured, read_episodes, write_episodes
 from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
 from uuv_marl.studies.heldout.sets import FIRST, SETS, HeldOut
@@ -52,13 +52,14 @@ def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trai
 
 def report(episodes: Sequence[Episode], trained: Sequence[Trained]) -> str:
     """The page's text."""
-    sets = {e.set for e in episodes if e.training_seed is None}
+    names, by_policy = {e.set for e in episodes if e.training_seed is None}, ByPolicy(episodes)
+    sets = [held for held in SETS if held.name in names]
     return read_text("heldout", "story.md").format(
         first=FIRST,
         targets=_targets(episodes),
-        glance=_glance(episodes),
-        guarded=_guarded(episodes),
-        sets="\n".join(_set(held, episodes) for held in SETS if held.name in sets),
+        glance=_glance(by_policy, sets),
+        guarded=_guarded(by_policy),
+        sets="\n".join(_set(held, by_policy) for held in sets),
         across=_across(episodes, trained),
         trainings=_trainings(trained),
     )
@@ -78,25 +79,24 @@ def _targets(episodes: Sequence[Episode]) -> str:
     return f"{'; '.join(words)}.\n\n" + markdown_table(("set", "demand", *policies), rows)
 
 
-def _glance(episodes: Sequence[Episode]) -> str:
+def _glance(episodes: ByPolicy, sets: Sequence[HeldOut]) -> str:
     """How many episodes arrive untouched: a row for each policy, a column for each set."""
-    sets = [held.name for held in SETS if any(e.set == held.name for e in episodes)]
     rows = [
         (policy, *(f"{sum(e.succeeded for e in mine)}/{len(mine)}" if mine else _NOTHING for mine in found))
         for policy in _ORDER
-        for found in [[select(episodes, name, policy) for name in sets]]
+        for found in [[episodes.select(held.name, policy) for held in sets]]
         if any(found)
     ]
-    return markdown_table(("policy", *sets), rows)
+    return markdown_table(("policy", *(held.name for held in sets)), rows)
 
 
-def _guarded(episodes: Sequence[Episode]) -> str:
+def _guarded(episodes: ByPolicy) -> str:
     """What the filter does: policies alone and guarded, on the seeds of a set that both have."""
     rows: list[tuple[str, ...]] = []
     for name in (name for name in _ORDER if name.startswith(_GUARDED)):
         for held in SETS:
-            guarded = select(episodes, held.name, name)
-            alone = select(episodes, held.name, name.removeprefix(_GUARDED))[: len(guarded)]
+            guarded = episodes.select(held.name, name)
+            alone = episodes.select(held.name, name.removeprefix(_GUARDED))[: len(guarded)]
             if guarded and alone:
                 both = alone, guarded
                 rows.append((
@@ -114,8 +114,8 @@ def _guarded(episodes: Sequence[Episode]) -> str:
     return markdown_table(headers, rows) if rows else "No guarded policy was run.\n"
 
 
-def _set(held: HeldOut, episodes: Sequence[Episode]) -> str:
-    found = {name: mine for name in _ORDER if (mine := select(episodes, held.name, name))}
+def _set(held: HeldOut, episodes: ByPolicy) -> str:
+    found = {name: mine for name in _ORDER if (mine := episodes.select(held.name, name))}
     rows = [(name, *_cells(mine)) for name, mine in found.items()]
     note, count = f", {held.note}" if held.note else "", max(map(len, found.values()))
     head = f"### {held.name}\n\n`{held.scenario}`{note}, seeds from {FIRST:,}, at most {count}.\n\n"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import binomtest
 
-from uuv_marl.studies.heldout.episodes import Episode, measured, select
+from uuv_marl.studies.heldout.episodes import ByPolicy, Episode, measured
 from uuv_marl.studies.heldout.sets import LEADING, SETS, HeldOut
 from uuv_marl.studies.robustness.scores import Score, scored
 
@@ -39,9 +39,10 @@ class Target(NamedTuple):
 def targets(episodes: Sequence[Episode]) -> list[Target]:
     """All demands on the policies of ``LEADING`` that the episodes can answer."""
     found: list[Target] = []
+    by_policy = ByPolicy(episodes)
     for held in (held for held in SETS if held.aimed):
-        tuned = select(episodes, held.name, _TUNED)
-        runs = {policy: mine for policy in LEADING if (mine := select(episodes, held.name, policy))}
+        tuned = by_policy.select(held.name, _TUNED)
+        runs = {policy: mine for policy in LEADING if (mine := by_policy.select(held.name, policy))}
         for policy, mine in runs.items():
             rivals = {name: runs[name] for name in _RIVALS if name in runs and name != policy}
             found += [Target(held.name, policy, *demand) for demand in _demands(held, mine, rivals, tuned)]

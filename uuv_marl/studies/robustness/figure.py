@@ -49,9 +49,10 @@ def _draw_line(ax: Axes, axis: Axis, own: Any, intervals: bool, **style: Any) ->
     if axis.name not in own or CALM not in own:
         return
     cells = own[[CALM, axis.name]].dropna(axis="columns", how="all")
-    scores = {level: scored(cells[name, level].dropna().to_numpy()) for name, level in cells}
-    if len(scores) > 1:
-        values, lows, highs = zip(*scores.values(), strict=True)
+    found = {level: cells[name, level].dropna().to_numpy() for name, level in cells}
+    if len(found) > 1:
+        levels = list(found)
         if intervals:
-            ax.fill_between(list(scores), lows, highs, color=style["color"], alpha=0.15, lw=0)
-        ax.plot(list(scores), values, **style)
+            _, lows, highs = zip(*map(scored, found.values()), strict=True)
+            ax.fill_between(levels, lows, highs, color=style["color"], alpha=0.15, lw=0)
+        ax.plot(levels, [values.mean() for values in found.values()], **style)

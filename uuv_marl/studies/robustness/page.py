@@ -1,7 +1,7 @@
 """``report.md``: scores, critical severities and all cells, written from the table of episodes alone."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -19,6 +19,7 @@ from uuv_marl.studies.robustness.scores import (
     ENOUGH,
     EVERY,
     WORTH_KEEPING,
+    AxisScore,
     axis_score,
     by_seed,
     critical_text,
@@ -115,6 +116,7 @@ def _missing(episodes: Any) -> Iterator[str]:
 def _scenario(name: str, episodes: Any, table: Any) -> str:
     """A scenario's picture and tables."""
     policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
+    scores = {(one, axis): axis_score(own, axis) for one, own in policies.items() for axis in AXES if axis in table}
     star = " A star: trained with it." if any(_mark(name, "A1", 1) for name in policies) else ""
     parts = (
         ("Scores", "Mean success over the levels that were run. `all`: the mean over the groups, without X.",
@@ -122,9 +124,9 @@ def _scenario(name: str, episodes: Any, table: Any) -> str:
         ("Who is best", "By how much the policy with the highest mean over all groups (of X, where only X was run), "
          "and each that was trained with disturbances, is above each other, paired by seed.", _best(table)),
         ("Axes", f"Mean success over the levels that were run; then what it keeps of level 0's success, where that "
-         f"is at least {WORTH_KEEPING:g}.{star}", _axes(policies)),
+         f"is at least {WORTH_KEEPING:g}.{star}", _table(scores, _kept)),
         ("Critical severity", f"Where success falls below {ENOUGH:g} first, linear between the levels that were run, "
-         "in the axis's unit.", _critical(policies)),
+         "in the axis's unit.", _table(scores, lambda _, axis, score: critical_text(axis, score))),
         ("Every cell", "Success; in how many episodes the whole swarm succeeded; contacts per episode, those of "
          "faulty vehicles too." + star,
          _cells(episodes[episodes["scenario"] == name], policies)),
@@ -161,29 +163,22 @@ def _best(table: Any) -> str:
     return markdown_table(("policies", EVERY, f"{GROUPS['X']} (X)"), rows) if rows else "There is one policy.\n"
 
 
-def _axes(policies: dict[str, Any]) -> str:
-    def cell(own: Any, axis: str) -> str:
-        score = axis_score(own, axis)
-        if score is None:
-            return _NOTHING
-        mark = _mark(own.index.get_level_values("policy")[0], axis, *score.levels)
-        return f"{score.success:.2f}{mark}" + (f"; {score.retention.value:.0%}" if score.retention else "")
-
-    return _table(policies, cell)
+def _kept(policy: str, axis: str, score: AxisScore) -> str:
+    """Success on an axis, and what it is of that at level 0."""
+    kept = f"; {score.retention.value:.0%}" if score.retention else ""
+    return f"{score.success:.2f}{_mark(policy, axis, *score.levels)}{kept}"
 
 
-def _critical(policies: dict[str, Any]) -> str:
-    def cell(own: Any, axis: str) -> str:
-        score = axis_score(own, axis)
-        return _NOTHING if score is None else critical_text(axis, score)
-
-    return _table(policies, cell)
-
-
-def _table(policies: dict[str, Any], cell: Any) -> str:
-    """A row for each axis that any policy was run on."""
-    axes = [axis for axis in AXES.values() if any(axis.name in own for own in policies.values())]
-    rows = [(a.name, f"{a.title} [{a.unit}]", *(cell(own, a.name) for own in policies.values())) for a in axes]
+def _table(scores: dict[tuple[str, str], AxisScore | None], cell: Callable[[str, str, AxisScore], str]) -> str:
+    """A row for each axis that any policy was run on, a column for each policy."""
+    policies, axes = (dict.fromkeys(key[k] for key in scores) for k in (0, 1))
+    rows = [
+        (
+            axis, f"{AXES[axis].title} [{AXES[axis].unit}]",
+            *(cell(policy, axis, score) if (score := scores[policy, axis]) else _NOTHING for policy in policies),
+        )
+        for axis in axes
+    ]  # fmt: skip
     return markdown_table(("axis", "what [unit]", *policies), rows)
 
 
