@@ -3,6 +3,7 @@
 import importlib.util
 import re
 import warnings
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,12 @@ def test_python_blocks_run_and_show_something(block, capsys, tmp_path, monkeypat
         warnings.filterwarnings("ignore", module="torchrl|tensordict")
         exec(compile(block, "README.md", "exec"), {"__name__": "example"})
     assert capsys.readouterr().out or block.startswith("# mine.py")
+
+
+def test_the_site_s_menu_has_every_page():
+    menu = re.findall(r"^(?:.*<)?([^\s:<>`]+)>?$", (ROOT / "docs" / "site" / "navigation.txt").read_text(), flags=re.M)
+    pages = {page.relative_to(ROOT).with_suffix("").as_posix() for page in PAGES} - {"README"}
+    assert {page for page in pages if not any(fnmatch(page, entry) for entry in menu)} == set()
 
 
 def test_examples_are_short():
