@@ -44,11 +44,12 @@ def pytest_runtest_setup(item):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled_by_halves(worker_id):
+def compiled_by_halves():
     """Of two processes that find nothing compiled, one begins with calm water and the other with the sea."""
     halves = {"gw0": {}, "gw1": {"current.speed_mps": 0.1}}
-    if worker_id in halves:
-        scenario = load_scenario("starter", overrides=halves[worker_id])
+    half = halves.get(os.environ.get("PYTEST_XDIST_WORKER", ""))
+    if half is not None:
+        scenario = load_scenario("starter", overrides=half)
         for worlds in (1, 2):
             swarm = Swarm(scenario, worlds)
             swarm.reset(0)

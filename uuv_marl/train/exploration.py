@@ -33,6 +33,7 @@ def exploration(
 
 
 def _lasting(rng: np.random.Generator, shape: tuple[int, int], kept: float) -> Iterator[Float32]:
+    """Standard normal numbers of a shape, of which ``kept`` is left at the next decision."""
     noise = rng.standard_normal(shape, np.float32)
     while True:
         yield noise
