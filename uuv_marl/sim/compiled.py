@@ -49,7 +49,7 @@ def cache_dir() -> Path | None:
             pass
     except OSError as error:
         _log.warning(
-            "The compile cache %s can't be used (%s), so every start compiles anew, for half a minute. "
+            "The compile cache %s can't be used (%s), so every start compiles anew, for up to a minute. "
             "Set UUV_MARL_CACHE_DIR to a writable folder of your own.",
             folder,
             error.strerror,
