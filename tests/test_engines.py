@@ -509,6 +509,7 @@ def fill(swarm, layout, seed):
         swarm.course.obstacles[0, :, :2] = np.array(DISCS)[:, :2] + [1e7, -3e7]
     else:
         swarm.course.obstacles[0] = DISCS
+    state.obstacles_before[0] = swarm.course.obstacles[0]
     swarm.observe()
 
 
@@ -535,7 +536,7 @@ def check(swarm):
     np.testing.assert_array_equal(swarm.percept["neighbour"][0], np.where(heard[:, :, None] >= 0, there, 0))
 
     spacing, largest, met = PLAIN.between_vehicles(eta, before, alive, hull)
-    clearance, reached, touched = PLAIN.to_obstacles(eta, before, alive, hull, discs)
+    clearance, reached, touched = PLAIN.to_obstacles(eta, before, alive, hull, discs, discs)
     np.testing.assert_array_equal(facts.spacing[0], spacing)
     assert (facts.min_spacing[0], facts.max_spacing[0]) == (min(spacing), largest)
     np.testing.assert_array_equal(facts.clearance[0], clearance)
@@ -625,7 +626,7 @@ def test_one_lost_vehicle_more_calls_for_a_grid_and_changes_nothing(layout):
     for ours, theirs in zip(more.state[:4], few.state[:4], strict=True):
         ours[0, :-1] = theirs[0]
     more.state.alive[0, -1] = False
-    more.course.obstacles[0] = few.course.obstacles[0]
+    more.course.obstacles[0] = more.state.obstacles_before[0] = few.course.obstacles[0]
     more.observe()
     np.testing.assert_array_equal(more.heard[0, :-1], few.heard[0])
     np.testing.assert_array_equal(more.percept.flat[0, :-1], few.percept.flat[0])
@@ -643,6 +644,7 @@ def test_a_vehicle_at_rest_on_a_hull_s_distance_from_an_obstacle_never_touches_i
     one = Swarm(load_scenario(BASE, num_vehicles=1, overrides={"obstacles": [disc]}), engine=engine)
     one.reset(0)
     one.state.eta[0], one.state.nu[0], one.course.obstacles[0, 0] = 0.0, 0.0, (x, y, math.hypot(x, y) - 1.0)
+    one.state.obstacles_before[...] = one.course.obstacles
     for _ in range(3):
         one.step(np.zeros((1, 1, 2), np.float32))
         assert one.facts.collisions[0] == 0

@@ -24,6 +24,9 @@ class State(NamedTuple):
     ]
     before: Annotated[Float64, "world vehicle 2", "Position one control hold ago, north and east [m]."]
     alive: Annotated[Bool, "world vehicle", "False for lost vehicles."]
+    obstacles_before: Annotated[
+        Float64, "world obstacle 3", "``Course.obstacles`` one control hold ago; infinitely far where there was none."
+    ]
     tick: Annotated[Int64, "world", "Control holds since the reset."]
     dwell: Annotated[Int64, "world radius", "Control holds for which the swarm has rested within each arrival radius."]
 

@@ -55,7 +55,7 @@ def between_vehicles(
 
 
 def to_obstacles(
-    now: Rows, before: Rows, alive: Sequence[bool], hull: float, discs: Rows
+    now: Rows, before: Rows, alive: Sequence[bool], hull: float, discs: Rows, discs_before: Rows
 ) -> tuple[list[float], list[float], list[int]]:
     """Each vehicle's distance to the nearest surface, each obstacle's to the nearest vehicle, and contacts that begin.
 
@@ -67,6 +67,7 @@ def to_obstacles(
         alive: False for lost vehicles.
         hull: radius of a hull [m].
         discs: the obstacles: centre north and east, radius [m], a row each.
+        discs_before: the same one control hold ago, infinitely far away where there was none.
     """
     clearance, reached, contacts = [math.inf] * len(now), [math.inf] * len(discs), [0] * len(now)
     for i in range(len(now)):
@@ -75,7 +76,8 @@ def to_obstacles(
                 continue
             gap = math.sqrt(squared_distance(discs[k], now[i])) - discs[k][2]
             clearance[i], reached[k] = min(clearance[i], gap), min(reached[k], gap)
-            if gap < hull and math.sqrt(squared_distance(discs[k], before[i])) - discs[k][2] >= hull:
+            was = discs_before[k]
+            if gap < hull and math.sqrt(squared_distance(was, before[i])) - was[2] >= hull:
                 contacts[i] += 1
     return clearance, reached, contacts
 

@@ -37,6 +37,7 @@ from uuv_marl.sim.formulas_sonar import between_vehicles, echo, hear, middle, su
 from uuv_marl.sim.model import model
 from uuv_marl.sim.sea.actuation import THRUSTER, YAW, is_lost
 from uuv_marl.sim.sea.sea import Sea, begin, drift, know, reads, take_readings
+from uuv_marl.sim.spacing import NOWHERE
 from uuv_marl.sim.vehicle import STILL, Plant
 from uuv_marl.sim.views import Fields, SeaFields
 from uuv_marl.sim.world import RUNAWAY
@@ -192,7 +193,9 @@ class PlainEngine:
         facts, alive, hull = self.facts, self.state.alive[w].tolist(), self.rules.hull
         now, before, discs = self.state.eta[w, :, :2].tolist(), self.state.before[w].tolist(), self.discs(w)
         spacing, largest, met = between_vehicles(now, before, alive, hull)
-        clearance, reached, touched = to_obstacles(now, before, alive, hull, discs)
+        discs_before = self.state.obstacles_before[w]
+        clearance, reached, touched = to_obstacles(now, before, alive, hull, discs, discs_before.tolist())
+        discs_before[:], discs_before[: len(discs)] = NOWHERE, self.course.obstacles[w, : len(discs)]
         facts.spacing[w] = np.minimum(facts.spacing[w], spacing)
         facts.min_spacing[w], facts.max_spacing[w] = facts.spacing[w].min(), largest
         facts.clearance[w] = np.minimum(facts.clearance[w], clearance)

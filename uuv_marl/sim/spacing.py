@@ -13,6 +13,10 @@ from uuv_marl.sim.workspace import Cells
 Float64 = NDArray[np.float64]
 
 
+NOWHERE = (math.inf, math.inf, 0.0)
+"""Where an obstacle was that there was not."""
+
+
 @compiled_inner
 def find_nearest(cells: Cells, grid: Grid) -> None:
     """Fill ``cells.nearest``, infinite where there is nobody else."""
@@ -130,27 +134,37 @@ def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid
 def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
     """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began.
 
+    A contact episode begins where a hull meets an obstacle now and did not one control hold ago; either may have moved.
+
     Args:
         w: index of the world.
         hull: radius of a hull [m].
-        world: the arrays; facts are written.
+        world: the arrays; facts and ``state.obstacles_before`` are written.
         cells: the living, sorted by cell.
         grid: where the cells lie.
     """
-    obstacles, before, facts = world.course.obstacles, world.state.before, world.facts
+    obstacles, num, facts = world.course.obstacles, world.course.num_obstacles[w], world.facts
+    before, obstacles_before = world.state.before, world.state.obstacles_before
     began = 0
     for p in range(grid.living):
         i = cells.vehicle[p]
-        for k in range(world.course.num_obstacles[w]):
+        for k in range(num):
             x, y, radius = obstacles[w, k, 0], obstacles[w, k, 1], obstacles[w, k, 2]
             dx, dy = x - cells.x[p], y - cells.y[p]
             gap = math.sqrt(dx * dx + dy * dy) - radius
             facts.clearance[w, i] = min(facts.clearance[w, i], gap)
             facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], gap)
-            was_x, was_y = x - before[w, i, 0], y - before[w, i, 1]
-            if gap < hull and math.sqrt(was_x * was_x + was_y * was_y) - radius >= hull:
+            if gap >= hull:
+                continue
+            was_x, was_y = obstacles_before[w, k, 0] - before[w, i, 0], obstacles_before[w, k, 1] - before[w, i, 1]
+            if math.sqrt(was_x * was_x + was_y * was_y) - obstacles_before[w, k, 2] >= hull:
                 facts.contacts[w, i] += 1
                 began += 1
+    for k in range(num):
+        for c in range(3):
+            obstacles_before[w, k, c] = obstacles[w, k, c]
+    for k in range(num, obstacles.shape[1]):
+        obstacles_before[w, k, 0], obstacles_before[w, k, 1], obstacles_before[w, k, 2] = NOWHERE
     return began
 
 

@@ -19,6 +19,7 @@ from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.sea.actuation import hit
 from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
 from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_tables
+from uuv_marl.sim.spacing import NOWHERE
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
@@ -177,6 +178,7 @@ class Swarm:
         course.num_obstacles[w] = m
         state.eta[w], state.nu[w] = start_state(self.scenario, field.waypoints, rng)
         state.before[w] = state.eta[w, :, :2]
+        state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, field.obstacles
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
