@@ -64,8 +64,7 @@ test-docs: .venv-docs/docs.stamp
 docs-links: .venv-docs/docs.stamp
 	$(SITE) -b linkcheck $(ARGS)
 
-# On one thread, because an error on a thread that Numba starts is lost; little optimised, which compiles faster and moves
-# no bit; what is compiled so stays out of the user's cache.
+# Little optimised, which compiles faster and moves no bit; what is compiled so stays out of the user's cache.
 BOUNDED := baselines bounds engines env reward sea sea_modem sea_sonar sonar swarm trajectory vector_env vehicle
 test-bounds: .venv/dev.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \

@@ -2,10 +2,10 @@
 
 import math
 import multiprocessing
+import os
 import subprocess
 import sys
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,8 +14,10 @@ from scipy.ndimage import label
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
+from uuv_marl.sim import engine as engine_module
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.threads import on_threads
 from uuv_marl.sim.vehicle import STILL, advance, plant
 
 
@@ -41,16 +43,54 @@ def test_a_world_is_the_same_alone_and_in_a_batch(name, policy):
             assert one[0].tobytes() == many[w].tobytes()
 
 
-def test_threads_do_not_change_a_run():
+def test_threads_do_not_change_a_run(monkeypatch):
     scenario = load_scenario("single_obstacle")
-    before = numba.get_num_threads()
-    try:
-        numba.set_num_threads(1)
-        one = play(scenario, range(6), 80)
-    finally:
-        numba.set_num_threads(before)
-    many = play(scenario, range(6), 80)
-    assert all(a.tobytes() == b.tobytes() for a, b in zip(one, many, strict=True))
+    many = [play(scenario, range(16), 80)]
+    for threads in (1, 3):
+        monkeypatch.setattr(engine_module, "num_threads", lambda threads=threads: threads)
+        many.append(play(scenario, range(16), 80))
+    for other in many[1:]:
+        assert all(a.tobytes() == b.tobytes() for a, b in zip(many[0], other, strict=True))
+
+
+@pytest.mark.parametrize("layer", ["omp", "workqueue"])
+def test_several_threads_step_batches_at_once(layer):
+    """Numba's own threads would end the process here, with the layer that it takes where OpenMP is missing."""
+    environment = {**os.environ, "NUMBA_THREADING_LAYER": layer, "NUMBA_NUM_THREADS": "2"}
+    done = subprocess.run([sys.executable, "-c", AT_ONCE], capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
+
+
+AT_ONCE = """
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+import uuv_marl
+
+def run(seed):
+    envs = uuv_marl.vector_env(16, num_vehicles=30)
+    envs.reset(seed=seed)
+    action = np.random.default_rng(seed).uniform(-1.0, 1.0, (16, 30, 2)).astype(np.float32)
+    return [envs.step(action)[0].tobytes() for _ in range(30)]
+
+with ThreadPoolExecutor(2) as threads:
+    print(list(threads.map(run, [3, 4])) == [run(3), run(4)])
+"""
+
+
+def test_an_error_of_any_thread_is_raised_once_all_have_ended():
+    ended = []
+
+    def work(thread, begin, end):
+        if thread == 1:
+            raise IndexError(f"from {begin} to {end}")
+        ended.append(thread)
+        return False
+
+    with pytest.raises(IndexError, match="from 4 to 8"):
+        on_threads(work, 10, 3)
+    assert sorted(ended) == [0, 2]
+    assert on_threads(lambda thread, begin, end: end == 10, 10, 3)
+    assert not on_threads(lambda thread, begin, end: begin > 9, 10, 7)
 
 
 def test_another_process_gives_the_same_run():
@@ -67,22 +107,20 @@ import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.sim.swarm import Swarm
 scenario = load_scenario("single_obstacle")
-action = np.zeros((2, 54, 2), np.float32)
-batch = Swarm(scenario, 2); batch.reset(0); batch.step(action)
+action = np.zeros((8, 54, 2), np.float32)
+batch = Swarm(scenario, 8); batch.reset(0); batch.step(action); before = batch.snapshot()
+batch.step(action); expected = batch.state.eta.tobytes(); batch.restore(before)
 pid = os.fork()
 if pid == 0:
     one = Swarm(scenario, 1); one.reset(0); one.step(action[:1])
     uuv_marl.parallel_env(scenario).reset(seed=0); uuv_marl.vector_env(2, scenario).reset(seed=0)
-    try:
-        batch.step(action)
-    except RuntimeError as error:
-        os._exit(7 if "spawn" in str(error) else 8)
-    os._exit(9)
+    batch.step(action)
+    os._exit(7 if batch.state.eta.tobytes() == expected else 8)
 print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 """
 
 
-def test_after_a_fork_one_world_runs_and_a_batch_names_spawn():
+def test_after_a_fork_a_batch_goes_on_with_threads_of_its_own():
     done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "7", done.stderr
 
@@ -338,3 +376,23 @@ def test_random_fields_are_feasible(seed, n):
     regions, _ = label(free)
     cells = [tuple(((point - low) / 2.5).round().astype(int)) for point in (waypoints[0], waypoints[-1])]
     assert regions[cells[0]] == regions[cells[1]] != 0
+
+
+@pytest.mark.parametrize("engine", ["numba", "plain"])
+def test_an_obstacle_that_moves_onto_a_vehicle_is_a_contact(engine):
+    """Contact is judged from the motion of both; who only lies there, or moves within a contact, begins no other."""
+    scenario = load_scenario("single_obstacle", num_vehicles=2)
+    swarm, still = Swarm(scenario, engine=engine), np.zeros((1, 2, 2), np.float32)
+    swarm.reset(0)
+    swarm.state.nu[...] = 0.0
+    counted = []
+    for north in (30.0, 25.5, 25.0, 500.0, 25.5):  # from the vehicle to the centre of a disc of 25 m [m]
+        swarm.course.obstacles[0, 0, :2] = swarm.state.eta[0, 0, :2] + (north, 0.0)
+        swarm.step(still)
+        counted.append(swarm.facts.contacts[0].tolist())
+    assert [one for one, _ in counted] == [0, 1, 0, 0, 1]
+    swarm.course.num_obstacles[0] = 0
+    swarm.step(still)
+    swarm.course.num_obstacles[0] = 1
+    assert swarm.step(still) is not None
+    assert swarm.facts.contacts[0, 0] == 1, "an obstacle that appears on a vehicle"

@@ -11,13 +11,12 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from uuv_marl.errors import RewardError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Bool, Facts, Float64, State
-from uuv_marl.sim.compiled import compiled, compiled_parallel
+from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
 
@@ -107,11 +106,7 @@ def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> tuple
     """
     terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
     reward = np.zeros(terms.shape[1:])
-    given = swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward
-    if swarm.num_worlds > 1:
-        _fill_all(running, *given)
-    elif running[0]:
-        _fill(0, *given)  # no threads, so that a forked process can step
+    _fill_all(running, swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward)
     return reward, terms
 
 
@@ -158,7 +153,7 @@ def _fill(
             reward[w, i] += terms[k, w, i]
 
 
-@compiled_parallel
+@compiled
 def _fill_all(
     running: Bool,
     time_limit_s: Float64,
@@ -168,7 +163,7 @@ def _fill_all(
     terms: Float64,
     reward: Float64,
 ) -> None:
-    """``_fill`` for the worlds that run, over threads.
+    """``_fill`` for the worlds that run.
 
     Args:
         running: worlds to fill, shape (world,); the others stay zero.
@@ -179,6 +174,6 @@ def _fill_all(
         terms: the weighted terms, shape (term, world, vehicle), zero before; filled.
         reward: their sum, shape (world, vehicle), zero before; filled.
     """
-    for w in numba.prange(running.shape[0]):
+    for w in range(running.shape[0]):
         if running[w]:
             _fill(w, time_limit_s, state, facts, weights, terms, reward)

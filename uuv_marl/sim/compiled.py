@@ -6,56 +6,97 @@ checkout or version it belongs to: who edits a kernel compiles what uses it, and
 
 import contextlib
 import functools
-import importlib
+import glob
 import logging
 import os
+import re
 import tempfile
 import time
 import types
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import platformdirs
 from numba.core import caching as _caching
 from numba.core import config as _config
 
+from uuv_marl.paths import user_path
 from uuv_marl.sim.sources import source_key
 
 F = TypeVar("F", bound=Callable[..., Any])
 _log = logging.getLogger("uuv_marl")
 _UNUSED_S = 30 * 86400.0
 """Compiled code that nobody loaded for so long is deleted."""
-_SPINS = {"GOMP_SPINCOUNT": "2000"}
-"""Some microseconds: from 2,000 on, steps are as fast on an idle machine as by default; with 0, three times as slow."""
 _QUIET_S = 60.0
 """One message is enough for functions that are compiled closer together than this."""
+_FOLDER, _MARK = "uuv_marl-compiled", "compiled-by-uuv_marl.txt"
+_WHAT_THIS_IS = "uuv_marl keeps compiled code in this folder. Code that is not used for a month is deleted from it.\n"
+_OURS = re.compile(r".+-[0-9a-f]{16}\.py\d+\w*\.(nbi|\d+\.nbc)(\.tmp\.[0-9a-f]{16})?")
+"""Names that a cache's files have: function, key, Python, number; and those of a write that was cut off."""
 _settings, caching = cast(Any, _config), cast(Any, _caching)
 _last_compiled = -_QUIET_S
 
 
+class Cache(NamedTuple):
+    """Where compiled code is kept."""
+
+    folder: Path
+    writable: bool
+    """False where others have prepared it, as in the image of a container, or where the disk is read-only."""
+
+
 @functools.cache
-def cache_dir() -> Path | None:
-    """Folder of the compiled code: ``UUV_MARL_CACHE_DIR`` or the user's cache; None where it can't be used."""
-    root = Path(os.environ.get("UUV_MARL_CACHE_DIR") or platformdirs.user_cache_dir("uuv_marl"))
-    folder = root / f"numba-{numba.__version__}"
+def cache() -> Cache | None:
+    """The cache, in ``UUV_MARL_CACHE_DIR`` or the user's cache folder; None where there can be none."""
+    folder: Path | str = "of the user"
     try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        # Loading compiled code executes it, so nobody else may be able to put some there.
-        if hasattr(os, "getuid") and (folder.stat().st_uid != os.getuid() or folder.stat().st_mode & 0o002):
-            raise OSError(0, "it belongs to another user, or everybody may write to it")
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
+        folder = user_path(os.environ.get("UUV_MARL_CACHE_DIR") or platformdirs.user_cache_dir("uuv_marl")) / _FOLDER
+        if folder.parts[0].startswith("~"):
+            raise OSError(0, "no home folder is known")
+        _claim(folder)
+        folder = folder / f"numba-{numba.__version__}"
+        _make(folder)
+        return Cache(folder, _can_write(folder))
+    except (OSError, RuntimeError) as error:  # RuntimeError: no home folder is known
         _log.warning(
             "The compile cache %s can't be used (%s), so every start compiles anew, for up to a minute. "
             "Set UUV_MARL_CACHE_DIR to a writable folder of your own.",
             folder,
-            error.strerror,
+            getattr(error, "strerror", None) or error,
         )
         return None
-    return folder
+
+
+def _make(folder: Path) -> None:
+    """Make a folder that only its owner may write to, this user or root. Raises OSError where it is another's.
+
+    Loading compiled code executes it; so does starting the Python that root has installed.
+    """
+    folder.mkdir(parents=True, exist_ok=True, mode=0o755)
+    found = folder.stat()
+    if hasattr(os, "getuid") and (found.st_uid not in (os.getuid(), 0) or found.st_mode & 0o022):
+        raise OSError(0, "it belongs to another user, or others may write to it")
+
+
+def _claim(folder: Path) -> None:
+    """Make the folder that nobody else keeps files in, marked by a file. Raises OSError where others do."""
+    _make(folder)
+    mark = folder / _MARK
+    if mark.exists():
+        return
+    if any(folder.iterdir()):
+        raise OSError(0, f"it holds files that are not uuv_marl's: there is no {_MARK}")
+    mark.write_text(_WHAT_THIS_IS, encoding="utf-8")
+
+
+def _can_write(folder: Path) -> bool:
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
 
 
 class _Locator(caching._CacheLocator):
@@ -63,20 +104,20 @@ class _Locator(caching._CacheLocator):
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
         self._py_file = py_file
-        self._key = source_key(py_func, _settings.BOUNDSCHECK, _settings.OPT, _OPTIONS)
+        self._key = _key(py_func)
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "_Locator":
         return cls(py_func, py_file)
 
     def get_cache_path(self) -> str:
-        return str(cache_dir())
+        return str(cast(Cache, cache()).folder)
 
     def get_source_stamp(self) -> str:
-        return self._key
+        return cast(str, self._key)
 
     def get_disambiguator(self) -> str:
-        return self._key
+        return cast(str, self._key)
 
 
 class _Implementation(caching.CompileResultCacheImpl):
@@ -98,13 +139,15 @@ class _Cache(caching.FunctionCache):
             with contextlib.suppress(OSError):
                 index.unlink(missing_ok=True)
         if found is None:
-            _announce(index.parent)
+            _announce(cast(Cache, cache()))
         else:
             _touch(index)
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
+        if not cast(Cache, cache()).writable:
+            return
         try:
             caching.FunctionCache.save_overload(self, sig, data)
         except OSError as error:
@@ -119,25 +162,46 @@ def _touch(index: Path) -> None:
             os.utime(index)
 
 
-def _announce(folder: Path) -> None:
+def _announce(place: Cache) -> None:
     """Say that compiling takes long, and tidy up meanwhile."""
     global _last_compiled  # noqa: PLW0603 - a clock of this process
     if time.monotonic() - _last_compiled > _QUIET_S:
-        _log.warning("Compiling a part of uuv_marl, once: this takes up to a minute, and is kept in %s.", folder)
-        prune(folder.parent)
+        kept = "is kept in %s" if place.writable else "can't be kept, since %s can't be written to"
+        _log.warning(f"Compiling a part of uuv_marl: this takes up to a minute, and {kept}.", place.folder)
+        if place.writable:
+            prune(place.folder.parent)
     _last_compiled = time.monotonic()
 
 
-def prune(root: Path) -> None:
-    """Delete compiled code that has not been used for a month, version 0.1.0's too; ``root`` is the cache's folder."""
-    for folder in [*root.glob("compiled-*"), *root.glob("numba-*")]:
-        old = [index for index in folder.rglob("*.nbi") if time.time() - index.stat().st_mtime > _UNUSED_S]
-        with contextlib.suppress(OSError):  # another process may tidy up, too
-            for path in [file for index in old for file in index.parent.glob(f"{index.stem}*")]:
-                path.unlink(missing_ok=True)
-            for place in sorted([folder, *folder.rglob("*/")], reverse=True):
-                if not any(place.iterdir()):
-                    place.rmdir()
+def prune(folder: Path) -> None:
+    """Delete compiled code that has not been used for a month, also of other versions of Numba.
+
+    Args:
+        folder: the cache's own; without its mark, nothing is deleted.
+    """
+    if not (folder / _MARK).exists():
+        return
+    for index in folder.glob("numba-*/*.nbi*"):
+        with contextlib.suppress(OSError):  # another process may tidy up, too; and what is not empty stays
+            if _OURS.fullmatch(index.name) and time.time() - index.stat().st_mtime > _UNUSED_S:
+                code = index.parent.glob(f"{glob.escape(index.name.partition('.nbi')[0])}.*.nbc*")
+                for path in (index, *(path for path in code if _OURS.fullmatch(path.name))):
+                    path.unlink(missing_ok=True)
+                index.parent.rmdir()
+
+
+@functools.cache
+def _warn_of_missing_sources(package: str) -> None:
+    _log.warning(
+        "The sources of %s are not on this disk, so that a change of them would not be seen. So compiled code is not "
+        "kept, and every start compiles anew, for up to a minute; install the package with its .py files.",
+        package,
+    )
+
+
+def _key(function: Callable[..., Any]) -> str | None:
+    """What a function's compiled code is kept under, None where it can't be."""
+    return source_key(function.__module__, repr((_settings.BOUNDSCHECK, _settings.OPT, _OPTIONS)))
 
 
 # Without Numba's runtime nothing is allocated, and no array's references are counted: with it, that counting takes more
@@ -182,32 +246,24 @@ def interpreted(function: F) -> F:
     return cast(F, types.FunctionType(plain.__code__, space, plain.__name__))
 
 
-def compiled_parallel(function: F) -> F:
-    """Compile with Numba, ``prange`` running over threads."""
-    _let_idle_threads_sleep()
-    return _jit(function, parallel=True)
+def entry(function: F, *arguments: object) -> F:
+    """A ``compiled`` function for arguments of these very types, whose types are not looked up at every call.
 
-
-@functools.cache
-def _let_idle_threads_sleep() -> None:
-    """Load the pool of threads that Numba takes from OpenMP so that a thread without work soon sleeps.
-
-    By default it spins for milliseconds, and takes the core from other programs: beside two of them, a benchmark took
-    ten times as long. GNU's OpenMP reads how long to spin when it is loaded; users who have set that keep their own.
+    For functions of many arrays, where looking takes as long as a third of a step. Who calls it answers for the types:
+    an array of another type, number of axes or memory layout is not noticed.
     """
-    if not {*_SPINS, "OMP_WAIT_POLICY"} & {*os.environ}:
-        os.environ.update(_SPINS)
-        try:
-            importlib.import_module("numba.np.ufunc.omppool")
-        except ImportError:
-            _log.debug("Numba has no OpenMP on this machine, so its threads wait in their own way.")
-        finally:
-            for name in _SPINS:
-                del os.environ[name]
+    dispatcher = cast(Any, function)
+    if _settings.DISABLE_JIT:
+        return function
+    return cast(F, dispatcher.compile(tuple(cast(Any, numba).typeof(argument) for argument in arguments)))
 
 
 def _jit(function: F, **options: object) -> F:
     dispatcher = cast(Any, numba).njit(**options, **_OPTIONS)(function)
-    if cache_dir() is not None and not _settings.DISABLE_JIT:
+    if _settings.DISABLE_JIT or cache() is None:
+        return cast(F, dispatcher)
+    if _key(function) is None:
+        _warn_of_missing_sources(function.__module__.partition(".")[0])
+    else:
         dispatcher._cache = _Cache(function)
     return cast(F, dispatcher)

@@ -1,47 +1,26 @@
 """What advances the worlds of a swarm: compiled code, or plain Python to read. ``Swarm`` is the front of either."""
 
-import os
-from typing import Any, Literal, Protocol, cast
+import functools
+from collections.abc import Callable
+from typing import Literal, Protocol
 
 import numpy as np
-from numba import config, get_num_threads
-from numba.np.ufunc.parallel import threading_layer
 from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import max_cells
-from uuv_marl.sim.entry_points import (
-    observe,
-    observe_at_sea,
-    step_alone,
-    step_alone_at_sea,
-    step_worlds,
-    step_worlds_at_sea,
-)
+from uuv_marl.sim.compiled import entry
+from uuv_marl.sim.entry_points import observe, step_worlds
 from uuv_marl.sim.model import model
 from uuv_marl.sim.plain import PlainEngine
 from uuv_marl.sim.sea.sea import Sea
+from uuv_marl.sim.threads import num_threads, on_threads
 from uuv_marl.sim.workspace import scratch
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 EngineName = Literal["numba", "plain"]
-
-_threads_of_parent = False
-
-
-def _note_fork() -> None:
-    global _threads_of_parent  # noqa: PLW0603 - set once, in a forked child
-    try:
-        threading_layer()
-    except ValueError:
-        return
-    _threads_of_parent = True
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_note_fork)
 
 
 class Engine(Protocol):
@@ -59,40 +38,43 @@ class Engine(Protocol):
         ...
 
 
+_LEAST = 200
+"""Vehicles that a thread must have to be worth waking: that takes as long as moving about as many."""
+
+
 class NumbaEngine:
-    """One world runs serially, several run on Numba's threads."""
+    """Few vehicles run in the calling thread; worlds with many are shared among threads."""
 
     def __init__(self, scenario: Scenario, world: World, sea: Sea | None) -> None:
-        self._world, self._model, self._num_worlds, self._sea = world, model(scenario), len(world.state.tick), sea
-        n = scenario.swarm.num_vehicles
-        threads = min(self._num_worlds, cast(Any, config).NUMBA_NUM_THREADS)
-        self._scratch = scratch(threads, n, scenario.sonar.num_sectors, max_cells(n))
+        n, self._num_worlds = scenario.swarm.num_vehicles, len(world.state.tick)
+        self._threads = max(1, min(self._num_worlds, num_threads(), self._num_worlds * n // _LEAST))
+        room = scratch(self._threads, n, scenario.sonar.num_sectors, max_cells(n))
+        self._numbers = (world, model(scenario), room, sea)
+        self._every = np.ones(self._num_worlds, np.bool_)
+
+    @functools.cached_property
+    def _observe(self) -> Callable[..., None]:
+        return entry(observe, 0, *self._numbers)
+
+    @functools.cached_property
+    def _step(self) -> Callable[..., bool]:
+        action = np.zeros((self._num_worlds, 1, 2), np.float32)
+        return entry(step_worlds, 0, 0, 0, self._every, action, *self._numbers)
 
     def observe(self, w: int) -> None:
         """See ``Engine``."""
-        if self._sea is None:
-            observe(w, self._world, self._model, self._scratch)
-        else:
-            observe_at_sea(w, self._world, self._model, self._scratch, self._sea)
+        self._observe(w, *self._numbers)
 
     def step(self, action: Float32, active: Bool | None) -> bool:
         """See ``Engine``."""
-        if self._num_worlds == 1:
-            if active is not None and not active[0]:
-                return False
-            if self._sea is None:
-                return step_alone(action, self._world, self._model, self._scratch)
-            return step_alone_at_sea(action, self._world, self._model, self._scratch, self._sea)
-        if _threads_of_parent:
-            raise RuntimeError(
-                "several worlds can't be stepped in a process forked after Numba's threads had started; "
-                "start workers with the 'spawn' method (multiprocessing.get_context('spawn'))"
-            )
-        running = np.ones(self._num_worlds, np.bool_) if active is None else active
-        threads = min(get_num_threads(), len(self._scratch.reals))
-        if self._sea is None:
-            return step_worlds(threads, running, action, *self._world, *self._model, self._scratch)
-        return step_worlds_at_sea(threads, running, action, *self._world, *self._model, self._scratch, *self._sea)
+        running = self._every if active is None else np.ascontiguousarray(active)
+        if self._threads == 1:
+            return self._step(0, 0, self._num_worlds, running, action, *self._numbers)
+
+        def some(thread: int, begin: int, end: int) -> bool:
+            return self._step(thread, begin, end, running, action, *self._numbers)
+
+        return on_threads(some, self._num_worlds, self._threads)
 
 
 def make_engine(name: EngineName, scenario: Scenario, world: World, sea: Sea | None) -> Engine:

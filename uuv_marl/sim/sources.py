@@ -1,107 +1,91 @@
-"""What a compiled function is made of: every statement that its source reaches, in its own file and in others.
+"""What a compiled function is made of: the code of its module and of all that this module imports.
 
-Numba notices an edit of a function's own file, but not one of a function that it calls, or of a constant or a tuple's
-fields in another file. So its cache is keyed by the code reached. Comments, docstrings and neighbours don't count.
+Numba notices an edit of a function's own file, but not one of a function that it calls, or of a constant in another
+file. So its cache is keyed by the modules that the function can reach. Comments and docstrings don't count.
 """
 
 import ast
-import contextlib
 import functools
 import hashlib
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any, cast
 
 
-def source_key(function: Callable[..., Any], *settings: object) -> str:
-    """Hash of all the code that a function is compiled from, and of ``settings``."""
-    text = "\n".join([repr(settings), *(f"{place}: {code}" for place, code in sorted(reached(function).items()))])
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+@functools.cache
+def source_key(module: str, settings: str = "") -> str | None:
+    """Hash of the code that a module's functions are compiled from, and of ``settings``; None where code is missing.
+
+    A package without sources (byte code alone, or a frozen program) has no key, since a change would not be seen.
+
+    Args:
+        module: name of an imported module.
+        settings: whatever else the compiled code depends on.
+    """
+    hashes = {name: _hash(name) for name in reached(module)}
+    if None in hashes.values():
+        return None
+    return hashlib.sha256(repr((settings, sorted(hashes.items()))).encode()).hexdigest()[:16]
 
 
-def reached(function: Callable[..., Any]) -> dict[tuple[str, str], str]:
-    """The function and all of its package and of uuv_marl that it uses: code by module and name."""
-    packages = {"uuv_marl", function.__module__.partition(".")[0]}
-    found: dict[tuple[str, str], str] = {}
-    waiting = [(function.__module__, function.__name__)]
+@functools.cache
+def reached(module: str) -> frozenset[str]:
+    """The module, and those of its own package and of uuv_marl that it imports, directly or through others."""
+    packages = {"uuv_marl", module.partition(".")[0]}
+    found, waiting = set[str](), {module}
     while waiting:
-        module, name = waiting.pop()
-        name, _, attribute = name.partition(".")
-        statement = _statements(module).get(name)
-        if statement is None or (module, name) in found:
-            continue
-        if attribute:
-            home = _module(statement, name)
-            if home.partition(".")[0] in packages:
-                waiting.append((home, attribute))
-            continue
-        if isinstance(statement, ast.Import | ast.ImportFrom):
-            home = statement.module or "" if isinstance(statement, ast.ImportFrom) else ""
-            if home.partition(".")[0] in packages:
-                waiting.append((home, next(a.name for a in statement.names if name in (a.name, a.asname))))
-            continue
-        found[module, name], names = _content(module, name)
-        waiting += [(module, used) for used in names]
-    return found
-
-
-def _module(statement: ast.stmt, name: str) -> str:
-    """The module that a statement binds a name to, where it imports one."""
-    if not isinstance(statement, ast.Import | ast.ImportFrom):
-        return ""
-    whole = next(alias.name for alias in statement.names if name in (alias.name, alias.asname))
-    return f"{statement.module}.{whole}" if isinstance(statement, ast.ImportFrom) else whole
+        name = waiting.pop()
+        found.add(name)
+        named = {other for other in _named(name) if other.partition(".")[0] in packages} - found
+        waiting |= {other for other in named if _is_module(other)}
+    return frozenset(found)
 
 
 @functools.cache
-def _statements(module: str) -> dict[str, ast.stmt]:
-    """A module's statements by the names that they bind."""
-    file = getattr(sys.modules.get(module), "__file__", None)
-    if file is None:
-        with contextlib.suppress(ModuleNotFoundError):  # a parameter that is called as a function elsewhere is none
-            spec = importlib.util.find_spec(module)
-            file = spec and spec.origin
-    tree = ast.parse(Path(file).read_bytes()) if file and Path(file).is_file() else ast.Module([], [])
-    return {name: statement for statement in tree.body for name in _bound(statement)}
-
-
-def _bound(statement: ast.stmt) -> Iterator[str]:
-    for node in [statement] if isinstance(statement, ast.FunctionDef | ast.ClassDef) else ast.walk(statement):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            yield node.name
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            yield from (alias.asname or alias.name for alias in node.names)
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.id
+def _tree(module: str) -> ast.Module | None:
+    """A module's source, also of one in a zip file, without its docstrings; None where only byte code is there."""
+    loader: Any = getattr(sys.modules.get(module), "__loader__", None)
+    if loader is None:
+        spec = importlib.util.find_spec(module)
+        loader = spec and spec.loader
+    try:
+        source = loader.get_source(module) if hasattr(loader, "get_source") else None
+    except (ImportError, OSError):
+        return None
+    tree = None if source is None else ast.parse(source)
+    for node in ast.walk(tree) if tree else ():
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            cast(Any, node).body = [line for line in cast(list[ast.AST], body) if not _is_text(line)]
+    return tree
 
 
 @functools.cache
-def _content(module: str, name: str) -> tuple[str, frozenset[str]]:
-    """The code of a statement and the names that it uses, but for its decorators'; of a class the fields alone."""
-    statement = _statements(module)[name]
-    parts: list[ast.AST] = [statement]
-    annotations: list[ast.AST] = []
-    decorators: list[ast.expr] = []  # they say whether it is copied into its callers
-    if isinstance(statement, ast.ClassDef):
-        fields = [line for line in statement.body if isinstance(line, ast.AnnAssign)]
-        parts = [*statement.bases, *(part for line in fields for part in (line.target, line.value) if part)]
-        annotations = [
-            line.annotation for line in fields
-        ]  # values bring their types along; but what is named there counts
-    elif isinstance(statement, ast.FunctionDef):
-        parts = [statement.args, *(line for line in statement.body if not _is_text(line))]
-        decorators = statement.decorator_list
-    nodes = [node for part in [*parts, *annotations] for node in ast.walk(part)]
-    used = {node.id for node in nodes if isinstance(node, ast.Name)}
-    used |= {
-        f"{node.value.id}.{node.attr}"
-        for node in nodes
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
-    }
-    return "; ".join(ast.dump(part) for part in [*parts, *decorators]), frozenset(used - {name})
+def _hash(module: str) -> str | None:
+    tree = _tree(module)
+    return tree and hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 
-def _is_text(line: ast.stmt) -> bool:
-    return isinstance(line, ast.Expr) and isinstance(cast(Any, line.value), ast.Constant)
+def _named(module: str) -> Iterator[str]:
+    """Whatever a module's import statements name, wherever they stand: modules, and things in modules."""
+    tree = _tree(module)
+    own = sys.modules.get(module)
+    for node in ast.walk(tree) if tree else ():
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            relative = "." * node.level + (node.module or "")
+            home = importlib.util.resolve_name(relative, getattr(own, "__package__", None) or module)
+            yield from (home, *(f"{home}.{alias.name}" for alias in node.names))
+
+
+def _is_module(name: str) -> bool:
+    try:
+        return name in sys.modules or importlib.util.find_spec(name) is not None
+    except (ImportError, ValueError):
+        return False
+
+
+def _is_text(line: ast.AST) -> bool:
+    return isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant)

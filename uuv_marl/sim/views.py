@@ -1,13 +1,16 @@
 """The fields of percepts by name, for compiled code: views of the flat array, which they read and write."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numba.np.arrayobj import reshape_unchecked  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+from numba import config
+from numba.np import arrayobj
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled_inline
 
+reshaped: Any = as_strided if cast(Any, config).DISABLE_JIT else cast(Any, arrayobj).reshape_unchecked
 Float32 = NDArray[np.float32]
 Starts = tuple[int, ...]
 """Where each field starts in a flat percept, -1 where it is absent: ``PerceptLayout.offsets``."""
@@ -113,4 +116,4 @@ def pairs(flat: Float32, start: int, num: int) -> tuple[Float32]:
     """A view (world, vehicle, num, 2) from an entry on, in a tuple, since compiled code returns no array alone."""
     worlds, vehicles, _ = flat.shape
     across, down, along = flat.strides
-    return (reshape_unchecked(flat[:, :, start:], (worlds, vehicles, num, 2), (across, down, 2 * along, along)),)
+    return (reshaped(flat[:, :, start:], (worlds, vehicles, num, 2), (across, down, 2 * along, along)),)
