@@ -255,27 +255,41 @@ def test_an_engine_that_there_is_not_is_refused():
 
 
 @pytest.mark.parametrize("overrides", [{}, contract.SEA])
-def test_the_plain_engine_needs_no_compiler(overrides):
+def test_without_a_compiler_a_run_is_the_same(overrides):
+    """Either engine under NUMBA_DISABLE_JIT=1; policies decide the same but for rounding to float32 in between."""
     run = """
 import json, sys
 import numpy as np
 from uuv_marl import load_scenario
+from uuv_marl.baselines import POLICIES, granted, make
 from uuv_marl.sim.swarm import Swarm
-swarm = Swarm(load_scenario("starter", overrides=json.loads(sys.argv[1])), engine="plain")
-swarm.reset(0)
-for _ in range(8):
-    percept = swarm.step(np.full((1, 5, 2), 0.5))
-print(percept.flat.tobytes().hex())
+scenario = load_scenario("starter", overrides=json.loads(sys.argv[1]))
+flat = []
+for engine in ("numba", "plain"):
+    swarm = Swarm(scenario, 2, engine)
+    swarm.reset(0)
+    for _ in range(8):
+        percept = swarm.step(np.full((2, 5, 2), 0.5))
+    flat.append(percept.flat.tobytes().hex())
+actions = []
+for name in POLICIES:
+    swarm, policy = Swarm(granted(name, scenario)), make(name, granted(name, scenario))
+    policy.reset(0)
+    actions.append(policy.act(swarm.reset(0)).tolist())
+print(json.dumps([flat, actions]))
 """
-    flat = {
-        subprocess.run(
-            [sys.executable, "-W", "error", "-c", run, json.dumps(overrides)], check=True,
-            env={**os.environ, "NUMBA_DISABLE_JIT": disable},
-            capture_output=True, text=True,
-        ).stdout
+    (flat, actions), (slow_flat, slow_actions) = (
+        json.loads(
+            subprocess.run(
+                [sys.executable, "-W", "error", "-c", run, json.dumps(overrides)], check=True,
+                env={**os.environ, "NUMBA_DISABLE_JIT": disable},
+                capture_output=True, text=True,
+            ).stdout
+        )
         for disable in "01"
-    }  # fmt: skip
-    assert len(flat) == 1
+    )  # fmt: skip
+    assert len({*flat, *slow_flat}) == 1
+    np.testing.assert_allclose(slow_actions, actions, rtol=0, atol=1e-4)
 
 
 # --- Motion ---

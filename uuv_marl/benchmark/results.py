@@ -1,10 +1,12 @@
 """Results on disk: every seed and metric, written whole after each run, so that a stopped benchmark can go on."""
 
+import functools
 import hashlib
 import inspect
 import json
 import os
 import platform
+import uuid
 import zipfile
 import zlib
 from collections.abc import Container, Iterable
@@ -252,8 +254,8 @@ def knowledge(policy: str) -> Knowledge:
     if isinstance(made, Trained):
         source = made.checkpoint.digest
     else:
-        file = inspect.getsourcefile(made) if ":" in policy else None
-        source = _hash(Path(file).read_bytes()) if file else None
+        file = inspect.getsourcefile(made)
+        source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
     damping = made.yaw_damping_nms * (Policy.full_torque_nm / made.full_torque_nm)
     return Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
 
@@ -266,9 +268,17 @@ def origin(policy: str) -> dict[str, str | None]:
 def source_fingerprint() -> str:
     """Hash of all that a run's numbers come from: code of the layers up to the benchmark's, and tuned gains."""
     code = sorted({path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)})
+    if Path(__file__).resolve() not in code:
+        return _unknown()
     return _hash(
         b"".join(f"{path.relative_to(_PACKAGE).as_posix()}\0".encode() + path.read_bytes() + b"\0" for path in code)
     )
+
+
+@functools.cache
+def _unknown() -> str:
+    """In place of a hash where no source lies on disk: another one in each process, so that no results are mixed."""
+    return f"unknown {uuid.uuid4().hex[:16]}"
 
 
 def _hash(data: bytes) -> str:
