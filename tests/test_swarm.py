@@ -3,6 +3,7 @@
 import math
 import multiprocessing
 import os
+import pickle
 import subprocess
 import sys
 
@@ -396,3 +397,11 @@ def test_an_obstacle_that_moves_onto_a_vehicle_is_a_contact(engine):
     swarm.course.num_obstacles[0] = 1
     assert swarm.step(still) is not None
     assert swarm.facts.contacts[0, 0] == 1, "an obstacle that appears on a vehicle"
+
+
+def test_a_swarm_that_has_run_can_be_pickled_and_goes_on_alike():
+    swarm, action = Swarm(load_scenario("starter"), 2), np.full((2, 5, 2), 0.5, np.float32)
+    swarm.reset(0)
+    swarm.step(action)
+    copy = pickle.loads(pickle.dumps(swarm))
+    assert copy.step(action).flat.tobytes() == swarm.step(action).flat.tobytes()

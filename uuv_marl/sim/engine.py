@@ -61,6 +61,10 @@ class NumbaEngine:
         action = np.zeros((self._num_worlds, 1, 2), np.float32)
         return entry(step_worlds, 0, 0, 0, self._every, action, *self._numbers)
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but the doors to compiled code, which belong to this process."""
+        return {name: value for name, value in vars(self).items() if name not in ("_observe", "_step")}
+
     def observe(self, w: int) -> None:
         """See ``Engine``."""
         self._observe(w, *self._numbers)
