@@ -1,16 +1,30 @@
 """Whatever enters compiled code is checked first: percepts of others, snapshots, masks; and a runaway is named."""
 
 import copy
+import shutil
+from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines.checkpoint import load_checkpoint, save_checkpoint
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.errors import DivergenceError
+from uuv_marl.benchmark.results import Results, load_trace
+from uuv_marl.cli import app
+from uuv_marl.errors import DivergenceError, ResultsError
+from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.replay.page import write_page
+from uuv_marl.replay.record import record
+from uuv_marl.replay.traces import from_folder, from_trace
+from uuv_marl.scenario import show, show_vehicle
+from uuv_marl.scenario.vehicle_files import VEHICLES
 from uuv_marl.sim import model as model_module
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import plant
@@ -215,3 +229,93 @@ def test_training_refuses_scenarios_in_which_vehicles_are_lost():
 
     with pytest.raises(ScenarioError, match="training can't show that a vehicle is lost"):
         TrainingEnv(Problem(load_scenario("lossy"), [(6, 2)], Weights()), lambda num: None)
+
+
+def commands(group, name=""):
+    """Every command below a group, with its whole name."""
+    for word, command in group.commands.items():
+        below = commands(command, f"{name}{word} ") if hasattr(command, "commands") else [(f"{name}{word}", command)]
+        yield from below
+
+
+COMMANDS = dict(commands(typer.main.get_command(app)))
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    """The home folder, while the work goes on in another."""
+    (tmp_path / "home").mkdir()
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path / "home"))
+    yield tmp_path / "home"
+    assert not list((tmp_path / "here").iterdir()), "~ was taken for the name of a folder"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_path_of_a_command_may_begin_with_the_home_folder(name, home, monkeypatch):
+    command, given = COMMANDS[name], {}
+    hints = get_type_hints(command.callback)
+    paths = [option for option in command.params if "Path" in str(hints.get(option.name))]
+    assert {"output"} & hints.keys() <= {option.name for option in paths}
+    monkeypatch.setattr(command, "callback", lambda **values: given.update(values))
+    options = [f"{option.opts[0]}=~/x" for option in paths if option.param_type_name == "option"]
+    positional = ["~/x" for option in command.params if option.param_type_name == "argument"]
+    command.main([*options, *positional], standalone_mode=False)
+    for option in paths:
+        assert given[option.name] in (home / "x", [home / "x"]), option.name
+
+
+def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
+    shipped = Path(load_scenario.__code__.co_filename).parent
+    shutil.copy(VEHICLES / "lauv.toml", home / "v.toml")
+    (home / "base.toml").write_text(f"extends = '{shipped / 'starter.toml'}'", encoding="utf-8")
+    mine = "extends = '~/base.toml'\nvehicle = '~/v.toml'\nscale = 'vehicle'"
+    (home / "mine.toml").write_text(mine, encoding="utf-8")
+    assert load_scenario("~/mine.toml").vehicle.name == "lauv"
+    assert load_scenario(Path("~/mine.toml")) == load_scenario("~/mine.toml")
+    assert load_scenario("starter", overrides={"vehicle": "~/v.toml", "scale": "vehicle"}).vehicle.name == "lauv"
+    assert "lauv" in show("~/mine.toml")
+    assert "lauv" in show_vehicle("~/v.toml")
+    for arguments in (["scenarios", "--show", "~/mine.toml"], ["vehicles", "--show", "~/v.toml"]):
+        assert CliRunner().invoke(app, arguments).exit_code == 0
+    trained = POLICIES["mappo"]
+    (home / "best").mkdir()
+    save_checkpoint("~/best/policy.safetensors", trained.checkpoint.card, trained.checkpoint.layers)
+    for name in ("~/best", "guarded:~/best", "~/best/policy.safetensors"):
+        assert make(name, granted(name, load_scenario("starter")))
+    assert load_checkpoint("~/best").layers[0].bias.shape == trained.checkpoint.layers[0].bias.shape
+
+
+def test_results_and_replays_go_to_the_home_folder(home):
+    scenario = load_scenario("starter", overrides={"time_limit.factor": 0.02, "swarm.num_vehicles": 2})
+    results = Results("~/results", [scenario])
+    results.use("idle")
+    for run in evaluate(scenario, "idle", [0]):
+        if isinstance(run, Run):
+            results.add("starter", "idle", run)
+    assert load_trace("~/results/traces/starter.idle.0.npz")["time_s"].size
+    assert from_folder("~/results", None, None, 0).seed == from_trace("~/results/traces/starter.idle.0.npz").seed
+    write_page([record(scenario, "idle", 0)], "~/episode.html")
+    assert (home / "episode.html").is_file()
+
+
+@pytest.mark.needs("torch")
+def test_trainings_and_recipes_in_the_home_folder(home):
+    from uuv_marl.train.mappo import Hyperparameters
+    from uuv_marl.train.recipe import load_recipe
+    from uuv_marl.train.settings import Settings
+    from uuv_marl.train.training import train
+
+    (home / "r.toml").write_text('like = "mappo_v4"\ntitle = "mine"', encoding="utf-8")
+    assert load_recipe("~/r.toml").title == "mine"
+    settings = Settings(scenario="starter", steps=1, start="~/gone", algorithm=Hyperparameters())
+    with pytest.raises(ResultsError, match=f"{home / 'gone'}"):
+        list(train("~/runs", settings))
+
+
+def test_what_names_no_known_home_stays_as_it_is(monkeypatch):
+    assert user_path("~nobody-has-this-name/x") == Path("~nobody-has-this-name/x")
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)  # as where neither HOME nor passwd knows one
+    assert user_path("~/x") == Path("~/x")

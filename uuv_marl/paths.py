@@ -3,8 +3,11 @@
 import os
 from pathlib import Path
 
+UserPath = str | os.PathLike[str]
+"""What a user may give for a path."""
 
-def user_path(path: str | os.PathLike[str]) -> Path:
+
+def user_path(path: UserPath) -> Path:
     """The path that a user means: ``~`` and ``~name`` at its start are home folders, as in a shell.
 
     As there, what names no known home stays as it is: it may be a file such as ``~backup.toml``.

@@ -6,6 +6,7 @@ from pathlib import Path
 from uuv_marl.baselines.checkpoint import Checkpoint, load_checkpoint
 from uuv_marl.baselines.learned import Learned
 from uuv_marl.baselines.learned_law import LearnedLaw
+from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario
 
 
@@ -18,7 +19,7 @@ class Trained:
         doc: the policy's docstring.
     """
 
-    def __init__(self, name: str, path: Path, doc: str | None = Learned.__doc__) -> None:
+    def __init__(self, name: str, path: UserPath, doc: str | None = Learned.__doc__) -> None:
         self.name, self._path, self.__doc__ = name, path, doc
 
     @functools.cached_property

@@ -8,7 +8,6 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
@@ -25,6 +24,7 @@ from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.recall import RECALLED
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
 from uuv_marl.scenario.hardware import Actuators, Vehicle
@@ -155,11 +155,12 @@ def rows_of(layout: PerceptLayout) -> tuple[Row, ...]:
 
 def is_checkpoint(name: str) -> bool:
     """Whether a policy's name means a file or folder."""
-    return "/" in name or os.sep in name or (":" not in name and Path(name).exists())
+    return "/" in name or os.sep in name or (":" not in name and user_path(name).exists())
 
 
-def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:
+def save_checkpoint(path: UserPath, card: Card, layers: Sequence[Layer]) -> None:
     """Write a checkpoint file, whole or not at all."""
+    path = user_path(path)
     tensors = {f"{k}.{name}": array for k, layer in enumerate(layers) for name, array in layer._asdict().items()}
     contiguous = {name: np.ascontiguousarray(array, np.float32) for name, array in tensors.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -167,8 +168,9 @@ def save_checkpoint(path: Path, card: Card, layers: Sequence[Layer]) -> None:
         partial.write_bytes(safetensors.numpy.save(contiguous, {_CARD: card.model_dump_json()}))
 
 
-def load_checkpoint(path: Path) -> Checkpoint:
+def load_checkpoint(path: UserPath) -> Checkpoint:
     """A checkpoint from its file, or from the folder that holds it. Raises PolicyError naming what is wrong."""
+    path = user_path(path)
     file = path / WEIGHTS_FILE if path.is_dir() else path
     try:
         data = file.read_bytes()

@@ -5,7 +5,6 @@ import inspect
 import math
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol, overload
 
 import numpy as np
@@ -27,6 +26,7 @@ from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
 from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.modules import named_object
+from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
 
@@ -131,7 +131,7 @@ def parse(name: str) -> Named:
     name = name.removeprefix(GUARDED)
     if name.startswith(GUARDED):
         raise PolicyError(f"policy {GUARDED + name!r} names the filter twice; write {name!r}")
-    plain, *pairs = [name] if Path(name).exists() else name.split(",")
+    plain, *pairs = [name] if user_path(name).exists() else name.split(",")
     wrong = next((pair for pair in pairs if not all(pair.partition("="))), None)
     if wrong is not None:
         raise PolicyError(f"policy {name!r}: {wrong!r} must be key=value, such as bio_inspired,zeta_n=0.5")
@@ -146,7 +146,7 @@ def policy_class(name: str) -> Kind:
 
 def _kind(name: str) -> Kind:
     if name not in POLICIES and is_checkpoint(name):
-        trained = Trained(name, Path(name))
+        trained = Trained(name, name)
         trained.checkpoint  # noqa: B018 - refused now, not in the middle of a benchmark
         return trained
     if ":" in name:

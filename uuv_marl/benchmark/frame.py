@@ -1,11 +1,11 @@
 """Results as a table for analysis. Needs the extra ``analysis``."""
 
 import importlib
-from pathlib import Path
 from typing import Any
 
 from uuv_marl.benchmark.results import FILE, read_content, trace_path
 from uuv_marl.extras import extra
+from uuv_marl.paths import UserPath, user_path
 
 
 def need_pandas(who: str) -> Any:
@@ -14,7 +14,7 @@ def need_pandas(who: str) -> Any:
         return importlib.import_module("pandas")
 
 
-def load(path: str | Path) -> Any:
+def load(path: UserPath) -> Any:
     """The runs of a ``results.json`` as a pandas data frame, a row for each, by scenario, policy and seed.
 
     Columns are ``scenario``, ``policy``, ``seed``, every metric (``constraint_share`` as ``constraint_share_all``,
@@ -29,7 +29,7 @@ def load(path: str | Path) -> Any:
         ResultsError: the file is no results.json of this version.
     """
     pandas = need_pandas("uuv_marl.benchmark.load")
-    path = Path(path)
+    path = user_path(path)
     file = path / FILE if path.is_dir() else path
     records: list[dict[str, Any]] = []
     for row in sorted(read_content(file)["runs"], key=lambda row: row[:3]):

@@ -28,6 +28,7 @@ from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
 
 FILE = "results.json"
@@ -110,9 +111,10 @@ class Results:
     """
 
     def __init__(
-        self, folder: Path, scenarios: Iterable[Scenario], route_seeds: Container[int] = (0,), traces: bool = True
+        self, folder: UserPath, scenarios: Iterable[Scenario], route_seeds: Container[int] = (0,), traces: bool = True
     ) -> None:
-        self.folder, self._traces = folder, traces
+        self.folder = folder = user_path(folder)
+        self._traces = traces
         self.scenarios = {scenario.name: scenario for scenario in scenarios}
         self.policies: dict[str, Knowledge] = {}
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
@@ -230,7 +232,7 @@ def run_name(scenario: str, policy: str, seed: int) -> str:
     return name
 
 
-def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
+def load_trace(path: UserPath) -> dict[str, NDArray[np.float32]]:
     """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
 
     Also ``obstacles`` and ``waypoints``, and for seeds whose routes are kept the fields of ``evaluate.Routes``, as
@@ -240,7 +242,7 @@ def load_trace(path: str | Path) -> dict[str, NDArray[np.float32]]:
         ResultsError: the file is missing or broken.
     """
     try:
-        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+        with user_path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultsError(

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import apf, bio_inspired, granted, olfati_saber, orca, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario, load_scenario
 
 TRIALS = 300
@@ -118,7 +119,7 @@ def search(
 
 
 def tune(
-    policy: str, output: Path, trials: int, report: Callable[[int, float], None], vehicle: str | None = None
+    policy: str, output: UserPath, trials: int, report: Callable[[int, float], None], vehicle: str | None = None
 ) -> Path:
     """Search a policy's parameters; after an interruption the same call continues. Needs the extra ``tune``.
 
@@ -135,6 +136,7 @@ def tune(
     """
     import optuna  # noqa: PLC0415 - an extra
 
+    output = user_path(output)
     space, gains = SPACES[policy]
     where, changes = (SCENARIO, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
     scenario, name = granted(policy, load_scenario(where, overrides=changes)), policy

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uuv_marl.cli.console import Anew, changes_of, console, explained, extra, find_modules, shown, working
+from uuv_marl.cli.console import Anew, changes_of, console, explained, extra, find_modules, path_option, shown, working
 
 if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
@@ -42,7 +42,7 @@ def benchmark(
         list[str] | None,
         typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder of results, table and pictures.")] = Path("results/benchmark"),
+    output: Annotated[Path, path_option("Folder of results, table and pictures.")] = Path("results/benchmark"),
     anew: Anew = False,
     ray: Annotated[
         str | None,
@@ -120,7 +120,7 @@ def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, A
 def tune(
     policy: Annotated[list[str] | None, typer.Option(help="Name. Repeat it for several. Default: all.")] = None,
     trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
-    output: Annotated[Path, typer.Option(help="Folder for the trials.")] = Path("results/tune"),
+    output: Annotated[Path, path_option("Folder for the trials.")] = Path("results/tune"),
     vehicle: Annotated[
         str | None, typer.Option(help="Tune on this vehicle, in its scale. Default: the paper's vehicle.")
     ] = None,

@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from uuv_marl.atomic import locked
 from uuv_marl.errors import MENDABLE, PolicyError
 from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
+from uuv_marl.paths import user_path
 
 # Piped output keeps a width at which tables are legible.
 console = Console(width=None if sys.stdout.isatty() else 130)
@@ -29,6 +30,21 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 _NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")))
 _MOST_FRAMES = 5
+
+
+def path(text: str | Path) -> Path:
+    """A path of the command line; ``--help`` shows this function's name as the kind of value."""
+    return user_path(text)
+
+
+def path_option(told: str) -> Any:
+    """An option that takes a path, with its help."""
+    return typer.Option(parser=path, help=told)
+
+
+def path_argument(told: str, **more: Any) -> Any:
+    """An argument that takes a path, with its help, and more of what ``typer.Argument`` takes."""
+    return typer.Argument(parser=path, help=told, **more)
 
 
 @contextmanager

@@ -5,14 +5,14 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import console, explained, extra
+from uuv_marl.cli.console import console, explained, extra, path_argument
 
 
 def export(
     policy: Annotated[
         str, typer.Argument(help="Checkpoint of a training (file or folder), or a name: mappo, scout, guarded:mappo.")
     ],
-    output: Annotated[Path, typer.Argument(help="ONNX file.", dir_okay=False)],
+    output: Annotated[Path, path_argument("ONNX file.")],
     scenario: Annotated[
         str, typer.Option(help="Name or TOML file; the model keeps its sonar suite, vehicle and decision period.")
     ] = "random_field",

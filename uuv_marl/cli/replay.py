@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uuv_marl.cli.console import changes_of, console, explained, find_modules, progress_bar, shown
+from uuv_marl.cli.console import (
+    changes_of,
+    console,
+    explained,
+    find_modules,
+    path_argument,
+    path_option,
+    progress_bar,
+    shown,
+)
 from uuv_marl.replay import FILMS, MOST_EPISODES
 
 if TYPE_CHECKING:
@@ -23,7 +32,7 @@ Write = Callable[["Sequence[Recording]", Path, Callable[[float], object]], objec
 def replay(
     run: Annotated[
         Path | None,
-        typer.Argument(help="Folder of a benchmark, or a trace of its seed 0. Without it the episode is simulated."),
+        path_argument("Folder of a benchmark, or a trace of its seed 0. Without it the episode is simulated."),
     ] = None,
     scenario: Annotated[
         str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's only scenario.")
@@ -46,9 +55,7 @@ def replay(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            help="A page (.html), a film (.mp4, .gif) or a picture (.png). Default: a page in results/replay."
-        ),
+        path_option("A page (.html), a film (.mp4, .gif) or a picture (.png). Default: a page in results/replay."),
     ] = None,
 ) -> None:
     """Show an episode: as one HTML file that any browser opens without a network, or as a film.

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl.cli.benchmark import evaluator_at
-from uuv_marl.cli.console import Anew, console, explained, find_modules, working
+from uuv_marl.cli.console import Anew, console, explained, find_modules, path_option, working
 
 
 def robustness(
@@ -51,7 +51,7 @@ def robustness(
         ),
     ] = None,
     anew: Anew = False,
-    output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/robustness"),
+    output: Annotated[Path, path_option("Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import Anew, console, explained, extra, shown, working
+from uuv_marl.cli.console import Anew, console, explained, extra, path_option, shown, working
 
 
 def reproduce(
@@ -16,7 +16,7 @@ def reproduce(
         ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=10_000, help="Number of seeds; they count from 0.")] = 20,
-    output: Annotated[Path, typer.Option(help="Folder for figures, ledger and page.")] = Path("results/reproduce"),
+    output: Annotated[Path, path_option("Folder for figures, ledger and page.")] = Path("results/reproduce"),
 ) -> None:
     """Make the paper's figures 7 to 15 and Table 2 again, and a ledger of what matches.
 
@@ -40,7 +40,7 @@ def reproduce(
 
 def identify(
     trials: Annotated[int, typer.Option(min=1, help="Evaluations; each runs four seeds on two scenarios.")] = 400,
-    output: Annotated[Path, typer.Option(help="Folder for the trials.")] = Path("results/identify"),
+    output: Annotated[Path, path_option("Folder for the trials.")] = Path("results/identify"),
 ) -> None:
     """Search the parameters that the paper leaves open, so that sections 5.1 and 5.2.1 are met.
 
@@ -66,10 +66,10 @@ def heldout(
         int | None, typer.Option(min=1, max=10_000, help="At most this many seeds of a policy on a set. Default: all.")
     ] = None,
     trainings: Annotated[
-        Path | None, typer.Option(help="Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
+        Path | None, path_option("Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
     ] = None,
     anew: Anew = False,
-    output: Annotated[Path, typer.Option(help="Folder for results, page and pictures.")] = Path("results/heldout"),
+    output: Annotated[Path, path_option("Folder for results, page and pictures.")] = Path("results/heldout"),
 ) -> None:
     """Evaluate every policy on seeds that no training, no tuning and no choice has used.
 

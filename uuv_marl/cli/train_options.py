@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from typer.core import TyperCommand
 
-from uuv_marl.cli.console import changes_of, find_modules
+from uuv_marl.cli.console import changes_of, find_modules, path_option
 
 
 def whole_number(text: str) -> int:
@@ -97,9 +97,9 @@ Recipe = Annotated[
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of worlds, weights and noise. It fixes the training.")]
 Start = Annotated[
-    Path | None, typer.Option(help="Start from the weights of another training: its folder best, or a checkpoint.")
+    Path | None, path_option("Start from the weights of another training: its folder best, or a checkpoint.")
 ]
-Output = Annotated[Path, typer.Option(help="Folder for settings, progress and checkpoints.")]
+Output = Annotated[Path, path_option("Folder for settings, progress and checkpoints.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue from the folder's last checkpoint.")]
 
 

@@ -8,7 +8,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from uuv_marl.cli.console import console, explained, find_modules, progress_bar, shown
+from uuv_marl.cli.console import console, explained, find_modules, path_argument, progress_bar, shown
 
 if TYPE_CHECKING:
     from uuv_marl.studies.verify.check import Verdict
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def verify(
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
+        path_argument(
+            "Files of episodes (episodes.csv, sea-trials.csv, identification.csv, results.json), or folders of such. "
+            "Default: docs, of this folder or of the checkout that holds the package.",
             metavar="[FILE|FOLDER]...",
-            help="Files of episodes (episodes.csv, sea-trials.csv, identification.csv, results.json), or folders of "
-            "such. Default: docs, of this folder or of the checkout that holds the package.",
         ),
     ] = None,
     sample: Annotated[int, typer.Option(min=1, help="How many rows; all, where there are not more.")] = 24,

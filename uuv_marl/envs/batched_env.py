@@ -2,7 +2,6 @@
 
 import difflib
 import math
-import os
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, TypedDict, Unpack
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 from uuv_marl.envs.observation import observe
 from uuv_marl.envs.reward import RewardFunction, compute_reward, named, own_reward, reward_weights
 from uuv_marl.envs.state import global_state, state_layout
+from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.arrays import Bool, Float32, Float64
@@ -19,7 +19,7 @@ from uuv_marl.sim.engine import EngineName
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 
-ScenarioLike = str | os.PathLike[str] | Scenario
+ScenarioLike = UserPath | Scenario
 Reward = Literal["individual", "team"] | RewardFunction
 
 

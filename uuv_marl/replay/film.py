@@ -15,6 +15,7 @@ from uuv_marl.envs.drawing.camera import CAMERAS
 from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
 from uuv_marl.errors import ReplayError
 from uuv_marl.extras import extra
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay import FILMS, MOST_EPISODES
 from uuv_marl.replay.recording import Recording
 from uuv_marl.replay.scenes import Scenes
@@ -40,7 +41,7 @@ class Format(NamedTuple):
 
 
 def write_film(
-    recordings: Sequence[Recording], path: Path, *,
+    recordings: Sequence[Recording], path: UserPath, *,
     camera: str = "follow", sonar_of: int | None = None, speed: float | None = None,
     size: tuple[int, int] | None = None, progress: Callable[[float], object] | None = None,
 ) -> None:  # fmt: skip
@@ -62,6 +63,7 @@ def write_film(
         ResultsError: the file can't be written.
         MissingExtraError: the extra ``render`` is not installed.
     """
+    path = user_path(path)
     suffix = check_format(path)
     if not 1 <= len(recordings) <= MOST_EPISODES:
         raise ReplayError(f"a film shows 1 to {MOST_EPISODES} recordings side by side, got {len(recordings)}")

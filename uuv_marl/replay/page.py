@@ -14,6 +14,7 @@ from pathlib import Path
 
 from uuv_marl.atomic import write_text
 from uuv_marl.errors import ReplayError
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay import MOST_EPISODES
 from uuv_marl.replay.encode import payload
 from uuv_marl.replay.recording import Recording
@@ -43,9 +44,9 @@ def page_html(recordings: Sequence[Recording]) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("page.html"))
 
 
-def write_page(recordings: Sequence[Recording], path: Path) -> None:
+def write_page(recordings: Sequence[Recording], path: UserPath) -> None:
     """Write ``page_html`` to a file, whole or not at all. Raises ResultsError where it can't be written."""
-    write_text(path, page_html(recordings))
+    write_text(user_path(path), page_html(recordings))
 
 
 class Replay:

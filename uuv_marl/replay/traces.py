@@ -13,6 +13,7 @@ from uuv_marl.baselines.registry import channels_in, is_trained
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import FILE, Content, load_trace, read_content, trace_path
 from uuv_marl.errors import ReplayError
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay.command import command
 from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
@@ -54,7 +55,7 @@ class Saved(NamedTuple):
         return Saved(folder, read_content(folder / FILE, "run the benchmark again, into another --output"))
 
 
-def from_trace(path: str | Path) -> Recording:
+def from_trace(path: UserPath) -> Recording:
     """The recording of a file in the folder ``traces`` of a benchmark, as far as it goes.
 
     It has no force, spacing of single vehicles, collisions over time or inspections.
@@ -63,7 +64,7 @@ def from_trace(path: str | Path) -> Recording:
         ReplayError: it is no trace of a benchmark, or holds no routes.
         ResultsError: it, or the results.json beside it, can't be read.
     """
-    path = Path(path)
+    path = user_path(path)
     if not path.exists():
         raise ReplayError(f"{path} does not exist; {_ELSE}")
     saved = Saved.at(path.absolute().parent.parent)
@@ -73,7 +74,7 @@ def from_trace(path: str | Path) -> Recording:
     raise ReplayError(f"{path} is no trace of a run in {saved.folder / FILE}; {_ELSE}")
 
 
-def from_folder(folder: str | Path, scenario: str | None, policy: str | None, seed: int) -> Recording:
+def from_folder(folder: UserPath, scenario: str | None, policy: str | None, seed: int) -> Recording:
     """The recording of a run in a benchmark's folder, as ``from_trace`` gives it.
 
     Args:
@@ -86,7 +87,7 @@ def from_folder(folder: str | Path, scenario: str | None, policy: str | None, se
         ReplayError: the run is not there, or its trace holds no routes.
         ResultsError: results.json or the trace can't be read.
     """
-    saved = Saved.at(Path(folder))
+    saved = Saved.at(user_path(folder))
     rows = saved.content["runs"]
     scenario = _chosen(folder, "--scenario", scenario, {row.scenario for row in rows})
     rows = [row for row in rows if row.scenario == scenario]
@@ -100,7 +101,7 @@ def from_folder(folder: str | Path, scenario: str | None, policy: str | None, se
     return _recording(saved, scenario, policy, seed, metrics[seed])
 
 
-def _chosen(folder: str | Path, option: str, wanted: str | None, held: set[str]) -> str:
+def _chosen(folder: UserPath, option: str, wanted: str | None, held: set[str]) -> str:
     """What is wanted, or the only one that is held.
 
     Args:

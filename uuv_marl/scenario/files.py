@@ -12,6 +12,7 @@ import tomlkit
 from pydantic import ValidationError
 
 from uuv_marl.errors import ScenarioError
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario.documents import File, items, merged, parse
 from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
@@ -32,7 +33,7 @@ def scenario_names() -> list[str]:
 
 
 def load_scenario(
-    scenario: str | os.PathLike[str] | Scenario,
+    scenario: UserPath | Scenario,
     *,
     num_vehicles: int | None = None,
     overrides: Mapping[str, object] | None = None,
@@ -122,7 +123,7 @@ def _leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
     return leaves
 
 
-def show(name: str | os.PathLike[str]) -> str:
+def show(name: UserPath) -> str:
     """A scenario's complete TOML with the source of every number: its comment, or the user's file that sets it."""
     document = tomlkit.parse(to_toml(load_scenario(name)))
     sources: dict[str, str] = {}
@@ -143,7 +144,7 @@ def _find(name: Any, beside: Path | None = None) -> Path:
         raise ScenarioError(f"scenario must be a name, a path ending in .toml, or a Scenario, got {shown(name)}")
     text = os.fsdecode(cast(str, name))
     if text.endswith(".toml"):
-        path = (beside or Path()) / text
+        path = (beside or Path()) / user_path(text)
         if not os.path.isfile(path):  # noqa: PTH113 - says no to names that no file can have
             raise ScenarioError(
                 f"scenario file {shown(text)} does not exist; give the path of a TOML file, or a name: "

@@ -7,6 +7,7 @@ from typing import Any, cast
 import tomlkit
 
 from uuv_marl.errors import ScenarioError
+from uuv_marl.paths import user_path
 from uuv_marl.scenario.documents import File, items, merged, parse
 from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.messages import short, shown
@@ -126,7 +127,7 @@ def _without_variants(name: str) -> tuple[str, list[str]]:
 
 
 def _find_vehicle(name: str, beside: Path | None = None) -> Path:
-    path = (beside or Path()) / name if name.endswith(".toml") else VEHICLES / f"{name}.toml"
+    path = (beside or Path()) / user_path(name) if name.endswith(".toml") else VEHICLES / f"{name}.toml"
     if name in vehicle_names() or (name.endswith(".toml") and path.is_file()):
         return path
     near = difflib.get_close_matches(name, vehicle_names(), n=1, cutoff=0.4)

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -14,6 +13,7 @@ from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.trims import ALL_TRIMS
 from uuv_marl.errors import ResultsError
+from uuv_marl.paths import user_path
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.robustness.axes import AXES, known
 from uuv_marl.train import ppo
@@ -153,7 +153,7 @@ def load_recipe(name: str) -> Recipe:
 
 
 def _told(name: str) -> dict[str, Any]:
-    path = Path(name) if name.endswith(".toml") else _folder() / f"{name}.toml"
+    path = user_path(name) if name.endswith(".toml") else _folder() / f"{name}.toml"
     try:
         told = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from math import isfinite
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from uuv_marl.benchmark.distributed import connected
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
 from uuv_marl.errors import ClusterError
 from uuv_marl.extras import extra
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.env import TRAINING_SEEDS
 from uuv_marl.train.folder import Say, opened, quiet
@@ -125,7 +125,7 @@ def world_seed(seed: int, agent_steps: int) -> int:
 
 
 def train(
-    output: Path,
+    output: UserPath,
     steps: int,
     settings: Settings | None = None,
     *,
@@ -155,7 +155,7 @@ def train(
             written; the last checkpoint is whole.
         ClusterError: the cluster can't be joined, has fewer cores than runners, or lost all of them.
     """
-    settings = settings or Settings()
+    output, settings = user_path(output), settings or Settings()
     scenario = settings.load()
     described = {**asdict(settings), "scenario": scenario.model_dump(mode="json")}
     with opened(output, described, resume, Record(), say) as folder:

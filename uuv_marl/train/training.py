@@ -22,6 +22,7 @@ from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_chec
 from uuv_marl.baselines.features import BARRIER
 from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import conditions
 from uuv_marl.train.env import EpisodeStats
@@ -98,7 +99,7 @@ class Trainer:
             self.restore(checkpoint)
         elif settings.start is not None:
             remedy = "give a folder best or a checkpoint of the same algorithm and sizes of network"
-            with _reading(Path(settings.start) / _LEARNER_FILE, remedy) as data:
+            with _reading(user_path(settings.start) / _LEARNER_FILE, remedy) as data:
                 self.algorithm.start_from(_learned(data))
 
     def iterate(self, before: Record) -> Record:
@@ -152,7 +153,7 @@ class Trainer:
 
 
 def train(
-    output: Path,
+    output: UserPath,
     settings: Settings | None = None,
     *,
     resume: bool = False,
@@ -180,7 +181,7 @@ def train(
             written; the last checkpoint is whole.
         RewardError: the reward can't be imported, or gives what is no reward.
     """
-    settings = settings or Settings()
+    output, settings = user_path(output), settings or Settings()
     until = settings.steps
     if resume:
         settings = replace(settings, steps=min(until, begun_with(output).get("steps", until)))

@@ -1,7 +1,6 @@
 """Policies as ONNX models: the whole way from observation to action, barrier, memory, filter and bounds included."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 from uuv_marl.atomic import writing
@@ -15,6 +14,7 @@ from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import granted, make
 from uuv_marl.extras import extra
+from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.tables import rows
@@ -29,7 +29,7 @@ OPSET = 18
 """Version of ONNX's operators: the first that has every operator in its present form."""
 
 
-def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
+def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
     """Write a policy as an ONNX model that maps observations (vehicle, size) to actions (vehicle, 2), float32.
 
     What a policy remembers is further inputs, ``kept_...`` of shape (vehicle, ...), zeros at the start. It comes out as
@@ -47,6 +47,7 @@ def write_onnx(policy: str, scenario: Scenario, path: Path) -> None:
             has.
         ResultsError: the file can't be written.
     """
+    path = user_path(path)
     made = make(policy, granted(policy, scenario))
     if made.reader is not None or (made.rudder is not None and not isinstance(made, Filtered)):
         what = "a scenario in a vehicle's scale" if made.reader is not None else "a vehicle with a rudder"
