@@ -1,7 +1,9 @@
 """Whatever enters compiled code is checked first: percepts of others, snapshots, masks; and a runaway is named."""
 
 import copy
+import io
 import shutil
+import sys
 from pathlib import Path
 from typing import get_type_hints
 
@@ -16,7 +18,7 @@ from uuv_marl.baselines import POLICIES, PolicyError, granted, make
 from uuv_marl.baselines.checkpoint import load_checkpoint, save_checkpoint
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, load_trace
-from uuv_marl.cli import app
+from uuv_marl.cli import app, main
 from uuv_marl.errors import DivergenceError, ResultsError
 from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept, PerceptLayout
@@ -319,3 +321,53 @@ def test_what_names_no_known_home_stays_as_it_is(monkeypatch):
     assert user_path("~nobody-has-this-name/x") == Path("~nobody-has-this-name/x")
     monkeypatch.setattr("os.path.expanduser", lambda path: path)  # as where neither HOME nor passwd knows one
     assert user_path("~/x") == Path("~/x")
+
+
+LEGACY = ("ascii", "latin-1", "iso8859-15", "cp437", "cp850", "cp1251", "cp932", "cp936", "cp949")
+
+
+@pytest.fixture
+def printed(monkeypatch):
+    """What the command line prints, with its exit status, where both streams have an encoding and are strict."""
+
+    def run(arguments, encoding):
+        streams = [io.TextIOWrapper(io.BytesIO(), encoding, errors="strict") for _ in range(2)]
+        monkeypatch.setattr(sys, "argv", ["uuv-marl", *arguments])
+        monkeypatch.setattr(sys, "stdout", streams[0])
+        monkeypatch.setattr(sys, "stderr", streams[1])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        for stream in streams:
+            stream.flush()
+        return ended.value.code or 0, *(stream.buffer.getvalue().decode(encoding) for stream in streams)
+
+    return run
+
+
+@pytest.mark.parametrize("encoding", LEGACY)
+def test_lists_help_and_errors_can_be_printed_in_any_encoding(encoding, printed):
+    for name in COMMANDS:
+        assert printed([*name.split(), "--help"], encoding)[0] == 0, name
+    for arguments, word in ((["policies"], "scout"), (["scenarios"], "starter"), (["scenarios", "--show=lossy"], "loss")):
+        status, text, _ = printed(arguments, encoding)
+        assert status == 0
+        assert word in text
+    status, _, error = printed(["benchmark", "--policy=μ–→"], encoding)
+    assert status == 2
+    assert "is unknown" in error
+
+
+def test_vehicles_can_be_printed_in_plain_ascii(printed):
+    status, text, _ = printed(["vehicles"], "ascii")
+    assert status == 0
+    assert "remus100" in text
+
+
+@pytest.mark.parametrize("encoding", LEGACY)
+def test_a_benchmark_that_has_finished_is_printed_in_any_encoding(encoding, printed, tmp_path):
+    (tmp_path / "größe–μ").mkdir()
+    quick = ["--scenario=starter", "--set=time_limit.factor=0.02", "--set=swarm.num_vehicles=2", "--policy=idle"]
+    status, text, _ = printed(["benchmark", *quick, "--seeds=1", f"--output={tmp_path / 'größe–μ'}"], encoding)
+    assert status == 0
+    assert "results.json" in text
+    assert "0/1" in text

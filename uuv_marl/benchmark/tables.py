@@ -217,7 +217,7 @@ def rich_table(title: str, rows: Sequence[Cells], width: int) -> RichTable:
             c.collisions if narrow else f"{c.within}\ncollisions: {c.collisions}",
             c.paper,
         )
-        table.add_row(*map(escape, cells))
+        table.add_row(*(escape(cell.replace(_NOTHING, "-")) for cell in cells))  # a dash that every terminal has
     return table
 
 

@@ -6,7 +6,7 @@ import typer
 
 from uuv_marl import __version__
 from uuv_marl.cli import benchmark, export, lists, replay, robustness, studies, train, verify
-from uuv_marl.cli.console import console
+from uuv_marl.cli.console import console, print_everywhere
 
 app = typer.Typer(
     help="Swarms of unmanned underwater vehicles: scenarios, controllers and their benchmark.",
@@ -41,4 +41,5 @@ def _main(
 
 def main() -> None:
     """Entry point of ``uuv-marl``."""
+    print_everywhere()
     app()

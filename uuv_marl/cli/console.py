@@ -1,6 +1,7 @@
 """What all commands share: the consoles, the progress bar, and errors that say what to do."""
 
 import errno
+import io
 import sys
 import sysconfig
 import traceback
@@ -30,6 +31,13 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 _NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")))
 _MOST_FRAMES = 5
+
+
+def print_everywhere() -> None:
+    """Print a question mark for what the terminal's encoding lacks: no finished work fails while it is told of."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def path(text: str | Path) -> Path:

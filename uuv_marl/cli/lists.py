@@ -52,7 +52,7 @@ def vehicles(
             hull = scenario.vehicle
             top, rate, radius = turn(scenario)
             how = f"{rate:.0f} deg/s" + (f", radius {radius:.1f} m" if radius > 0.01 else " on the spot")
-            length = "–" if hull.length_m is None else f"{hull.length_m:g}"
+            length = "-" if hull.length_m is None else f"{hull.length_m:g}"
             source = f"variant: {', '.join(changes(name))}" if "+" in name else hull.source
             table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, source)
         console.print(table)
@@ -65,7 +65,7 @@ def policies() -> None:
     table = Table("name", "channels", "yaw damping [N m s]", "what")
     for name, made in POLICIES.items():
         what = (made.__doc__ or "").strip().splitlines()[0]
-        table.add_row(name, ", ".join(made.channels) or "–", f"{made.yaw_damping_nms:g}", what)
+        table.add_row(name, ", ".join(made.channels) or "-", f"{made.yaw_damping_nms:g}", what)
     console.print(table)
 
 
