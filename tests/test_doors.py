@@ -3,6 +3,7 @@
 import copy
 import io
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from typing import get_type_hints
@@ -323,6 +324,10 @@ def test_what_names_no_known_home_stays_as_it_is(monkeypatch):
     assert user_path("~/x") == Path("~/x")
 
 
+QUICK = (
+    "benchmark", "--scenario=starter", "--set=time_limit.factor=0.02", "--set=swarm.num_vehicles=2", "--policy=idle",
+    "--seeds=1",
+)  # fmt: skip
 LEGACY = ("ascii", "latin-1", "iso8859-15", "cp437", "cp850", "cp1251", "cp932", "cp936", "cp949")
 
 
@@ -348,8 +353,8 @@ def printed(monkeypatch):
 def test_lists_help_and_errors_can_be_printed_in_any_encoding(encoding, printed):
     for name in COMMANDS:
         assert printed([*name.split(), "--help"], encoding)[0] == 0, name
-    for arguments, word in ((["policies"], "scout"), (["scenarios"], "starter"), (["scenarios", "--show=lossy"], "loss")):
-        status, text, _ = printed(arguments, encoding)
+    for arguments, word in (("policies", "scout"), ("scenarios", "starter"), ("scenarios --show=lossy", "loss")):
+        status, text, _ = printed(arguments.split(), encoding)
         assert status == 0
         assert word in text
     status, _, error = printed(["benchmark", "--policy=μ–→"], encoding)
@@ -366,8 +371,26 @@ def test_vehicles_can_be_printed_in_plain_ascii(printed):
 @pytest.mark.parametrize("encoding", LEGACY)
 def test_a_benchmark_that_has_finished_is_printed_in_any_encoding(encoding, printed, tmp_path):
     (tmp_path / "größe–μ").mkdir()
-    quick = ["--scenario=starter", "--set=time_limit.factor=0.02", "--set=swarm.num_vehicles=2", "--policy=idle"]
-    status, text, _ = printed(["benchmark", *quick, "--seeds=1", f"--output={tmp_path / 'größe–μ'}"], encoding)
+    status, text, _ = printed([*QUICK, f"--output={tmp_path / 'größe–μ'}"], encoding)
     assert status == 0
     assert "results.json" in text
     assert "0/1" in text
+
+
+def test_commands_work_without_docstrings(tmp_path):
+    """``python -OO`` drops them, and every assert."""
+    lines = [["policies"], ["scenarios"], ["vehicles", "--show=lauv"]]
+    lines += [[*name.split(), "--help"] for name in COMMANDS]
+    code = f"""import sys
+from uuv_marl.cli import main
+for arguments in {lines!r}:
+    sys.argv = ["uuv-marl", *arguments]
+    try:
+        main()
+    except SystemExit as ended:
+        if ended.code:
+            sys.exit(f"{{arguments}} ended with {{ended.code}}")
+"""
+    run = [sys.executable, "-OO", "-c", code]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
+    assert done.returncode == 0, done.stderr[-2000:]

@@ -64,7 +64,7 @@ def policies() -> None:
 
     table = Table("name", "channels", "yaw damping [N m s]", "what")
     for name, made in POLICIES.items():
-        what = (made.__doc__ or "").strip().splitlines()[0]
+        what = (made.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
         table.add_row(name, ", ".join(made.channels) or "-", f"{made.yaw_damping_nms:g}", what)
     console.print(table)
 
