@@ -4,14 +4,21 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections import UserDict, deque
+from collections.abc import Sequence
+from decimal import Decimal
+from fractions import Fraction
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.conftest import SCENARIOS as LARGE
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.scenario import ScenarioError, parse_override, show, to_toml
+from uuv_marl.baselines import make
+from uuv_marl.scenario import ScenarioError, load_vehicle, parse_override, show, to_toml
+from uuv_marl.scenario.hardware import Vehicle
 from uuv_marl.scenario.scenario import warn_of_speed
 
 FOLDER = resources.files("uuv_marl.scenario")
@@ -524,3 +531,93 @@ def test_show_gives_no_default_the_source_of_the_vehicle_below(tmp_path):
     path.write_text(f'extends = "below.toml"\n[vehicle]\nname = "mine"\n{stated}')
     assert "munk_moment = true  # " in show(tmp_path / "below.toml")
     assert "munk_moment = true\n" in show(path)
+
+
+class Listed(Sequence):
+    """As lists of configuration libraries are: no list."""
+
+    def __init__(self, *values):
+        self.values = values
+
+    def __getitem__(self, k):
+        return self.values[k]
+
+    def __len__(self):
+        return len(self.values)
+
+
+@pytest.mark.parametrize(
+    ("field", "same", "given"),
+    [
+        ("sonar.channels", ["compass"], Listed("compass")),
+        ("sonar.channels", ["compass"], np.array(["compass"])),
+        ("sonar.channels", ["compass"], deque(["compass"])),
+        ("swarm.num_vehicles", 7, np.int64(7)),
+        ("swarm.num_vehicles", 7, np.array(7)),
+        ("contact.ends_vehicle", True, np.bool_(True)),
+        ("contact.ends_vehicle", True, np.array(True)),
+        ("disturbance.loss_times_s", [1.0, 2.5], np.array([1.0, 2.5], np.float32)),
+        ("trajectory.speed_mps", 3.5, np.float32(3.5)),
+        ("trajectory.speed_mps", 3.5, Decimal("3.5")),
+        ("trajectory.speed_mps", 3.5, Fraction(7, 2)),
+        ("obstacles", [{"centre_m": [1.0, 2.0], "radius_m": 3.0}],
+         Listed(UserDict(centre_m=np.array([1.0, 2.0]), radius_m=np.float64(3.0)))),
+    ],
+)  # fmt: skip
+def test_a_value_of_an_override_is_taken_for_what_it_can_do(field, same, given):
+    assert load_scenario("lossy", overrides={field: given}) == load_scenario("lossy", overrides={field: same})
+    path = field.split(".")
+    nested = UserDict({path[0]: UserDict({path[1]: given})}) if path[1:] else UserDict({field: given})
+    assert load_scenario("lossy", overrides=nested) == load_scenario("lossy", overrides={field: same})
+
+
+@pytest.mark.parametrize(
+    ("field", "given", "message"),
+    [
+        ("swarm.num_vehicles", np.float64(7.0), "swarm.num_vehicles must be a whole number, got 7.0"),
+        ("swarm.num_vehicles", np.bool_(True), "swarm.num_vehicles must be a whole number, got True"),
+        ("trajectory.speed_mps", np.complex64(1), "trajectory.speed_mps must be a number"),
+        ("trajectory.speed_mps", Fraction(10**400), "trajectory.speed_mps must be a number"),
+        ("trajectory.speed_mps", "3", "trajectory.speed_mps must be a number, got '3'"),
+        ("sonar.channels", {"compass"}, "sonar.channels must be a list, got {'compass'}"),
+        ("sonar.channels", "compass", "sonar.channels must be a list, got 'compass'"),
+        ("sonar.channels", b"compass", "sonar.channels must be a list"),
+        ("current", {"speed": 0.5}, "current.speed is unknown"),
+        ("current", 0.5, "current must be a table of fields, got 0.5"),
+        ("current", {"speed_mps": "x"}, "current.speed_mps must be a number, got 'x'"),
+    ],
+)
+def test_a_value_of_another_kind_is_refused_by_its_field(field, given, message):
+    with pytest.raises(ScenarioError, match=re.escape(message)):
+        load_scenario("lossy", overrides={field: given})
+
+
+def test_a_table_changes_the_fields_that_it_has():
+    def same(whole, single, name="lossy"):
+        assert load_scenario(name, overrides=whole) == load_scenario(name, overrides=single)
+
+    same({"current": {"speed_mps": 0.5}}, {"current.speed_mps": 0.5})
+    same({"vehicle": {"X_uu": 90.0}}, {"vehicle.X_uu": 90.0})
+    same({"actuators": {"yaw_lag_s": 0.5}, "vehicle": "lauv", "scale": "vehicle"},
+         {"vehicle": "lauv", "actuators.yaw_lag_s": 0.5, "scale": "vehicle"})  # fmt: skip
+    first = load_scenario("lossy").sonar.arrays[0].name
+    same({f"sonar.arrays.{first}": {"range_m": 80.0}}, {f"sonar.arrays.{first}.range_m": 80.0})
+
+
+def test_a_whole_vehicle_takes_no_optional_number_from_the_vehicle_below():
+    vehicle = load_vehicle("literature_185")["vehicle"]
+    whole = {name: value for name, value in vehicle.items() if Vehicle.model_fields[name].is_required()}
+    below = load_scenario("starter", overrides={"vehicle": {"N_vv": -3.0, "source": "mine"}})
+    assert below.vehicle.N_vv == -3.0
+    assert load_scenario(below, overrides={"vehicle": whole}).vehicle == Vehicle.model_validate(whole)
+
+
+def test_a_vehicle_may_be_given_by_a_path():
+    path = Path(str(FOLDER)) / "vehicles" / "lauv.toml"
+    assert load_scenario("sea_trial", overrides={"vehicle": path}).vehicle.name == "lauv"
+
+
+def test_gains_are_taken_for_what_they_can_do():
+    scenario = load_scenario("starter")
+    for value in (np.float32(0.5), np.array(0.5), Decimal("0.5"), Fraction(1, 2)):
+        assert make("bio_inspired", scenario, zeta_n=value).gains.zeta_n == 0.5

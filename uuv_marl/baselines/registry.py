@@ -29,6 +29,7 @@ from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.overrides import plain
 
 Float32 = NDArray[np.float32]
 
@@ -274,7 +275,7 @@ def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters
     policy.name = name
     gains: Any = getattr(policy, "gains", None)
     fields: tuple[str, ...] = getattr(gains, "_fields", ())
-    changed = {key: _value(value) for key, value in parameters.items() if key not in known}
+    changed = {key: plain(_value(value)) for key, value in parameters.items() if key not in known}
     for key, value in changed.items():
         if key not in fields:
             there = [*known, *fields]

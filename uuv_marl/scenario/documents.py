@@ -42,12 +42,14 @@ def parse(path: Path) -> File:
 
 def merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     """Tables merge; everything else, lists included, is replaced."""
-    result = dict(below)
-    for key, value in above.items():
-        old = result.get(key)
-        both = isinstance(old, dict) and isinstance(value, dict)
-        result[key] = merged(cast(dict[str, Any], old), cast(dict[str, Any], value)) if both else value
-    return result
+    changes: dict[str, Any] = {key: replaced(below.get(key), value) for key, value in above.items()}
+    return {**below, **changes}
+
+
+def replaced(old: Any, new: Any) -> Any:
+    """What stands where the new value comes in place of the old one: two tables merge."""
+    both = isinstance(old, dict) and isinstance(new, dict)
+    return merged(cast(dict[str, Any], old), cast(dict[str, Any], new)) if both else cast(Any, new)
 
 
 def items(table: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -4,7 +4,6 @@ import difflib
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from numbers import Integral
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,7 +15,7 @@ from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario.documents import File, items, merged, parse
 from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
-from uuv_marl.scenario.overrides import assign
+from uuv_marl.scenario.overrides import assign, plain
 from uuv_marl.scenario.scale import Scale, in_scale
 from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.vehicle_files import left_out, load_vehicle, variant_comments, vehicle_file
@@ -45,9 +44,10 @@ def load_scenario(
             A file states only what differs from the scenario named by its ``extends``, else from ``base.toml``.
         num_vehicles: replaces ``swarm.num_vehicles``.
         overrides: ``{"sonar.echo_reports": "surface", "sonar.arrays.bow.range_m": 80.0}``; entries of lists are
-            addressed by their name or index. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and lags, and
-            ``{"vehicle": "remus100+munk_on"}`` takes a variant of it. ``{"scale": "vehicle"}`` multiplies lengths,
-            speeds and times by the vehicle's (``uuv_marl.scenario.scale``); what other overrides give is not
+            addressed by their name or index. A table changes only the fields that it has, a list is replaced. Values
+            may be those of NumPy, torch or OmegaConf. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and
+            lags, and ``{"vehicle": "remus100+munk_on"}`` takes a variant of it. ``{"scale": "vehicle"}`` multiplies
+            lengths, speeds and times by the vehicle's (``uuv_marl.scenario.scale``); what other overrides give is not
             multiplied.
 
     Raises:
@@ -60,19 +60,19 @@ def load_scenario(
         data = _data(scenario)
         # Whole tables before their entries, and a vehicle before its numbers, however they are ordered.
         ordered = sorted((overrides or {}).items(), key=lambda one: (str(one[0]) != "vehicle", str(one[0]).count(".")))
-        changes = {str(field): value for field, value in ordered}
+        changes = {str(field): plain(value) for field, value in ordered}
         own = {field: changes.pop(field) for field in list(changes) if field.partition(".")[0] in _OWN}
         for field, value in own.items():
             if field == "vehicle" and isinstance(value, str):
                 data = merged(data, load_vehicle(value))
             else:
+                data["vehicle"] = (left_out(value) if field == "vehicle" else None) or data["vehicle"]
                 assign(data, field, value)
         data = _scaled(data, changes)
         for field, value in changes.items():
             assign(data, field, value)
         if num_vehicles is not None:
-            whole = isinstance(cast(object, num_vehicles), Integral) and not isinstance(num_vehicles, bool)
-            assign(data, "swarm.num_vehicles", int(num_vehicles) if whole else num_vehicles)
+            assign(data, "swarm.num_vehicles", plain(num_vehicles))
         return Scenario.model_validate(_frozen(data))
     except ValidationError as error:
         raise ScenarioError("\n".join(explain(dict(e), data) for e in error.errors()[:10])) from None

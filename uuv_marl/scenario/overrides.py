@@ -1,11 +1,20 @@
 """Fields of a scenario by name: ``field=value`` on the command line, and where in nested tables a field lies."""
 
+import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from decimal import Decimal
+from numbers import Integral, Real
 from typing import Any, cast
 
 from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario.documents import replaced
 from uuv_marl.scenario.messages import short, shown
+
+_PLAIN: tuple[tuple[type, Callable[[Any], object]], ...] = (
+    (os.PathLike, os.fspath), (Integral, int), (Real, float), (Decimal, float),
+)  # fmt: skip
+"""Kinds of values, and what makes them plain."""
 
 
 def parse_override(text: str) -> tuple[str, object]:
@@ -23,8 +32,10 @@ def parse_override(text: str) -> tuple[str, object]:
         raise ScenarioError(f"--set {shown(field.strip())} can't be read: {error}; give a plain value") from None
 
 
-def assign(data: dict[str, Any], field: str, value: object) -> None:
+def assign(data: dict[str, Any], field: str, value: Any) -> None:
     """Set a field of nested tables: its keys with dots between, an entry of a list by name or index, in place.
+
+    A table changes the fields that it has and leaves the others, as a table of a file does; a list is replaced.
 
     Raises:
         ScenarioError: a key lies in what is no table, or there is no such entry.
@@ -33,20 +44,35 @@ def assign(data: dict[str, Any], field: str, value: object) -> None:
     place: Any = data
     for part in path:
         place = _step(place, part, field)
-    if isinstance(place, dict):
-        cast(dict[str, Any], place)[last] = _copied(value)
-    elif isinstance(place, list):
+    if isinstance(place, list):
         entries = cast(list[Any], place)
-        entries[_index(entries, last, field)] = _copied(value)
+        k = _index(entries, last, field)
+        entries[k] = replaced(entries[k], value)
+    elif isinstance(place, dict):
+        table = cast(dict[str, Any], place)
+        table[last] = replaced(table.get(last), value)
     else:
         raise ScenarioError(f"{short(field)} is unknown: {short('.'.join(path))} is a value, not a table")
 
 
-def _copied(value: object) -> object:
-    """Tables and lists of one's own, so that entries can be set in them."""
-    if isinstance(value, dict):
-        return {key: _copied(entry) for key, entry in cast(dict[str, Any], value).items()}
-    return [_copied(entry) for entry in cast(list[Any], value)] if isinstance(value, list) else value
+def plain(value: object) -> Any:
+    """A value as TOML would give it, in tables and lists of its own: NumPy's, torch's and OmegaConf's are as good.
+
+    Numbers, sequences and mappings are taken for what they can do, and any other value as it is.
+    """
+    if callable(tolist := getattr(value, "tolist", None)):  # numbers and arrays of NumPy and torch
+        value = tolist()
+    if isinstance(value, bool | str | bytes | bytearray):
+        return value
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in cast(Mapping[Any, object], value).items()}
+    if isinstance(value, Sequence):
+        return [plain(entry) for entry in cast(Sequence[object], value)]
+    to = next((to for kind, to in _PLAIN if isinstance(value, kind)), None)
+    try:
+        return value if to is None else to(value)
+    except (OverflowError, ValueError):  # a fraction beyond all floats, a signalling NaN
+        return value
 
 
 def _step(place: Any, part: str, field: str) -> Any:
