@@ -5,6 +5,7 @@ import re
 import warnings
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Literal, get_args, get_origin
 
 import pytest
 from typer.testing import CliRunner
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
+from uuv_marl.scenario import Scenario
 
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
@@ -210,3 +212,18 @@ def test_the_glossary_names_what_there_is():
     for field in re.findall(r"`(\w+\.\w+)`", text):
         section, _, name = field.partition(".")
         assert hasattr(getattr(scenario, section), name), field
+
+
+def switches(model, prefix=""):
+    """Fields of a scenario that turn something on or off, or choose among words."""
+    for name, info in model.model_fields.items():
+        inner = [part for part in (info.annotation, *get_args(info.annotation)) if hasattr(part, "model_fields")]
+        if inner:
+            yield from switches(inner[0], f"{prefix}{name}.")
+        elif info.annotation is bool or get_origin(info.annotation) is Literal:
+            yield f"{prefix}{name}"
+
+
+@pytest.mark.parametrize("field", list(switches(Scenario)))
+def test_every_switch_of_a_scenario_is_on_a_page(field):
+    assert any(field.rpartition(".")[2] in page.read_text() for page in PAGES)
