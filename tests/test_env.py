@@ -398,18 +398,19 @@ def test_the_last_info_tells_how_it_ended(reason):
     policy = make("bio_inspired", env)
     observations, _ = env.reset(seed=4)
     whole.reset(seed=4)
-    solo.reset(seed=4)
+    alone = solo.reset(seed=4)[1]
     policy.reset(4)
-    last, collisions, alone = {}, 0, {}
+    last, collisions = {}, 0
+    assert alone == {"is_success": False, "ending": "running", "arrived": False, "time_s": 0.0, "collisions": 0}
     while env.agents:
         acted, actions = list(env.agents), policy(observations)
         observations, *_, infos = env.step(actions)
         observations = {agent: observations[agent] for agent in env.agents}
         everyone = np.array([[actions.get(agent, np.zeros(2)) for agent in env.possible_agents]])
         final = whole.step(everyone)[-1]
-        if not alone:
+        if alone["ending"] == "running":
             alone = solo.step(actions["uuv_0"])[-1]
-            assert alone == infos["uuv_0"]
+            assert alone == infos["uuv_0"] or (alone["ending"], infos["uuv_0"]) == ("running", {})
         collisions += int(env.swarm.facts.collisions[0])
         for agent in acted:
             assert bool(infos[agent]) == (agent not in env.agents), "only the last info tells"

@@ -1,16 +1,19 @@
 """Gymnasium's APIs: many worlds, one learner among others, the registries."""
 
 import copy
+import importlib
 import pickle
 import subprocess
 import sys
 import warnings
 from functools import partial
+from importlib.util import find_spec
 
 import gymnasium
 import numpy as np
 import pettingzoo
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector as wrappers
@@ -383,7 +386,10 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
         own = rng.uniform(-1, 1, 2).astype(np.float32)
         observation, *outcome = env.step(own)
         observations, *theirs = whole.step({**policy(observations), "uuv_0": own})
-        assert outcome == [values["uuv_0"] for values in theirs]
+        running = {"is_success": False, "ending": "running", "arrived": False}
+        running |= {key: outcome[-1][key] for key in ("time_s", "collisions")}
+        expected = [values["uuv_0"] for values in theirs]
+        assert outcome == [*expected[:-1], expected[-1] if any(outcome[1:3]) else {**running, **expected[-1]}]
         steps += 1
     assert steps > 15
     assert outcome[1] != outcome[2]  # terminated where the learner was lost, else truncated
@@ -464,3 +470,72 @@ def test_solo_takes_an_engine_and_actions_that_can_t_be_written_to(monkeypatch):
 def test_an_argument_that_is_not_there_is_named(make):
     with pytest.raises(TypeError, match="no argument num_vehicle; did you mean num_vehicles"):
         make("starter", num_vehicle=3)
+
+
+class Three:
+    """A whole number as other libraries' are, such as a tensor."""
+
+    def __index__(self):
+        return 3
+
+
+@pytest.mark.parametrize("seed", [np.array(3), np.int64(3), np.uint8(3), Three()], ids=lambda seed: type(seed).__name__)
+@pytest.mark.parametrize("make", [uuv_marl.parallel_env, SoloEnv, partial(uuv_marl.vector_env, 2)])
+def test_a_seed_is_taken_for_the_number_that_it_is(make, seed):
+    plain, env = make(scenario="starter"), make(scenario="starter")
+    plain.reset(seed=3)
+    env.reset(seed=seed)
+    assert snapshot_bytes(env) == snapshot_bytes(plain)
+    assert env.np_random.integers(2**62) == plain.np_random.integers(2**62)
+
+
+@pytest.mark.parametrize("seed", [np.array(-3), np.array(1.5), np.array("3"), True, [1, 2, 3], object()], ids=repr)
+@pytest.mark.parametrize("make", [uuv_marl.parallel_env, SoloEnv, partial(uuv_marl.vector_env, 2)])
+def test_a_refused_seed_changes_nothing(make, seed):
+    env = make(scenario="starter")
+    env.reset(seed=3)
+    before, random = snapshot_bytes(env), str(env.np_random.bit_generator.state)
+    with pytest.raises((TypeError, ValueError), match="seed must"):
+        env.reset(seed=seed)
+    assert (snapshot_bytes(env), str(env.np_random.bit_generator.state)) == (before, random)
+
+
+def snapshot_bytes(env):
+    return {name: array.tobytes() for name, array in env.swarm.snapshot().items()}
+
+
+@pytest.mark.parametrize("action", [1e-300, 1e-46, -1e-300])
+def test_numbers_below_float32s_range_are_zero_whatever_numpy_is_told(action):
+    """Actions of a user, observations on their way to a policy, and rewards."""
+
+    def tiny(swarm):
+        return np.full(swarm.state.alive.shape, action)
+
+    with np.errstate(all="raise"):
+        env, alone, whole = uuv_marl.parallel_env("starter"), SoloEnv("starter"), uuv_marl.vector_env(2, "starter")
+        observations, _ = env.reset(seed=0)
+        idle = baselines.make("idle", env)
+        assert idle({agent: np.full(seen.shape, action) for agent, seen in observations.items()})
+        env.step({agent: np.full(2, action) for agent in env.agents})
+        alone.reset(seed=0)
+        alone.step(np.full(2, action))
+        whole.reset(seed=0)
+        whole.step(np.full((2, 5, 2), action))
+        for library, name in (("stable_baselines3", "sb3.SwarmVecEnv"), ("torchrl", "torchrl.SwarmEnv")):
+            if find_spec(library):
+                module, _, kind = name.partition(".")
+                env = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), kind)(2, "starter", reward=tiny)
+                started = env.reset()
+                env.step(np.full((10, 2), action) if library == "stable_baselines3" else env.rand_action(started))
+
+
+def test_a_spec_with_a_scenario_goes_through_json():
+    scenario = uuv_marl.load_scenario("starter", overrides={"current.speed_mps": 0.5})
+    one = gymnasium.make("uuv_marl/Solo-v0", scenario=scenario, max_episode_steps=5)
+    again = gymnasium.make(EnvSpec.from_json(one.spec.to_json()))
+    assert again.unwrapped.scenario == one.unwrapped.scenario
+    assert again.spec.max_episode_steps == 5
+    many = gymnasium.make_vec("uuv_marl/Swarm-v0", 2, scenario=scenario)
+    assert gymnasium.make_vec(EnvSpec.from_json(many.spec.to_json())).scenario == scenario
+    with pytest.raises(ScenarioError, match="swarm.num_vehicles must be a whole number, got 'x'"):
+        uuv_marl.load_scenario({**scenario.model_dump(), "swarm": {"num_vehicles": "x"}})

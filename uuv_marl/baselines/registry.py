@@ -30,6 +30,7 @@ from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import plain
+from uuv_marl.sim.arguments import rounding
 
 Float32 = NDArray[np.float32]
 
@@ -100,9 +101,10 @@ class EnvPolicy:
         """An action for every agent that has an observation."""
         layout = self.policy.layout
         rows = np.zeros((1, len(self._agents), layout.size), np.float32)
-        for i, agent in enumerate(self._agents):
-            if agent in observations:
-                rows[0, i] = observations[agent]
+        with rounding():
+            for i, agent in enumerate(self._agents):
+                if agent in observations:
+                    rows[0, i] = observations[agent]
         actions = self.policy.act(Percept.from_observation(rows, layout))[0]
         return {agent: actions[i] for i, agent in enumerate(self._agents) if agent in observations}
 

@@ -19,7 +19,7 @@ from uuv_marl.sim.engine import EngineName
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 
-ScenarioLike = UserPath | Scenario
+ScenarioLike = UserPath | Scenario | Mapping[str, object]
 Reward = Literal["individual", "team"] | RewardFunction
 
 
@@ -82,7 +82,8 @@ class BatchedEnv:
         self._weights = reward_weights(scenario)
         self._waiting = set(range(num_worlds))
         """Worlds that were never reset."""
-        self._over = np.zeros(num_worlds, np.bool_)
+        self.over = np.zeros(num_worlds, np.bool_)
+        """Worlds whose episode has ended, shape (world,)."""
         self.collisions = np.zeros(num_worlds, np.int64)
         """Contact episodes that began since the reset, shape (world,)."""
         self.max_cycles = max_cycles
@@ -116,7 +117,7 @@ class BatchedEnv:
         chosen = list(range(self.swarm.num_worlds)) if worlds is None else list(worlds)
         self.swarm.reset(seed, chosen)
         self._waiting -= set(chosen)
-        self._over[chosen], self.collisions[chosen] = False, 0
+        self.over[chosen], self.collisions[chosen] = False, 0
         return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
 
     def need_reset(self, what: str) -> None:
@@ -131,7 +132,7 @@ class BatchedEnv:
         """
         self.need_reset("step")
         swarm = self.swarm
-        before, running = swarm.state.alive.copy(), ~self._over
+        before, running = swarm.state.alive.copy(), ~self.over
         percept = swarm.step(action, running)
         np.add(self.collisions, swarm.facts.collisions, out=self.collisions, where=running)
         alive = swarm.state.alive
@@ -140,13 +141,13 @@ class BatchedEnv:
         if self._max_cycles is not None:
             last_tick = self._max_cycles * swarm.scenario.timing.holds_per_decision
             world_truncated |= (swarm.state.tick >= last_tick) & ~world_terminated
-        self._over = world_terminated | world_truncated
+        self.over = world_terminated | world_truncated
         return StepResult(
             observation=observe(percept),
             reward=reward,
             terminated=before & (world_terminated[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
-            acting=alive & ~self._over[:, None],
+            acting=alive & ~self.over[:, None],
             world_reward=world_reward,
             world_terminated=world_terminated,
             world_truncated=world_truncated,
@@ -163,7 +164,7 @@ class BatchedEnv:
         if callable(self._reward):
             own = own_reward(self._reward, self.swarm, before)
             return own, own.mean(axis=1), None
-        reward, terms = compute_reward(self.swarm, self._weights, ~self._over)
+        reward, terms = compute_reward(self.swarm, self._weights, ~self.over)
         mean = reward.sum(axis=1) / self.swarm.num_vehicles  # twice as fast as reward.mean(axis=1), and its bits
         if self._reward == "team":
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.

@@ -1,4 +1,4 @@
-"""How an episode ended: the entries of the last infos, in every API."""
+"""How an episode ended, or stands: entries of infos, in every API."""
 
 from typing import Any
 
@@ -6,10 +6,10 @@ from uuv_marl.envs.batched_env import BatchedEnv
 
 
 def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:
-    """Why the episode of a world, or of one vehicle, ended; as plain Python values.
+    """Why the episode of a world, or of one vehicle, ended, or that it goes on; as plain Python values.
 
     Args:
-        batch: the worlds directly after the step in which the episode of the world, or of the vehicle, ended.
+        batch: the worlds, before the next step or reset of an episode that has ended.
         world: index of the world.
         vehicle: index of the vehicle; None for the world as a whole.
 
@@ -17,7 +17,7 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
         ``is_success`` (the swarm arrived, and this vehicle, or any of them, was there to the end; the name under which
         libraries look for it), ``ending`` (``arrival``, ``time_limit``: also after an arrival where
         ``arrival.ends_episode`` is false, ``lost``: this vehicle or all of them, or ``diverged``: the integration step
-        is too long),
+        is too long; ``running`` until then),
         ``arrived`` (the swarm did), ``time_s`` since the reset, and ``collisions``, the contact episodes of the whole
         swarm until now.
     """
@@ -28,10 +28,12 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
         reason = "lost"
     elif swarm.facts.diverged[world] >= 0:
         reason = "diverged"
+    elif not batch.over[world]:
+        reason = "running"
     else:
         reason = "arrival" if arrived and swarm.scenario.arrival.ends_episode else "time_limit"
     return {
-        "is_success": arrived and reason in ("arrival", "time_limit"),
+        "is_success": arrived and reason not in ("lost", "diverged"),
         "ending": reason,
         "arrived": arrived,
         "time_s": float(swarm.facts.time_s[world]),

@@ -1,14 +1,17 @@
 """What the environments of all APIs have in common: the worlds below, and pictures of them."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.renderer import Renderer
 from uuv_marl.scenario import Scenario, conditions
+from uuv_marl.scenario.overrides import plain
 from uuv_marl.sim.swarm import Swarm
 
 
@@ -53,6 +56,23 @@ class EnvMixin:
     def swarm(self) -> Swarm:
         """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
         return self._batch.swarm
+
+
+class SpecMixin:
+    """Gymnasium's ``spec`` in a form that JSON can hold: a scenario in it is its fields, a path is text."""
+
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How ``gymnasium.make`` made this environment, and makes its like."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None and "scenario" in spec.kwargs:
+            spec = replace(spec, kwargs={**spec.kwargs, "scenario": plain(spec.kwargs["scenario"])})
+        self._spec = spec
 
 
 class RenderMixin(EnvMixin):

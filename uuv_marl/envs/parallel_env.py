@@ -15,7 +15,7 @@ from uuv_marl.envs.batched_env import BatchedEnv, Reward, ScenarioLike, StepResu
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
-from uuv_marl.sim.arguments import action_array
+from uuv_marl.sim.arguments import action_array, world_seeds
 from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.engine import EngineName
 
@@ -87,9 +87,10 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         options: dict[str, Any] | None = None,  # noqa: ARG002 - PettingZoo's signature
     ) -> tuple[dict[str, Float32], Infos]:
         """Start an episode. Without a seed the environment's random stream continues. ``options`` are ignored."""
-        observation = self._batch.reset(seed)[0]
-        if seed is not None:
-            self.np_random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0,)))
+        (own,) = world_seeds(seed, [0])
+        observation = self._batch.reset(own)[0]
+        if own is not None:
+            self.np_random = np.random.default_rng(np.random.SeedSequence(own, spawn_key=(0,)))
         self.agents = list(self.possible_agents)
         self._rows = slice(None)
         self._renderer.update()

@@ -13,10 +13,11 @@ from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
-from uuv_marl.sim.arguments import action_array, whole_number
+from uuv_marl.sim.arguments import action_array, rounding, whole_number
 from uuv_marl.sim.arrays import Float32
 
 with extra("train", "SwarmVecEnv"):
+    from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 Indices = None | int | Iterable[int]
@@ -134,9 +135,11 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
             observation = self._batch.reset(worlds=worlds)
             self._forget(over)
         self._renderer.update()
+        with rounding():
+            reward = result.reward.astype(np.float32).reshape(-1)
         return (
             observation.reshape(self.num_envs, -1),
-            result.reward.astype(np.float32).reshape(-1),
+            reward,
             np.repeat(over, self._shape[1]),
             infos,
         )
@@ -154,6 +157,10 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
 
     def _forget(self, worlds: NDArray[np.bool_]) -> None:
         self._returns[worlds], self._lengths[worlds], self._starts[worlds] = 0.0, 0, time.perf_counter()
+
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
+        """Whether rows tell what SB3's ``Monitor`` tells: ``episode``, at an episode's end."""
+        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of every world."""

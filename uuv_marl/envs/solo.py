@@ -11,20 +11,22 @@ from uuv_marl.baselines import granted, make
 from uuv_marl.envs.batched_env import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
-from uuv_marl.envs.mixins import RenderMixin
+from uuv_marl.envs.mixins import RenderMixin, SpecMixin
 from uuv_marl.scenario import Scenario, ScenarioError
-from uuv_marl.sim.arguments import action_array
+from uuv_marl.sim.arguments import action_array, rounding, world_seeds
 from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.engine import EngineName
 
 
-class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
+class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is a property
+    SpecMixin, RenderMixin, gymnasium.Env[Float32, Float32]
+):
     """The learner is vehicle 0 and acts by ``step``; all others run the policy ``others``.
 
     Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the swarm
-    arrives or the learner is lost, and is truncated by the time limit; others may be lost on the way. The last info
-    tells how the episode ended: ``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``
-    (``uuv_marl.envs.ending.ending``).
+    arrives or the learner is lost, and is truncated by the time limit; others may be lost on the way. Every info
+    tells how the episode stands, so that a wrapper may end it: ``is_success``, ``ending`` (``running`` until it ends),
+    ``arrived``, ``time_s``, ``collisions`` (``uuv_marl.envs.ending.ending``).
 
     Args:
         others: name of a policy, or ``module:Class``. The scenario gets the channels and the yaw damping that the
@@ -69,13 +71,14 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Float32, dict[str, Any]]:
         """Start an episode: with a seed, the episode of ``parallel_env``; without one, the random stream goes on."""
-        super().reset(seed=seed, options=options)
-        observation = self._batch.reset(seed)
+        (own,) = world_seeds(seed, [0])
+        super().reset(seed=own, options=options)
+        observation = self._batch.reset(own)
         # Policies that draw follow the world's seed, and go on from the environment's stream where there is none.
-        self._others.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
+        self._others.reset(int(self.np_random.integers(2**31)) if own is None else own)
         self._renderer.update()
         self._running = True
-        return observation[0, 0], {}
+        return observation[0, 0], ending(self._batch, 0, 0)
 
     def step(self, action: ArrayLike) -> tuple[Float32, float, bool, bool, dict[str, Any]]:
         """One decision of the learner and of all others. Raises RuntimeError before a reset and after the end."""
@@ -84,7 +87,8 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         own = action_array(action, (2,), "the action")
         if not np.isfinite(own).all():
             raise ValueError(f"the action must be finite, got {own.tolist()}")
-        actions = np.array(self._others.act(self.swarm.percept), np.float32)
+        with rounding():
+            actions = np.array(self._others.act(self.swarm.percept), np.float32)
         actions[0, 0] = own
         result = self._batch.step(actions)
         self._running = bool(result.acting[0, 0])
@@ -98,7 +102,7 @@ class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):
         )
 
     def _info(self, result: StepResult) -> dict[str, Any]:
-        info: dict[str, Any] = {} if self._running else ending(self._batch, 0, 0)
+        info = ending(self._batch, 0, 0)
         if self._info_terms:
             info["reward_terms"] = {name: float(term[0, 0]) for name, term in result.terms.items()}
         return info

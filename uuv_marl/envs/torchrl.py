@@ -10,7 +10,7 @@ from uuv_marl.envs.batched_env import EnvOptions, ScenarioLike, make_batched_env
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.sim.arguments import world_seeds
+from uuv_marl.sim.arguments import rounding, world_seeds
 from uuv_marl.sim.arrays import Bool
 
 with extra("torchrl", "SwarmEnv"):
@@ -104,11 +104,9 @@ class SwarmEnv(EnvMixin, EnvBase):
         """One decision of every vehicle of every world."""
         result = self._batch.step(tensordict.get((GROUP, "action")).detach().cpu().numpy())
         alive = self.swarm.state.alive
-        group = {
-            "observation": result.observation,
-            "mask": alive.copy(),
-            "reward": result.reward.astype(np.float32)[:, :, None],
-        }
+        with rounding():
+            reward = result.reward.astype(np.float32)[:, :, None]
+        group = {"observation": result.observation, "mask": alive.copy(), "reward": reward}
         return self._tensordict(
             group, result.terminated | ~alive, result.truncated, result.world_terminated, result.world_truncated
         )

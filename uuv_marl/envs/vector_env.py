@@ -12,14 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from uuv_marl.envs.batched_env import BatchedEnv, EnvOptions, ScenarioLike, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
-from uuv_marl.envs.mixins import EnvMixin
+from uuv_marl.envs.mixins import EnvMixin, SpecMixin
 from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
 from uuv_marl.sim.arrays import Bool, Float32, Float64
 
 Infos = dict[str, Any]
 
 
-class SwarmVectorEnv(EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]):
+class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is a property
+    SpecMixin, EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]
+):
     """Worlds stepped together; ``vector_env`` makes them.
 
     Observations have shape (num_envs, vehicle, entry), actions (num_envs, vehicle, 2). A reward is the mean over a
@@ -85,8 +87,8 @@ class SwarmVectorEnv(EnvMixin, VectorEnv[Float32, Float32, NDArray[Any]]):
         worlds = np.flatnonzero(mask).tolist()
         seeds = world_seeds(seed, range(self.num_envs))
         observation = self._batch.reset([seeds[world] for world in worlds], worlds)
-        if isinstance(seed, int | np.integer):
-            super().reset(seed=int(seed))
+        if seeds[0] is not None:
+            super().reset(seed=seeds[0])
         self._due = self._due & ~mask
         self._renderer.update()
         return observation, _masked({"agent_mask": self.swarm.state.alive.copy()}, mask)

@@ -32,7 +32,7 @@ def scenario_names() -> list[str]:
 
 
 def load_scenario(
-    scenario: UserPath | Scenario,
+    scenario: UserPath | Scenario | Mapping[str, object],
     *,
     num_vehicles: int | None = None,
     overrides: Mapping[str, object] | None = None,
@@ -40,7 +40,8 @@ def load_scenario(
     """A scenario by name, from a TOML file, or changed from another.
 
     Args:
-        scenario: a shipped name (``scenario_names()``), a path ending in ``.toml``, or a ``Scenario``.
+        scenario: a shipped name (``scenario_names()``), a path ending in ``.toml``, a ``Scenario``, or all
+            of its fields as ``Scenario.model_dump`` gives them, for places that hold plain data only.
             A file states only what differs from the scenario named by its ``extends``, else from ``base.toml``.
         num_vehicles: replaces ``swarm.num_vehicles``.
         overrides: ``{"sonar.echo_reports": "surface", "sonar.arrays.bow.range_m": 80.0}``; entries of lists are
@@ -187,8 +188,8 @@ def _layers(path: Path) -> Iterator[File]:
 
 def _data(scenario: Any) -> dict[str, Any]:
     """A scenario's fields and values, not yet checked."""
-    if isinstance(scenario, Scenario):
-        return scenario.model_dump(mode="json", exclude_none=True)
+    if isinstance(scenario, Scenario | Mapping):
+        return plain(cast(object, scenario))
     path = _find(scenario)
     if not re.fullmatch(NAME, path.stem):
         raise ScenarioError(

@@ -7,6 +7,8 @@ from decimal import Decimal
 from numbers import Integral, Real
 from typing import Any, cast
 
+from pydantic import BaseModel
+
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario.documents import replaced
 from uuv_marl.scenario.messages import short, shown
@@ -62,6 +64,8 @@ def plain(value: object) -> Any:
     """
     if callable(tolist := getattr(value, "tolist", None)):  # numbers and arrays of NumPy and torch
         value = tolist()
+    if isinstance(value, BaseModel):
+        value = value.model_dump(mode="json", exclude_none=True)
     if isinstance(value, bool | str | bytes | bytearray):
         return value
     if isinstance(value, Mapping):

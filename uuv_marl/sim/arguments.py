@@ -71,5 +71,10 @@ def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArr
         raise ValueError(f"{whose} must have shape {shape}, got {given.shape}")
     if given.dtype == np.float32:
         return given
-    with np.errstate(over="ignore"):  # what is too large for float32 becomes infinite, and is refused as such
+    with rounding():
         return np.asarray(given, np.float32)
+
+
+def rounding() -> np.errstate:
+    """A block in which numbers are rounded to float32 whatever ``np.seterr`` says: to 0, or to what is infinite."""
+    return np.errstate(over="ignore", under="ignore")
