@@ -26,6 +26,15 @@ def runs_of(scenario, policy, seeds):
     return {run.seed: run for run in evaluate(granted(policy, scenario), policy, seeds) if isinstance(run, Run)}
 
 
+def test_seeds_may_be_numpys(tmp_path):
+    scenario = quick("starter")
+    results = Results(tmp_path, [scenario])
+    for run in evaluate(scenario, "idle", np.arange(2)):
+        if isinstance(run, Run):
+            results.add("starter", "idle", run)
+    assert [row.seed for row in Results(tmp_path, [scenario]).rows] == [0, 1]
+
+
 def test_metrics_are_those_of_the_series(monkeypatch):
     monkeypatch.setattr("uuv_marl.benchmark.evaluate.ROUTE_PERIOD_S", 0.1)
     run = runs_of(load_scenario("single_obstacle"), "bio_inspired", [4])[4]
@@ -281,9 +290,12 @@ def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
 
     monkeypatch.setattr(tuning, "SEEDS", (10_000,))
     monkeypatch.setattr("uuv_marl.scenario.load_scenario", lambda *a, **k: quick())
+    optuna = pytest.importorskip("optuna")
+    before = optuna.logging.get_verbosity()
     for folder, stops in (("whole", [5]), ("parts", [2, 5])):
         for trials in stops:
             tuning.tune("bio_inspired_plus", tmp_path / folder, trials, lambda *a: None)
+    assert optuna.logging.get_verbosity() == before
     for name in ("bio_inspired_plus.json", "bio_inspired_plus.csv"):
         assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
     assert len((tmp_path / "whole" / "bio_inspired_plus.csv").read_text().splitlines()) == 6

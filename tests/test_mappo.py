@@ -6,6 +6,7 @@ import errno
 import itertools
 import json
 import os
+import random
 import shutil
 import signal
 import subprocess
@@ -50,7 +51,8 @@ TINY = Hyperparameters(hidden=(16, 16), horizon=8, minibatch=64)
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    torch.set_num_threads(1)
+    with trainings.one_thread():
+        yield
 
 
 def test_advantages_by_hand():
@@ -851,3 +853,39 @@ def test_the_critic_may_learn_alone_first():
     assert same == [True, False]
     training.iterate(0.5)
     assert not all(map(torch.equal, training.learner.actor.parameters(), before[0]))
+
+
+def global_state():
+    """What a training may change of the process."""
+    numpys = str(np.random.get_state())  # noqa: NPY002 - that of others
+    return torch.get_num_threads(), torch.get_rng_state().tolist(), random.getstate(), numpys
+
+
+@pytest.mark.parametrize("end", ["whole", "closed", "error"])
+def test_a_training_gives_global_state_back(end, tmp_path, no_validation):
+    torch.set_num_threads(2)
+    before = global_state()
+
+    def stop():
+        if end == "error":
+            raise LookupError("no")
+        return False
+
+    records = train(tmp_path, settings(), stop=stop)
+    if end == "whole":
+        assert list(records)
+    elif end == "closed":
+        next(records)
+        records.close()
+    else:
+        with pytest.raises(LookupError, match="no"):
+            list(records)
+    assert global_state() == before
+
+
+def test_settings_may_hold_numpys_numbers(tmp_path, no_validation):
+    overrides = {"timing.decision_period_s": np.float64(0.5), "obstacles": np.array([]), "time_limit.factor": 0.02}
+    given = settings(seed=np.int64(3), steps=np.int64(168), overrides=overrides)
+    assert list(train(tmp_path, given))
+    kept = json.loads((tmp_path / "config.json").read_text(encoding="utf-8"))["settings"]
+    assert (kept["seed"], kept["overrides"]["obstacles"]) == (3, [])

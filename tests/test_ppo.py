@@ -36,7 +36,8 @@ TINY = Hyperparameters(hidden=(16, 16), horizon=8, minibatch=84)
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    torch.set_num_threads(1)
+    with trainings.one_thread():
+        yield
 
 
 def open_water(**overrides):

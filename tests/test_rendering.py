@@ -1,6 +1,9 @@
 """Frames and the window: what is drawn is what is there, where it is; options, keys, errors."""
 
+import os
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pygame
@@ -470,3 +473,10 @@ def test_a_paused_window_can_be_closed(window):
     with pytest.warns(UserWarning, match="the window was closed; the run goes on without it"):
         window.step(idle(window))
     window.step(idle(window))
+
+
+def test_pygame_greets_nobody():
+    """PettingZoo asks it not to; it would greet on standard output."""
+    run = [sys.executable, "-c", "from uuv_marl.envs.drawing import ink"]
+    there = {name: value for name, value in os.environ.items() if "PYGAME" not in name}
+    assert subprocess.run(run, capture_output=True, check=True, env=there).stdout == b""

@@ -6,14 +6,23 @@ import pytest
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from tests import contract
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.scenario import ScenarioError
+from uuv_marl.train import training
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
 QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """Sums in another order give other bits."""
+    with training.one_thread():
+        yield
 
 
 def swarm(num_worlds=2, scenario="random_field", overrides=SHORT, **kwargs):
@@ -34,11 +43,11 @@ def learn(env, seed=3):
 
 
 def test_ppo_learns_and_a_seed_fixes_it():
-    first, second = learn(VecMonitor(swarm())), learn(VecMonitor(swarm()))
+    first, second = learn(swarm()), learn(swarm())
     assert weights(first).tobytes() == weights(second).tobytes()
-    assert weights(first).tobytes() != weights(learn(VecMonitor(swarm()), seed=4)).tobytes()
+    assert weights(first).tobytes() != weights(learn(swarm(), seed=4)).tobytes()
     assert first.num_timesteps == 3 * 32 * 8
-    mean, _ = evaluate_policy(first, VecMonitor(swarm()), n_eval_episodes=8)
+    mean, _ = evaluate_policy(first, swarm(), n_eval_episodes=8)
     assert np.isfinite(mean)
 
 
@@ -56,12 +65,13 @@ def test_ppo_knows_episodes_without_any_wrapper():
 
 
 def test_normalising_and_stacking_wrappers():
-    learn(VecNormalize(VecMonitor(VecCheckNan(swarm(), raise_exception=True))))
+    learn(VecNormalize(VecCheckNan(swarm(), raise_exception=True)))
     learn(VecFrameStack(swarm(), 2))
 
 
 def test_episode_statistics_agree_with_vecmonitor():
-    ours, theirs = swarm(), VecMonitor(swarm())
+    with pytest.warns(UserWarning, match="already wrapped with a `Monitor`"):
+        ours, theirs = swarm(), VecMonitor(swarm())
     for env in (ours, theirs):
         env.seed(5)
         env.reset()
@@ -164,3 +174,26 @@ def test_sac_learns_on_solo():
     assert np.isfinite(weights(model)).all()
     assert not np.array_equal(before, weights(model))
     assert model.ep_info_buffer
+
+
+def test_a_monitor_finds_its_keys_where_a_wrapper_ends_the_episode():
+    env = gymnasium.make("uuv_marl/Solo-v0", scenario="starter", max_episode_steps=5)
+    env = Monitor(env, info_keywords=("is_success", "ending", "arrived", "time_s", "collisions"))
+    told = env.reset(seed=0)[1]
+    assert told["ending"] == "running"
+    for _ in range(5):
+        *_, truncated, info = env.step(np.zeros(2, np.float32))
+        assert info.keys() >= told.keys()
+    assert truncated
+    assert info["episode"]["ending"] == "running"
+    assert info["episode"]["is_success"] is False
+
+
+def test_sb3_evaluates_rows_without_a_wrapper():
+    env = swarm()
+    model = PPO("MlpPolicy", env, device="cpu")
+    _, lengths = evaluate_policy(model, env, 8, return_episode_rewards=True)  # a warning would be an error
+    assert len(lengths) == 8
+    assert min(lengths) > 1
+    assert env.env_is_wrapped(Monitor) == [True] * 8
+    assert not any(env.env_is_wrapped(gymnasium.wrappers.TimeLimit))

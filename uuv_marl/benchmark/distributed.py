@@ -11,7 +11,7 @@ from typing import Any
 from uuv_marl.benchmark.evaluate import BATCH, Run, evaluate
 from uuv_marl.benchmark.results import origin
 from uuv_marl.errors import ClusterError
-from uuv_marl.extras import extra
+from uuv_marl.extras import environment, extra
 from uuv_marl.scenario import Scenario
 
 with extra("distributed", "spreading over a Ray cluster"):
@@ -42,13 +42,13 @@ def connected(address: str | None, num_cpus: int = 1, working_dir: Path | None =
     if ray.is_initialized():
         yield
         return
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     # Every task has one core, on which Numba's own threads would only contend.
-    environment: dict[str, Any] = {"env_vars": {"NUMBA_NUM_THREADS": "1"}}
+    workers: dict[str, Any] = {"env_vars": {"NUMBA_NUM_THREADS": "1"}}
     if working_dir is not None:
-        environment["working_dir"] = str(working_dir)
-    common = {"runtime_env": environment, "log_to_driver": False, "logging_level": logging.ERROR}
-    with _closed_to_others() if address is None else nullcontext():
+        workers["working_dir"] = str(working_dir)
+    common = {"runtime_env": workers, "log_to_driver": False, "logging_level": logging.ERROR}
+    closed = _closed_to_others() if address is None else nullcontext()
+    with environment(RAY_USAGE_STATS_ENABLED="0"), closed:
         if address is None:
             ray.init("local", num_cpus=num_cpus, include_dashboard=False, **common)
         else:

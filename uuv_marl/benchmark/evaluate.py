@@ -12,6 +12,7 @@ from uuv_marl.baselines import POLICIES, make
 from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
 from uuv_marl.errors import DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import whole_number
 from uuv_marl.sim.swarm import Swarm
 
 Float32 = NDArray[np.float32]
@@ -82,6 +83,7 @@ def evaluate(
         DivergenceError: the integration step was too long for a vehicle. This run has no metrics; the runs of the other
             seeds are yielded first.
     """
+    seeds = [whole_number("seed", seed, 0) for seed in seeds]
     for first in range(0, len(seeds), BATCH):
         batch = seeds[first : first + BATCH]
         for event in _batch(scenario, policy, batch, watch or _look_away, parameters):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import logging
 import tomllib
 import warnings
 from collections.abc import Callable, Sequence
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple
 from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import apf, bio_inspired, granted, olfati_saber, orca, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.extras import silenced
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario, load_scenario
 
@@ -101,20 +103,19 @@ def search(
     from optuna.storages.journal import JournalFileBackend  # noqa: PLC0415
     from optuna.trial import TrialState  # noqa: PLC0415
 
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    output.mkdir(parents=True, exist_ok=True)
-    storage = optuna.storages.JournalStorage(JournalFileBackend(str(output / f"{name}.journal")))
-    directions = [optuna.study.StudyDirection.MINIMIZE] * objectives
-    study = optuna.create_study(storage=storage, study_name=name, directions=directions, load_if_exists=True)
-
-    while (done := len(study.get_trials(states=(TrialState.COMPLETE,)))) < trials:
-        if first and not done and not study.get_trials(states=(TrialState.WAITING,)):
-            study.enqueue_trial(first)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-            study.sampler = sampler(done)
-        study.optimize(objective, n_trials=1)
-        report(done + 1, min(max(trial.values) for trial in study.get_trials(states=(TrialState.COMPLETE,))))
+    with silenced("optuna", logging.WARNING):
+        output.mkdir(parents=True, exist_ok=True)
+        storage = optuna.storages.JournalStorage(JournalFileBackend(str(output / f"{name}.journal")))
+        directions = [optuna.study.StudyDirection.MINIMIZE] * objectives
+        study = optuna.create_study(storage=storage, study_name=name, directions=directions, load_if_exists=True)
+        while (done := len(study.get_trials(states=(TrialState.COMPLETE,)))) < trials:
+            if first and not done and not study.get_trials(states=(TrialState.WAITING,)):
+                study.enqueue_trial(first)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+                study.sampler = sampler(done)
+            study.optimize(objective, n_trials=1)
+            report(done + 1, min(max(trial.values) for trial in study.get_trials(states=(TrialState.COMPLETE,))))
     return study.get_trials(states=(TrialState.COMPLETE,))
 
 

@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
 from uuv_marl.errors import ResultsError
+from uuv_marl.scenario.overrides import plain
 
 _MADE_HERE = re.compile(r"\d{6,}(\.partial)?")
 """Names of checkpoints; everything else under ``checkpoints`` is the user's."""
@@ -37,7 +38,7 @@ class TrainingFolder(Generic[R]):
 
     Args:
         path: new or empty, or with ``resume`` that of an earlier training.
-        settings: what must be the same throughout a training, as JSON can hold it.
+        settings: what must be the same throughout a training, as JSON can hold it once it is plain.
         resume: go on with what the folder holds.
         start: the record before the first iteration, all of whose fields have defaults.
 
@@ -47,7 +48,7 @@ class TrainingFolder(Generic[R]):
 
     def __init__(self, path: Path, settings: Mapping[str, Any], resume: bool, start: R) -> None:
         self.path = path
-        self._settings: dict[str, Any] = json.loads(json.dumps(settings))
+        self._settings: dict[str, Any] = json.loads(json.dumps(plain(settings)))
         self._sessions: list[dict[str, Any]] = []
         self._start = start
         self.record: R = start
@@ -112,7 +113,7 @@ class TrainingFolder(Generic[R]):
     def begin(self, session: Mapping[str, Any], libraries: Sequence[str]) -> None:
         """Make the folder ready for the next iteration, and note how it comes about: seeds, versions."""
         now = {"agent_steps": self.record.agent_steps, **session, "versions": versions(libraries)}
-        config = {"settings": self._settings, "sessions": [*self._sessions, now]}
+        config = plain({"settings": self._settings, "sessions": [*self._sessions, now]})
         write_text(self.path / "config.json", json.dumps(config, indent=1) + "\n")
         with writing(self._checkpoints):
             self._checkpoints.mkdir(exist_ok=True)
@@ -159,7 +160,7 @@ def opened(
 
     Args:
         path: new or empty, or with ``resume`` that of an earlier training.
-        settings: what must be the same throughout a training, as JSON can hold it.
+        settings: what must be the same throughout a training, as JSON can hold it once it is plain.
         resume: go on with what the folder holds.
         start: the record before the first iteration, all of whose fields have defaults.
         say: told from where a resume goes on.

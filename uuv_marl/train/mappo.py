@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -337,7 +337,7 @@ def network(
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     layers: list[nn.Module] = []
     for k, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
-        linear = nn.Linear(inputs, outputs)
+        linear = cast(nn.Linear, nn.utils.skip_init(nn.Linear, inputs, outputs))  # no draw from the global generator
         is_last = k == len(sizes) - 2
         nn.init.orthogonal_(linear.weight, last_gain if is_last else math.sqrt(2.0), generator=generator)
         nn.init.zeros_(linear.bias)

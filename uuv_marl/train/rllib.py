@@ -12,7 +12,7 @@ import numpy as np
 from uuv_marl.benchmark.distributed import connected
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
 from uuv_marl.errors import ClusterError
-from uuv_marl.extras import extra
+from uuv_marl.extras import extra, silenced
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.env import TRAINING_SEEDS
@@ -162,7 +162,7 @@ def train(
         if folder.record.agent_steps >= steps:
             return
         seed = world_seed(settings.seed, folder.record.agent_steps)
-        with connected(address, max(1, num_env_runners)):
+        with connected(address, max(1, num_env_runners)), silenced("ray.rllib", logging.ERROR):
             _need_cores(num_env_runners)
             algorithm = _algorithm(ppo_config(settings, num_env_runners, seed), on_cluster=address is not None)
             try:
@@ -194,7 +194,6 @@ def _need_cores(num_env_runners: int) -> None:
 
 
 def _algorithm(config: PPOConfig, on_cluster: bool) -> Any:
-    logging.getLogger("ray.rllib").setLevel(logging.ERROR)
     # A node of a cluster may go away; a process that dies on one machine would only die again.
     config.fault_tolerance(restart_failed_env_runners=on_cluster)
     return config.build_algo()

@@ -12,7 +12,6 @@ from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.modules import named_object
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.scenario.overrides import plain
 from uuv_marl.train.acting import ACTING, Sees
 from uuv_marl.train.group import Conditions
 from uuv_marl.train.mappo import Hyperparameters
@@ -88,7 +87,6 @@ class Settings:
     """Fields of the scenario of further validation episodes."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "overrides", plain(self.overrides))  # as config.json can hold them
         scenario = self.load()
         self._check_periods(scenario)
         n = scenario.swarm.num_vehicles

@@ -25,6 +25,7 @@ from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import conditions
+from uuv_marl.scenario.overrides import plain
 from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
 from uuv_marl.train.group import Problem
@@ -125,7 +126,7 @@ class Trainer:
 
     def save_policy(self, folder: Path, record: Record) -> None:
         """The policy, and the learner that a later training may start from."""
-        training = {**asdict(self.settings), "versions": versions(_LIBRARIES), "record": record._asdict()}
+        training = plain({**asdict(self.settings), "versions": versions(_LIBRARIES), "record": record._asdict()})
         card = Card(
             percept=rows_of(PerceptLayout.of(self.scenario)),
             yaw_damping_nms=self.scenario.actuators.yaw_damping_nms,
@@ -187,14 +188,13 @@ def train(
         settings = replace(settings, steps=min(until, begun_with(output).get("steps", until)))
     scenario = settings.load()
     described = {**asdict(settings), "scenario": scenario.model_dump(mode="json")}
-    with opened(output, described, resume, Record(), say) as folder:
+    with opened(output, described, resume, Record(), say) as folder, one_thread():
         record, stopped = folder.record, False
         if record.agent_steps >= until:
             return
         sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in settings.sizes)
         own = f"{len(settings.conditions)} conditions, an episode each" if settings.conditions else conditions(scenario)
         say(f"Training on swarms of {sizes}; {own}.")
-        torch.set_num_threads(1)  # sums in another order give other bits
         trainer = Trainer(settings, device, folder.checkpoint)
         folder.begin({"seed": settings.seed, "steps": until, "device": device}, _LIBRARIES)
         # TensorBoard hides what was written from the purge step on: what a break has left after the checkpoint.
@@ -211,6 +211,17 @@ def train(
                     folder.keep(record, lambda path, record=record: trainer.save(path, record))
                 _show(board, record, episodes)
                 yield record
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Torch computes on one thread in this block: sums in another order give other bits."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def _validated(trainer: Trainer, record: Record, output: Path) -> Record:

@@ -1,14 +1,12 @@
 """What all drawn frames share: colours and text."""
 
 import functools
-import os
 from pathlib import Path
 
 import matplotlib as mpl
 
 from uuv_marl.extras import extra
 
-os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
 with extra("render", "rendering"):
     import pygame
 
