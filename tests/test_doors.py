@@ -2,6 +2,8 @@
 
 import copy
 import io
+import logging
+import os
 import shutil
 import subprocess
 import sys
@@ -21,6 +23,7 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, load_trace
 from uuv_marl.cli import app, main
 from uuv_marl.errors import DivergenceError, ResultsError
+from uuv_marl.extras import environment, silenced
 from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.replay.page import write_page
@@ -377,6 +380,13 @@ def test_a_benchmark_that_has_finished_is_printed_in_any_encoding(encoding, prin
     assert "0/1" in text
 
 
+def test_a_table_fits_a_notebook(tmp_path):
+    run = [sys.executable, "-m", "uuv_marl", *QUICK, f"--output={tmp_path}"]
+    there = {**os.environ, "JPY_PARENT_PID": "1", "PYTHONIOENCODING": "utf-8"}
+    text = subprocess.run(run, capture_output=True, encoding="utf-8", check=True, env=there).stdout
+    assert 60 < max(len(line) for line in text.splitlines() if "│" in line) <= 88
+
+
 def test_commands_work_without_docstrings(tmp_path):
     """``python -OO`` drops them, and every assert."""
     lines = [["policies"], ["scenarios"], ["vehicles", "--show=lauv"]]
@@ -394,3 +404,12 @@ for arguments in {lines!r}:
     run = [sys.executable, "-OO", "-c", code]
     done = subprocess.run(run, cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
     assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_what_libraries_are_told_is_taken_back(monkeypatch):
+    monkeypatch.setenv("GIVEN", "by the user")
+    log = logging.getLogger("some.library")
+    log.setLevel(logging.INFO)
+    with environment(GIVEN="1", NEW="1"), silenced("some.library", logging.ERROR):
+        assert (os.environ["GIVEN"], os.environ["NEW"], log.level) == ("by the user", "1", logging.ERROR)
+    assert (os.environ["GIVEN"], os.environ.get("NEW"), log.level) == ("by the user", None, logging.INFO)

@@ -2,6 +2,7 @@
 
 import errno
 import io
+import os
 import sys
 import sysconfig
 import traceback
@@ -20,8 +21,15 @@ from uuv_marl.errors import MENDABLE, PolicyError
 from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
 from uuv_marl.paths import user_path
 
-# Piped output keeps a width at which tables are legible.
-console = Console(width=None if sys.stdout.isatty() else 130)
+
+def _width() -> int | None:
+    """Columns: those of the terminal (None), those that fit a notebook, else as many as make tables legible."""
+    if sys.stdout.isatty():
+        return None
+    return 88 if "JPY_PARENT_PID" in os.environ else 130  # Jupyter gives it to all that a kernel starts
+
+
+console = Console(width=_width())
 errors = Console(stderr=True)
 Anew = Annotated[
     bool, typer.Option("--anew", help="Drop the runs of policies whose file has changed since, and run these again.")
