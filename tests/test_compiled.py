@@ -43,6 +43,10 @@ import uuv_marl
 from uuv_marl.sim import sources
 assert uuv_marl.__file__.startswith(sys.argv[1]), uuv_marl.__file__
 print(sources.source_key("uuv_marl.sim.motion"))
+try:
+    uuv_marl.load_scenario("starter")
+except uuv_marl.scenario.ScenarioError as error:
+    print(error, file=sys.stderr)
 """
 
 
@@ -115,6 +119,7 @@ def test_a_package_without_sources_on_disk_never_runs_old_physics(copy, tmp_path
         if form == "zip":
             shutil.make_archive(str(place), "zip", copy)
             done.append(run(place.with_suffix(".zip"), tmp_path / "cache", script=KEY))
+            assert "runs from a zip file" in done[-1].stderr
         else:
             shutil.copytree(copy, place)
             compileall.compile_dir(place, quiet=1, legacy=True)

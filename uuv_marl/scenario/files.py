@@ -27,8 +27,14 @@ _OWN = ("vehicle", "actuators")
 
 
 def scenario_names() -> list[str]:
-    """Names of the scenarios that ship with the package."""
-    return sorted(path.stem for path in _FOLDER.glob("*.toml") if path != _BASE)
+    """Names of the scenarios that ship with the package. Raises ScenarioError where its files are not on the disk."""
+    names = sorted(path.stem for path in _FOLDER.glob("*.toml") if path != _BASE)
+    if not names:
+        raise ScenarioError(
+            f"there are no scenario files in {_FOLDER}: uuv_marl runs from a zip file, or was packed without its data; "
+            "install it unpacked, with its .toml, .json and .safetensors files"
+        )
+    return names
 
 
 def load_scenario(
