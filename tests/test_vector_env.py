@@ -489,7 +489,11 @@ def test_a_seed_is_taken_for_the_number_that_it_is(make, seed):
     assert env.np_random.integers(2**62) == plain.np_random.integers(2**62)
 
 
-@pytest.mark.parametrize("seed", [np.array(-3), np.array(1.5), np.array("3"), True, [1, 2, 3], object()], ids=lambda seed: type(seed).__name__)
+@pytest.mark.parametrize(
+    "seed",
+    [np.array(-3), np.array(1.5), np.array("3"), True, [1, 2, 3], object()],
+    ids=lambda seed: type(seed).__name__,
+)
 @pytest.mark.parametrize("make", [uuv_marl.parallel_env, SoloEnv, partial(uuv_marl.vector_env, 2)])
 def test_a_refused_seed_changes_nothing(make, seed):
     env = make(scenario="starter")
