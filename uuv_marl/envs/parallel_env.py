@@ -17,7 +17,6 @@ from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.sim.arguments import action_array
 from uuv_marl.sim.arrays import Float32
-from uuv_marl.sim.engine import EngineName
 
 Infos = dict[str, dict[str, Any]]
 
@@ -180,7 +179,6 @@ def parallel_env(
     info_terms: bool = False,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
-    engine: EngineName = "numba",
 ) -> SwarmParallelEnv:
     """A PettingZoo parallel environment.
 
@@ -196,12 +194,10 @@ def parallel_env(
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
-        engine: ``numba``, or ``plain``: the same run, bit for bit, from the plain Python of ``uuv_marl/sim/plain.py``,
-            tens to hundreds of times slower.
     """
     batch = make_batched_env(
         scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
-        overrides=overrides, engine=engine,
+        overrides=overrides,
     )  # fmt: skip
     return SwarmParallelEnv(batch, render_mode, info_terms, render_options)
 

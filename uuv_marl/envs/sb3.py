@@ -69,7 +69,7 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
         scenario: a name, a TOML file or a ``Scenario``.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
         render_options: as for ``uuv_marl.parallel_env``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
             for ``uuv_marl.parallel_env``.
     """
 

@@ -36,7 +36,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         scenario: a name, a TOML file or a ``Scenario``.
         seed: of the first reset, in which world w starts from ``seed + w``; as ``set_seed``.
         device: where the tensors go; the simulation stays on the CPU.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
             for ``uuv_marl.parallel_env``.
     """
 

@@ -186,7 +186,7 @@ def vector_env(
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
             ``SwarmVectorEnv``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
             for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each vehicle; the reward of
             a row is the mean over all vehicles.
     """

@@ -18,7 +18,6 @@ from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Float32, Recording, Water
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.sim.compiled import interpreted
 from uuv_marl.sim.sea.current import advance_gust, water
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import arrival_times, reference
@@ -204,13 +203,13 @@ def _water(scenario: Scenario, seed: int, time_s: Float32) -> Water | None:
     """How the water moved, which the seed decides alone."""
     if not scenario.current.flows:
         return None
-    swarm, numbers, step, tick = Swarm(scenario), water(scenario), interpreted(advance_gust), 0
+    swarm, numbers, tick = Swarm(scenario), water(scenario), 0
     swarm.reset(seed)
     drift = np.zeros((len(time_s), 2), np.float32)
     for k, until in enumerate(np.rint(time_s / scenario.timing.control_hold_s).astype(int).tolist()):
         while tick < until:
             tick += 1
-            step(0, swarm.keys[0], tick, numbers, swarm.currents)
+            advance_gust(0, swarm.keys[0], tick, numbers, swarm.currents)
         drift[k] = swarm.flow_field().drift
     return Water(drift, swarm.flow_field().eddies)
 

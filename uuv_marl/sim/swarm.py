@@ -1,4 +1,4 @@
-"""Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks; an engine computes."""
+"""Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
 from uuv_marl.sim.disturbance import draw_losses
-from uuv_marl.sim.engine import EngineName, make_engine
+from uuv_marl.sim.engine import Engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
@@ -37,11 +37,9 @@ class Swarm:
     Args:
         scenario: what to simulate.
         num_worlds: how many worlds a call steps.
-        engine: ``numba`` (compiled: one world runs serially, several run on threads), or ``plain``, the same numbers
-            from the plain Python of ``uuv_marl/sim/plain.py``, tens to hundreds of times slower.
     """
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, engine: EngineName = "numba") -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.num_worlds = num_worlds = whole_number("num_worlds", num_worlds, 1)
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
@@ -57,7 +55,7 @@ class Swarm:
         self._world = World(self.state, self.course, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
         self._sea = make_sea(scenario, self.keys, self._sizes)
-        self._engine = make_engine(engine, scenario, self._world, self._sea)
+        self._engine = Engine(scenario, self._world, self._sea)
 
     @property
     def percept(self) -> Percept:

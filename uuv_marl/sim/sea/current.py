@@ -159,7 +159,7 @@ def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float,
     return v_x, v_y
 
 
-@compiled_inner
+@compiled
 def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) -> None:
     """The process one control hold later, exactly: its mean and variance depend on no step.
 

@@ -1,7 +1,6 @@
 """The sea: everything that disturbs a world, in rooms of their own, and the moments of a step at which each acts.
 
-A world without disturbances has no sea (None), and its compiled code holds nothing of this. Both engines call the
-functions here: the compiled one compiled, the plain one as the Python that they are.
+A world without disturbances has no sea (None), and its compiled code holds nothing of this.
 """
 
 from collections.abc import Mapping
