@@ -11,13 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64, UInt64
 
 MAX_SPEED = 64.0
 """Velocities in a percept saturate here [m/s, rad/s], so that observation bounds are finite."""
@@ -188,7 +184,7 @@ class Clock(NamedTuple):
 
     time_s: Float64
     """Since the reset, shape (world,)."""
-    episode: NDArray[np.uint64]
+    episode: UInt64
     """A number that every reset changes, except one with the same seed, shape (world,)."""
 
 

@@ -11,7 +11,6 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.bio_inspired import MIN_DISTANCE_M, counts_once
@@ -20,9 +19,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Int64 = NDArray[np.int64]
+from uuv_marl.types import Float32, Int64
 
 
 class Gains(NamedTuple):

@@ -2,14 +2,9 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.policy import Limits, resistance
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields
-
-Float32 = NDArray[np.float32]
 
 
 @compiled

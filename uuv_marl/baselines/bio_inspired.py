@@ -4,7 +4,6 @@ import math
 from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
 from uuv_marl.errors import PolicyError
@@ -12,9 +11,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Int64 = NDArray[np.int64]
+from uuv_marl.types import Float32, Int64
 
 FEED_FORWARD = 1.2
 """Feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference, not the bow."""

@@ -6,9 +6,9 @@ from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_for
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32, Int64
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Starts, fields
+from uuv_marl.types import Float32, Int64
 
 BARRIER = Gains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)
 """Eq. 20-21 at short range, without the pull to l(t): half the paper's delta_n, and weaker but steeper at obstacles."""

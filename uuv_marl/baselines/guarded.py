@@ -10,7 +10,6 @@ With a rudder the action is the wished force; its torque is close to the rudder'
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.filtered import Filtered
@@ -23,10 +22,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 
 class Guarded(Filtered):

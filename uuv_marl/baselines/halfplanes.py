@@ -7,12 +7,8 @@ Nothing is drawn at random, and both answers are unique, so that the order chang
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.compiled import compiled
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 TOLERANCE = 1e-9
 """Largest violation with which a half-plane counts as kept [m/s]; assumed: far above rounding, below any use."""

@@ -9,9 +9,9 @@ from uuv_marl.baselines.features import Features
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
+from uuv_marl.types import Float32
 
 __all__ = ["Card", "Layer", "Learned", "forward", "need_same", "rows_of", "save_checkpoint"]
 

@@ -10,7 +10,6 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
@@ -19,8 +18,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 EPSILON = 0.1
 """Parameter of the sigma-norm, as in the source's simulations [1]."""

@@ -10,7 +10,6 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
@@ -21,9 +20,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float32, Float64
 
 _SHARE = 0.5
 """Share of a change that a vehicle takes; its neighbour takes the other half. Definition of ORCA^tau_A|B."""

@@ -3,7 +3,6 @@
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.steering import steer, velocity_gain
@@ -11,8 +10,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Starts, fields
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 
 class Gains(NamedTuple):

@@ -2,9 +2,6 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.features import put
 from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.halfplanes import nearest_velocity
@@ -20,10 +17,7 @@ from uuv_marl.baselines.scout import modulated, wished
 from uuv_marl.baselines.steering import full_speed
 from uuv_marl.scenario.sections import NOMINAL_VEHICLES
 from uuv_marl.sim.compiled import compiled
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 NEIGHBOURS, SURFACES = 6, 4
 """How many of the nearest neighbours and obstacles an actor sees."""

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.actors import Trained, shipped
 from uuv_marl.baselines.apf import Apf
@@ -29,8 +28,7 @@ from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.modules import named_object
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 Kind = type[Policy] | Trained
 """A class of policies: a call with a scenario makes a policy. It has ``channels`` and ``yaw_damping_nms``."""

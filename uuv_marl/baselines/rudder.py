@@ -3,15 +3,11 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Starts, fields
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 STEERAGE = 0.5
 """Steerage way over cruise speed: a rudder then gives a quarter of its moment. Assumed: few hulls steer slower."""

@@ -10,9 +10,6 @@ avoidance (van den Berg et al. 2011, see ``halfplanes``).
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
@@ -21,9 +18,7 @@ from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.sim.compiled import compiled
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float32, Float64
 
 
 class Barrier(NamedTuple):

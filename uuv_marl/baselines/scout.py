@@ -8,7 +8,6 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.gains import LEAD, PLUS, WARY, Gains
@@ -25,10 +24,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 
 class Scout(Filtered):

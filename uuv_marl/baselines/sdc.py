@@ -10,7 +10,6 @@ import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
@@ -21,11 +20,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64, Int64
 
 SLOT_PITCH_M = 12.0
 """Distance between neighbouring slots."""

@@ -9,7 +9,6 @@ import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
@@ -18,10 +17,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 HORIZON_S = 1.0
 """How far ahead neighbours are predicted."""

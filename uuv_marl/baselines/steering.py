@@ -2,14 +2,10 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.policy import Limits, resistance, write_action
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 _SHARE = 1.5
 """Of a velocity error, what a decision period's force makes good at most [1]. Above 2 it would grow. Tried by hand: 1

@@ -7,8 +7,8 @@ from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.doubt import trim_weights
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.types import Bool, Float32
 
 Trim = Literal["pull", "together", "push", "behind_m", "steering", "neighbour_m"]
 """A number of a vehicle that an actor may change: one of five gains (``trimmed``), or the distance kept from neighbours

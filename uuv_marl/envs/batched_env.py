@@ -14,9 +14,9 @@ from uuv_marl.envs.reward import RewardFunction, compute_reward, named, own_rewa
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
-from uuv_marl.sim.arrays import Bool, Float32, Float64
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Bool, Float32, Float64
 
 ScenarioLike = str | os.PathLike[str] | Scenario
 Reward = Literal["individual", "team"] | RewardFunction

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 from gymnasium.spaces import Box, Space
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
@@ -16,7 +16,7 @@ from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.sim.arguments import action_array
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.types import Float32, Int64
 
 Infos = dict[str, dict[str, Any]]
 
@@ -57,7 +57,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
-        self._rows: slice | NDArray[np.int64] = slice(None)
+        self._rows: slice | Int64 = slice(None)
         layout = batch.swarm.layout
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
@@ -126,7 +126,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self._renderer.update()
         return observations, rewards, terminated, truncated, infos
 
-    def _infos(self, result: StepResult, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
+    def _infos(self, result: StepResult, agents: list[str], rows: slice | Int64) -> Infos:
         if not self._info_terms:
             return {agent: {} for agent in agents}
         terms = {name: term[0, rows].tolist() for name, term in result.terms.items()}

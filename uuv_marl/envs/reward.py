@@ -15,10 +15,11 @@ import numpy as np
 
 from uuv_marl.errors import RewardError
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Bool, Facts, Float64, State
+from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Bool, Float64
 
 RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""

@@ -14,7 +14,7 @@ from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.sim.arguments import action_array
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.types import Float32
 
 
 class SoloEnv(RenderMixin, gymnasium.Env[Float32, Float32]):

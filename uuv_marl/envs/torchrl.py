@@ -11,7 +11,7 @@ from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.arguments import world_seeds
-from uuv_marl.sim.arrays import Bool
+from uuv_marl.types import Bool
 
 with extra("torchrl", "SwarmEnv"):
     import torch

@@ -14,7 +14,7 @@ from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
-from uuv_marl.sim.arrays import Bool, Float32, Float64
+from uuv_marl.types import Bool, Float32, Float64
 
 Infos = dict[str, Any]
 

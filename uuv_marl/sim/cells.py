@@ -7,15 +7,9 @@ a search visits boxes of cells: in each row of a box the vehicles are neighbours
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.workspace import Cells, Columns
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool
 
 ONE_CELL_UP_TO = 250
 """Vehicles up to which a look at every pair is faster than a grid (perf/, docs/speed.md)."""

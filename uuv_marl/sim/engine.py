@@ -4,7 +4,6 @@ import functools
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
@@ -15,9 +14,8 @@ from uuv_marl.sim.model import model
 from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.threads import num_threads, on_threads
 from uuv_marl.sim.workspace import scratch
+from uuv_marl.types import Bool, Float32
 
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
 _LEAST = 200
 """Vehicles that a thread must have to be worth waking: that takes as long as moving about as many."""
 
@@ -43,6 +41,10 @@ class Engine:
     def _step(self) -> Callable[..., bool]:
         action = np.zeros((self._num_worlds, 1, 2), np.float32)
         return entry(step_worlds, 0, 0, 0, self._every, action, *self._numbers)
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but the doors to compiled code, which belong to this process."""
+        return {name: value for name, value in vars(self).items() if name not in ("_observe", "_step")}
 
     def observe(self, w: int) -> None:
         """Facts and percepts of world w from its state and course, as after a reset."""

@@ -3,18 +3,13 @@
 Numba compiles ``uuv_marl.sim.world`` once without a sea and once with one, so that calm worlds hold nothing of it.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.model import Model
 from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.workspace import Scratch, workspace
 from uuv_marl.sim.world import observe_world, step_world
-
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32
 
 
 @compiled

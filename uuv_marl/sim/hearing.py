@@ -3,17 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import Course
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.sonar import Suite, cross, diamond
 from uuv_marl.sim.workspace import Cells, Listener, Workspace
+from uuv_marl.types import Float64, Int64
 
-Float64 = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
 Box = tuple[float, float, float, float]
 """Northern, southern, eastern and western side [m]."""
 Points = tuple[Float64, Float64, Int64]

@@ -1,16 +1,13 @@
 """A world's vehicles moved together: their states as columns, over which loops pass on vector registers."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import State
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, actuators, advance, effort, held, limited, wrap
 from uuv_marl.sim.workspace import Columns
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float32
 
 
 @compiled_inner

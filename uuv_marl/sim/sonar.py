@@ -9,13 +9,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+from uuv_marl.types import Float64, Int64
 
 _TINY = 1e-300
 """Keeps the direction of no vector at all from dividing by zero."""

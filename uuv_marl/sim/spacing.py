@@ -2,16 +2,11 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.workspace import Cells
-
-Float64 = NDArray[np.float64]
-
+from uuv_marl.types import Float64
 
 NOWHERE = (math.inf, math.inf, 0.0)
 """Where an obstacle was that there was not."""

@@ -2,16 +2,14 @@
 
 from typing import Any, NamedTuple, cast
 
-import numpy as np
 from numba import config
 from numba.np import arrayobj
 from numpy.lib.stride_tricks import as_strided
-from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled_inline
+from uuv_marl.types import Float32
 
 reshaped: Any = as_strided if cast(Any, config).DISABLE_JIT else cast(Any, arrayobj).reshape_unchecked
-Float32 = NDArray[np.float32]
 Starts = tuple[int, ...]
 """Where each field starts in a flat percept, -1 where it is absent: ``PerceptLayout.offsets``."""
 

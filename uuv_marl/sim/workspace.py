@@ -7,10 +7,8 @@ from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.tables import rows
+from uuv_marl.types import Float64, Int32, Int64
 
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Int32 = NDArray[np.int32]
 Column = Annotated[Float64, "vehicle", "See uuv_marl.sim.vehicle."]
 
 

@@ -6,9 +6,6 @@ depends on its neighbours in the batch.
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.arrays import Facts, World
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled_inner
@@ -23,11 +20,7 @@ from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields, sea_fields
 from uuv_marl.sim.workspace import Columns, Workspace
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
-UInt64 = NDArray[np.uint64]
+from uuv_marl.types import Float32, Float64
 
 RUNAWAY = 1000.0
 """A vehicle whose velocities (surge, sway [m/s], yaw rate [rad/s]) add up to this has diverged. Assumed: no vehicle

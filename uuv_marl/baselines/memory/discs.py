@@ -7,17 +7,13 @@ heard and is not, decision after decision, is forgotten.
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.memory.pose import to_body, to_map, to_map_axes
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.sonar import cross, suite
 from uuv_marl.sim.views import Fields
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 NOISE_M, NOISE_SHARE = 0.05, 0.03
 """Standard deviation of an echo: so much, and this share of its range. Assumed: noise of 2 % and of 1 degree."""

@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory.actuators import identify
 from uuv_marl.baselines.memory.response import follow
@@ -18,9 +17,7 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, held, plant
 from uuv_marl.sim.views import Fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float32, Float64
 
 _MOVES_MPS = 0.005
 """l(t) moves if it is faster; scenarios know no speed below 0.01 m/s."""

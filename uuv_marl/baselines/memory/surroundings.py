@@ -3,9 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.memory import discs, neighbours, pose
 from uuv_marl.baselines.memory.discs import ActiveSectors
 from uuv_marl.baselines.memory.pose import Reckoning
@@ -13,9 +10,7 @@ from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Starts, fields
-
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32
 
 
 class Model(NamedTuple):

@@ -7,7 +7,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
@@ -19,10 +18,7 @@ from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
 from uuv_marl.sim.workspace import Columns
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float64, Int64
 
 THRUSTER, YAW, ARRAY, MEMBER = range(4)
 _KINDS = {"thruster": THRUSTER, "yaw": YAW, "array": ARRAY, "member": MEMBER}

@@ -9,7 +9,7 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
@@ -23,8 +23,8 @@ from uuv_marl.sim.sea.purposes import DIRECTION, EDDY_PLACE, GUST
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields, SeaFields
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 _PEAK = 0.638172686
 """Largest speed around a Lamb-Oseen vortex, in circulation / (2 pi core): at 1.12091 core radii. [derived]"""
 

@@ -10,7 +10,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
@@ -23,8 +22,8 @@ from uuv_marl.sim.sea.navigation import Track, by_compass
 from uuv_marl.sim.sea.purposes import MESSAGE
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import SeaFields
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 _MAX_AGE_S = 4096.0
 
 

@@ -8,7 +8,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
@@ -20,8 +19,7 @@ from uuv_marl.sim.sea.purposes import COMPASS, DRIFT
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 
 class Navigation(NamedTuple):

@@ -7,7 +7,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
@@ -21,10 +20,7 @@ from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import SeaFields
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-UInt64 = NDArray[np.uint64]
+from uuv_marl.types import Bool, Float64, Int64
 
 _NEVER = 2**40
 """A reading that no episode reaches."""
@@ -288,7 +284,7 @@ def is_silent(at: Reading, i: int, key: np.uint64, noise: Noise, ears: Ears) -> 
 
 
 @compiled_inner
-def tell_ranged(w: int, alive: NDArray[np.bool_], listening: Listening, noise: Noise, more: SeaFields) -> None:
+def tell_ranged(w: int, alive: Bool, listening: Listening, noise: Noise, more: SeaFields) -> None:
     """Write into the percepts of world w which sub-sectors measure ranges.
 
     Args:

@@ -13,7 +13,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.arrays import State, World
@@ -23,11 +22,8 @@ from uuv_marl.sim.sea.navigation import Track
 from uuv_marl.sim.sea.schedule import Listening, Reading, due, hold_of, latest, listening
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.views import Fields, SeaFields
+from uuv_marl.types import Float32, Float64, Int32, Int64
 
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
 Move = tuple[float, float, float, float]
 """Cosine and sine of a vehicle's turn, then how far it went, ahead and abeam as it is headed now [m]; (1, 0, 0, 0) for
 none."""

@@ -8,13 +8,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario, hears_ideally
 from uuv_marl.sim.compiled import compiled
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+from uuv_marl.types import Float64, Int64
 
 
 class Listening(NamedTuple):

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario, disturbances
 from uuv_marl.sim.arrays import Course, State, World
@@ -31,8 +30,8 @@ from uuv_marl.sim.sea.schedule import Listening, Reading, due, listening
 from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.views import Fields, SeaFields
 from uuv_marl.sim.workspace import Columns
+from uuv_marl.types import UInt64
 
-UInt64 = NDArray[np.uint64]
 SEA_CHANNELS = ("current", "age", "ranged", "modem")
 """Channels that only a disturbed world's code writes."""
 
