@@ -4,10 +4,10 @@ import numpy as np
 
 from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits
-from uuv_marl.percept import PerceptLayout
+from uuv_marl.percept import PerceptLayout, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Starts, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Int64
 
 BARRIER = Gains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)

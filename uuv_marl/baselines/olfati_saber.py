@@ -14,10 +14,10 @@ import numpy as np
 from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, Starts, fields
+from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Float32
 
 EPSILON = 0.1

@@ -3,10 +3,11 @@
 import math
 from typing import NamedTuple
 
+from uuv_marl.percept import Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Starts, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32
 
 STEERAGE = 0.5

@@ -183,16 +183,21 @@ def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, gri
         listen(grid.living, (cells.x, cells.y, cells.vehicle), pose, w, course, suite, ear)
         return
     reach = _REACH_CELLS * grid.side
-    box = pose[0] + reach, pose[0] - reach, pose[1] + reach, pose[1] - reach
-    # First all within reach; then sub-sector by sub-sector, farther and farther until nobody nearer can be missed.
-    k, near = -1, 0.0
-    while k < sectors:
-        num = gather(box, cells, grid, ear)
-        listen(num, (ear.x, ear.y, ear.vehicle), pose, w, course, suite, ear)
-        near *= 1.5
-        while k < sectors and (k < 0 or near * near > ear.nearest[k]):
-            k, near = k + 1, reach
-        box = reached(min(k, sectors - 1), near, 1.5 * near, pose, suite)
+    around = pose[0] + reach, pose[0] - reach, pose[1] + reach, pose[1] - reach
+    listen_within(around, pose, w, course, suite, workspace, grid)
+    for k in range(sectors):  # farther and farther, until nobody nearer can be missed
+        near = reach
+        while near * near <= ear.nearest[k]:
+            listen_within(reached(k, near, 1.5 * near, pose, suite), pose, w, course, suite, workspace, grid)
+            near *= 1.5
+
+
+@compiled_inner
+def listen_within(box: Box, pose: Pose, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
+    """A listener hears those of a rectangle of the world, as in ``listen``."""
+    ear = workspace.listener
+    num = gather(box, workspace.cells, grid, ear)
+    listen(num, (ear.x, ear.y, ear.vehicle), pose, w, course, suite, ear)
 
 
 @compiled_inner

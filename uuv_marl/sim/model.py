@@ -5,12 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import PerceptLayout
+from uuv_marl.percept import PerceptLayout, Starts
 from uuv_marl.scenario import Scenario, growth
 from uuv_marl.sim.disturbance import loss_ticks
 from uuv_marl.sim.sonar import Suite, suite
 from uuv_marl.sim.vehicle import Plant, plant
-from uuv_marl.sim.views import Starts
 from uuv_marl.types import Float64, Int64
 
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)

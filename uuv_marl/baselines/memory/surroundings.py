@@ -7,9 +7,10 @@ from uuv_marl.baselines.memory import discs, neighbours, pose
 from uuv_marl.baselines.memory.discs import ActiveSectors
 from uuv_marl.baselines.memory.pose import Reckoning
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Starts, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32
 
 
