@@ -13,7 +13,7 @@ from uuv_marl.baselines import make
 from uuv_marl.scenario import IDEAL, conditions
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
-from uuv_marl.sim.sea.actuation import followed, victims
+from uuv_marl.sim.sea.actuation import followed, own_plant, victims
 from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.sea.sea import SEA_CHANNELS
 from uuv_marl.sim.swarm import Swarm
@@ -320,6 +320,12 @@ def test_a_vehicle_that_differs_swims_as_a_scenario_with_its_numbers():
         theirs = plant(swarm.scenario.model_copy(update={"vehicle": swarm.scenario.vehicle.times(mass, added, drag)}))
         np.testing.assert_allclose(own, theirs, rtol=1e-12)
     assert len({tuple(row) for row in swarm._sea.hull.plants[0]}) == 5
+
+
+def test_every_number_of_a_vehicle_has_a_column():
+    swarm = swim(MISMATCH, 0)
+    swarm._sea.hull.plants[0, 2] = np.arange(len(Plant._fields))
+    assert own_plant.py_func(0, 2, swarm._sea.hull) == Plant(*range(len(Plant._fields)))
 
 
 @given(st.floats(0, 1), st.floats(0, 1), st.integers(0, 2**32))

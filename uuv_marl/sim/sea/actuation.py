@@ -4,11 +4,9 @@ A fault breaks the thruster, the yaw torque or a sonar array of some vehicles, o
 """
 
 import math
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numba import config
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
@@ -22,13 +20,12 @@ from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
 from uuv_marl.sim.workspace import Columns
 from uuv_marl.types import Bool, Float64, Int64
 
+
 THRUSTER, YAW, ARRAY, MEMBER = range(4)
 _KINDS = {"thruster": THRUSTER, "yaw": YAW, "array": ARRAY, "member": MEMBER}
 _NEVER = 2**62
 """A control hold that no episode reaches."""
 PLANT = len(Plant._fields)
-fixed: Any = (lambda row, _length: tuple(row)) if cast(Any, config).DISABLE_JIT else to_fixed_tuple
-"""A row of known length as a tuple."""
 
 
 class Actuation(NamedTuple):
@@ -212,7 +209,7 @@ def integrate_each(
     for i in range(hull.tau.shape[1]):
         if not alive[w, i]:
             continue
-        p, current = Plant(*fixed(hull.plants[w, i], PLANT)), (flow[w, i, 0], flow[w, i, 1])
+        p, current = own_plant(w, i, hull), (flow[w, i, 0], flow[w, i, 1])
         for _ in range(rules.steps):
             state = now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i]
             u_0, u_1, u_2 = followed(now.tau_u[i], hull.tau[w, i, 0], numbers.thrust_half, numbers.thrust_whole)
@@ -223,6 +220,16 @@ def integrate_each(
             hull.tau[w, i, 0], hull.tau[w, i, 1] = u_2, r_2
         now.psi[i] = wrap(now.psi[i])
         now.cos[i], now.sin[i] = cos_sin(now.psi[i])
+
+
+@compiled_inline
+def own_plant(w: int, i: int, hull: Hull) -> Plant:
+    """Vehicle i's numbers. Every field has a column of its own: tests/test_sea.py."""
+    p = hull.plants[w, i]
+    return Plant(
+        p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16],
+        p[17], p[18], p[19], p[20], p[21], p[22], p[23], p[24], p[25], p[26], p[27], p[28], p[29], p[30], p[31],
+    )  # fmt: skip
 
 
 @compiled_inner
