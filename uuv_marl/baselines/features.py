@@ -51,12 +51,7 @@ class Features:
 def put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
     """A position [m] as four features: its direction, longer the nearer than about ``near`` it is, and itself.
 
-    Args:
-        p_x: forward [m].
-        p_y: to starboard [m].
-        near: distance at which the direction has a length of about two thirds [m].
-        out: a vehicle's features, shape (size,); four of them are filled.
-        k: index of the first.
+    At ``near`` [m] the direction has a length of about two thirds. Four features are filled, ``k`` is the first.
     """
     length = np.sqrt(p_x * p_x + p_y * p_y)
     weight = near / ((length + 0.5 * near) * max(length, 1e-3))
@@ -70,14 +65,7 @@ def _look(
 ) -> None:
     """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do.
 
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        gains: of the barrier.
-        limits: of the actuators, and the surge resistance.
-        features: filled, shape (world, vehicle, size).
-        barrier: filled with the force [full force], shape (world, vehicle, 2).
-        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
+    ``barrier`` is filled with the force [full force], shape (world, vehicle, 2).
     """
     see = fields(flat, at)
     for w in range(flat.shape[0]):

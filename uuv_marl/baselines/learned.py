@@ -107,11 +107,7 @@ def forward(layers: Sequence[Layer], x: Float32) -> Float32:
 def _dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
     """A layer without its activation.
 
-    Args:
-        x: shape (row, in).
-        weight: shape (in, out).
-        bias: shape (out,).
-        out: filled, shape (row, out).
+    ``x`` (row, in), ``weight`` (in, out), ``bias`` (out,); ``out`` (row, out) is filled.
     """
     for i in range(x.shape[0]):
         for k in range(out.shape[1]):

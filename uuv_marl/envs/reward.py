@@ -121,17 +121,7 @@ def shortfall(share: float) -> float:
 def _fill(
     w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
 ) -> None:
-    """The reward of one world.
-
-    Args:
-        w: index of the world.
-        time_limit_s: when worlds are given up [s], shape (world,).
-        state: of all worlds.
-        facts: of all worlds.
-        weights: of the terms, and the lengths in them [m].
-        terms: the weighted terms, shape (term, world, vehicle), zero before; filled for this world.
-        reward: their sum, shape (world, vehicle), zero before; filled for this world.
-    """
+    """Fill the weighted ``terms`` of one world, shape (term, world, vehicle), and their sum; both are zero before."""
     left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
     worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
     arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is

@@ -88,14 +88,7 @@ def _unit(degrees: float) -> tuple[float, float]:
 
 @compiled_inline
 def cross(a_x: float, a_y: float, b_x: float, b_y: float) -> float:
-    """Positive where b is clockwise of a, by less than half a turn.
-
-    Args:
-        a_x: forward part of the vector a, in any unit.
-        a_y: its starboard part.
-        b_x: forward part of the vector b, in any unit.
-        b_y: its starboard part.
-    """
+    """Positive where b is clockwise of a, by less than half a turn."""
     return a_x * b_y - a_y * b_x
 
 
