@@ -13,7 +13,7 @@
 ``workspace``, ``now``      What a thread works with (``workspace.Workspace``): the world's vehicles as columns,
 ``cells``, ``ear``          the living sorted by cell, and one listener. ``room``: the same of all threads.
 ``grid``                    Where the cells lie.
-``see``, ``more``           The fields of all percepts by name, views of ``senses.percept``; those of the sea's channels.
+``see``, ``more``           Fields of all percepts by name, views of ``senses.percept``; those of the sea's channels.
 ``alive``                   False for lost vehicles, shape (world, vehicle).
 ``action``                  Shares of full force, body frame, shape (world, vehicle, 2).
 ``x``, ``y``, ``c``, ``s``  North and east [m]; cosine and sine of the heading. ``pose`` holds the four.
