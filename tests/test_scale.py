@@ -195,9 +195,8 @@ def passing(**changes):
     return load_scenario("tracking", num_vehicles=4, overrides={**base, "arrival.spread_m": 10.0, **changes})
 
 
-@pytest.mark.parametrize("engine", ["numba", "plain"])
-def test_a_reference_that_passes_goes_on_along_its_last_leg(engine):
-    swarm = Swarm(passing(), engine=engine)
+def test_a_reference_that_passes_goes_on_along_its_last_leg():
+    swarm = Swarm(passing())
     swarm.reset(0)
     swarm.state.tick[:] = 500
     swarm.observe()
@@ -207,7 +206,6 @@ def test_a_reference_that_passes_goes_on_along_its_last_leg(engine):
 SPREAD = np.array([[-3.0, -3.0], [3.0, -3.0], [-3.0, 3.0], [3.0, 3.0]])
 
 
-@pytest.mark.parametrize("engine", ["numba", "plain"])
 @pytest.mark.parametrize(
     ("centre", "scattered", "time_s", "arrives"),
     [
@@ -220,11 +218,9 @@ SPREAD = np.array([[-3.0, -3.0], [3.0, -3.0], [-3.0, 3.0], [3.0, 3.0]])
         ((100.0, 60.1), 1.0, 39.8, False),
     ],
 )
-def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together(
-    engine, centre, scattered, time_s, arrives
-):
+def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together(centre, scattered, time_s, arrives):
     """And l(t) has: its way of 160 m takes 40 s."""
-    swarm = Swarm(passing(), engine=engine)
+    swarm = Swarm(passing())
     swarm.reset(0)
     swarm.state.eta[0, :, :2], swarm.state.tick[:] = np.array(centre) + scattered * SPREAD, round(10.0 * time_s)
     swarm.observe()

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.scenario import IDEAL, conditions
-from uuv_marl.sim.compiled import interpreted
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
 from uuv_marl.sim.sea.actuation import followed, own_plant, victims
@@ -203,14 +202,14 @@ def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(hold_s):
     swarm = Swarm(load_scenario("starter", overrides=overrides), num_worlds=1)
     swarm.reset(0)
     sea = swarm._sea
-    steps, step = round(6.0 / hold_s), interpreted(advance_gust)
+    steps = round(6.0 / hold_s)
     first, last = [], []
     for key in np.random.default_rng(0).integers(0, 2**63, 2000).astype(np.uint64):
         for tick in range(0, 5000, 1000):
             sea.flow.gust[0] = 0.4 * np.array(normals(key, 999, tick, 0, 0))
             first.append(sea.flow.gust[0].copy())
             for k in range(1, steps + 1):
-                step(0, key, tick + k, sea.water, sea.flow)
+                advance_gust(0, key, tick + k, sea.water, sea.flow)
             last.append(sea.flow.gust[0].copy())
     start, end = np.concatenate(first) / 0.4, np.concatenate(last) / 0.4
     m = len(end)

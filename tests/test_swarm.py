@@ -379,11 +379,10 @@ def test_random_fields_are_feasible(seed, n):
     assert regions[cells[0]] == regions[cells[1]] != 0
 
 
-@pytest.mark.parametrize("engine", ["numba", "plain"])
-def test_an_obstacle_that_moves_onto_a_vehicle_is_a_contact(engine):
+def test_an_obstacle_that_moves_onto_a_vehicle_is_a_contact():
     """Contact is judged from the motion of both; who only lies there, or moves within a contact, begins no other."""
     scenario = load_scenario("single_obstacle", num_vehicles=2)
-    swarm, still = Swarm(scenario, engine=engine), np.zeros((1, 2, 2), np.float32)
+    swarm, still = Swarm(scenario), np.zeros((1, 2, 2), np.float32)
     swarm.reset(0)
     swarm.state.nu[...] = 0.0
     counted = []

@@ -458,8 +458,8 @@ def test_solo_drops_no_override(overrides, message):
     assert both.scenario.sonar.channels == ("compass", "modem")
 
 
-def test_solo_takes_an_engine_and_actions_that_can_t_be_written_to(monkeypatch):
-    env = SoloEnv("starter", engine="plain")
+def test_solo_takes_actions_that_can_t_be_written_to(monkeypatch):
+    env = SoloEnv("starter")
     env.reset(seed=0)
     act = env._others.act
     monkeypatch.setattr(env._others, "act", lambda percept: np.broadcast_to(act(percept), (1, 5, 2)))

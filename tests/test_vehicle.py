@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tests.oracle.motion import matrices
 from uuv_marl import load_scenario
 from uuv_marl.scenario import ScenarioError, vehicle_checks
 from uuv_marl.sim import vehicle
@@ -48,29 +49,6 @@ def plants(draw):
         return plant(load_scenario("tracking", overrides=overrides))
     except ScenarioError:
         assume(False)
-
-
-def matrices(scenario, nu):
-    """M, C and D of Eq. 3-4, written as the paper prints them."""
-    p, (u, v, r) = scenario.vehicle, nu
-    m, x_g = p.m_kg, p.x_G_m
-    on = 1.0 if p.munk_moment else 0.0
-    m_rb = np.array([[m, 0, 0], [0, m, m * x_g], [0, m * x_g, p.I_z_kgm2]])
-    m_a = -np.array([[p.X_udot_kg, 0, 0], [0, p.Y_vdot_kg, p.Y_rdot_kgm], [0, p.Y_rdot_kgm, p.N_rdot_kgm2]])
-    a, b = m * (x_g * r + v), m * u
-    c_rb = np.array([[0, 0, -a], [0, 0, b], [a, -b, 0]])
-    a, b = p.Y_vdot_kg * v + p.Y_rdot_kgm * r, p.X_udot_kg * u
-    c_a = np.array([[0, 0, a], [0, 0, -b], [-a, b, 0]])
-    d_l = np.array([[p.X_u, 0, 0], [0, p.Y_v, -p.Y_r], [0, -p.N_v, p.N_r]])
-    d_nl = np.array(
-        [
-            [p.X_uu * abs(u), 0, 0],
-            [0, p.Y_vv * abs(v), -p.Y_rr * abs(r)],
-            [0, -p.N_rv * abs(r) - p.N_vv * abs(v), p.N_rr * abs(r)],
-        ]
-    )
-    lift = max(u, 0.0) * np.array([[0, 0, 0], [0, p.Y_uv, p.Y_ur], [0, p.N_uv, p.N_ur]])
-    return m_rb + m_a, c_rb + on * c_a, d_l + d_nl - lift
 
 
 @given(speed, speed, speed, st.floats(-3000, 3000), st.floats(-3000, 3000))

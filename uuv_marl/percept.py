@@ -11,13 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64, UInt64
 
 MAX_SPEED = 64.0
 """Velocities in a percept saturate here [m/s, rad/s], so that observation bounds are finite."""
@@ -130,6 +126,30 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
     return sum(granted, _sonar(num_sectors, num_active))
 
 
+class Starts(NamedTuple):
+    """Where each field that there can be starts in a flat percept, -1 where it is absent."""
+
+    velocity: int
+    yaw_rate: int
+    reference: int
+    reference_velocity: int
+    heard: int
+    neighbour: int
+    echo: int
+    echo_range: int
+    echo_position: int
+    compass: int
+    link_identity: int
+    link_velocity: int
+    ground_velocity: int
+    water_velocity: int
+    age: int
+    ranged: int
+    modem_identity: int
+    modem_velocity: int
+    modem_age: int
+
+
 @dataclasses.dataclass(frozen=True)
 class PerceptLayout:
     """A table with its positions in the flat vector."""
@@ -154,15 +174,15 @@ class PerceptLayout:
         return {field.name: int(end) - field.size for field, end in zip(self.table, ends, strict=True)}
 
     @functools.cached_property
-    def offsets(self) -> tuple[int, ...]:
-        """First index of every field that there can be, in the order of ``percept_table``; -1 where absent."""
-        return tuple(self.starts.get(field.name, -1) for field in percept_table(0, 0))
+    def offsets(self) -> Starts:
+        """First index of every field that there can be, -1 where absent."""
+        return Starts(**{field.name: self.starts.get(field.name, -1) for field in percept_table(0, 0)})
 
     @functools.cached_property
-    def message_offsets(self) -> tuple[int, ...]:
-        """``offsets``, the modem's fields in place of the link's, whose order and shapes are the same."""
-        names = [field.name.replace("link_", "modem_") for field in percept_table(0, 0)]
-        return tuple(self.starts.get(name, -1) for name in names)
+    def message_offsets(self) -> Starts:
+        """``offsets``, the modem's fields in place of the link's, whose shapes are the same."""
+        at = self.offsets
+        return at._replace(link_identity=at.modem_identity, link_velocity=at.modem_velocity)
 
     @functools.cached_property
     def scale(self) -> Float32:
@@ -188,7 +208,7 @@ class Clock(NamedTuple):
 
     time_s: Float64
     """Since the reset, shape (world,)."""
-    episode: NDArray[np.uint64]
+    episode: UInt64
     """A number that every reset changes, except one with the same seed, shape (world,)."""
 
 

@@ -11,18 +11,15 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.bio_inspired import MIN_DISTANCE_M, counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Int64 = NDArray[np.int64]
+from uuv_marl.sim.views import Fields, fields
+from uuv_marl.types import Float32, Int64
 
 
 class Gains(NamedTuple):
@@ -63,15 +60,8 @@ class Apf(Policy):
 def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g: Gains) -> tuple[float, float, int]:
     """Force [N] from an obstacle: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2 rho_goal^2 within rho_0.
 
-    Ge and Cui 2000, with n = 2: one part points away from the obstacle, one to the goal.
-
-    Args:
-        n_x: unit vector to the surface's nearest point, forward.
-        n_y: the same, to starboard.
-        rho: distance to it [m].
-        l_x: the goal, forward [m].
-        l_y: the goal, to starboard [m].
-        g: the law's gains.
+    Ge and Cui 2000, with n = 2: one part points away from the obstacle, one to the goal. n is a unit vector to the
+    surface's nearest point, ``rho`` the distance to it [m], l the goal [m].
 
     Returns:
         The force, forward and to starboard, and 1 where the distance's bound binds.
@@ -98,17 +88,7 @@ def neighbour_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int
 
 @compiled
 def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, action: Float32, clamps: Int64) -> None:
-    """The law for every vehicle.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        centres: echoes report centres; else points of surfaces.
-        action: filled with shares of full force, shape (world, vehicle, 2).
-        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
-    """
+    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -119,15 +99,7 @@ def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, act
 
 @compiled
 def _force(w: int, i: int, see: Fields, g: Gains, centres: bool) -> tuple[float, float, int]:
-    """Body-frame force on one vehicle [N], forward and to starboard, and how many bounds bound.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        g: the law's gains.
-        centres: echoes report centres; else points of surfaces.
-    """
+    """Body-frame force on one vehicle [N], forward and to starboard, and how many bounds bound."""
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     f_x, f_y, bound = g.attraction * l_x, g.attraction * l_y, 0
     for k in range(see.heard.shape[2]):

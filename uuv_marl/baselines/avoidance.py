@@ -2,14 +2,9 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.policy import Limits, resistance
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields
-
-Float32 = NDArray[np.float32]
 
 
 @compiled
@@ -25,13 +20,6 @@ def obstacle_at(w: int, i: int, a: int, see: Fields, centres: bool) -> tuple[flo
     """Where the obstacle of an echo lies: a unit vector towards it, the distance to its surface and its radius [m].
 
     The radius is the distance from surface to centre; 0 if echoes are points of surfaces, whose radius is unknown.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        a: index of the active sub-sector; it holds an echo.
-        see: the fields of percepts, of all worlds.
-        centres: True if echoes report centres, False if they report points of surfaces.
     """
     n_x, n_y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
     reach, distance = float(see.echo_range[w, i, a]), math.hypot(n_x, n_y)
@@ -45,17 +33,8 @@ def pass_obstacle(
 ) -> tuple[float, float]:
     """Force [N] from the nearest echo: away from it, and sideways while the vehicle moves towards it.
 
-    The nearest echo acts as a beta-agent (Olfati-Saber 2006). The sideways push goes to the side on which the
-    vehicle already passes, port if dead ahead. Strengths in N, ranges in m.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        repulsion: strength of the push away [N].
-        repulsion_range: range to the surface at which it vanishes [m].
-        tangential: strength of the push sideways [N].
-        tangential_range: range to the surface at which it vanishes [m].
+    The nearest echo acts as a beta-agent (Olfati-Saber 2006). The sideways push goes to the side on which the vehicle
+    already passes, port if dead ahead. Strengths in N, ranges in m. At their ranges to the surface the pushes vanish.
     """
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):

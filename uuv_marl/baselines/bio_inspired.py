@@ -4,17 +4,14 @@ import math
 from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
 from uuv_marl.errors import PolicyError
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Int64 = NDArray[np.int64]
+from uuv_marl.sim.views import Fields, fields
+from uuv_marl.types import Float32, Int64
 
 FEED_FORWARD = 1.2
 """Feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference, not the bow."""
@@ -127,15 +124,7 @@ def obstacle_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]
 
 @compiled
 def counts_once(w: int, i: int, a: int, see: Fields, centres: bool) -> bool:
-    """Whether active sub-sector a holds the echo that stands for its whole obstacle: the nearest, first of equals.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        a: index of the active sub-sector; it holds an echo.
-        see: the fields of percepts, of all worlds.
-        centres: echoes report centres; else points of surfaces.
-    """
+    """Whether active sub-sector a holds the echo that stands for its whole obstacle: the nearest, first of equals."""
     reach, position = see.echo_range[w, i, a], see.echo_position[w, i]
     for side in (-1, 1):
         other = a + side
@@ -153,18 +142,7 @@ def counts_once(w: int, i: int, a: int, see: Fields, centres: bool) -> bool:
 def _act(
     flat: Float32, at: Starts, g: Gains, limits: Limits, once: bool, centres: bool, action: Float32, clamps: Int64
 ) -> None:
-    """The law for every vehicle. Eq. 18-22.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        once: adjacent echoes of one obstacle count once.
-        centres: echoes report centres; else points of surfaces.
-        action: filled with shares of full force, shape (world, vehicle, 2).
-        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
-    """
+    """The law for every vehicle. Eq. 18-22. With ``once``, adjacent echoes of one obstacle count once."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

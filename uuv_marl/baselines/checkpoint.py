@@ -28,7 +28,7 @@ from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
 from uuv_marl.scenario.hardware import Actuators, Vehicle
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.types import Float32
 
 Row = tuple[str, int, str, float]
 

@@ -4,11 +4,11 @@ import numpy as np
 
 from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits
-from uuv_marl.percept import PerceptLayout
+from uuv_marl.percept import PerceptLayout, Starts
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32, Int64
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Starts, fields
+from uuv_marl.sim.views import fields
+from uuv_marl.types import Float32, Int64
 
 BARRIER = Gains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)
 """Eq. 20-21 at short range, without the pull to l(t): half the paper's delta_n, and weaker but steeper at obstacles."""
@@ -51,12 +51,7 @@ class Features:
 def put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
     """A position [m] as four features: its direction, longer the nearer than about ``near`` it is, and itself.
 
-    Args:
-        p_x: forward [m].
-        p_y: to starboard [m].
-        near: distance at which the direction has a length of about two thirds [m].
-        out: a vehicle's features, shape (size,); four of them are filled.
-        k: index of the first.
+    At ``near`` [m] the direction has a length of about two thirds. Four features are filled, ``k`` is the first.
     """
     length = np.sqrt(p_x * p_x + p_y * p_y)
     weight = near / ((length + 0.5 * near) * max(length, 1e-3))
@@ -70,14 +65,7 @@ def _look(
 ) -> None:
     """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do.
 
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        gains: of the barrier.
-        limits: of the actuators, and the surge resistance.
-        features: filled, shape (world, vehicle, size).
-        barrier: filled with the force [full force], shape (world, vehicle, 2).
-        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
+    ``barrier`` is filled with the force [full force], shape (world, vehicle, 2).
     """
     see = fields(flat, at)
     for w in range(flat.shape[0]):

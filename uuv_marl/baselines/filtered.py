@@ -3,7 +3,6 @@
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory import Model, Surroundings, listen
 from uuv_marl.baselines.memory.neighbours import KEPT_S
@@ -13,12 +12,7 @@ from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.turning import turning_radius
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-
+from uuv_marl.types import Bool, Float32, Float64, Int64
 
 TURNS = 8.0
 """Turning radii at l(t)'s speed, at least, in which a vehicle with a rudder closes a distance that is left. By hand."""

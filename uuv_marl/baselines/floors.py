@@ -11,8 +11,7 @@ from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.streams import packed, unpacked
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 
 class Random(Policy):

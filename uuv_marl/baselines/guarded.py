@@ -10,7 +10,6 @@ With a rudder the action is the wished force; its torque is close to the rudder'
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.filtered import Filtered
@@ -23,10 +22,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 
 class Guarded(Filtered):
@@ -72,15 +68,7 @@ class Guarded(Filtered):
 
 @compiled
 def coming_velocity(w: int, i: int, action: Float32, own: Reckoning, kept: Surroundings) -> tuple[float, float]:
-    """The velocity in the vehicle's map [m/s] that an action leads to at the next decision, in still water.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        action: shares of full thrust and torque, shape (2,).
-        own: the vehicle's model of itself.
-        kept: what is remembered.
-    """
+    """The velocity in the vehicle's map [m/s] that an action leads to at the next decision, in still water."""
     _, _, psi, u, v, _ = reckoned(kept.motion[w, i], action, own)
     c, s = cos_sin(psi)
     return to_map_axes(c * u - s * v, s * u + c * v, kept.pose[w, i])
@@ -91,18 +79,7 @@ def guard_all(
     worlds: Bool, own: Reckoning, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, planes: Float64,
     action: Float32,
 ) -> None:  # fmt: skip
-    """Replace actions that are not safe.
-
-    Args:
-        worlds: those that run, shape (world,).
-        own: the vehicle's model of itself.
-        barrier: margins and rates of the filter.
-        limits: of the actuators, and the surge resistance.
-        gain: force per velocity error [N s/m].
-        kept: what vehicles remember; whether the filter acts is written.
-        planes: room for half-planes, shape (disc + sector, 3).
-        action: shares of full force, shape (world, vehicle, 2); changed.
-    """
+    """Replace actions that are not safe. ``action`` is changed, and whether the filter acts is written."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if not worlds[w] or kept.begun[w, i] == 0.0:

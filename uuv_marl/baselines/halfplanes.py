@@ -7,12 +7,8 @@ Nothing is drawn at random, and both answers are unique, so that the order chang
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.compiled import compiled
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 TOLERANCE = 1e-9
 """Largest violation with which a half-plane counts as kept [m/s]; assumed: far above rounding, below any use."""
@@ -71,12 +67,8 @@ def _excess(v_x: float, v_y: float, planes: Float64, i: int) -> float:
 def _row(planes: Float64, j: int, rival: int, firm: int, slack: float) -> tuple[float, float, float, bool]:
     """The unit normal and bound of a plane, or of those velocities that violate it no more than they do a rival.
 
-    Args:
-        planes: as in ``nearest_velocity``.
-        j: index of the plane.
-        rival: index of the other, -1 for none.
-        firm: planes before this one stay as they are.
-        slack: by which the others are moved outwards [m/s].
+    ``rival``: index of the other plane, -1 for none. Planes before ``firm`` stay as they are; the others are moved
+    outwards by ``slack`` [m/s].
 
     Returns:
         n_x, n_y, b, and False where there is no border.
@@ -98,16 +90,8 @@ def _program(
 ) -> tuple[float, float, int]:
     """The velocity that is nearest to c, or lies farthest along it, within the limit and the planes.
 
-    Args:
-        c_x: what is aimed at [m/s].
-        c_y: and across.
-        far: farthest along c, else nearest to it.
-        planes: as in ``nearest_velocity``.
-        num: how many rows count.
-        rival: as in ``_row``, likewise ``firm`` and ``slack``.
-        firm: planes that have no rival and no slack.
-        slack: of the others [m/s].
-        limit: largest speed [m/s].
+    c is what is aimed at [m/s]: with ``far`` the farthest along it, else the nearest to it; ``rival``, ``firm`` and
+    ``slack`` as in ``_row``.
 
     Returns:
         The velocity [m/s], and how many planes were kept before one that can't be: ``num`` where all are.
@@ -130,16 +114,7 @@ def _along_border(
 ) -> tuple[float, bool]:
     """Where on the border of plane i, counted from its foot along (-n_y, n_x), the best velocity lies [m/s].
 
-    Args:
-        c_x: as in ``_program``, likewise the others.
-        c_y: and across.
-        far: farthest along c, else nearest to it.
-        planes: those before i are kept.
-        i: index of the plane.
-        rival: as in ``_row``.
-        firm: planes that have no rival and no slack.
-        slack: of the others [m/s].
-        limit: largest speed [m/s].
+    The planes before i are kept; the rest as in ``_program``.
 
     Returns:
         The place, and whether there is one.

@@ -9,9 +9,9 @@ from uuv_marl.baselines.features import Features
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
+from uuv_marl.types import Float32
 
 __all__ = ["Card", "Layer", "Learned", "forward", "need_same", "rows_of", "save_checkpoint"]
 
@@ -107,11 +107,7 @@ def forward(layers: Sequence[Layer], x: Float32) -> Float32:
 def _dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
     """A layer without its activation.
 
-    Args:
-        x: shape (row, in).
-        weight: shape (in, out).
-        bias: shape (out,).
-        out: filled, shape (row, out).
+    ``x`` (row, in), ``weight`` (in, out), ``bias`` (out,); ``out`` (row, out) is filled.
     """
     for i in range(x.shape[0]):
         for k in range(out.shape[1]):

@@ -17,7 +17,7 @@ from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.trims import ALL_TRIMS, MOST_TRIM, TRIMS, Trim, heeded
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Bool, Float32
+from uuv_marl.types import Bool, Float32
 
 _STEERING = ALL_TRIMS.index("steering")
 

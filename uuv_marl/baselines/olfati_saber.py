@@ -10,17 +10,15 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
+from uuv_marl.sim.views import Fields, fields
+from uuv_marl.types import Float32
 
 EPSILON = 0.1
 """Parameter of the sigma-norm, as in the source's simulations [1]."""
@@ -147,16 +145,7 @@ def obstacle_force(reach: float, g: Gains) -> float:
 
 @compiled
 def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, action: Float32) -> None:
-    """The law for every vehicle.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        centres: echoes report centres; else points of surfaces.
-        action: filled with shares of full force, shape (world, vehicle, 2).
-    """
+    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -174,14 +163,7 @@ def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, act
 
 @compiled
 def _alpha(w: int, i: int, see: Fields, g: Gains) -> tuple[float, float]:
-    """Force [N] from neighbours: the lattice, and alignment where their velocities are told.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        g: the law's gains.
-    """
+    """Force [N] from neighbours: the lattice, and alignment where their velocities are told."""
     u, v, f_x, f_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0.0, 0.0
     for k in range(see.heard.shape[2]):
         if see.heard[w, i, k] == 0.0:
@@ -203,13 +185,6 @@ def _beta(w: int, i: int, see: Fields, g: Gains, centres: bool) -> tuple[float, 
 
     That point runs along the surface as the vehicle's shadow: at radius / distance of the velocity across. Where echoes
     are points of surfaces, the radius is unknown and the point stands.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        g: the law's gains.
-        centres: echoes report centres; else points of surfaces.
     """
     u, v, f_x, f_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0.0, 0.0
     for a in range(see.echo.shape[2]):

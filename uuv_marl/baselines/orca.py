@@ -10,20 +10,17 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.bio_inspired import counts_once
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.policy import Limits, Policy, tuned
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.sim.views import Fields, fields
+from uuv_marl.types import Float32, Float64
 
 _SHARE = 0.5
 """Share of a change that a vehicle takes; its neighbour takes the other half. Definition of ORCA^tau_A|B."""
@@ -79,16 +76,8 @@ def escape(
 
     The velocity obstacle holds the velocities that meet the disc within the horizon: a cone, cut off by a disc that is
     ``horizon`` times smaller. From inside the disc, those that are still in it after a decision period. The normal
-    points out of it. Straight at the disc, starboard counts as the shorter way round.
-
-    Args:
-        p_x: the disc's centre, forward of the vehicle [m].
-        p_y: and to starboard [m].
-        radius: of the disc, both vehicles' together [m].
-        v_x: velocity relative to it, forward [m/s].
-        v_y: and to starboard [m/s].
-        horizon: within which a collision counts [s].
-        period: between two decisions [s].
+    points out of it. Straight at the disc, starboard counts as the shorter way round. p is the disc's centre [m], v the
+    velocity relative to it [m/s], ``radius`` both vehicles' together [m].
 
     Returns:
         u_x, u_y [m/s], n_x, n_y.
@@ -122,13 +111,7 @@ def _add(
 ) -> int:
     """Write the half-plane of velocities that take a share of a change; the number of planes then.
 
-    Args:
-        planes: n_x, n_y and b of n.v <= b, as ``nearest_velocity`` takes them.
-        num: how many there are.
-        u: own surge velocity [m/s].
-        v: own sway velocity [m/s].
-        demand: of ``escape``.
-        share: of the change.
+    u and v are the vehicle's own velocity [m/s], ``demand`` is that of ``escape``, ``share`` of the change.
     """
     u_x, u_y, n_x, n_y = demand
     planes[num, 0], planes[num, 1] = -n_x, -n_y
@@ -149,20 +132,7 @@ def _act(
     planes: Float64,
     action: Float32,
 ) -> None:
-    """The law for every vehicle.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        speed: the vehicle's largest [m/s].
-        follow: of ``velocity_gain`` [N s/m].
-        period: between two decisions [s].
-        centres: echoes report centres; else points of surfaces.
-        planes: room for a half-plane for every sub-sector and every active one, shape (plane, 3).
-        action: filled with shares of full force, shape (world, vehicle, 2).
-    """
+    """The law for every vehicle. ``speed``: the vehicle's largest [m/s]; ``follow``: of ``velocity_gain`` [N s/m]."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -180,14 +150,7 @@ def _act(
 def _obstacles(w: int, i: int, see: Fields, g: Gains, period: float, centres: bool, planes: Float64) -> int:
     """Write the half-planes of obstacles, each once; how many. The vehicle takes the whole change.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        g: the law's gains.
-        period: between two decisions [s].
-        centres: echoes report centres; else points of surfaces, of which the nearest counts.
-        planes: filled from the first row on.
+    Of points of surfaces the nearest counts.
     """
     u, v, num = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0
     for a in range(see.echo.shape[2]):
@@ -203,16 +166,8 @@ def _obstacles(w: int, i: int, see: Fields, g: Gains, period: float, centres: bo
 def _neighbours(w: int, i: int, see: Fields, g: Gains, period: float, planes: Float64, num: int) -> int:
     """Add the half-planes of neighbours; how many planes there are then.
 
-    One whose velocity has not been told (``modem``) counts as moving like the reference point.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        g: the law's gains.
-        period: between two decisions [s].
-        planes: written from row ``num`` on.
-        num: how many there are.
+    One whose velocity has not been told (``modem``) counts as moving like the reference point. Written from row ``num``
+    on.
     """
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     for k in range(see.heard.shape[2]):

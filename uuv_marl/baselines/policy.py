@@ -19,12 +19,7 @@ from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.vehicle import project
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-
+from uuv_marl.types import Bool, Float32, Float64, Int64
 
 FULL_RUDDER = 0.5
 """Sine of the angle between bow and wished velocity that asks for the whole rudder at cruise speed [1]. Assumed: 30

@@ -3,16 +3,14 @@
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.steering import steer, velocity_gain
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Starts, fields
-
-Float32 = NDArray[np.float32]
+from uuv_marl.sim.views import fields
+from uuv_marl.types import Float32
 
 
 class Gains(NamedTuple):
@@ -43,16 +41,7 @@ class Pull(Policy):
 
 @compiled
 def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, gain: float, action: Float32) -> None:
-    """The law for every vehicle.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        gain: force per velocity error [N s/m].
-        action: filled with shares of full force, shape (world, vehicle, 2).
-    """
+    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

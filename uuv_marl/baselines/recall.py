@@ -2,9 +2,6 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.features import put
 from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.halfplanes import nearest_velocity
@@ -20,10 +17,7 @@ from uuv_marl.baselines.scout import modulated, wished
 from uuv_marl.baselines.steering import full_speed
 from uuv_marl.scenario.sections import NOMINAL_VEHICLES
 from uuv_marl.sim.compiled import compiled
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 NEIGHBOURS, SURFACES = 6, 4
 """How many of the nearest neighbours and obstacles an actor sees."""
@@ -39,16 +33,7 @@ def recall(
 ) -> None:  # fmt: skip
     """Fill the features of vehicles: their motion, l(t), the hand-made law's wish, who and what is near.
 
-    Args:
-        rows: the vehicles, shape (world, vehicle).
-        num_vehicles: of the swarm.
-        period: between two decisions [s].
-        g: gains of the hand-made law.
-        barrier: margins and rates of the filter.
-        limits: of the actuators, and the surge resistance.
-        kept: what vehicles remember.
-        planes: room for half-planes, shape (disc + sector, 3).
-        features: filled, shape (world, vehicle, ``RECALLED``); zero for lost vehicles.
+    Shape (world, vehicle, ``RECALLED``); zero for vehicles that are not among ``rows``, shape (world, vehicle).
     """
     for w in range(features.shape[0]):
         for i in range(features.shape[1]):
@@ -68,16 +53,7 @@ def _own(
 ) -> None:  # fmt: skip
     """A vehicle's motion, l(t), and what the hand-made law wishes and the filter leaves of it.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        period: between two decisions [s].
-        g: gains of the hand-made law.
-        barrier: margins and rates of the filter.
-        limits: of the actuators, and the surge resistance.
-        kept: what is remembered.
-        planes: room for half-planes, shape (disc + sector, 3).
-        out: the vehicle's features; the first are filled.
+    The first of ``out`` are filled.
     """
     pose, reference = kept.pose[w, i], kept.reference[w, i]
     motion, speed = kept.motion[w, i], kept.reference_speed[w, i]
@@ -122,11 +98,7 @@ def _nearest(away: Float64, num: int, least: float) -> int:
 def _neighbours(w: int, i: int, kept: Surroundings, out: Float32) -> None:
     """The nearest neighbours, in order: where they are, and how they move beside the vehicle.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        kept: what is remembered.
-        out: the vehicle's features; six for each neighbour are filled.
+    Six for each are filled.
     """
     away, place, velocity, pose = kept.away[w, i], kept.place[w, i], kept.velocity[w, i], kept.pose[w, i]
     least = -1.0
@@ -147,13 +119,7 @@ def _neighbours(w: int, i: int, kept: Surroundings, out: Float32) -> None:
 def _surfaces(w: int, i: int, barrier: Barrier, kept: Surroundings, left: Float64, out: Float32) -> None:
     """The obstacles whose surfaces are nearest, in order: direction, distance, size, and the distance to keep.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        barrier: has the margins.
-        kept: what is remembered.
-        left: room for distances, shape (at least disc,).
-        out: the vehicle's features; five for each obstacle are filled.
+    Five for each are filled; ``left`` is room for distances.
     """
     score, disc, pose = kept.score[w, i], kept.disc[w, i], kept.pose[w, i]
     for d in range(score.shape[0]):

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.actors import Trained, shipped
 from uuv_marl.baselines.apf import Apf
@@ -31,8 +30,7 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import plain
 from uuv_marl.sim.arguments import rounding
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 Kind = type[Policy] | Trained
 """A class of policies: a call with a scenario makes a policy. It has ``channels`` and ``yaw_damping_nms``."""

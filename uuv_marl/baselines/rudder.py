@@ -3,15 +3,12 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from uuv_marl.percept import Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Starts, fields
-
-Float32 = NDArray[np.float32]
+from uuv_marl.sim.views import fields
+from uuv_marl.types import Float32
 
 STEERAGE = 0.5
 """Steerage way over cruise speed: a rudder then gives a quarter of its moment. Assumed: few hulls steer slower."""
@@ -60,14 +57,8 @@ def steer_by_rudder(flat: Float32, at: Starts, fin: Rudder, action: Float32) -> 
     whole counts: the bow goes round to it, since the vehicle can't follow it backwards. The rudder's angle is that
     moment over what the rudder gives at its limit in the present flow, which is taken as no slower than steerage way.
     Thrust is the force's part ahead, or astern as far as there is thrust astern; below steerage way it is no less than
-    what holds that speed, as a vehicle without flow would not turn at all.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        fin: the vehicle's rudder.
-        action: forces as shares of full thrust and torque, shape (world, vehicle, 2); overwritten by shares of full
-            thrust and of the rudder's limit.
+    what holds that speed, as a vehicle without flow would not turn at all. ``action`` holds forces as shares of full
+    thrust and torque, and is overwritten by shares of full thrust and of the rudder's limit.
     """
     see = fields(flat, at)
     for w in range(action.shape[0]):

@@ -10,9 +10,6 @@ avoidance (van den Berg et al. 2011, see ``halfplanes``).
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
@@ -21,9 +18,7 @@ from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.sim.compiled import compiled
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float32, Float64
 
 
 class Barrier(NamedTuple):
@@ -61,15 +56,7 @@ GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
 
 @compiled
 def margin(w: int, i: int, d: int, barrier: Barrier, kept: Surroundings) -> float:
-    """Distance to keep from the surface of a remembered obstacle [m]: less where the gap to the next is narrow.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        d: index of the disc.
-        barrier: margins and rates.
-        kept: what is remembered.
-    """
+    """Distance to keep from the surface of a remembered obstacle [m]: less where the gap to the next is narrow."""
     disc, least = kept.disc[w, i], barrier.obstacle_m
     for e in range(kept.score.shape[2]):
         if e != d and kept.score[w, i, e] >= CONFIRMED:
@@ -85,14 +72,6 @@ def margin(w: int, i: int, d: int, barrier: Barrier, kept: Surroundings) -> floa
 @compiled
 def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surroundings, planes: Float64) -> int:
     """Half-planes of velocity in the vehicle's map, n . v <= b, for what it remembers.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        period: between two decisions [s].
-        barrier: margins and rates.
-        kept: what is remembered.
-        planes: filled with n_x, n_y and b [m/s], shape (disc + sector, 3).
 
     Returns:
         How many there are.
@@ -127,14 +106,7 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surrounding
 
 @compiled
 def keeps(v_x: float, v_y: float, planes: Float64, num: int) -> bool:
-    """Whether a velocity keeps to half-planes.
-
-    Args:
-        v_x: the velocity [m/s].
-        v_y: the same, second axis [m/s].
-        planes: n_x, n_y and b [m/s], shape (at least num, 3).
-        num: how many there are.
-    """
+    """Whether a velocity keeps to half-planes."""
     for k in range(num):  # noqa: SIM110 - compiled
         if planes[k, 0] * v_x + planes[k, 1] * v_y > planes[k, 2]:
             return False
@@ -148,17 +120,7 @@ def steer_safely(
 ) -> None:  # fmt: skip
     """The action that takes a vehicle to the velocity that keeps to half-planes and is nearest to a wished one.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        w_x: wished velocity in the map [m/s].
-        w_y: the same, second axis [m/s].
-        num: how many half-planes there are.
-        planes: n_x, n_y and b [m/s], shape (at least num, 3).
-        gain: force per velocity error [N s/m].
-        limits: of the actuators, and the surge resistance.
-        kept: what is remembered; whether the filter acts is written.
-        action: shares of full force, shape (world, vehicle, 2); the vehicle's are written.
+    Whether the filter acts is written.
     """
     safe_x, safe_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, full_speed(limits))
     if broken > 0.0 or not keeps(w_x, w_y, planes, num):

@@ -8,7 +8,6 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.gains import LEAD, PLUS, WARY, Gains
@@ -25,10 +24,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 
 class Scout(Filtered):
@@ -115,14 +111,7 @@ class ScoutWary(Scout):
 
 @compiled
 def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
-    """The velocity that a vehicle wishes where there are no obstacles, in its map [m/s].
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        g: the law's gains.
-        kept: what is remembered.
-    """
+    """The velocity that a vehicle wishes where there are no obstacles, in its map [m/s]."""
     pose, reference, speed = kept.pose[w, i], kept.reference[w, i], kept.reference_speed[w, i]
     pull, push, together = g.pull, g.push, g.together
     if reference[2] == 0.0 and reference[3] == 0.0:
@@ -149,14 +138,6 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
     The modulation of Khansari-Zadeh and Billard, A dynamical system approach to realtime obstacle avoidance, Autonomous
     Robots 32 (2012), for discs: with (R / r)^2, R the radius and the margin, r the distance of the centre, the velocity
     towards a disc shrinks by that share, and that past it grows. Each disc bends what the one before has left.
-
-    Args:
-        w_x: wished velocity in the map [m/s].
-        w_y: the same, second axis [m/s].
-        w: index of the world.
-        i: index of the vehicle.
-        barrier: has the margins.
-        kept: what is remembered.
     """
     for d in range(kept.score.shape[2]):
         if kept.score[w, i, d] < CONFIRMED:
@@ -177,13 +158,7 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
 def _lead(w: int, i: int, share: float, limits: Limits, kept: Surroundings, action: Float32) -> None:
     """Change an action so that it acts in spite of actuators that lag or are weak.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        share: of lag and weakness that is made up for.
-        limits: of the actuators.
-        kept: what is remembered.
-        action: shares of full thrust and torque, shape (world, vehicle, 2); the vehicle's are changed.
+    ``share``: of lag and weakness that is made up for.
     """
     damping = limits.yaw_damping * kept.motion[w, i, 2]
     torque = lead(w, i, 1, min(max(action[w, i, 1] - damping, -1.0), 1.0), share, kept) + damping
@@ -199,18 +174,8 @@ def decide_all(
 ) -> None:  # fmt: skip
     """The law for every vehicle.
 
-    Args:
-        worlds: those that run, shape (world,).
-        period: between two decisions [s].
-        g: the law's gains.
-        barrier: margins and rates of the filter.
-        limits: of the actuators, and the surge resistance.
-        gain: force per velocity error [N s/m].
-        kept: what vehicles remember.
-        planes: room for half-planes, shape (disc + sector, 3).
-        trims: changes of the law, see ``trimmed`` and ``widened``, shape (world, vehicle, TRIMS), of which as much
-            counts as a vehicle doubts (of steering: as its actuators lag); or (world, vehicle, 0) for none.
-        action: filled with shares of full force, shape (world, vehicle, 2).
+    ``trims``, shape (world, vehicle, TRIMS), change the law as ``trimmed`` and ``widened`` say, as far as a vehicle
+    doubts (that of steering: as its actuators lag); shape (world, vehicle, 0) for none.
     """
     doubts = trims.shape[2] > 0 or g.pull_in_doubt != 0.0 or g.push_in_doubt != 0.0
     for w in range(action.shape[0]):

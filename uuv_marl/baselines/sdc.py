@@ -10,22 +10,17 @@ import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.errors import PolicyError
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
-from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from uuv_marl.sim.views import Fields, fields
+from uuv_marl.types import Bool, Float32, Float64, Int64
 
 SLOT_PITCH_M = 12.0
 """Distance between neighbouring slots."""
@@ -171,17 +166,9 @@ def _act(
 ) -> None:
     """The law for every vehicle.
 
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        slots: place of every vehicle in the formation [m], north and east, shape (world, vehicle, 2).
-        depth: distance of its place from the informed vehicle's [m], shape (world, vehicle).
-        all_informed: every vehicle uses the reference; else the informed one alone.
-        rho: half width of the funnel [m], shape (world,).
-        action: filled with shares of full force, shape (world, vehicle, 2).
-        clamps: numerical bounds that bound, counted per world, shape (world,); added to.
+    ``slots``: place of every vehicle in the formation, north and east [m], shape (world, vehicle, 2); ``depth``:
+    distance of its place from the informed vehicle's [m], shape (world, vehicle). With ``all_informed`` every vehicle
+    uses the reference, else the informed one alone. ``rho``: half width of the funnel [m], shape (world,).
     """
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -212,16 +199,8 @@ def _force(
 ) -> tuple[float, float, int]:
     """Body-frame force on one vehicle [N], forward and to starboard, and 1 where the funnel's bound binds.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        slots: place of every vehicle in the formation [m], north and east, shape (vehicle, 2).
-        depth: distance of its place from the informed vehicle's [m], shape (vehicle,).
-        informed: this vehicle uses the reference.
-        rho: half width of the funnel [m].
+    ``slots`` and ``depth`` are those of the world, ``rho`` the half width of the funnel [m]. An ``informed`` vehicle
+    uses the reference.
     """
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])

@@ -9,19 +9,15 @@ import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.percept import Percept
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
-from uuv_marl.sim.views import Fields, Starts, fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.sim.views import Fields, fields
+from uuv_marl.types import Bool, Float32, Float64
 
 HORIZON_S = 1.0
 """How far ahead neighbours are predicted."""
@@ -125,15 +121,7 @@ def _recall(identity: float, known: Float32) -> int:
 
 @compiled
 def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Memory) -> None:
-    """What every vehicle hears, beside what it heard before.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        period: between two decisions [s].
-        worlds: those that run, shape (world,).
-        memory: of all worlds.
-    """
+    """What every vehicle hears, beside what it heard before."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -145,12 +133,7 @@ def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Me
 def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None:
     """What one vehicle hears, beside what it heard; the frame has turned by its yaw rate times the period since.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        period: between two decisions [s].
-        memory: of all worlds; brought up to date for this vehicle.
+    ``memory`` is brought up to date.
     """
     who, where, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
     r = float(see.yaw_rate[w, i, 0])
@@ -173,16 +156,7 @@ def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None
 
 @compiled
 def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory, action: Float32) -> None:
-    """The law for every vehicle.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        memory: of all worlds.
-        action: filled with shares of full force, shape (world, vehicle, 2).
-    """
+    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -192,16 +166,7 @@ def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory,
 
 @compiled
 def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, memory: Memory) -> tuple[float, float]:
-    """Body-frame force on one vehicle [N], forward and to starboard.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        g: the law's gains.
-        limits: of the actuators, and the surge resistance.
-        memory: of all worlds.
-    """
+    """Body-frame force on one vehicle [N], forward and to starboard."""
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)

@@ -2,14 +2,10 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.policy import Limits, resistance, write_action
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 _SHARE = 1.5
 """Of a velocity error, what a decision period's force makes good at most [1]. Above 2 it would grow. Tried by hand: 1
@@ -31,16 +27,7 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
     The force lies in the horizontal plane. Its forward part becomes thrust, ahead or astern; its sideways part turns
     the bow to it by the lever arm, since the vehicle can't push sideways. With a rudder the sideways part follows the
     angle between the bow and the wished velocity alone, by its sine: such a hull slips sideways in every turn, and
-    making that good would turn it back.
-
-    Args:
-        w_x: wished velocity, forward [m/s].
-        w_y: wished velocity, to starboard [m/s].
-        u: own surge velocity [m/s].
-        v: own sway velocity [m/s].
-        gain: force per velocity error [N s/m], of ``velocity_gain``.
-        limits: of the actuators, and the surge resistance.
-        out: filled with shares of full force, shape (2,).
+    making that good would turn it back. w is the wished velocity [m/s].
     """
     drag = resistance(math.hypot(w_x, w_y), limits)
     f_x, f_y = drag * w_x + gain * (w_x - u), drag * w_y + gain * (w_y - v)
@@ -52,13 +39,7 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
 
 @compiled
 def wished_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, float]:
-    """The velocity [m/s] at which the resistance equals an action's force. Eq. 22 backwards.
-
-    Args:
-        a_x: share of full thrust.
-        a_y: share of full torque.
-        limits: of the actuators, and the surge resistance.
-    """
+    """The velocity [m/s] at which the resistance equals an action's force. Eq. 22 backwards."""
     f_x, f_y = a_x * limits.max_force, a_y * limits.max_torque / limits.lever_arm
     force = math.hypot(f_x, f_y)
     if force == 0.0:

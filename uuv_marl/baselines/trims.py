@@ -7,8 +7,8 @@ from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.doubt import trim_weights
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.types import Bool, Float32
 
 Trim = Literal["pull", "together", "push", "behind_m", "steering", "neighbour_m"]
 """A number of a vehicle that an actor may change: one of five gains (``trimmed``), or the distance kept from neighbours
@@ -26,12 +26,7 @@ the way for which a swarm coasts on, and a share of a hull's length."""
 
 @compiled
 def wary(g: Gains, share: float) -> Gains:
-    """Gains of a vehicle that doubts: pull and push, changed.
-
-    Args:
-        g: the law's.
-        share: how much it doubts, 0 to 1.
-    """
+    """Gains of a vehicle that doubts: pull and push, changed. ``share``: how much it doubts, 0 to 1."""
     pull, push = math.exp(share * g.pull_in_doubt), math.exp(share * g.push_in_doubt)
     return Gains(
         g.pull * pull, g.push * push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m, g.steering,
@@ -43,13 +38,9 @@ def wary(g: Gains, share: float) -> Gains:
 def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
     """Gains of one vehicle, changed: pull, push and steering by factors, together and behind_m by sums.
 
-    Steering is never harder than the law's, nor softer than a twentieth of it; pushes are never weaker.
-
-    Args:
-        g: the law's.
-        trims: the first are of pull, together, push, behind_m and steering, shape (TRIMS,); 0 changes nothing.
-        share: of them that counts, 0 to 1.
-        lags: of that of steering, 0 to 1.
+    Steering is never harder than the law's, nor softer than a twentieth of it; pushes are never weaker. ``trims``: of
+    pull, together, push, behind_m and steering, 0 changes nothing; ``share`` of them counts, of that of steering
+    ``lags``, 0 to 1 each.
     """
     pull, push = share * trims[0], share * max(trims[2], 0.0)
     steering = max(lags * _TRIM_STEERING * min(trims[4], 0.0), -MOST_TRIM)
@@ -65,10 +56,7 @@ def trimmed(g: Gains, trims: Float32, share: float, lags: float) -> Gains:
 def widened(by: Barrier, trims: Float32, share: float) -> Barrier:
     """The filter of one vehicle, which keeps a larger distance from neighbours.
 
-    Args:
-        by: the law's.
-        trims: the last is of that distance, shape (TRIMS,); 0 and less change nothing.
-        share: of it that counts, 0 to 1.
+    The last of ``trims`` is that of the distance, 0 and less change nothing; ``share`` of it counts, 0 to 1.
     """
     keep = by.neighbour_m + share * _TRIM_KEEP_M * max(trims[5], 0.0)
     return Barrier(
@@ -81,12 +69,7 @@ def widened(by: Barrier, trims: Float32, share: float) -> Barrier:
 def heeded(worlds: Bool, steering_alone: bool, share: float, kept: Surroundings, out: Bool) -> None:
     """Whose trims count at all: steering where actuators lag, all others where a vehicle doubts.
 
-    Args:
-        worlds: those that run, shape (world,).
-        steering_alone: whether steering is all that is trimmed.
-        share: of the lag that the law makes up for.
-        kept: what vehicles remember.
-        out: filled, shape (world, vehicle).
+    ``steering_alone``: whether steering is all that is trimmed; ``share``: of the lag that the law makes up for.
     """
     for w in range(out.shape[0]):
         for i in range(out.shape[1]):

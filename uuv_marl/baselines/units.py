@@ -11,14 +11,12 @@ differs from the paper's only in size gets the paper's runs, bit for bit where i
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.percept import Clock, Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.dimensions import NUMBER, Dimension, converted
 from uuv_marl.scenario.scale import Scale
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 _DIMENSIONS = {
     "m": Dimension(1, 0, 0), "m/s": Dimension(1, -1, 0), "rad/s": Dimension(0, -1, 0), "s": Dimension(0, 1, 0),

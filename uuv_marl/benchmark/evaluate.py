@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines import POLICIES, make
 from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
@@ -14,8 +13,7 @@ from uuv_marl.errors import DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import whole_number
 from uuv_marl.sim.swarm import Swarm
-
-Float32 = NDArray[np.float32]
+from uuv_marl.types import Float32
 
 BATCH = 8
 """Seeds stepped together: enough for all cores, and few to repeat after a benchmark was stopped."""

@@ -11,13 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, draw_course, house_style, legend, panels, save
 from uuv_marl.scenario import Scenario, conditions, disturbances
+from uuv_marl.types import Float32, Float64
 
-Float32 = NDArray[np.float32]
 Trace = dict[str, Float32]
 _GRID_S = 0.5
 _ROUTE_S = 2.0
@@ -171,7 +170,7 @@ def _over_time(
     return figure, axes[: len(curves)]
 
 
-def _band(series: Sequence[tuple[Float32, Float32]]) -> tuple[NDArray[np.float64], ...]:
+def _band(series: Sequence[tuple[Float32, Float32]]) -> tuple[Float64, ...]:
     """Time, lowest, median and highest, as long as more than half of the seeds are under way."""
     grid = np.arange(0.0, max(float(time[-1]) for time, _ in series), _GRID_S)
     curves = np.array([np.interp(grid, time, values, right=np.nan) for time, values in series])

@@ -3,14 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
 from uuv_marl.benchmark.success import Success, SuccessRecorder
 from uuv_marl.sim.swarm import Swarm
-
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64
 
 
 class Shares(TypedDict):
@@ -115,7 +112,7 @@ class MetricsRecorder:
         self._collisions += np.where(active, self._swarm.facts.collisions, 0)
         self._success.update(active)
 
-    def series(self, world: int) -> dict[str, NDArray[np.float32]]:
+    def series(self, world: int) -> dict[str, Float32]:
         """A world's samples over time: every field of ``Sample``, and ``obstacle_distance_m`` (time, obstacle)."""
         columns = {name: values.astype(np.float32) for name, values in self._table(world).items()}
         num = int(self._swarm.course.num_obstacles[world])

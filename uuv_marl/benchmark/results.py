@@ -16,7 +16,6 @@ from typing import Any, Literal, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
@@ -30,6 +29,7 @@ from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
+from uuv_marl.types import Float32
 
 FILE = "results.json"
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -207,7 +207,7 @@ class Results:
         """Where a run's time series are."""
         return trace_path(self.folder, scenario, policy, seed)
 
-    def trace(self, scenario: str, policy: str, seed: int) -> dict[str, NDArray[np.float32]]:
+    def trace(self, scenario: str, policy: str, seed: int) -> dict[str, Float32]:
         """A run's time series, as ``load_trace`` gives them."""
         return load_trace(self.trace_path(scenario, policy, seed))
 
@@ -232,7 +232,7 @@ def run_name(scenario: str, policy: str, seed: int) -> str:
     return name
 
 
-def load_trace(path: UserPath) -> dict[str, NDArray[np.float32]]:
+def load_trace(path: UserPath) -> dict[str, Float32]:
     """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
 
     Also ``obstacles`` and ``waypoints``, and for seeds whose routes are kept the fields of ``evaluate.Routes``, as

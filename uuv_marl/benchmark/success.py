@@ -7,11 +7,11 @@ Shares are over healthy vehicles: those that no fault has hit and that were not 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Bool
 
 GRACE_S = 60.0
 """When vehicles are judged, after l(t)'s end [s]. Assumed: the time beyond l(t)'s that ``base.toml`` allows."""
@@ -45,7 +45,7 @@ class SuccessRecorder:
         self._judged = np.zeros(swarm.num_worlds, np.bool_)
         self._offset = np.full((*shape, 2), np.inf)
 
-    def update(self, active: NDArray[np.bool_]) -> None:
+    def update(self, active: Bool) -> None:
         """Look at the swarm after a reset or step of the ``active`` worlds."""
         swarm, facts = self._swarm, self._swarm.facts
         touches = facts.contacts > 0

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.markup import escape
 from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
@@ -14,8 +13,8 @@ from uuv_marl.baselines.registry import channels_in, is_trained
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import Knowledge, Results, Row
 from uuv_marl.scenario import differences
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 _CONFIDENCE = 0.95
 _RESAMPLES = 2000
 _NOTHING = "–"

@@ -14,10 +14,9 @@ from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
-from uuv_marl.sim.arrays import Bool, Float32, Float64
-from uuv_marl.sim.engine import EngineName
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Bool, Float32, Float64
 
 ScenarioLike = UserPath | Scenario | Mapping[str, object]
 Reward = Literal["individual", "team"] | RewardFunction
@@ -64,7 +63,6 @@ class BatchedEnv:
         reward: ``individual`` (the sum of a vehicle's terms), ``team`` (every vehicle gets the mean over all vehicles;
             a lost vehicle also pays its own loss), or a function from the swarm to an array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
-        engine: ``numba`` or ``plain``, see ``Swarm``.
     """
 
     def __init__(
@@ -73,11 +71,10 @@ class BatchedEnv:
         num_worlds: int = 1,
         reward: Reward = "individual",
         max_cycles: int | None = None,
-        engine: EngineName = "numba",
     ) -> None:
         if not callable(reward) and reward not in ("individual", "team"):
             raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
-        self.swarm = Swarm(scenario, num_worlds, engine)
+        self.swarm = Swarm(scenario, num_worlds)
         self.state_layout = state_layout(scenario)
         self._weights = reward_weights(scenario)
         self._waiting = set(range(num_worlds))
@@ -185,7 +182,6 @@ class EnvOptions(Changes, total=False):
 
     max_cycles: int | None
     reward: Reward
-    engine: EngineName
 
 
 def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
@@ -216,7 +212,6 @@ def make_batched_env(
     *,
     max_cycles: int | None = None,
     reward: Reward = "individual",
-    engine: EngineName = "numba",
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes.
@@ -226,10 +221,9 @@ def make_batched_env(
         num_worlds: worlds stepped together.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
-        engine: ``numba`` or ``plain``.
         changes: ``num_vehicles``, ``decision_period`` [s] and ``overrides`` of the scenario, see ``changed``.
     """
-    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, engine)
+    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from uuv_marl.percept import Percept
-from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.types import Float32
 
 
 def observe(percept: Percept) -> Float32:

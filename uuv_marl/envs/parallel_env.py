@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 from gymnasium.spaces import Box, Space
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
@@ -16,8 +16,7 @@ from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
 from uuv_marl.sim.arguments import action_array, world_seeds
-from uuv_marl.sim.arrays import Float32
-from uuv_marl.sim.engine import EngineName
+from uuv_marl.types import Float32, Int64
 
 Infos = dict[str, dict[str, Any]]
 
@@ -58,7 +57,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self.possible_agents = [f"uuv_{i}" for i in range(self.scenario.swarm.num_vehicles)]
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
-        self._rows: slice | NDArray[np.int64] = slice(None)
+        self._rows: slice | Int64 = slice(None)
         layout = batch.swarm.layout
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
@@ -128,7 +127,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self._renderer.update()
         return observations, rewards, terminated, truncated, infos
 
-    def _infos(self, result: StepResult, agents: list[str], rows: slice | NDArray[np.int64]) -> Infos:
+    def _infos(self, result: StepResult, agents: list[str], rows: slice | Int64) -> Infos:
         if not self._info_terms:
             return {agent: {} for agent in agents}
         terms = {name: term[0, rows].tolist() for name, term in result.terms.items()}
@@ -181,7 +180,6 @@ def parallel_env(
     info_terms: bool = False,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
-    engine: EngineName = "numba",
 ) -> SwarmParallelEnv:
     """A PettingZoo parallel environment.
 
@@ -197,12 +195,10 @@ def parallel_env(
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
-        engine: ``numba``, or ``plain``: the same run, bit for bit, from the plain Python of ``uuv_marl/sim/plain.py``,
-            tens to hundreds of times slower.
     """
     batch = make_batched_env(
         scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
-        overrides=overrides, engine=engine,
+        overrides=overrides,
     )  # fmt: skip
     return SwarmParallelEnv(batch, render_mode, info_terms, render_options)
 

@@ -15,10 +15,11 @@ import numpy as np
 
 from uuv_marl.errors import RewardError
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Bool, Facts, Float64, State
+from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Bool, Float64
 
 RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""
@@ -120,17 +121,7 @@ def shortfall(share: float) -> float:
 def _fill(
     w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
 ) -> None:
-    """The reward of one world.
-
-    Args:
-        w: index of the world.
-        time_limit_s: when worlds are given up [s], shape (world,).
-        state: of all worlds.
-        facts: of all worlds.
-        weights: of the terms, and the lengths in them [m].
-        terms: the weighted terms, shape (term, world, vehicle), zero before; filled for this world.
-        reward: their sum, shape (world, vehicle), zero before; filled for this world.
-    """
+    """Fill the weighted ``terms`` of one world, shape (term, world, vehicle), and their sum; both are zero before."""
     left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
     worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
     arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from uuv_marl.envs.parallel_env import Infos, parallel_env
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.types import Float32
 
 with extra("distributed", "SwarmMultiAgentEnv"):
     from ray.rllib.env.multi_agent_env import MultiAgentEnv  # pyright: ignore[reportMissingImports]

@@ -14,7 +14,7 @@ from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.sim.arguments import action_array, rounding, whole_number
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.types import Bool, Float32
 
 with extra("train", "SwarmVecEnv"):
     from stable_baselines3.common.monitor import Monitor
@@ -70,7 +70,7 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
         scenario: a name, a TOML file or a ``Scenario``.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
         render_options: as for ``uuv_marl.parallel_env``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
             for ``uuv_marl.parallel_env``.
     """
 
@@ -119,7 +119,7 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
         rows = action_array(actions, (self.num_envs, 2), "actions, a row per vehicle,")
         self._actions = rows.reshape(*self._shape, 2)
 
-    def step_wait(self) -> tuple[Float32, Float32, NDArray[np.bool_], list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Float32, Float32, Bool, list[dict[str, Any]]]:
         """Observations, rewards, dones and infos of every row."""
         if self._actions is None:
             raise RuntimeError("step_wait came before step_async; call step(actions)")
@@ -155,7 +155,7 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
                 "episode": {"r": float(self._returns[world, i]), "l": int(self._lengths[world]), "t": seconds},
             }
 
-    def _forget(self, worlds: NDArray[np.bool_]) -> None:
+    def _forget(self, worlds: Bool) -> None:
         self._returns[worlds], self._lengths[worlds], self._starts[worlds] = 0.0, 0, time.perf_counter()
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:

@@ -14,8 +14,7 @@ from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
-from uuv_marl.sim.arrays import Float32
-from uuv_marl.sim.engine import EngineName
+from uuv_marl.types import Float32
 
 
 class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is a property
@@ -35,7 +34,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
             otherwise.
         info_terms: whether the info holds the reward's terms.
-        scenario, max_cycles, reward, engine: as for ``uuv_marl.parallel_env``.
+        scenario, max_cycles, reward: as for ``uuv_marl.parallel_env``.
         changes: ``num_vehicles``, ``decision_period`` and ``overrides``, likewise.
 
     Raises:
@@ -54,11 +53,10 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         info_terms: bool = False,
         max_cycles: int | None = None,
         reward: Reward = "individual",
-        engine: EngineName = "numba",
         **changes: Unpack[Changes],
     ) -> None:
         suited = _suited(others, changed(scenario), changed(scenario, **changes))
-        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, engine=engine)
+        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
         self._info_terms = info_terms

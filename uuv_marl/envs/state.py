@@ -4,8 +4,8 @@ import numpy as np
 
 from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, Kind, PerceptField, PerceptLayout
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Float32
 
 _TIME = Kind("1", 1.0, 0.0, 2.0)
 

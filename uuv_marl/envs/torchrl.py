@@ -11,7 +11,7 @@ from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.arguments import rounding, world_seeds
-from uuv_marl.sim.arrays import Bool
+from uuv_marl.types import Bool
 
 with extra("torchrl", "SwarmEnv"):
     import torch
@@ -36,7 +36,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         scenario: a name, a TOML file or a ``Scenario``.
         seed: of the first reset, in which world w starts from ``seed + w``; as ``set_seed``.
         device: where the tensors go; the simulation stays on the CPU.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
             for ``uuv_marl.parallel_env``.
     """
 

@@ -14,7 +14,7 @@ from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin, SpecMixin
 from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
-from uuv_marl.sim.arrays import Bool, Float32, Float64
+from uuv_marl.types import Bool, Float32, Float64
 
 Infos = dict[str, Any]
 
@@ -188,7 +188,7 @@ def vector_env(
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
             ``SwarmVectorEnv``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period``, ``overrides`` and ``engine``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
             for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each vehicle; the reward of
             a row is the mean over all vehicles.
     """

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from uuv_marl import __version__
 from uuv_marl.envs.drawing.camera import shown_speed
-from uuv_marl.replay.recording import Float32, Recording
+from uuv_marl.replay.recording import Recording
 from uuv_marl.scenario import Scenario, conditions, growth
-
-Int32 = NDArray[np.int32]
+from uuv_marl.types import Bool, Float32, Float64, Int32, Int64
 
 SCHEMA = 1
 
@@ -188,7 +187,7 @@ def _entry(
     }  # fmt: skip
 
 
-def _filled(values: NDArray[np.float64], missing: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _filled(values: Float64, missing: Bool) -> Float64:
     """The value before in place of each one that is missing, zero where there is none."""
     if not missing.any():
         return values
@@ -204,7 +203,7 @@ def _differences(values: Int32, order: int) -> Int32:
     return np.moveaxis(values, 0, -1).ravel()
 
 
-def _smooth(scaled: NDArray[np.float64], coding: Coding) -> Int32:
+def _smooth(scaled: Float64, coding: Coding) -> Int32:
     """Samples from coarse to fine; each level's differences stand in the order of the vehicles, then of time."""
     whole = np.zeros(scaled.shape, np.int32)
     whole[:: coding.stride] = np.rint(scaled[:: coding.stride])
@@ -219,7 +218,7 @@ def _smooth(scaled: NDArray[np.float64], coding: Coding) -> Int32:
     return np.concatenate(levels)
 
 
-def _between(whole: Int32, now: NDArray[np.int64], half: int) -> Int32:
+def _between(whole: Int32, now: Int64, half: int) -> Int32:
     """What samples ``half`` before and after ``now``, and three times as far, say of it; shape as ``whole[now]``."""
     after = np.where(now + half < len(whole), now + half, now - half)
     guess = (whole[now - half] + whole[after]) >> 1

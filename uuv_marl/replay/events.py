@@ -1,12 +1,9 @@
 """What is marked on a replay's time line: contacts, near misses, losses and the arrival."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from uuv_marl.replay.recording import Event, Float32
-
-Bool = NDArray[np.bool_]
-Int32 = NDArray[np.int32]
+from uuv_marl.replay.recording import Event
+from uuv_marl.types import Bool, Float32, Int32
 
 REARM_S = 2.0
 """A vehicle's next near miss counts once it has kept its distance for so long, so that one which stays at the limit

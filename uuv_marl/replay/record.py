@@ -10,9 +10,10 @@ from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.events import arrival, contacts, losses, near_misses
-from uuv_marl.replay.recording import Event, Float32, Inspection, Recording, Water
+from uuv_marl.replay.recording import Event, Inspection, Recording, Water
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Float32
 
 MOST_INSPECTED = 8
 """Vehicles whose sonar one recording holds."""

@@ -2,14 +2,9 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario
-
-Float32 = NDArray[np.float32]
-Int32 = NDArray[np.int32]
+from uuv_marl.types import Float32, Float64, Int32
 
 
 class Event(NamedTuple):
@@ -47,7 +42,7 @@ class Water(NamedTuple):
 
     drift: Float32
     """Velocity of mean and process together, north and east [m/s], shape (time, 2)."""
-    eddies: NDArray[np.float64]
+    eddies: Float64
     """Centre north, east [m] and circulation [m2/s], clockwise positive, shape (eddy, 3)."""
 
 

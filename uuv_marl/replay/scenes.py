@@ -1,12 +1,12 @@
 """Scenes of a recording, for the painter that draws live worlds too."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, Sonar
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.recording import Event, Inspection, Recording
 from uuv_marl.sim.sea.current import FlowField
+from uuv_marl.types import Bool
 
 
 class Scenes:
@@ -62,7 +62,7 @@ class Scenes:
             water=self._water(k),
         )
 
-    def _near(self, k: int) -> NDArray[np.bool_]:
+    def _near(self, k: int) -> Bool:
         recording, limits = self.recording, self.recording.scenario.constraints
         discs, position = recording.obstacles, self._position[k]
         offset = position[:, None] - discs[None, :, :2]

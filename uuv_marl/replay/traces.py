@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from pydantic import ValidationError
@@ -17,12 +17,12 @@ from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay.command import command
 from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
-from uuv_marl.replay.recording import Event, Float32, Recording, Water
+from uuv_marl.replay.recording import Event, Recording, Water
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.sim.compiled import interpreted
-from uuv_marl.sim.sea.current import advance_gust, water
+from uuv_marl.sim.sea.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import arrival_times, reference
+from uuv_marl.types import Float32
 
 _ELSE = "give the folder of a benchmark or a file of its folder traces, or simulate with --scenario and --policy"
 _MOST_LISTED = 10
@@ -205,13 +205,13 @@ def _water(scenario: Scenario, seed: int, time_s: Float32) -> Water | None:
     """How the water moved, which the seed decides alone."""
     if not scenario.current.flows:
         return None
-    swarm, numbers, step, tick = Swarm(scenario), water(scenario), interpreted(advance_gust), 0
+    swarm, numbers, tick = Swarm(scenario), water(scenario), 0
     swarm.reset(seed)
     drift = np.zeros((len(time_s), 2), np.float32)
     for k, until in enumerate(np.rint(time_s / scenario.timing.control_hold_s).astype(int).tolist()):
         while tick < until:
             tick += 1
-            step(0, swarm.keys[0], tick, numbers, swarm.currents)
+            advance_gust(0, swarm.keys[0], tick, numbers, cast(Flow, swarm.currents))
         drift[k] = swarm.flow_field().drift
     return Water(drift, swarm.flow_field().eddies)
 

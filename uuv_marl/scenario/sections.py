@@ -7,8 +7,6 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from uuv_marl.scenario.fields import (
@@ -21,12 +19,13 @@ from uuv_marl.scenario.fields import (
     Speed,
     within,
 )
+from uuv_marl.types import Float64
 
 NOMINAL_VEHICLES = 54
 """The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
 
 
-Seconds = TypeVar("Seconds", float, NDArray[np.float64])
+Seconds = TypeVar("Seconds", float, Float64)
 """A time or an array of times [s]."""
 Legs = Annotated[int, within(1, 8)]
 Discs = Annotated[int, within(0, 64)]

@@ -7,12 +7,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.sections import Timing
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 RK4_LIMIT = 2.78
 """Classical Runge-Kutta is stable on the negative real axis up to this product of rate and step."""
 TRIAL_STEPS, RUNS = 600, 128

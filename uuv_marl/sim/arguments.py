@@ -8,6 +8,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from uuv_marl.types import Float32
+
 SeedLike = int | Sequence[int | None] | NDArray[np.integer] | None
 
 
@@ -47,7 +49,7 @@ def world_seeds(seed: SeedLike, worlds: Sequence[int]) -> list[int | None]:
     return [None if value is None else whole_number("seed", value, 0) for value in given]
 
 
-def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray[np.float32]:
+def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> Float32:
     """An action as float32 of a shape; not copied where it is that already.
 
     Args:

@@ -2,16 +2,8 @@
 
 from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.tables import Bounds, described
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32, Float64, Int32, Int64
 
 
 @described

@@ -7,15 +7,9 @@ a search visits boxes of cells: in each row of a box the vehicles are neighbours
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.workspace import Cells, Columns
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool
 
 ONE_CELL_UP_TO = 250
 """Vehicles up to which a look at every pair is faster than a grid (perf/, docs/speed.md)."""
@@ -48,11 +42,7 @@ def max_cells(num_vehicles: int) -> int:
 def fit(w: int, alive: Bool, side: float, now: Columns) -> Grid:
     """A grid over the living of a world: cells as wide as asked, smaller in a crowd, wider where there were too many.
 
-    Args:
-        w: index of the world.
-        alive: False for lost vehicles, shape (world, vehicle).
-        side: edge of a cell, as asked for [m].
-        now: columns of the world's vehicles, of which positions are read.
+    ``side`` is the edge of a cell that is asked for [m].
     """
     x, y = now.x, now.y
     living, x_min, x_max, y_min, y_max = 0, math.inf, -math.inf, math.inf, -math.inf
@@ -77,11 +67,7 @@ def fit(w: int, alive: Bool, side: float, now: Columns) -> Grid:
 def place(value: float, low: float, side: float, num: int) -> int:
     """Row or column that holds a coordinate; the first or last for one beyond the grid, the first for none (NaN).
 
-    Args:
-        value: the coordinate [m]: north for a row, east for a column.
-        low: where the first row or column begins [m].
-        side: edge of a cell [m].
-        num: how many rows or columns there are.
+    ``low``: where the first row or column begins [m]; ``side``: edge of a cell [m]; ``num``: how many there are.
     """
     cell = (value - low) / side
     return int(min(cell, num - 1.0)) if cell > 0.0 else 0
@@ -91,12 +77,7 @@ def place(value: float, low: float, side: float, num: int) -> int:
 def sort(w: int, alive: Bool, side: float, now: Columns, cells: Cells) -> Grid:
     """Fill ``cells`` with the living of a world, by cell and within a cell by index; where the cells lie.
 
-    Args:
-        w: index of the world.
-        alive: False for lost vehicles, shape (world, vehicle).
-        side: edge of a cell, as asked for [m]; see ``fit``.
-        now: columns of the world's vehicles.
-        cells: is written.
+    ``side`` is that of ``fit``.
     """
     grid, x, y, c, s = fit(w, alive, side, now), now.x, now.y, now.cos, now.sin
     num = grid.rows * grid.columns

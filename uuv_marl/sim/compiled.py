@@ -12,7 +12,6 @@ import os
 import re
 import tempfile
 import time
-import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
@@ -230,20 +229,8 @@ def compiled_inner(function: F) -> F:
     def ignore(*_args: object) -> None:
         return
 
-    dispatcher._insert, dispatcher._compile_for_args, dispatcher.is_inner = ignore, refuse, True
+    dispatcher._insert, dispatcher._compile_for_args = ignore, refuse
     return cast(F, dispatcher)
-
-
-@functools.cache
-def interpreted(function: F) -> F:
-    """The Python of a ``compiled_inner`` function and of those that it calls; functions with a door stay compiled."""
-    plain = getattr(function, "py_func", None)
-    if plain is None:  # Numba is switched off: it is Python already
-        return function
-    used = {name: plain.__globals__[name] for name in plain.__code__.co_names if name in plain.__globals__}
-    inner = {name: interpreted(value) for name, value in used.items() if getattr(value, "is_inner", False)}
-    space = {**plain.__globals__, **inner}
-    return cast(F, types.FunctionType(plain.__code__, space, plain.__name__))
 
 
 def entry(function: F, *arguments: object) -> F:

@@ -1,11 +1,9 @@
-"""What advances the worlds of a swarm: compiled code, or plain Python to read. ``Swarm`` is the front of either."""
+"""What advances the worlds of a swarm: the compiled functions, and the threads that share them."""
 
 import functools
 from collections.abc import Callable
-from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
@@ -13,37 +11,20 @@ from uuv_marl.sim.cells import max_cells
 from uuv_marl.sim.compiled import entry
 from uuv_marl.sim.entry_points import observe, step_worlds
 from uuv_marl.sim.model import model
-from uuv_marl.sim.plain import PlainEngine
 from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.threads import num_threads, on_threads
 from uuv_marl.sim.workspace import scratch
-
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
-EngineName = Literal["numba", "plain"]
-
-
-class Engine(Protocol):
-    """Reads and writes the arrays of ``World`` that it was made with; whatever else it holds, no later run needs."""
-
-    def observe(self, w: int) -> None:
-        """Facts and percepts of world w from its state and course, as after a reset."""
-        ...
-
-    def step(self, action: Float32, active: Bool | None) -> bool:
-        """One decision period of the worlds that are ``active``, shape (world,), default all; whether any has diverged.
-
-        ``action``, shape (world, vehicle, 2), is finite but for the lost. A world that has diverged stays as it is.
-        """
-        ...
-
+from uuv_marl.types import Bool, Float32
 
 _LEAST = 200
 """Vehicles that a thread must have to be worth waking: that takes as long as moving about as many."""
 
 
-class NumbaEngine:
-    """Few vehicles run in the calling thread; worlds with many are shared among threads."""
+class Engine:
+    """Reads and writes the arrays of ``World`` that it was made with; whatever else it holds, no later run needs.
+
+    Few vehicles run in the calling thread; worlds with many are shared among threads.
+    """
 
     def __init__(self, scenario: Scenario, world: World, sea: Sea | None) -> None:
         n, self._num_worlds = scenario.swarm.num_vehicles, len(world.state.tick)
@@ -66,11 +47,14 @@ class NumbaEngine:
         return {name: value for name, value in vars(self).items() if name not in ("_observe", "_step")}
 
     def observe(self, w: int) -> None:
-        """See ``Engine``."""
+        """Facts and percepts of world w from its state and course, as after a reset."""
         self._observe(w, *self._numbers)
 
     def step(self, action: Float32, active: Bool | None) -> bool:
-        """See ``Engine``."""
+        """One decision period of the worlds that are ``active``, shape (world,), default all; whether any has diverged.
+
+        ``action``, shape (world, vehicle, 2), is finite but for the lost. A world that has diverged stays as it is.
+        """
         running = self._every if active is None else np.ascontiguousarray(active)
         if self._threads == 1:
             return self._step(0, 0, self._num_worlds, running, action, *self._numbers)
@@ -79,18 +63,3 @@ class NumbaEngine:
             return self._step(thread, begin, end, running, action, *self._numbers)
 
         return on_threads(some, self._num_worlds, self._threads)
-
-
-def make_engine(name: EngineName, scenario: Scenario, world: World, sea: Sea | None) -> Engine:
-    """An engine by name.
-
-    Args:
-        name: ``numba`` or ``plain``.
-        scenario: what to simulate.
-        world: the arrays that it works on.
-        sea: what disturbs them, None for nothing.
-    """
-    engines: dict[EngineName, type[NumbaEngine | PlainEngine]] = {"numba": NumbaEngine, "plain": PlainEngine}
-    if name not in engines:
-        raise ValueError(f"engine must be 'numba' or 'plain', got {name!r}")
-    return engines[name](scenario, world, sea)

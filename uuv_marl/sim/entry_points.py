@@ -3,31 +3,18 @@
 Numba compiles ``uuv_marl.sim.world`` once without a sea and once with one, so that calm worlds hold nothing of it.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.model import Model
 from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.workspace import Scratch, workspace
 from uuv_marl.sim.world import observe_world, step_world
-
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float32
 
 
 @compiled
 def observe(w: int, world: World, model: Model, room: Scratch, sea: Sea | None) -> None:
-    """Facts and percepts of a world that has just been reset.
-
-    Args:
-        w: index of the world.
-        world: the arrays; facts, senses and ``state.dwell`` are written.
-        model: the scenario's numbers.
-        room: to work in; the first thread's is used.
-        sea: what disturbs it, None for nothing.
-    """
+    """Facts and percepts of a world that has just been reset. The first thread's room is used."""
     observe_world(w, world, model, workspace(room, 0), sea)
 
 
@@ -38,16 +25,7 @@ def step_worlds(
 ) -> bool:  # fmt: skip
     """One decision period of those worlds in a range that are active; whether any of them has diverged.
 
-    Args:
-        thread: index of the room to work in.
-        begin: the first world.
-        end: the first world beyond them.
-        active: worlds to step, shape (world,); the others stay as they are.
-        action: shares of full force, body frame, shape (world, vehicle, 2).
-        world: the arrays.
-        model: the scenario's numbers.
-        room: to work in, a part for each thread.
-        sea: what disturbs the worlds, None for nothing.
+    ``begin`` and ``end`` bound the range, ``thread`` is the index of the room to work in.
     """
     own, diverged = workspace(room, thread), False
     for w in range(begin, end):

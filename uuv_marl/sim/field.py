@@ -4,13 +4,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import RandomField, growth
 from uuv_marl.sim.trajectory import arrival_times
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 _TRIES_PER_OBSTACLE = 32
 
 

@@ -3,17 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import Course
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.sonar import Suite, cross, diamond
 from uuv_marl.sim.workspace import Cells, Listener, Workspace
+from uuv_marl.types import Float64, Int64
 
-Float64 = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
 Box = tuple[float, float, float, float]
 """Northern, southern, eastern and western side [m]."""
 Points = tuple[Float64, Float64, Int64]
@@ -27,16 +24,7 @@ _REACH_CELLS = 5.0
 
 @compiled_inner
 def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> bool:
-    """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy).
-
-    Args:
-        x: start of the segment, north [m].
-        y: start of the segment, east [m].
-        dx: how far north of it the segment ends [m].
-        dy: how far east of it the segment ends [m].
-        w: index of the world.
-        course: holds the obstacles of all worlds.
-    """
+    """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy)."""
     obstacles, length2 = course.obstacles, dx * dx + dy * dy
     for k in range(course.num_obstacles[w]):
         o_x, o_y = obstacles[w, k, 0] - x, obstacles[w, k, 1] - y
@@ -50,12 +38,8 @@ def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> 
 def locate(num: int, points: Points, pose: Pose, bins: int, ear: Listener) -> None:
     """Where points are for a listener; itself nowhere.
 
-    Args:
-        num: how many of the points count, from the first on.
-        points: north and east [m] and index of the vehicles to listen to, shape (vehicle,) each.
-        pose: of the listener: north and east [m], cosine and sine of the heading.
-        bins: parts of the full circle of directions, a power of two.
-        ear: squared distances, places ahead and abeam, and bins are written.
+    ``bins``: parts of the full circle of directions, a power of two. Squared distances, places ahead and abeam, and
+    bins are written.
     """
     (xs, ys, _), (x, y, c, s) = points, pose
     per_unit, last = 0.25 * bins, np.int32(bins - 1)
@@ -72,13 +56,8 @@ def locate(num: int, points: Points, pose: Pose, bins: int, ear: Listener) -> No
 def choose_sectors(num: int, layer: int, suite: Suite, ear: Listener) -> None:
     """The sub-sector of a layer for each of those located. Eq. 12-13.
 
-    No branch depends on the positions: a wrongly guessed branch costs more than all the arithmetic here.
-
-    Args:
-        num: how many were located.
-        layer: row of ``suite.codes``, which holds sub-sectors that do not overlap.
-        suite: finds a direction's sub-sector.
-        ear: places and bins are read, sub-sectors are written; the number of all sub-sectors stands for none.
+    No branch depends on the positions: a wrongly guessed branch costs more than all the arithmetic here. ``layer`` is a
+    row of ``suite.codes``. The number of all sub-sectors stands for none.
     """
     none, num_edges = suite.lower.shape[0], 0
     for q in range(num):
@@ -115,14 +94,7 @@ def keep_nearest(num: int, vehicles: Int64, ear: Listener) -> None:
 def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: Suite, ear: Listener) -> None:
     """A listener hears those of some vehicles that are nearest in a sub-sector, unless an obstacle is between.
 
-    Args:
-        num: how many of the points count, from the first on.
-        points: north and east [m] and index of the vehicles to listen to, shape (vehicle,) each.
-        pose: of the listener: north and east [m], cosine and sine of the heading.
-        w: index of the world.
-        course: holds the obstacles of all worlds.
-        suite: the sonar's sub-sectors.
-        ear: whom it has heard so far in each sub-sector; a nearer one replaces that.
+    Of the points the first ``num`` count. A nearer one replaces whom the ear has heard so far.
     """
     locate(num, points, pose, suite.codes.shape[1], ear)
     xs, ys, vehicles = points
@@ -137,14 +109,7 @@ def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: 
 
 @compiled_inner
 def gather(box: Box, cells: Cells, grid: Grid, ear: Listener) -> int:
-    """Collect the entries of the cells that meet a rectangle of the world; how many.
-
-    Args:
-        box: the rectangle's northern, southern, eastern and western side [m].
-        cells: the living, sorted by cell.
-        grid: where the cells lie.
-        ear: positions and indices of those in these cells are written.
-    """
+    """Collect the entries of the cells that meet a rectangle of the world; how many."""
     north, south, east, west = box
     left, right = place(west, grid.y_min, grid.side, grid.columns), place(east, grid.y_min, grid.side, grid.columns)
     top, bottom = place(north, grid.x_min, grid.side, grid.rows), place(south, grid.x_min, grid.side, grid.rows)
@@ -166,16 +131,7 @@ def hear_nobody(ear: Listener) -> None:
 
 @compiled_inline
 def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
-    """Whom one vehicle hears: those around it, then farther out where a sub-sector is empty.
-
-    Args:
-        p: its entry in ``workspace.cells``.
-        w: index of the world.
-        course: holds the obstacles of all worlds.
-        suite: the sonar's sub-sectors.
-        workspace: the sorted cells are read, the listener is written.
-        grid: where the cells lie.
-    """
+    """Whom one vehicle hears: those around it, then farther out where a sub-sector is empty."""
     cells, ear, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]
     pose = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(sectors + 1):
@@ -186,29 +142,26 @@ def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, gri
         listen(grid.living, (cells.x, cells.y, cells.vehicle), pose, w, course, suite, ear)
         return
     reach = _REACH_CELLS * grid.side
-    box = pose[0] + reach, pose[0] - reach, pose[1] + reach, pose[1] - reach
-    # First all within reach; then sub-sector by sub-sector, farther and farther until nobody nearer can be missed.
-    k, near = -1, 0.0
-    while k < sectors:
-        num = gather(box, cells, grid, ear)
-        listen(num, (ear.x, ear.y, ear.vehicle), pose, w, course, suite, ear)
-        near *= 1.5
-        while k < sectors and (k < 0 or near * near > ear.nearest[k]):
-            k, near = k + 1, reach
-        box = reached(min(k, sectors - 1), near, 1.5 * near, pose, suite)
+    around = pose[0] + reach, pose[0] - reach, pose[1] + reach, pose[1] - reach
+    listen_within(around, pose, w, course, suite, workspace, grid)
+    for k in range(sectors):  # farther and farther, until nobody nearer can be missed
+        near = reach
+        while near * near <= ear.nearest[k]:
+            listen_within(reached(k, near, 1.5 * near, pose, suite), pose, w, course, suite, workspace, grid)
+            near *= 1.5
+
+
+@compiled_inner
+def listen_within(box: Box, pose: Pose, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
+    """A listener hears those of a rectangle of the world, as in ``listen``."""
+    ear = workspace.listener
+    num = gather(box, workspace.cells, grid, ear)
+    listen(num, (ear.x, ear.y, ear.vehicle), pose, w, course, suite, ear)
 
 
 @compiled_inner
 def reached(k: int, near: float, far: float, pose: Pose, suite: Suite) -> Box:
-    """Rectangle around what a sub-sector hears between two distances.
-
-    Args:
-        k: index of the sub-sector.
-        near: the smaller distance [m].
-        far: the larger distance [m].
-        pose: of the listener: north and east [m], cosine and sine of the heading.
-        suite: the sonar's sub-sectors.
-    """
+    """Rectangle around what a sub-sector hears between two distances, ``near`` and ``far`` [m]."""
     x, y, c, s = pose
     l_x, l_y, u_x, u_y = suite.lower[k, 0], suite.lower[k, 1], suite.upper[k, 0], suite.upper[k, 1]
     # The far edges are lengthened so that their chord clears the arc: by 1 / cos of half the width.

@@ -4,14 +4,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from uuv_marl.percept import PerceptLayout
+from uuv_marl.percept import PerceptLayout, Starts
 from uuv_marl.scenario import Scenario, growth
 from uuv_marl.sim.disturbance import loss_ticks
 from uuv_marl.sim.sonar import Suite, suite
 from uuv_marl.sim.vehicle import Plant, plant
-from uuv_marl.sim.views import Starts
+from uuv_marl.types import Float64, Int64
 
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
 """Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
@@ -40,9 +39,9 @@ class Rules(NamedTuple):
     """Control holds that the swarm must rest to have arrived; 0 in passage."""
     spread: float
     """Largest distance of a vehicle from the end for arrival; in passage, from where the centre is along the leg."""
-    arrival_radii: NDArray[np.float64]
+    arrival_radii: Float64
     """Radii for the swarm's centre, the scenario's own first, which is infinite in passage, shape (radius,)."""
-    loss_ticks: NDArray[np.int64]
+    loss_ticks: Int64
     """Control hold at whose end each loss happens, shape (loss,)."""
     cell_side: float
 

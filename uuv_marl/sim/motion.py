@@ -1,16 +1,13 @@
 """A world's vehicles moved together: their states as columns, over which loops pass on vector registers."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.sim.arrays import State
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, actuators, advance, effort, held, limited, wrap
 from uuv_marl.sim.workspace import Columns
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float32
 
 
 @compiled_inner
@@ -27,14 +24,7 @@ def load(w: int, state: State, now: Columns) -> None:
 
 @compiled_inner
 def load_one(w: int, i: int, state: State, now: Columns) -> None:
-    """The columns of one vehicle alone, whose latest motion is thrown away.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        state: poses and velocities to go back to.
-        now: columns of the world's vehicles; the vehicle's pose and velocity are written.
-    """
+    """The columns of one vehicle alone, whose latest motion is thrown away."""
     eta, nu = state.eta, state.nu
     now.x[i], now.y[i], now.psi[i] = eta[w, i, 0], eta[w, i, 1], eta[w, i, 2]
     now.u[i], now.v[i], now.r[i] = nu[w, i, 0], nu[w, i, 1], nu[w, i, 2]
@@ -61,14 +51,7 @@ def apply_actuators(first: bool, now: Columns, plant: Plant) -> None:
 
 @compiled
 def integrate(steps: int, step_s: float, now: Columns, plant: Plant) -> None:
-    """One control hold. Eq. 1-4, 23-24.
-
-    Args:
-        steps: integration steps of a control hold.
-        step_s: time of one of them [s].
-        now: columns of the world's vehicles; thrust and torque are held, poses and velocities are written.
-        plant: the scenario's vehicle.
-    """
+    """One control hold. Eq. 1-4, 23-24. Thrust and torque are held; poses and velocities are written."""
     for _ in range(steps):
         for i in range(now.x.shape[0]):
             state = now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i]

@@ -19,16 +19,7 @@ def echo(
 ) -> tuple[float, float, float]:
     """Range [m] and nearest point, in the body frame [m], of a disc's surface within a beam; range infinite for none.
 
-    Inside the disc the range is 0.
-
-    Args:
-        c_x: the disc's centre, how far ahead [m].
-        c_y: the disc's centre, how far to starboard [m].
-        radius: of the disc [m].
-        l_x: lower edge of the beam, a unit vector: forward part.
-        l_y: lower edge: starboard part.
-        u_x: upper edge of the beam, a unit vector: forward part.
-        u_y: upper edge: starboard part.
+    Inside the disc the range is 0. The beam lies between l and u, unit vectors; c is the disc's centre.
     """
     distance = math.hypot(c_x, c_y)
     if distance <= radius:
@@ -55,14 +46,7 @@ def saturate(value: float, limit: float) -> float:
 
 @compiled_inline
 def toward(dx: float, dy: float, c: float, s: float) -> tuple[float, float]:
-    """A vector in the body frame, ahead and to starboard [m]; one longer than ``MAX_RANGE_M`` is cut to that.
-
-    Args:
-        dx: its northern part [m].
-        dy: its eastern part [m].
-        c: cosine of the heading.
-        s: sine of the heading.
-    """
+    """A vector in the body frame, ahead and to starboard [m]; one longer than ``MAX_RANGE_M`` is cut to that."""
     far = max(math.sqrt(dx * dx + dy * dy) / MAX_RANGE_M, 1.0)
     return saturate((c * dx + s * dy) / far, MAX_RANGE_M), saturate((c * dy - s * dx) / far, MAX_RANGE_M)
 
@@ -71,13 +55,7 @@ def toward(dx: float, dy: float, c: float, s: float) -> tuple[float, float]:
 def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspace, see: Fields) -> None:
     """What one vehicle knows, into the fields of its percept. Eq. 11, 14-17.
 
-    Args:
-        p: its entry in ``workspace.cells``.
-        w: index of the world.
-        world: the arrays; the vehicle's percept is cleared and written.
-        model: the scenario's numbers.
-        workspace: the sorted cells, and the listener, which ``hear`` has filled for this vehicle.
-        see: fields of the percepts, views of ``world.senses.percept``.
+    The vehicle's percept is cleared and written.
     """
     cells, listener, course = workspace.cells, workspace.listener, world.course
     nu, reference, i = world.state.nu, world.facts.reference, cells.vehicle[p]
@@ -114,13 +92,7 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 def write_echoes(i: int, w: int, pose: Pose, course: Course, suite: Suite, see: Fields) -> None:
     """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
 
-    Args:
-        i: index of the vehicle.
-        w: index of the world.
-        pose: of the vehicle: north and east [m], cosine and sine of the heading.
-        course: holds the obstacles of all worlds.
-        suite: the sonar's sub-sectors.
-        see: fields of the percepts; echoes are written, and stay as they are where nothing is heard.
+    What was written stays where nothing is heard.
     """
     x, y, c, s = pose
     for a in range(suite.active.shape[0]):

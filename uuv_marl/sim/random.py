@@ -42,15 +42,7 @@ def episode_key(stream: np.random.Generator) -> np.uint64:
 
 @compiled_inline
 def philox(key: np.uint64, c_0: np.uint64, c_1: np.uint64, c_2: np.uint64, c_3: np.uint64) -> Block:
-    """Four random words of 32 bits.
-
-    Args:
-        key: the generator's key, 64 bits.
-        c_0: first word of its counter, below 2^32, as the other three.
-        c_1: second word.
-        c_2: third word.
-        c_3: fourth word.
-    """
+    """Four random words of 32 bits. The words of the counter are below 2^32."""
     k_0, k_1 = key & _LOW, key >> _HALF
     for _ in range(10):
         p_0, p_1 = _MULTIPLIER_0 * c_0, _MULTIPLIER_1 * c_2

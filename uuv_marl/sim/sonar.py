@@ -9,13 +9,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+from uuv_marl.types import Float64, Int64
 
 _TINY = 1e-300
 """Keeps the direction of no vector at all from dividing by zero."""
@@ -91,14 +88,7 @@ def _unit(degrees: float) -> tuple[float, float]:
 
 @compiled_inline
 def cross(a_x: float, a_y: float, b_x: float, b_y: float) -> float:
-    """Positive where b is clockwise of a, by less than half a turn.
-
-    Args:
-        a_x: forward part of the vector a, in any unit.
-        a_y: its starboard part.
-        b_x: forward part of the vector b, in any unit.
-        b_y: its starboard part.
-    """
+    """Positive where b is clockwise of a, by less than half a turn."""
     return a_x * b_y - a_y * b_x
 
 

@@ -2,16 +2,11 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.workspace import Cells
-
-Float64 = NDArray[np.float64]
-
+from uuv_marl.types import Float64
 
 NOWHERE = (math.inf, math.inf, 0.0)
 """Where an obstacle was that there was not."""
@@ -34,12 +29,7 @@ def find_nearest(cells: Cells, grid: Grid) -> None:
 def lower_all(first: int, end: int, x: float, y: float, cells: Cells) -> None:
     """Let entries of the cells know of somebody.
 
-    Args:
-        first: the first of these entries.
-        end: the first entry beyond them.
-        x: where that somebody is, north [m].
-        y: where that somebody is, east [m].
-        cells: the living, sorted by cell; ``nearest`` is lowered.
+    Those from ``first`` on, before ``end``; ``cells.nearest`` is lowered.
     """
     for q in range(first, end):
         dx, dy = cells.x[q] - x, cells.y[q] - y
@@ -75,13 +65,7 @@ def search(p: int, cells: Cells, grid: Grid) -> float:
 def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, grid: Grid) -> int:
     """Contact episodes of one vehicle that begin: others that are near now and were not one control hold ago.
 
-    Args:
-        w: index of the world.
-        p: the vehicle's entry in ``cells``.
-        touch: distance of two centres below which they are in contact [m].
-        before: positions one control hold ago, north and east [m], shape (world, vehicle, 2).
-        cells: the living, sorted by cell.
-        grid: where the cells lie.
+    ``touch``: distance of two centres below which they are in contact [m].
     """
     i, count = cells.vehicle[p], 0
     rings = 0.0 if grid.rows * grid.columns == 1 else touch
@@ -109,13 +93,6 @@ def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid
     """Lower the spacing of the living and raise their contacts; how many episodes between vehicles began.
 
     A contact episode begins where two hulls overlap now and did not one control hold ago.
-
-    Args:
-        w: index of the world.
-        hull: radius of a hull [m].
-        world: the arrays; facts are written.
-        cells: the living, sorted by cell; ``nearest`` is written.
-        grid: where the cells lie.
     """
     before, facts = world.state.before, world.facts
     touch, began = 2.0 * hull, 0
@@ -135,13 +112,7 @@ def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Gri
     """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began.
 
     A contact episode begins where a hull meets an obstacle now and did not one control hold ago; either may have moved.
-
-    Args:
-        w: index of the world.
-        hull: radius of a hull [m].
-        world: the arrays; facts and ``state.obstacles_before`` are written.
-        cells: the living, sorted by cell.
-        grid: where the cells lie.
+    ``state.obstacles_before`` is written, too.
     """
     obstacles, num, facts = world.course.obstacles, world.course.num_obstacles[w], world.facts
     before, obstacles_before = world.state.before, world.state.obstacles_before
@@ -170,14 +141,7 @@ def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Gri
 
 @compiled_inner
 def farthest(x: float, y: float, cells: Cells, grid: Grid) -> int:
-    """The entry of ``cells`` that is farthest from a point, -1 for none.
-
-    Args:
-        x: the point's north [m].
-        y: the point's east [m].
-        cells: the living, sorted by cell.
-        grid: where the cells lie.
-    """
+    """The entry of ``cells`` that is farthest from a point, -1 for none."""
     best, most = -1, -1.0
     for p in range(grid.living):
         dx, dy = cells.x[p] - x, cells.y[p] - y

@@ -3,12 +3,11 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 _TRIES_PER_VEHICLE = 64
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-UInt64 = NDArray[np.uint64]
+from uuv_marl.types import UInt64
+
 _LOW = 2**64 - 1
 
 

@@ -1,4 +1,4 @@
-"""Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks; an engine computes."""
+"""Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
 from uuv_marl.sim.disturbance import draw_losses
-from uuv_marl.sim.engine import EngineName, make_engine
+from uuv_marl.sim.engine import Engine
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
@@ -24,6 +24,7 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
 from uuv_marl.sim.trajectory import arrival_times
+from uuv_marl.types import Bool, Float64, Int32
 
 _log = logging.getLogger("uuv_marl")
 
@@ -37,11 +38,9 @@ class Swarm:
     Args:
         scenario: what to simulate.
         num_worlds: how many worlds a call steps.
-        engine: ``numba`` (compiled: one world runs serially, several run on threads), or ``plain``, the same numbers
-            from the plain Python of ``uuv_marl/sim/plain.py``, tens to hundreds of times slower.
     """
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, engine: EngineName = "numba") -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.num_worlds = num_worlds = whole_number("num_worlds", num_worlds, 1)
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
@@ -57,7 +56,7 @@ class Swarm:
         self._world = World(self.state, self.course, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
         self._sea = make_sea(scenario, self.keys, self._sizes)
-        self._engine = make_engine(engine, scenario, self._world, self._sea)
+        self._engine = Engine(scenario, self._world, self._sea)
 
     @property
     def percept(self) -> Percept:
@@ -65,17 +64,17 @@ class Swarm:
         return Percept(self._senses.percept, self.layout, Clock(self.facts.time_s, self.keys), self.state.alive)
 
     @property
-    def heard(self) -> NDArray[np.int32]:
+    def heard(self) -> Int32:
         """Index of the vehicle heard in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
         return self._senses.heard
 
     @property
-    def heading(self) -> NDArray[np.float64]:
+    def heading(self) -> Float64:
         """Cosine and sine of every vehicle's heading psi, shape (world, vehicle, 2)."""
         return self._senses.heading
 
     @property
-    def flow(self) -> NDArray[np.float64]:
+    def flow(self) -> Float64:
         """Velocity of the water at each vehicle, north and east [m/s], shape (world, vehicle, 2)."""
         return np.zeros_like(self.state.before) if self._sea is None else self._sea.flow.flow
 
@@ -95,7 +94,7 @@ class Swarm:
         return flow_field(world, self._sea.water.core, self._sea.flow)
 
     @property
-    def velocity(self) -> NDArray[np.float64]:
+    def velocity(self) -> Float64:
         """Every vehicle's velocity over ground, surge and sway in its body frame [m/s], shape (world, vehicle, 2)."""
         if self._sea is None:
             return self.state.nu[:, :, :2]
@@ -104,26 +103,26 @@ class Swarm:
         return self.state.nu[:, :, :2] + drift * self.state.alive[:, :, None]
 
     @property
-    def duration_s(self) -> NDArray[np.float64]:
+    def duration_s(self) -> Float64:
         """Time that l(t) takes to its end [s], no task time is shorter; shape (world,)."""
         return self._duration_s
 
     @property
-    def time_limit_s(self) -> NDArray[np.float64]:
+    def time_limit_s(self) -> Float64:
         """Time at which an episode is cut off [s], shape (world,)."""
         return self.scenario.time_limit.of(self.duration_s)
 
     @property
-    def faulty(self) -> NDArray[np.bool_]:
+    def faulty(self) -> Bool:
         """Vehicles that a fault of the scenario has hit since the reset, shape (world, vehicle)."""
         return np.zeros_like(self.state.alive) if self._sea is None else hit(self.state.tick, self._sea.hull)
 
     @property
-    def arrived(self) -> NDArray[np.bool_]:
+    def arrived(self) -> Bool:
         """Worlds whose swarm has arrived, shape (world,)."""
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
-    def endings(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def endings(self) -> tuple[Bool, Bool]:
         """How episodes ended, shape (world,) each; both False for episodes that go on.
 
         Returns:
@@ -136,7 +135,7 @@ class Swarm:
         return terminated, (late | (self.facts.diverged >= 0)) & ~terminated
 
     @property
-    def ended(self) -> NDArray[np.bool_]:
+    def ended(self) -> Bool:
         """Worlds whose episode is over, shape (world,)."""
         terminated, truncated = self.endings()
         return terminated | truncated
@@ -232,7 +231,7 @@ class Swarm:
             **{k: array for table in (*self._world, *sea_tables(self._sea)) for k, array in table._asdict().items()},
         }
 
-    def step(self, action: ArrayLike, active: NDArray[np.bool_] | None = None) -> Percept:
+    def step(self, action: ArrayLike, active: Bool | None = None) -> Percept:
         """Advance by one decision period.
 
         Args:

@@ -1,11 +1,9 @@
 """The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest at its end, or on beyond it."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 
 def arrival_times(waypoints: Float64, speed: float) -> Float64:

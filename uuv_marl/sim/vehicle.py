@@ -137,10 +137,7 @@ def damping(nu: Vector3, p: Plant) -> Vector3:
 def steering(u: float, steer: float, p: Plant) -> Vector2:
     """Sway force [N] and yaw moment [N m] of a torque [N m], or of a rudder's angle [rad] in the flow from ahead.
 
-    Args:
-        u: surge velocity through the water [m/s].
-        steer: the torque or the angle, positive to starboard.
-        p: the vehicle.
+    ``steer``: the torque or the angle, positive to starboard.
     """
     pressure = max(u, 0.0) * max(u, 0.0)
     return p.Y_uud * pressure * steer, (p.direct + p.N_uud * pressure) * steer
@@ -223,12 +220,7 @@ def advance_lagging(
 def advance(state: State6, tau: Vector2, flow: Vector2, h: float, p: Plant) -> State6:
     """The joint state one step later, forces and water held: the classical fourth-order Runge-Kutta method (Eq. 23-24).
 
-    Args:
-        state: pose and velocity relative to the water.
-        tau: thrust [N] and torque [N m], or the rudder's angle [rad].
-        flow: velocity of the water, north and east [m/s].
-        h: the step [s].
-        p: the vehicle.
+    ``tau``: thrust [N] and torque [N m], or the rudder's angle [rad].
     """
     return advance_lagging(state, tau, tau, tau, flow, h, p)
 
@@ -266,11 +258,7 @@ def most_thrust(direction: float, p: Plant) -> float:
 def held(a_x: float, a_y: float, angle: float, p: Plant) -> tuple[float, float]:
     """An action some control holds later: its force keeps its direction in the world; thrust and a rudder stay.
 
-    Args:
-        a_x: share of full thrust.
-        a_y: share of full torque, or of the rudder's limit.
-        angle: by which the vehicle has turned, clockwise [rad].
-        p: the vehicle.
+    ``angle``: by which the vehicle has turned, clockwise [rad].
     """
     if p.direct > 0.0:
         b_x, b_y = turned(a_x, a_y, angle, p)
@@ -290,11 +278,7 @@ def effort(a_x: float, a_y: float, p: Plant) -> float:
 def turned(a_x: float, a_y: float, angle: float, p: Plant) -> tuple[float, float]:
     """The action that keeps the same horizontal force in the world after the vehicle has turned.
 
-    Args:
-        a_x: share of full thrust.
-        a_y: share of full torque.
-        angle: by which it has turned, clockwise [rad].
-        p: the vehicle.
+    ``angle``: by which it has turned, clockwise [rad].
     """
     f_x, f_y = a_x * most_thrust(a_x, p), a_y * p.max_torque / p.lever_arm
     c, s = cos_sin(angle)

@@ -2,18 +2,15 @@
 
 from typing import Any, NamedTuple, cast
 
-import numpy as np
 from numba import config
 from numba.np import arrayobj
 from numpy.lib.stride_tricks import as_strided
-from numpy.typing import NDArray
 
+from uuv_marl.percept import Starts
 from uuv_marl.sim.compiled import compiled_inline
+from uuv_marl.types import Float32
 
 reshaped: Any = as_strided if cast(Any, config).DISABLE_JIT else cast(Any, arrayobj).reshape_unchecked
-Float32 = NDArray[np.float32]
-Starts = tuple[int, ...]
-"""Where each field starts in a flat percept, -1 where it is absent: ``PerceptLayout.offsets``."""
 
 
 class Fields(NamedTuple):
@@ -50,23 +47,21 @@ class Fields(NamedTuple):
 
 @compiled_inline
 def fields(flat: Float32, at: Starts) -> Fields:
-    """Views of flat percepts (world, vehicle, entry). The order is the table's: tests/test_tables.py."""
-    sectors, active = at[5] - at[4], at[7] - at[6]
-    compass, directions = max(at[9], 0), 2 if at[9] >= 0 else 0
-    link, linked = max(at[10], 0), sectors if at[10] >= 0 else 0
+    """Views of flat percepts (world, vehicle, entry)."""
+    sectors, active = at.neighbour - at.heard, at.echo_range - at.echo
     return Fields(
-        velocity=flat[:, :, at[0] : at[0] + 2],
-        yaw_rate=flat[:, :, at[1] : at[1] + 1],
-        reference=flat[:, :, at[2] : at[2] + 2],
-        reference_velocity=flat[:, :, at[3] : at[3] + 2],
-        heard=flat[:, :, at[4] : at[4] + sectors],
-        neighbour=pairs(flat, at[5], sectors)[0],
-        echo=flat[:, :, at[6] : at[6] + active],
-        echo_range=flat[:, :, at[7] : at[7] + active],
-        echo_position=pairs(flat, at[8], active)[0],
-        compass=flat[:, :, compass : compass + directions],
-        link_identity=flat[:, :, link : link + linked],
-        link_velocity=pairs(flat, link + linked, linked)[0],
+        velocity=part(flat, at.velocity, 2)[0],
+        yaw_rate=part(flat, at.yaw_rate, 1)[0],
+        reference=part(flat, at.reference, 2)[0],
+        reference_velocity=part(flat, at.reference_velocity, 2)[0],
+        heard=part(flat, at.heard, sectors)[0],
+        neighbour=pairs(flat, at.neighbour, sectors)[0],
+        echo=part(flat, at.echo, active)[0],
+        echo_range=part(flat, at.echo_range, active)[0],
+        echo_position=pairs(flat, at.echo_position, active)[0],
+        compass=part(flat, at.compass, 2)[0],
+        link_identity=part(flat, at.link_identity, sectors)[0],
+        link_velocity=pairs(flat, at.link_velocity, sectors)[0],
     )
 
 
@@ -91,29 +86,30 @@ class SeaFields(NamedTuple):
 
 @compiled_inline
 def sea_fields(flat: Float32, at: Starts) -> SeaFields:
-    """Views of flat percepts (world, vehicle, entry). The order is the table's: tests/test_tables.py."""
-    sectors = at[5] - at[4]
+    """Views of flat percepts (world, vehicle, entry)."""
+    sectors = at.neighbour - at.heard
     return SeaFields(
-        ground_velocity=part(flat, at[12], 2)[0],
-        water_velocity=part(flat, at[13], 2)[0],
-        age=part(flat, at[14], sectors)[0],
-        ranged=part(flat, at[15], sectors)[0],
-        modem_identity=part(flat, at[16], sectors)[0],
-        modem_velocity=pairs(flat, max(at[17], 0), sectors if at[17] >= 0 else 0)[0],
-        modem_age=part(flat, at[18], sectors)[0],
+        ground_velocity=part(flat, at.ground_velocity, 2)[0],
+        water_velocity=part(flat, at.water_velocity, 2)[0],
+        age=part(flat, at.age, sectors)[0],
+        ranged=part(flat, at.ranged, sectors)[0],
+        modem_identity=part(flat, at.modem_identity, sectors)[0],
+        modem_velocity=pairs(flat, at.modem_velocity, sectors)[0],
+        modem_age=part(flat, at.modem_age, sectors)[0],
     )
 
 
 @compiled_inline
 def part(flat: Float32, start: int, num: int) -> tuple[Float32]:
-    """A view (world, vehicle, num) from an entry on, empty where that is -1."""
+    """A view (world, vehicle, num) from an entry on, empty where that is -1; in a tuple, as ``pairs``."""
     first = max(start, 0)
     return (flat[:, :, first : first + (num if start >= 0 else 0)],)
 
 
 @compiled_inline
 def pairs(flat: Float32, start: int, num: int) -> tuple[Float32]:
-    """A view (world, vehicle, num, 2) from an entry on, in a tuple, since compiled code returns no array alone."""
+    """A view (world, vehicle, num, 2), likewise; in a tuple, since compiled code returns no array alone."""
     worlds, vehicles, _ = flat.shape
     across, down, along = flat.strides
-    return (reshaped(flat[:, :, start:], (worlds, vehicles, num, 2), (across, down, 2 * along, along)),)
+    shape = (worlds, vehicles, num if start >= 0 else 0, 2)
+    return (reshaped(flat[:, :, max(start, 0) :], shape, (across, down, 2 * along, along)),)

@@ -1,16 +1,16 @@
 """Room to work in: arrays that a step fills and forgets, one set for each thread."""
 
-from typing import Annotated, Any, NamedTuple
+from collections import Counter
+from collections.abc import Iterator
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.tables import rows
+from uuv_marl.types import Float64, Int32, Int64
 
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Int32 = NDArray[np.int32]
 Column = Annotated[Float64, "vehicle", "See uuv_marl.sim.vehicle."]
 
 
@@ -116,13 +116,41 @@ def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -
     )
 
 
+def _columns() -> Iterator[Any]:
+    """The tables of a workspace, in place of each array the number of its column among those of its axis and type."""
+    taken: Counter[object] = Counter()
+    for table in (Columns, Cells, Listener):
+        kinds = [(row.axes, row.dtype) for row in rows(table).values()]
+        numbers: list[int] = []
+        for kind in kinds:
+            numbers.append(taken[kind])
+            taken[kind] += 1
+        yield table(*cast(Any, numbers))
+
+
+_NOW, _CELLS, _LISTENER = _columns()
+
+
 @compiled_inner
 def workspace(room: Scratch, t: int) -> Workspace:
-    """Thread t's scratch by name. Every array has a column of its own: tests/test_tables.py."""
-    a, b, c, d = room.reals[t], room.wholes[t], room.shorts[t], room.sector_reals[t]
-    heard, first = room.sector_wholes[t, 0], room.cell_wholes[t, 0]
+    """Thread t's scratch by name."""
+    reals, wholes, shorts = room.reals[t], room.wholes[t], room.shorts[t]
+    sector_reals, sector_wholes, cell_wholes = room.sector_reals[t], room.sector_wholes[t], room.cell_wholes[t]
+    n, c, e = _NOW, _CELLS, _LISTENER
     return Workspace(
-        Columns(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13]),
-        Cells(a[14], a[15], a[16], a[17], b[0], b[1], a[18], b[2], first),
-        Listener(heard, d[0], d[1], d[2], d[3], a[19], a[20], b[3], a[21], a[22], a[23], c[0], b[4], c[1]),
-    )
+        Columns(
+            x=reals[n.x], y=reals[n.y], psi=reals[n.psi], u=reals[n.u], v=reals[n.v], r=reals[n.r],
+            cos=reals[n.cos], sin=reals[n.sin], tau_u=reals[n.tau_u], tau_r=reals[n.tau_r],
+            a_x=reals[n.a_x], a_y=reals[n.a_y], psi_0=reals[n.psi_0], effort=reals[n.effort],
+        ),
+        Cells(
+            x=reals[c.x], y=reals[c.y], cos=reals[c.cos], sin=reals[c.sin], vehicle=wholes[c.vehicle],
+            entry=wholes[c.entry], nearest=reals[c.nearest], some=wholes[c.some], first=cell_wholes[c.first],
+        ),
+        Listener(
+            heard=sector_wholes[e.heard], kept=sector_reals[e.kept], kept_ahead=sector_reals[e.kept_ahead],
+            kept_abeam=sector_reals[e.kept_abeam], nearest=sector_reals[e.nearest], x=reals[e.x], y=reals[e.y],
+            vehicle=wholes[e.vehicle], squared=reals[e.squared], ahead=reals[e.ahead], abeam=reals[e.abeam],
+            bin=shorts[e.bin], sector=wholes[e.sector], some=shorts[e.some],
+        ),
+    )  # fmt: skip

@@ -6,9 +6,6 @@ depends on its neighbours in the batch.
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.arrays import Facts, World
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled_inner
@@ -23,11 +20,7 @@ from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields, sea_fields
 from uuv_marl.sim.workspace import Columns, Workspace
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Bool = NDArray[np.bool_]
-UInt64 = NDArray[np.uint64]
+from uuv_marl.types import Float32, Float64
 
 RUNAWAY = 1000.0
 """A vehicle whose velocities (surge, sway [m/s], yaw rate [rad/s]) add up to this has diverged. Assumed: no vehicle
@@ -38,14 +31,8 @@ under water is a hundredth as fast."""
 def control_hold(w: int, first: bool, world: World, model: Model, now: Columns, sea: Sea | None) -> None:
     """Actions become forces, forces become motion. Eq. 1-4, 22-24.
 
-    Args:
-        w: index of the world.
-        first: whether the decision was made at the start of this hold; later ones keep its force's direction in the
-            world.
-        world: the arrays; states and facts are written.
-        model: the scenario's numbers.
-        now: columns of the world's vehicles, with the decided actions.
-        sea: what disturbs it, None for nothing.
+    ``first`` says whether the decision was made at the start of this hold; later ones keep its force's direction in the
+    world. States and facts are written.
     """
     state, facts, rules = world.state, world.facts, model.rules
     apply_actuators(first, now, model.plant)
@@ -71,14 +58,7 @@ def control_hold(w: int, first: bool, world: World, model: Model, now: Columns, 
 
 @compiled_inner
 def apply_losses(w: int, world: World, rules: Rules, sea: Sea | None) -> None:
-    """Vehicles whose scheduled time has come fall silent and stop.
-
-    Args:
-        w: index of the world.
-        world: the arrays; states and facts of those vehicles are written.
-        rules: the scenario's schedule of losses.
-        sea: what disturbs it, None for nothing; its faults may lose vehicles, too.
-    """
+    """Vehicles whose scheduled time has come fall silent and stop. The sea's faults may lose vehicles, too."""
     if sea is not None:
         for i in range(world.state.alive.shape[1]):
             if is_lost(w, i, world.state.tick[w], sea.actuation, sea.hull):
@@ -99,28 +79,13 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 @compiled_inner
 def sort_into_cells(w: int, world: World, model: Model, workspace: Workspace) -> Grid:
-    """Sort the living into cells; where these lie.
-
-    Args:
-        w: index of the world.
-        world: the arrays.
-        model: the scenario's numbers.
-        workspace: positions are read from its columns, its cells are written.
-    """
+    """Sort the living into cells; where these lie."""
     return sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
 
 
 @compiled_inner
 def measure(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> int:
-    """Distances of the living, folded into the facts of the step; how many contact episodes began now.
-
-    Args:
-        w: index of the world.
-        world: the arrays; facts are written.
-        model: the scenario's numbers.
-        workspace: with the living sorted into its cells.
-        grid: where the cells lie.
-    """
+    """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
     facts, hull = world.facts, model.rules.hull
     began = measure_vehicles(w, hull, world, workspace.cells, grid)
     began += measure_obstacles(w, hull, world, workspace.cells, grid)
@@ -168,14 +133,7 @@ def check_arrival(w: int, world: World, rules: Rules) -> None:
 
 @compiled_inner
 def passed(x: float, y: float, waypoints: Float64, last: int) -> tuple[float, float, bool]:
-    """The point of the last leg, prolonged, that is nearest to another [m], and whether it lies beyond the end.
-
-    Args:
-        x: the other point, north [m].
-        y: the same, east [m].
-        waypoints: corners of the trajectory, north and east [m], shape (point, 2).
-        last: index of the last corner.
-    """
+    """The point of the last leg, prolonged, that is nearest to another [m], and whether it lies beyond the end."""
     end_x, end_y = waypoints[last, 0], waypoints[last, 1]
     leg_x, leg_y = end_x - waypoints[last - 1, 0], end_y - waypoints[last - 1, 1]
     along = ((x - end_x) * leg_x + (y - end_y) * leg_y) / (leg_x * leg_x + leg_y * leg_y)
@@ -186,13 +144,7 @@ def passed(x: float, y: float, waypoints: Float64, last: int) -> tuple[float, fl
 def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Grid, listens: bool) -> None:
     """What the living hear, and everybody's percept.
 
-    Args:
-        w: index of the world.
-        world: the arrays; senses are written.
-        model: the scenario's numbers.
-        workspace: with the living sorted into its cells.
-        grid: where the cells lie.
-        listens: False where earlier readings stand, so that nobody need listen now.
+    Without ``listens`` earlier readings stand, so that nobody need listen now.
     """
     state, senses, now = world.state, world.senses, workspace.now
     see = fields(senses.percept, model.at)
@@ -229,15 +181,7 @@ def clear_facts(w: int, facts: Facts) -> None:
 
 @compiled_inner
 def observe_world(w: int, world: World, model: Model, own: Workspace, sea: Sea | None) -> None:
-    """Facts and percepts of a world that has just been reset.
-
-    Args:
-        w: index of the world.
-        world: the arrays; facts, senses and ``state.dwell`` are written.
-        model: the scenario's numbers.
-        own: room to work in.
-        sea: what disturbs it, None for nothing.
-    """
+    """Facts and percepts of a world that has just been reset. Facts, senses and ``state.dwell`` are written."""
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.facts.arrival_s[w] = math.nan
@@ -257,13 +201,7 @@ def observe_world(w: int, world: World, model: Model, own: Workspace, sea: Sea |
 def step_hold(w: int, first: bool, world: World, model: Model, workspace: Workspace, sea: Sea | None) -> Grid:
     """One control hold of a world and what becomes true by it; where the cells of the living lie afterwards.
 
-    Args:
-        w: index of the world.
-        first: whether the decision was made at the start of this hold.
-        world: the arrays; states and facts are written.
-        model: the scenario's numbers.
-        workspace: room to work in, loaded with the vehicles and their actions.
-        sea: what disturbs it, None for nothing.
+    ``first`` is that of ``control_hold``.
     """
     control_hold(w, first, world, model, workspace.now, sea)
     world.state.tick[w] += 1
@@ -281,16 +219,7 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
 
 @compiled_inner
 def step_world(w: int, action: Float32, world: World, model: Model, workspace: Workspace, sea: Sea | None) -> None:
-    """One decision period of a world. A world that has diverged stays as it is.
-
-    Args:
-        w: index of the world.
-        action: shares of full force, body frame, shape (world, vehicle, 2).
-        world: the arrays.
-        model: the scenario's numbers.
-        workspace: room to work in.
-        sea: what disturbs it, None for nothing; compiled code for nothing holds nothing of it.
-    """
+    """One decision period of a world. A world that has diverged stays as it is."""
     facts, holds = world.facts, model.rules.holds
     if facts.diverged[w] >= 0:
         return

@@ -10,9 +10,6 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
 
-Float64 = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int64 = NDArray[np.int64]
 Columns = dict[str, NDArray[Any]]
 """Columns of one length, numbers or texts. NaN stands for nothing measured."""
 _DIGITS = 6

@@ -9,12 +9,13 @@ import numpy as np
 
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.tables import estimate, markdown_table
-from uuv_marl.studies.columns import Columns, Float64, groups, read_columns, where
+from uuv_marl.studies.columns import Columns, groups, read_columns, where
 from uuv_marl.studies.data import read_text
 from uuv_marl.studies.dynamics.identify import METRICS, pareto, trials
 from uuv_marl.studies.dynamics.unknowns import OBJECTIVES
 from uuv_marl.studies.paper.ledger import Entry, markdown, read_ledger
 from uuv_marl.studies.part import Part
+from uuv_marl.types import Float64
 
 NEEDED = ("identification", "margins", "rest", "critical")
 """Tables that the text takes numbers from."""

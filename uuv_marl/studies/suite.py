@@ -13,7 +13,7 @@ from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.runner import Evaluate, run_missing
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.studies.columns import Float32, Float64
+from uuv_marl.types import Float32, Float64
 
 Trace = dict[str, Float32]
 Report = Callable[[str, float], None]

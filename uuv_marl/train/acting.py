@@ -14,7 +14,7 @@ from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.trims import MOST_TRIM, Trim
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.types import Float32
 
 Arrays = dict[str, NDArray[Any]]
 Sees = Literal["percept", "memory"]

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.envs.batched_env import refuse_losses
-from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.train.acting import ACTING
 from uuv_marl.train.group import Group, Problem, Seeds
 from uuv_marl.train.shaping import PRIVILEGED_SIZE
+from uuv_marl.types import Bool, Float32
 
 TRAINING_SEEDS = (100_000, 900_000)
 """Worlds are drawn from these; 900,000-999,999 are for validation."""

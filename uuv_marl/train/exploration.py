@@ -4,14 +4,11 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from uuv_marl.sim.arrays import Float32
+from uuv_marl.types import Float32, Int64
 
 
-def exploration(
-    rng: np.random.Generator, world: NDArray[np.int64], outputs: int, shared: float, kept: float
-) -> Iterator[Float32]:
+def exploration(rng: np.random.Generator, world: Int64, outputs: int, shared: float, kept: float) -> Iterator[Float32]:
     """Standard normal numbers for the outputs of each decision, shape (row, output), without end.
 
     Args:

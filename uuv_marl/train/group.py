@@ -12,10 +12,10 @@ from uuv_marl.baselines.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.sim.arrays import Bool, Float32, Float64
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.acting import ACTING, Sees
 from uuv_marl.train.shaping import privileged_observation
+from uuv_marl.types import Bool, Float32, Float64
 
 Conditions = Sequence[Mapping[str, object]]
 """Fields of a scenario, for one episode after the other."""

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
-from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.exploration import exploration
 from uuv_marl.train.group import Problem
 from uuv_marl.train.shared import Count, PPOHyperparameters, Share, Update, adam_arrays, annealed, restore_adam
+from uuv_marl.types import Bool, Float32, Int64
 
 with extra("train", "training with MAPPO"):
     import torch
@@ -75,7 +75,7 @@ class Environment(Protocol):
     size: int
     outputs: int
     rows: int
-    world: NDArray[np.int64]
+    world: Int64
     observation: Float32
 
     def step(self, action: Float32) -> Transition:

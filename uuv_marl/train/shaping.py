@@ -13,8 +13,8 @@ from uuv_marl.baselines.policy import Policy, inner_loop_nms
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.scale import Scale
-from uuv_marl.sim.arrays import Float32, Float64
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Float32, Float64
 
 _LOOP = "actuators.yaw_damping_nms"
 _LOOP_NMS = 600.0

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from uuv_marl.envs.sb3 import SharedEnvMixin
 from uuv_marl.extras import extra
-from uuv_marl.sim.arrays import Float32
 from uuv_marl.train.acting import ACTING
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv
 from uuv_marl.train.group import Problem
+from uuv_marl.types import Bool, Float32
 
 with extra("train", "training with Stable-Baselines3"):
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
@@ -70,7 +70,7 @@ class TrainingVecEnv(SharedEnvMixin, VecEnv):
         """Keep the actions, shape (row, outputs), for ``step_wait``."""
         self._actions = np.asarray(actions, np.float32)
 
-    def step_wait(self) -> tuple[Float32, Float32, NDArray[np.bool_], list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Float32, Float32, Bool, list[dict[str, Any]]]:
         """Features, rewards, dones and infos of every row; cut-off rows tell what they would have seen next."""
         transition = self.env.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

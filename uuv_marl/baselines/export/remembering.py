@@ -24,8 +24,8 @@ from uuv_marl.baselines.rudder import steer_by_rudder
 from uuv_marl.baselines.scout import Scout, ScoutLead, ScoutPlus, ScoutWary, decide_all
 from uuv_marl.baselines.trims import MOST_TRIM
 from uuv_marl.extras import extra
-from uuv_marl.percept import PerceptLayout
-from uuv_marl.sim.views import Fields, Starts, fields
+from uuv_marl.percept import PerceptLayout, Starts
+from uuv_marl.sim.views import Fields, fields
 
 with extra("onnx", "export to ONNX"):
     from onnx import NodeProto, TensorProto, ValueInfoProto, helper

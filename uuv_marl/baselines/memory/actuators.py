@@ -36,14 +36,8 @@ _LEAST, _MOST = 0.05, 1.5
 def identify(w: int, i: int, axis: int, asked: float, off: float, period: float, kept: Surroundings) -> None:
     """Take what one period showed of a component into the estimate.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        axis: 0 thrust, 1 torque.
-        asked: the share that was asked for, with the inner loop's.
-        off: by how much more the motion shows, as a share of full thrust or torque.
-        period: between two decisions [s].
-        kept: what is remembered; actuators is brought up to date.
+    ``asked`` is the share with the inner loop's, ``off`` by how much more the motion shows, as a share of full thrust
+    or torque.
     """
     at = kept.actuators[w, i, axis]
     f, g, h = at[ACTED] - at[ACTED_BEFORE], asked - at[ASKED], at[ASKED] - at[ASKED_BEFORE]
@@ -67,12 +61,6 @@ def answer(w: int, i: int, axis: int, kept: Surroundings) -> tuple[float, float,
     """What remains of a difference after a period, e; the share of what is asked that comes, s, and that comes at once.
 
     They are 0, 1 and 1 at first.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        axis: 0 thrust, 1 torque.
-        kept: what is remembered.
     """
     at = kept.actuators[w, i, axis]
     d_0 = at[SQUARES] + _NOTHING  # L D L' of the sums
@@ -95,14 +83,8 @@ def lead(w: int, i: int, axis: int, wanted: float, share: float, kept: Surroundi
     """What to ask of a component so that what is wanted acts at the end of the period: the answer, inverted.
 
     It counts as far as less than all comes at once. Where all does, a slowly changing current looks like a lag.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        axis: 0 thrust, 1 torque.
-        wanted: share of full thrust or torque, with the inner loop's.
-        share: of the change that is made: 0 asks for what is wanted, 1 for what makes up for lag and weakness.
-        kept: what is remembered.
+    ``wanted`` is a share with the inner loop's. Of the change ``share`` is made: 0 asks for what is wanted, 1 for what
+    makes up for lag and weakness.
     """
     at = kept.actuators[w, i, axis]
     e, s, at_once = answer(w, i, axis, kept)

@@ -7,17 +7,13 @@ heard and is not, decision after decision, is forgotten.
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.memory.pose import to_body, to_map, to_map_axes
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.sonar import cross, suite
 from uuv_marl.sim.views import Fields
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 NOISE_M, NOISE_SHARE = 0.05, 0.03
 """Standard deviation of an echo: so much, and this share of its range. Assumed: noise of 2 % and of 1 degree."""
@@ -82,15 +78,7 @@ def holds(a: int, x: float, y: float, sectors: ActiveSectors) -> bool:
 
 @compiled
 def listen(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
-    """Take a vehicle's echoes into its discs, and forget those that should have been heard and were not.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        sectors: the active sub-sectors.
-        kept: what is remembered; the discs are brought up to date.
-    """
+    """Take a vehicle's echoes into its discs, and forget those that should have been heard and were not."""
     unheard = kept.unheard[w, i]
     for d in range(unheard.shape[0]):
         unheard[d] += sectors.period_s
@@ -143,13 +131,6 @@ def surface_point(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors) -
     """The point of a surface that an echo comes from, in the body frame [m].
 
     Where echoes report centres it lies in the centre's direction, or on the edge of the sub-sector next to that.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        a: index of the active sub-sector; it holds an echo.
-        see: the fields of percepts, of all worlds.
-        sectors: the active sub-sectors.
     """
     x, y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
     if not sectors.centres:
@@ -172,16 +153,7 @@ def centre_of(w: int, i: int, a: int, see: Fields, kept: Surroundings) -> tuple[
 
 @compiled
 def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
-    """The disc that an echo belongs to, -1 for none: the one whose surface it misses least.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        a: index of the active sub-sector; it holds an echo.
-        see: the fields of percepts, of all worlds.
-        sectors: the active sub-sectors.
-        kept: what is remembered.
-    """
+    """The disc that an echo belongs to, -1 for none: the one whose surface it misses least."""
     x, y = surface_point(w, i, a, see, sectors)
     x, y = to_map(x, y, kept.pose[w, i])
     sd = deviation(float(see.echo_range[w, i, a]))
@@ -208,12 +180,8 @@ def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, kept: Sur
 def correct(disc: Float64, p: Float64, h: tuple[float, float, float], wrong: float, variance: float) -> None:
     """One step of recursive least squares: a measurement that is ``wrong`` by h . (x, y, R) corrects a disc.
 
-    Args:
-        disc: centre and radius [m], shape (3,); corrected.
-        p: their covariance [m2], shape (6,): xx, xy, xR, yy, yR, RR; corrected.
-        h: derivative of the measurement by centre and radius [1].
-        wrong: what was measured less what was expected [m].
-        variance: of the measurement [m2].
+    ``disc`` holds centre and radius [m], ``p`` their covariance [m2]: xx, xy, xR, yy, yR, RR; both are corrected.
+    ``wrong`` is what was measured less what was expected [m], with its ``variance`` [m2].
     """
     g_x = p[0] * h[0] + p[1] * h[1] + p[2] * h[2]
     g_y = p[1] * h[0] + p[3] * h[1] + p[4] * h[2]
@@ -228,17 +196,7 @@ def correct(disc: Float64, p: Float64, h: tuple[float, float, float], wrong: flo
 
 @compiled
 def _correct_centre(w: int, i: int, d: int, a: int, sd: float, see: Fields, kept: Surroundings) -> None:
-    """Correct a disc by the centre that an echo reports.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        d: index of the disc.
-        a: index of the active sub-sector; it holds an echo.
-        sd: standard deviation of the centre [m].
-        see: the fields of percepts, of all worlds.
-        kept: what is remembered; the disc is corrected.
-    """
+    """Correct a disc by the centre that an echo reports. ``sd``: standard deviation of the centre [m]."""
     disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
     x, y = centre_of(w, i, a, see, kept)
     correct(disc, p, (1.0, 0.0, 0.0), x - disc[0], sd * sd)

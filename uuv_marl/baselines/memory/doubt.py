@@ -23,11 +23,6 @@ def doubt(w: int, i: int, kept: Surroundings) -> tuple[float, float]:
     """Whether its actuators lag, and of all: from 0, as expected, to 1.
 
     A lag delays thrust and torque, a fault or little authority touches one of them.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        kept: what is remembered.
     """
     old = max(age_of(w, i, kept) - USUAL_AGE_S, 0.0)
     thrust, torque = remains(w, i, 0, kept), remains(w, i, 1, kept)
@@ -40,13 +35,8 @@ def trim_weights(w: int, i: int, lead: float, kept: Surroundings) -> tuple[float
     """How far trims count, 0 to 1: that of steering, and all others. They are ``doubt``'s, with one exception.
 
     Soft steering bears a lag, but lets vehicles touch that do not know well where the others are. So where a law makes
-    up for the lag itself, the trim of steering counts the less, the less well neighbours are heard.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        lead: share of the lag that is made up for.
-        kept: what is remembered.
+    up for the lag itself, the trim of steering counts the less, the less well neighbours are heard. ``lead``: share of
+    the lag that is made up for.
     """
     lags, share = doubt(w, i, kept)
     if lead > 0.0:

@@ -36,9 +36,7 @@ _LEARNS = 0.05
 def alpha_beta(period: float, deviation: float) -> tuple[float, float]:
     """Alpha and beta [1] for the tracking index: ACCELERATION period^2 / deviation. Kalata 1984.
 
-    Args:
-        period: since the reading before [s].
-        deviation: of the errors of positions [m].
+    ``period``: since the reading before [s]; ``deviation``: of the errors of positions [m].
     """
     index = ACCELERATION * period * period / deviation
     r = 0.25 * (4.0 + index - math.sqrt(index * (8.0 + index)))
@@ -68,11 +66,6 @@ def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
 
     A vehicle in the middle of a swarm has neighbours all round; one at the edge has them on one side, and so can tell
     where the swarm is.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        kept: what is remembered.
     """
     x, y, num, pose = 0.0, 0.0, 0, kept.pose[w, i]
     for k in range(kept.known.shape[2]):
@@ -85,16 +78,7 @@ def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
 
 @compiled
 def listen(w: int, i: int, see: Fields, period: float, kept_s: float, kept: Surroundings) -> None:
-    """Take the neighbours that a vehicle hears into those it knows.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        period: since the percept before [s].
-        kept_s: for how long a neighbour is kept that is heard no more [s].
-        kept: what is remembered; the neighbours are brought up to date.
-    """
+    """Take the neighbours that a vehicle hears into those it knows."""
     known, since, place, velocity = kept.known[w, i], kept.since[w, i], kept.place[w, i], kept.velocity[w, i]
     for k in range(known.shape[0]):
         if known[k] > 0.0:
@@ -121,13 +105,7 @@ def listen(w: int, i: int, see: Fields, period: float, kept_s: float, kept: Surr
 def _match(x: float, y: float, reach: float, w: int, i: int, kept: Surroundings) -> int:
     """Index of the known neighbour that is expected nearest to where one is heard, -1 for none within the gate.
 
-    Args:
-        x: where one is heard, in the map [m].
-        y: the same, second axis [m].
-        reach: its range [m].
-        w: index of the world.
-        i: index of the vehicle.
-        kept: what is remembered.
+    x and y are where one is heard, in the map [m], ``reach`` is its range [m].
     """
     gate = GATE_M + GATE_SHARE * reach
     best, least, known, place = -1, gate * gate, kept.known[w, i], kept.place[w, i]
@@ -151,17 +129,7 @@ def _is_heard(x: float, y: float, w: int, i: int, kept: Surroundings) -> bool:
 
 @compiled
 def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surroundings) -> None:
-    """Correct a known neighbour by a reading.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        k: index of the neighbour.
-        x: where it is heard, in the map [m].
-        y: the same, second axis [m].
-        reach: its range [m].
-        kept: what is remembered.
-    """
+    """Correct a known neighbour by a reading. x, y and ``reach`` as for ``_match``."""
     place, velocity, last = kept.place[w, i, k], kept.velocity[w, i, k], kept.reading[w, i, k]
     kept.known[w, i, k] = 1.0 - kept.known[w, i, k]
     since = kept.since[w, i, k]
@@ -181,12 +149,7 @@ def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surr
 def _meet(w: int, i: int, x: float, y: float, kept: Surroundings) -> None:
     """Know a new neighbour, believed to move as l(t) does; where there is no room, that heard the longest ago goes.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        x: where it is heard, in the map [m].
-        y: the same, second axis [m].
-        kept: what is remembered.
+    x and y as for ``_match``.
     """
     best, most = 0, -1.0
     for k in range(kept.known.shape[2]):

@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory.actuators import identify
 from uuv_marl.baselines.memory.response import follow
@@ -18,9 +17,7 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, held, plant
 from uuv_marl.sim.views import Fields
-
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float32, Float64
 
 _MOVES_MPS = 0.005
 """l(t) moves if it is faster; scenarios know no speed below 0.01 m/s."""
@@ -67,10 +64,7 @@ class Reckoning(NamedTuple):
 def reckoned(motion: Float64, action: Float64 | Float32, own: Reckoning) -> State6:
     """The state after one decision [m, rad, m/s, rad/s], from the origin ahead, in still water.
 
-    Args:
-        motion: surge and sway velocity [m/s] and yaw rate [rad/s] at the decision, shape (3,).
-        action: shares of full thrust and torque (or rudder), shape (2,).
-        own: the vehicle.
+    ``motion``: surge and sway velocity [m/s] and yaw rate [rad/s] at the decision.
     """
     state = (0.0, 0.0, 0.0, motion[0], motion[1], motion[2])
     for _ in range(own.holds):
@@ -108,14 +102,7 @@ def to_body(x: float, y: float, pose: Float64) -> tuple[float, float]:
 
 @compiled
 def begin(w: int, i: int, see: Fields, kept: Surroundings) -> None:
-    """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        kept: what is remembered; pose, reference and begun are written.
-    """
+    """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow."""
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed = math.hypot(v_x, v_y)
     c, s, moving = 1.0, 0.0, 0.0
@@ -131,15 +118,7 @@ def begin(w: int, i: int, see: Fields, kept: Surroundings) -> None:
 
 @compiled
 def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> None:
-    """A later percept: heading and place from l(t) while it stays on its leg, or at rest; else by dead reckoning.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        own: the vehicle.
-        kept: what is remembered; the pose is brought up to date.
-    """
+    """A later percept: heading and place from l(t) while it stays on its leg, or at rest; else by dead reckoning."""
     pose, at, motion = kept.pose[w, i], kept.reference[w, i], kept.motion[w, i]
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed, half = math.hypot(v_x, v_y), 0.5 * own.period_s
@@ -182,14 +161,7 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
 
 @compiled
 def keep_motion(w: int, i: int, see: Fields, kept: Surroundings) -> None:
-    """Own velocity and l(t)'s speed, for the next percept.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        see: the fields of percepts, of all worlds.
-        kept: what is remembered; motion and reference_speed are written.
-    """
+    """Own velocity and l(t)'s speed, for the next percept."""
     kept.motion[w, i, 0], kept.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
     kept.motion[w, i, 2] = see.yaw_rate[w, i, 0]
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])

@@ -22,14 +22,8 @@ _NOTHING = 0.01
 def follow(w: int, i: int, axis: int, asked: float, off: float, period: float, kept: Surroundings) -> None:
     """Take what one period showed of a component into the estimate.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        axis: 0 thrust, 1 torque.
-        asked: the action's share.
-        off: by how much the motion was more than the model makes of it, as a share of full thrust or torque.
-        period: between two decisions [s].
-        kept: what is remembered; response is brought up to date.
+    ``asked`` is the action's share; ``off`` by how much the motion was more than the model makes of it, as a share of
+    full thrust or torque.
     """
     at = kept.response[w, i, axis]
     due = at[ACTED] - asked
@@ -42,13 +36,6 @@ def follow(w: int, i: int, axis: int, asked: float, off: float, period: float, k
 
 @compiled
 def remains(w: int, i: int, axis: int, kept: Surroundings) -> float:
-    """Share of the difference between what acted and what is asked that remains on the mean over a period, 0 to 1.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        axis: 0 thrust, 1 torque.
-        kept: what is remembered.
-    """
+    """Share of the difference between what acted and what is asked that remains on the mean over a period, 0 to 1."""
     at = kept.response[w, i, axis]
     return min(max(at[PRODUCTS] / (at[SQUARES] + _NOTHING), 0.0), 1.0)

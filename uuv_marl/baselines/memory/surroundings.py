@@ -3,19 +3,15 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.memory import discs, neighbours, pose
 from uuv_marl.baselines.memory.discs import ActiveSectors
 from uuv_marl.baselines.memory.pose import Reckoning
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Starts, fields
-
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
+from uuv_marl.sim.views import fields
+from uuv_marl.types import Bool, Float32
 
 
 class Model(NamedTuple):
@@ -43,16 +39,7 @@ def is_lost(row: Float32) -> bool:
 
 @compiled
 def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept_s: float, kept: Surroundings) -> None:
-    """Take what every vehicle perceives into what it remembers. Once for every decision.
-
-    Args:
-        flat: percepts in physical units, shape (world, vehicle, entry).
-        at: first index of every field in a flat percept.
-        worlds: those that have gone on, shape (world,).
-        model: what vehicles know of themselves.
-        kept_s: for how long they remember a neighbour that they hear no more [s].
-        kept: what they remember; brought up to date.
-    """
+    """Take what every vehicle perceives into what it remembers. Once for every decision."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
@@ -74,13 +61,7 @@ def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept_s: float,
 
 @compiled
 def _keep_distances(w: int, i: int, kept: Surroundings) -> None:
-    """How far a vehicle is from what it remembers, once for all that decides by it.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        kept: what is remembered; the distances are brought up to date.
-    """
+    """How far a vehicle is from what it remembers, once for all that decides by it."""
     x, y = kept.pose[w, i, 0], kept.pose[w, i, 1]
     for d in range(kept.score.shape[2]):
         there = kept.score[w, i, d] > 0.0

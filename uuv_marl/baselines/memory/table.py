@@ -6,12 +6,8 @@ which l(t) moved then (the bow, if l(t) was at rest).
 
 from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from uuv_marl.sim.tables import described
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 
 @described

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from uuv_marl.envs.batched_env import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.sea.current import FlowField
+from uuv_marl.types import Bool
 
 Float = NDArray[np.floating]
-Bool = NDArray[np.bool_]
 
 TRAIL_S = 20.0
 """How long a trail is [s]."""

@@ -7,7 +7,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
@@ -19,10 +18,7 @@ from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
 from uuv_marl.sim.workspace import Columns
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from uuv_marl.types import Bool, Float64, Int64
 
 THRUSTER, YAW, ARRAY, MEMBER = range(4)
 _KINDS = {"thruster": THRUSTER, "yaw": YAW, "array": ARRAY, "member": MEMBER}
@@ -144,15 +140,7 @@ def hit(tick: Int64, hull: Hull) -> Bool:
 
 @compiled
 def acts(w: int, i: int, fault: int, tick: int, hull: Hull) -> bool:
-    """Whether a fault acts on a vehicle in a control hold.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        fault: index of the fault in the scenario.
-        tick: control holds since the reset, at the start of this one.
-        hull: holds when each fault acts.
-    """
+    """Whether a fault acts on a vehicle in a control hold. ``tick`` is that at the start of the hold."""
     return hull.broken[w, i, fault, 0] <= tick < hull.broken[w, i, fault, 1]
 
 
@@ -160,12 +148,7 @@ def acts(w: int, i: int, fault: int, tick: int, hull: Hull) -> bool:
 def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> None:
     """Thrust and torque asked of the vehicles, lessened by mismatch, authority and faults.
 
-    Args:
-        w: index of the world.
-        tick: control holds since the reset, at the start of this one.
-        now: columns of the world's vehicles; thrust and torque are written.
-        numbers: the scenario's authority and faults.
-        hull: what each vehicle is like.
+    ``tick`` is that at the start of the hold. Thrust and torque are written.
     """
     for i in range(hull.thrust.shape[1]):
         now.tau_u[i] *= hull.thrust[w, i]
@@ -200,14 +183,7 @@ def integrate_each(
 ) -> None:
     """One control hold of vehicles that differ, lag and are carried along. Eq. 1-4, 23-24.
 
-    Args:
-        w: index of the world.
-        alive: the vehicles that move, shape (world, vehicle).
-        rules: the scenario's clocks.
-        now: columns of the vehicles; thrust and torque as asked of them.
-        numbers: the scenario's lags.
-        hull: what each vehicle is like; the forces that reach the water are written.
-        flow: velocity of the water at each vehicle, north and east [m/s], shape (world, vehicle, 2).
+    ``now`` holds thrust and torque as asked for. The forces that reach the water, ``hull.tau``, are written.
     """
     for i in range(hull.tau.shape[1]):
         if not alive[w, i]:
@@ -237,15 +213,7 @@ def own_plant(w: int, i: int, hull: Hull) -> Plant:
 
 @compiled_inner
 def is_lost(w: int, i: int, tick: int, numbers: Actuation, hull: Hull) -> bool:
-    """Whether a fault has lost a vehicle by the end of a control hold.
-
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        tick: control holds since the reset, this one included.
-        numbers: the scenario's faults.
-        hull: holds when each fault acts.
-    """
+    """Whether a fault has lost a vehicle by the end of a control hold. ``tick`` counts this hold."""
     lost = False
     for f in range(numbers.kind.shape[0]):
         lost = lost or (numbers.kind[f] == MEMBER and hull.broken[w, i, f, 0] <= tick)

@@ -9,7 +9,7 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
@@ -23,8 +23,8 @@ from uuv_marl.sim.sea.purposes import DIRECTION, EDDY_PLACE, GUST
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields, SeaFields
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 _PEAK = 0.638172686
 """Largest speed around a Lamb-Oseen vortex, in circulation / (2 pi core): at 1.12091 core radii. [derived]"""
 
@@ -128,13 +128,8 @@ def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, wa
 def eddy_flow(dx: float, dy: float, circulation: float, core: float) -> tuple[float, float]:
     """Velocity, north and east [m/s], around a Lamb-Oseen vortex.
 
-    v(r) = circulation / (2 pi r) (1 - exp(-r^2 / core^2)), smooth at its centre.
-
-    Args:
-        dx: how far north of its centre [m].
-        dy: how far east of its centre [m].
-        circulation: its strength [m2/s], clockwise where positive.
-        core: radius of its core [m].
+    v(r) = circulation / (2 pi r) (1 - exp(-r^2 / core^2)), smooth at its centre. It is clockwise where ``circulation``
+    [m2/s] is positive; ``core`` is the radius of its core [m].
     """
     share = circulation / (2.0 * math.pi * core * core) * decay_mean((dx * dx + dy * dy) / (core * core))
     return -share * dy, share * dx
@@ -142,15 +137,7 @@ def eddy_flow(dx: float, dy: float, circulation: float, core: float) -> tuple[fl
 
 @compiled
 def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float, float]:
-    """Velocity of the water at a point, north and east [m/s].
-
-    Args:
-        w: index of the world.
-        x: the point's north [m].
-        y: the point's east [m].
-        core: radius of the eddies' cores [m].
-        flow: the current of all worlds.
-    """
+    """Velocity of the water at a point, north and east [m/s]. ``core``: radius of the eddies' cores [m]."""
     v_x, v_y = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
     for k in range(flow.eddies.shape[1]):
         if flow.eddies[w, k, 2] != 0.0:
@@ -159,16 +146,11 @@ def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float,
     return v_x, v_y
 
 
-@compiled_inner
+@compiled
 def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) -> None:
     """The process one control hold later, exactly: its mean and variance depend on no step.
 
-    Args:
-        w: index of the world.
-        key: of its episode.
-        tick: control holds since the reset, this one included.
-        water: the scenario's numbers.
-        flow: the current of all worlds; ``gust`` is written.
+    ``tick`` counts this hold.
     """
     kick = water.deviation * math.sqrt(1.0 - water.remains * water.remains)
     north, east = normals(key, GUST, tick, 0, 0)
@@ -178,14 +160,7 @@ def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) ->
 
 @compiled_inner
 def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
-    """The water's velocity at every vehicle of a world.
-
-    Args:
-        w: index of the world.
-        state: holds where they are.
-        water: the scenario's numbers.
-        flow: the current of all worlds; ``flow`` is written.
-    """
+    """The water's velocity at every vehicle of a world."""
     everywhere = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
     for i in range(state.eta.shape[1]):
         flow.flow[w, i, 0], flow.flow[w, i, 1] = everywhere
@@ -199,14 +174,7 @@ def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
 
 @compiled
 def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]:
-    """Velocity of a vehicle over ground, north and east [m/s]; a lost one stands still.
-
-    Args:
-        w: index of the world.
-        j: index of the vehicle.
-        state: holds its heading, and its velocity through the water.
-        flow: holds the velocity of the water at it.
-    """
+    """Velocity of a vehicle over ground, north and east [m/s]; a lost one stands still."""
     if not state.alive[w, j]:
         return 0.0, 0.0
     (c, s), u, v = cos_sin(state.eta[w, j, 2]), state.nu[w, j, 0], state.nu[w, j, 1]
@@ -215,16 +183,7 @@ def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]
 
 @compiled_inner
 def know_velocities(w: int, world: World, water: Water, flow: Flow, see: Fields, more: SeaFields) -> None:
-    """Write each vehicle's own velocity, and by the link its neighbours', as the current makes them.
-
-    Args:
-        w: index of the world.
-        world: its arrays; percepts hold what is true in still water.
-        water: the scenario's current.
-        flow: the water now.
-        see: fields of the percepts, which are written.
-        more: fields of the sea's channels, which are written.
-    """
+    """Write each vehicle's own velocity, and by the link its neighbours', as the current makes them."""
     state, heading = world.state, world.senses.heading
     for i in range(state.alive.shape[1]):
         if not state.alive[w, i]:

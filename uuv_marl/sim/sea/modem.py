@@ -10,7 +10,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
@@ -23,8 +22,8 @@ from uuv_marl.sim.sea.navigation import Track, by_compass
 from uuv_marl.sim.sea.purposes import MESSAGE
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import SeaFields
+from uuv_marl.types import Float64
 
-Float64 = NDArray[np.float64]
 _MAX_AGE_S = 4096.0
 
 
@@ -66,17 +65,7 @@ def rounds(tick: int, slots: float, numbers: Modem) -> int:
 
 @compiled_inner
 def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, flow: Flow, track: Track) -> None:
-    """Send and receive what is due at the start of an episode, or the end of a control hold, its number counted.
-
-    Args:
-        w: index of the world.
-        key: of its episode.
-        world: its arrays.
-        numbers: the scenario's messages.
-        mail: is written.
-        flow: the water, which makes velocities over ground.
-        track: the errors of compasses.
-    """
+    """Send and receive what is due at the start of an episode, or the end of a control hold, its number counted."""
     state, n, tick = world.state, mail.sent.shape[1], world.state.tick[w]
     for j in range(n):
         if not state.alive[w, j]:
@@ -95,15 +84,7 @@ def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, f
 
 @compiled_inner
 def know_mail(w: int, world: World, mail: Mail, track: Track, more: SeaFields) -> None:
-    """Write, for each sub-sector, what the vehicle heard in it last said.
-
-    Args:
-        w: index of the world.
-        world: its arrays, with whom each vehicle hears.
-        mail: what arrived.
-        track: the errors of compasses.
-        more: fields of the percepts, which are written.
-    """
+    """Write, for each sub-sector, what the vehicle heard in it last said."""
     heading, now_s = world.senses.heading, world.facts.time_s[w]
     for i in range(world.state.alive.shape[1]):
         c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], track)

@@ -8,7 +8,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
@@ -20,8 +19,7 @@ from uuv_marl.sim.sea.purposes import COMPASS, DRIFT
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields
-
-Float64 = NDArray[np.float64]
+from uuv_marl.types import Float64
 
 
 class Navigation(NamedTuple):
@@ -77,12 +75,7 @@ def go_astray(w: int, state: State, navigation: Navigation, track: Track) -> Non
 def by_compass(w: int, i: int, north: float, east: float, track: Track) -> tuple[float, float]:
     """A vector north and east as a vehicle's compass has it: turned clockwise by the compass's error.
 
-    Args:
-        w: index of the world.
-        i: index of the vehicle.
-        north: the vector's northern part, or the cosine of a heading.
-        east: its eastern part, or the sine of a heading.
-        track: the errors of compasses.
+    The vector may be a heading's cosine and sine.
     """
     c, s = track.bias[w, i, 0], track.bias[w, i, 1]
     return c * north - s * east, c * east + s * north
@@ -90,15 +83,7 @@ def by_compass(w: int, i: int, north: float, east: float, track: Track) -> tuple
 
 @compiled_inner
 def navigate(w: int, world: World, navigation: Navigation, track: Track, see: Fields) -> None:
-    """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them.
-
-    Args:
-        w: the world.
-        world: its arrays.
-        navigation: the scenario's numbers.
-        track: what each vehicle gets wrong.
-        see: fields of the percepts, which are written.
-    """
+    """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them."""
     if navigation.drift_share == 0.0 and navigation.compass_bias == 0.0:
         return
     eta, heading, reference = world.state.eta, world.senses.heading, world.facts.reference

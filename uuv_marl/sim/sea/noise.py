@@ -7,7 +7,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
@@ -21,10 +20,7 @@ from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import SeaFields
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-UInt64 = NDArray[np.uint64]
+from uuv_marl.types import Bool, Float64, Int64
 
 _NEVER = 2**40
 """A reading that no episode reaches."""
@@ -122,17 +118,7 @@ def gap(chance: float, probability: float) -> int:
 
 @compiled_inner
 def spoil(at: Reading, num: int, key: np.uint64, passive: bool, noise: Noise, ears: Ears, hits: Hits) -> None:
-    """What an array of every vehicle misses, and puts elsewhere.
-
-    Args:
-        at: the reading.
-        num: of the hits.
-        key: of the world's episode.
-        passive: whether the array is.
-        noise: the scenario's errors.
-        ears: what lasts.
-        hits: what is heard, true before, and with errors after.
-    """
+    """What an array of every vehicle misses, and puts elsewhere. ``hits`` are true before, and have errors after."""
     if noise.half_range[at.a] > 0.0:
         miss(at, num, key, noise, hits)
     measured = noise.passive_ranges or not passive
@@ -146,12 +132,7 @@ def spoil(at: Reading, num: int, key: np.uint64, passive: bool, noise: Noise, ea
 def miss(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -> None:
     """What is too faint is missed: signal excess 20 log10(r50 / r), or 40 log10 there and back, plus noise <= 0.
 
-    Args:
-        at: the reading.
-        num: of the hits.
-        key: of the world's episode.
-        noise: the scenario's errors.
-        hits: ranges of those missed become negative.
+    Ranges of those missed become negative.
     """
     w, decades, half_range = at.w, noise.decades[at.a], noise.half_range[at.a]
     for q in range(num):
@@ -179,14 +160,7 @@ def draw_blur(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -
 def blur(at: Reading, num: int, measured: bool, passive: bool, noise: Noise, ears: Ears, hits: Hits) -> None:
     """Put hits at a wrong bearing and range; an echo's position moves as far as its range does.
 
-    Args:
-        at: the reading.
-        num: of the hits, with draws of ``draw_blur``.
-        measured: whether the array measures ranges.
-        passive: whether it is passive.
-        noise: the scenario's errors.
-        ears: what lasts.
-        hits: is written.
+    ``measured``: whether the array measures ranges. The hits have draws of ``draw_blur``.
     """
     w = at.w
     for q in range(num):
@@ -208,19 +182,7 @@ def interrupt(
     at: Reading, key: np.uint64, listening: Listening, noise: Noise, ears: Ears, actuation: Actuation, hull: Hull,
     hits: Hits, readings: Readings,
 ) -> None:  # fmt: skip
-    """Echoes of nothing; arrays that are silent for a while; dead arrays.
-
-    Args:
-        at: the reading.
-        key: of the world's episode.
-        listening: the scenario's arrays.
-        noise: the scenario's errors.
-        ears: what lasts; is written.
-        actuation: the scenario's faults.
-        hull: when they act.
-        hits: room to work in.
-        readings: is written.
-    """
+    """Echoes of nothing; arrays that are silent for a while; dead arrays."""
     if noise.false_echo > 0.0:
         imagine(at, key, listening, noise, hits, readings)
     if noise.silence > 0.0:
@@ -239,14 +201,6 @@ def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, hit
     """Echoes of nothing, anywhere in a sub-sector within the array's range, unless something nearer is heard there.
 
     An active array takes one for an obstacle's surface, a passive one for a vehicle.
-
-    Args:
-        at: the reading.
-        key: of the world's episode.
-        listening: the scenario's arrays.
-        noise: the scenario's errors.
-        hits: room to work in.
-        readings: is written.
     """
     w, a, slot = at.w, at.a, at.slot
     first, end = listening.first[a], listening.first[a + 1]
@@ -274,12 +228,7 @@ def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, hit
 def is_silent(at: Reading, i: int, key: np.uint64, noise: Noise, ears: Ears) -> bool:
     """Whether an array of vehicle i is silent at a reading; a silence is over before the next can begin.
 
-    Args:
-        at: the reading.
-        i: the vehicle.
-        key: of the world's episode.
-        noise: the scenario's errors.
-        ears: is written where a silence is over.
+    ``ears`` is written where a silence is over.
     """
     while at.number - ears.silent[at.w, i, at.a] >= noise.silent_readings:
         end = ears.silent[at.w, i, at.a] + noise.silent_readings
@@ -288,16 +237,8 @@ def is_silent(at: Reading, i: int, key: np.uint64, noise: Noise, ears: Ears) -> 
 
 
 @compiled_inner
-def tell_ranged(w: int, alive: NDArray[np.bool_], listening: Listening, noise: Noise, more: SeaFields) -> None:
-    """Write into the percepts of world w which sub-sectors measure ranges.
-
-    Args:
-        w: the world.
-        alive: the vehicles that have a percept, shape (world, vehicle).
-        listening: the scenario's arrays.
-        noise: the scenario's errors.
-        more: fields of the sea's channels, which are written.
-    """
+def tell_ranged(w: int, alive: Bool, listening: Listening, noise: Noise, more: SeaFields) -> None:
+    """Write into the percepts of world w which sub-sectors measure ranges."""
     if more.ranged.shape[2] == 0:
         return
     for a in range(listening.every.shape[0]):

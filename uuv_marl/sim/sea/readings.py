@@ -13,7 +13,6 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.arrays import State, World
@@ -23,11 +22,8 @@ from uuv_marl.sim.sea.navigation import Track
 from uuv_marl.sim.sea.schedule import Listening, Reading, due, hold_of, latest, listening
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.views import Fields, SeaFields
+from uuv_marl.types import Float32, Float64, Int32, Int64
 
-Float32 = NDArray[np.float32]
-Float64 = NDArray[np.float64]
-Int32 = NDArray[np.int32]
-Int64 = NDArray[np.int64]
 Move = tuple[float, float, float, float]
 """Cosine and sine of a vehicle's turn, then how far it went, ahead and abeam as it is headed now [m]; (1, 0, 0, 0) for
 none."""
@@ -135,14 +131,7 @@ def collect(
 ) -> int:
     """All that an array of every living vehicle hears now, into ``hits``; how many they are.
 
-    Args:
-        at: the reading.
-        world: its arrays; percepts hold what is true.
-        see: fields of the percepts.
-        listening: the scenario's numbers.
-        track: how far vehicles believe to be from where they are.
-        readings: the poses at reception are written.
-        hits: is written.
+    Poses at reception are written into ``readings``.
     """
     w, a, num = at.w, at.a, 0
     eta, heading, heard, sectors = world.state.eta, world.senses.heading, world.senses.heard, see.heard.shape[2]
@@ -177,15 +166,7 @@ def collect(
 
 @compiled_inner
 def store(at: Reading, num: int, listening: Listening, hits: Hits, readings: Readings) -> None:
-    """Put the first ``num`` hits that are not missed into the line; in all other places nothing is heard.
-
-    Args:
-        at: the reading.
-        num: of the hits.
-        listening: the scenario's numbers.
-        hits: what is heard.
-        readings: is written.
-    """
+    """Put the first ``num`` hits that are not missed into the line; in all other places nothing is heard."""
     for i in range(readings.whom.shape[2]):
         hush(at, i, listening, readings)
     w, slot = at.w, at.slot
@@ -213,17 +194,7 @@ def hush(at: Reading, i: int, listening: Listening, readings: Readings) -> None:
 def recall(
     w: int, world: World, listening: Listening, track: Track, readings: Readings, see: Fields, more: SeaFields
 ) -> None:
-    """Write into the percepts of world w, and into ``heard``, what the readings that stand now say.
-
-    Args:
-        w: the world.
-        world: its arrays.
-        listening: the scenario's numbers.
-        track: how far vehicles believe to be from where they are.
-        readings: the line.
-        see: fields of the percepts, which are written.
-        more: fields of the sea's channels, which are written.
-    """
+    """Write into the percepts of world w, and into ``heard``, what the readings that stand now say."""
     tick, since = world.state.tick[w], world.state.tick[w] - readings.began[w]
     for a in range(listening.every.shape[0]):
         number = latest(since - listening.delay, listening.every[a])
@@ -246,14 +217,7 @@ def tell_vehicles(
 ) -> None:
     """The vehicles that vehicle i heard in a reading, into its percept; by the link also who they are.
 
-    Args:
-        at: the reading; a number below 0 for silence.
-        i: index of the vehicle.
-        move: its own since the reading.
-        listening: the scenario's numbers.
-        readings: the line.
-        heard: index of the vehicle heard, shape (world, vehicle, sector); is written.
-        see: fields of the percepts, which are written.
+    A number of the reading below 0 is silence.
     """
     w, slot, linked = at.w, at.slot, see.link_identity.shape[2] > 0
     for k in range(listening.first[at.a], listening.first[at.a + 1]):
@@ -273,16 +237,7 @@ def tell_vehicles(
 
 @compiled_inner
 def tell_echoes(at: Reading, i: int, move: Move, listening: Listening, readings: Readings, see: Fields) -> None:
-    """The echoes that vehicle i heard in a reading, into its percept.
-
-    Args:
-        at: the reading; a number below 0 for silence.
-        i: index of the vehicle.
-        move: its own since the reading.
-        listening: the scenario's numbers.
-        readings: the line.
-        see: fields of the percepts, which are written.
-    """
+    """The echoes that vehicle i heard in a reading, into its percept. A number of the reading below 0 is silence."""
     w, slot = at.w, at.slot
     for e in range(listening.active[at.a], listening.active[at.a + 1]):
         k, reach, x, y = see.heard.shape[2] + e, -1.0, 0.0, 0.0

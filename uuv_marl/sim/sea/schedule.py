@@ -8,13 +8,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario, hears_ideally
 from uuv_marl.sim.compiled import compiled
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
+from uuv_marl.types import Float64, Int64
 
 
 class Listening(NamedTuple):
@@ -95,11 +92,8 @@ def latest(hold: int, every: float) -> int:
 def due(hold: int, every: float, delay: int, holds: int) -> int:
     """Number of the reading that an array takes at this control hold; -1 for none, or one that no decision will see.
 
-    Args:
-        hold: since the array began.
-        every: control holds between readings.
-        delay: control holds until a policy has a reading.
-        holds: of a decision.
+    ``hold``: since the array began; ``every``: holds between readings; ``delay``: until a policy has one; ``holds``: of
+    a decision.
     """
     number = latest(hold, every)
     if hold_of(number, every) != hold:

@@ -1,14 +1,12 @@
 """The sea: everything that disturbs a world, in rooms of their own, and the moments of a step at which each acts.
 
-A world without disturbances has no sea (None), and its compiled code holds nothing of this. Both engines call the
-functions here: the compiled one compiled, the plain one as the Python that they are.
+A world without disturbances has no sea (None), and its compiled code holds nothing of this.
 """
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.scenario import Scenario, disturbances
 from uuv_marl.sim.arrays import Course, State, World
@@ -32,8 +30,8 @@ from uuv_marl.sim.sea.schedule import Listening, Reading, due, listening
 from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.views import Fields, SeaFields
 from uuv_marl.sim.workspace import Columns
+from uuv_marl.types import UInt64
 
-UInt64 = NDArray[np.uint64]
 SEA_CHANNELS = ("current", "age", "ranged", "modem")
 """Channels that only a disturbed world's code writes."""
 
@@ -114,15 +112,7 @@ def sea_tables(sea: Sea | None) -> tuple[Any, ...]:
 
 @compiled_inner
 def integrate_at_sea(w: int, state: State, rules: Rules, now: Columns, sea: Sea) -> None:
-    """One control hold of world w.
-
-    Args:
-        w: index of the world.
-        state: of the vehicles, at the start.
-        rules: the scenario's clocks.
-        now: columns of the vehicles; thrust and torque as asked of them.
-        sea: forces that reach the water are written.
-    """
+    """One control hold of world w. Forces that reach the water are written."""
     weaken(w, state.tick[w], now, sea.actuation, sea.hull)
     integrate_each(w, state.alive, rules, now, sea.actuation, sea.hull, sea.flow.flow)
 
@@ -155,14 +145,7 @@ def reads(w: int, tick: int, sea: Sea) -> bool:
 
 @compiled_inner
 def take_readings(w: int, world: World, sea: Sea, see: Fields) -> None:
-    """Keep what the arrays hear now, from percepts that hold what is true.
-
-    Args:
-        w: index of the world.
-        world: its arrays; percepts hold what is true.
-        sea: the readings are written, and what the noise remembers.
-        see: fields of the percepts, which are read.
-    """
+    """Keep what the arrays hear now, from percepts that hold what is true."""
     tick, line = world.state.tick[w], sea.listening
     for a in range(0 if line.ideal else line.every.shape[0]):
         number = due(tick - sea.readings.began[w], line.every[a], line.delay, line.holds)
@@ -176,15 +159,7 @@ def take_readings(w: int, world: World, sea: Sea, see: Fields) -> None:
 
 @compiled_inner
 def know(w: int, world: World, sea: Sea, see: Fields, more: SeaFields) -> None:
-    """Percepts that hold what is true become what vehicles know.
-
-    Args:
-        w: index of the world.
-        world: its arrays; percepts hold what is true, and ``heard`` is written.
-        sea: what lies between the truth and what is known.
-        see: fields of the percepts, which are written.
-        more: fields of the sea's channels, which are written.
-    """
+    """Percepts that hold what is true become what vehicles know. ``heard`` is written, too."""
     if not sea.listening.ideal:
         recall(w, world, sea.listening, sea.track, sea.readings, see, more)
     tell_ranged(w, world.state.alive, sea.listening, sea.noise, more)

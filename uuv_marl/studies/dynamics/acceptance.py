@@ -1,4 +1,4 @@
-"""Whether a vehicle swims as its source says: top speed, turn, coasting and stability, by the engine's own equations.
+"""Whether a vehicle swims as its source says: top speed, turn, coasting and stability, by the simulation's equations.
 
 A vehicle is alone in still water. Its lags count. It is integrated with the longest step that is accepted for it.
 """
@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario import Scenario, load_scenario, load_vehicle, variant_names, vehicle_names
-from uuv_marl.sim.formulas import Row, actuators, advance, derivative, lagging
-from uuv_marl.sim.sea.actuation import actuation
-from uuv_marl.sim.vehicle import STILL, plant
+from uuv_marl.sim.sea.actuation import actuation, followed
+from uuv_marl.sim.vehicle import STILL, State6, actuators, advance_lagging, derivative, plant
 
 SPEEDS_MPS = (0.5, 1.0, 1.5, 2.0)
 """Speeds at which the stability of going straight is tabled."""
@@ -87,7 +86,7 @@ def alone(vehicle: str, **overrides: object) -> Scenario:
     return load_scenario("tracking", num_vehicles=1, overrides=slow | {"timing.integration_step_s": STEPS_S[-1]})
 
 
-def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_mps: float = 0.0) -> Iterator[Row]:
+def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_mps: float = 0.0) -> Iterator[State6]:
     """States (x, y, psi, u, v, r) of a vehicle after every integration step; it begins straight ahead, without forces.
 
     Args:
@@ -97,14 +96,14 @@ def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_
         speed_mps: at the start.
     """
     p, numbers, h = plant(scenario), actuation(scenario), scenario.timing.integration_step_s
-    now: Row = (0.0, 0.0, 0.0, speed_mps, 0.0, 0.0)
+    now: State6 = (0.0, 0.0, 0.0, speed_mps, 0.0, 0.0)
     given = (0.0, 0.0)
     for _ in range(round(seconds / h)):
-        asked = actuators(action, now[5], p)
-        thrust = lagging(asked[0], given[0], numbers.thrust_half, numbers.thrust_whole)
-        steer = lagging(asked[1], given[1], numbers.yaw_half, numbers.yaw_whole)
-        now = advance(now, list(zip(thrust, steer, strict=True)), STILL, h, p)
-        given = thrust[2], steer[2]
+        thrust, steer = actuators(*action, now[5], p)
+        u_0, u_1, u_2 = followed(thrust, given[0], numbers.thrust_half, numbers.thrust_whole)
+        r_0, r_1, r_2 = followed(steer, given[1], numbers.yaw_half, numbers.yaw_whole)
+        now = advance_lagging(now, (u_0, r_0), (u_1, r_1), (u_2, r_2), STILL, h, p)
+        given = u_2, r_2
         yield now
 
 
@@ -135,7 +134,7 @@ def turn(scenario: Scenario) -> tuple[float, float, float]:
     return top[3], math.degrees(turning[5]), math.hypot(turning[3], turning[4]) / abs(turning[5])
 
 
-def _last(scenario: Scenario, action: tuple[float, float], seconds: float) -> Row:
+def _last(scenario: Scenario, action: tuple[float, float], seconds: float) -> State6:
     *_, last = swim(scenario, action, seconds)
     return last
 
@@ -158,7 +157,7 @@ def sway_yaw(scenario: Scenario, speed_mps: float) -> NDArray[np.complex128]:
     """
     p, small = plant(scenario), 1e-7
 
-    def rate(v: float, r: float) -> Row:
+    def rate(v: float, r: float) -> tuple[float, ...]:
         return derivative((0.0, 0.0, 0.0, speed_mps, v, r), (0.0, 0.0), STILL, p)[4:]
 
     slopes = [(np.subtract(rate(v, r), rate(-v, -r)) / (2.0 * small)).tolist() for v, r in ((small, 0.0), (0.0, small))]

@@ -8,14 +8,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.studies.columns import Float64
-
-Int32 = NDArray[np.int32]
+from uuv_marl.types import Float64, Int32
 
 ROUNDS = 1500
 """Relaxation steps towards a formation."""

@@ -19,11 +19,12 @@ from uuv_marl.baselines.policy import Policy
 from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, SKY, legend, panels
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.studies.columns import Columns, Float64, groups
+from uuv_marl.studies.columns import Columns, groups
 from uuv_marl.studies.dynamics.formation import straight_leg
 from uuv_marl.studies.dynamics.softening import PAPER, Softened, Softening
 from uuv_marl.studies.part import Part, Share, Tables
 from uuv_marl.studies.suite import Suite
+from uuv_marl.types import Float64
 
 SEEDS = (0, 1, 2, 3)
 """Starts of every variant."""

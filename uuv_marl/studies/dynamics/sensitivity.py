@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from uuv_marl.benchmark.style import panels
-from uuv_marl.studies.columns import Float64, columns, groups
+from uuv_marl.studies.columns import columns, groups
 from uuv_marl.studies.paper.assumptions import READINGS
 from uuv_marl.studies.paper.cases import SCENARIOS
 from uuv_marl.studies.paper.ledger import CLOSE, NUMBERS, Number, difference
 from uuv_marl.studies.part import Part, Share, Tables
 from uuv_marl.studies.suite import Case, Suite
+from uuv_marl.types import Float64
 
 SEEDS = range(6)
 OWN = [

@@ -22,10 +22,11 @@ from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.style import BLACK, BLUE, COLOURS, GREY, ORANGE, panels
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.vehicle import STILL, derivative, plant
-from uuv_marl.studies.columns import Columns, Float64, columns, groups, where
+from uuv_marl.studies.columns import Columns, columns, groups, where
 from uuv_marl.studies.dynamics.formation import Formation, drag_n, formations, stiffness, straight_leg
 from uuv_marl.studies.part import Part, Share, Tables
 from uuv_marl.studies.suite import Suite
+from uuv_marl.types import Float64
 
 Complex128 = NDArray[np.complex128]
 

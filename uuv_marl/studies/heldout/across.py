@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from uuv_marl.benchmark.tables import FEWEST
 from uuv_marl.studies.heldout.episodes import Episode
 from uuv_marl.studies.heldout.sets import FIRST, SETS, HeldOut
 from uuv_marl.studies.robustness.scores import Score
+from uuv_marl.types import Float64
 
 
 def success(episodes: Sequence[Episode]) -> float:
@@ -90,11 +90,11 @@ def _bootstrapped(statistic: Any, scores: Sequence[Sequence[float]], fewest: int
     return Score(value, float(interval.low), float(interval.high))
 
 
-def _mean(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
+def _mean(*samples: Float64, axis: int = -1) -> Float64:
     return np.mean([x.mean(axis=axis) for x in samples], axis=0)
 
 
-def _higher(*samples: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:  # noqa: ARG001 - scipy names it
+def _higher(*samples: Float64, axis: int = -1) -> Float64:  # noqa: ARG001 - scipy names it
     """Of mine and then the other's samples, runs along the last axis."""
     half = len(samples) // 2
     pairs = [(x[..., :, None], y[..., None, :]) for x, y in zip(samples[:half], samples[half:], strict=True)]

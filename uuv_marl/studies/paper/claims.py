@@ -4,13 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from uuv_marl.studies.columns import Float64
 from uuv_marl.studies.data import read_toml
 from uuv_marl.studies.paper import measures
 from uuv_marl.studies.paper.cases import BY_NAME
 from uuv_marl.studies.suite import NOTHING, Case, Suite
+from uuv_marl.types import Bool, Float64
 
 _TABLES = read_toml("paper", "stated.toml")
 
@@ -52,7 +51,7 @@ class Claim(NamedTuple):
         with np.errstate(divide="ignore", invalid="ignore"):
             return found[0] / found[1] if self.combined == "ratio" else found[0]
 
-    def holds(self, values: Float64) -> NDArray[np.bool_]:
+    def holds(self, values: Float64) -> Bool:
         """Whether the claim holds, by seed."""
         return (values >= self.least) & (values <= self.most)
 

@@ -7,9 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, draw_course
-from uuv_marl.studies.columns import Columns, Int64
+from uuv_marl.studies.columns import Columns
 from uuv_marl.studies.paper.measures import corner_times
 from uuv_marl.studies.suite import Case, Suite, Trace
+from uuv_marl.types import Int64
 
 GROUPS = ((0, BLUE, "starts to port"), (1, ORANGE, "starts to starboard"))
 """Groups as ``start_groups`` numbers them, with colour and label."""

@@ -11,11 +11,11 @@ from uuv_marl.atomic import write_text
 from uuv_marl.baselines.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.tables import Estimate, estimate, markdown_table
-from uuv_marl.studies.columns import Float64
 from uuv_marl.studies.paper.assumptions import ASSUMPTIONS
 from uuv_marl.studies.paper.cases import BY_NAME, SCENARIOS
 from uuv_marl.studies.paper.claims import CLAIMS, Claim, stated
 from uuv_marl.studies.suite import Case, Suite
+from uuv_marl.types import Float64
 
 CLOSE, NEAR = 0.05, 0.15
 """Relative differences that are called a match."""

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from uuv_marl.studies.columns import Float32, Float64, Int64
 from uuv_marl.studies.suite import Trace
+from uuv_marl.types import Float32, Float64, Int64
 
 SPEED_MPS = 4.0
 """Speed of l(t) [m/s]. Section 5.1."""

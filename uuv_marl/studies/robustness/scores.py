@@ -9,12 +9,11 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from uuv_marl.studies.robustness.axes import AXES, CALM
+from uuv_marl.types import Float64, Int64
 
-Float64 = NDArray[np.float64]
 ENOUGH = 0.9
 """Success at which a level still counts as passed. Assumed: a usual demand."""
 WORTH_KEEPING = 0.8
@@ -114,7 +113,7 @@ def critical_level(shares: Float64, levels: tuple[int, ...]) -> Float64:
         Shape (...): -1 where level 0 is below already, and one more than the last level where none is.
     """
     below = shares < ENOUGH - _ROUNDING
-    k: NDArray[np.int64] = np.where(below.any(axis=0), np.argmax(below, axis=0), len(levels))
+    k: Int64 = np.where(below.any(axis=0), np.argmax(below, axis=0), len(levels))
     high = np.clip(k, 1, len(levels) - 1)[None]
     s_low, s_high = (np.take_along_axis(shares, j, 0)[0] for j in (high - 1, high))
     at = np.array(levels, np.float64)
