@@ -473,6 +473,18 @@ def test_one_disturbance_moves_no_draw_of_what_is_missed(own, other):
         same(ours, theirs, ("heard", "echo", "who"))
 
 
+def test_a_phantom_as_far_off_as_the_vehicle_beside_it_leaves_that_heard():
+    """Heard by bearings alone, all are put at one range, which float32 rounds up; who is there stays."""
+    bearings = {"noise.passive_ranges": False, "noise.nominal_range_m": 12.3}
+    true, false = (
+        Swarm(load_scenario("starter", overrides=bearings | more))
+        for more in ({}, {"noise.false_echo_probability": 1.0})
+    )
+    true.reset(0)
+    false.reset(0)
+    np.testing.assert_array_equal(false.heard, true.heard)
+
+
 def test_false_echoes_stay_where_they_are_beside_others():
     _, alone = swim(FALSE)
     _, among = swim(FALSE | DETECTION | FACTOR)

@@ -51,28 +51,6 @@ def plants(draw):
         assume(False)
 
 
-@given(speed, speed, speed, st.floats(-3000, 3000), st.floats(-3000, 3000))
-def test_acceleration_is_equation_2_with_all_its_terms(u, v, r, tau_u, tau_r):
-    scenario = load_scenario("tracking", overrides=COUPLED)
-    nu = np.array([u, v, r])
-    m, c, d = matrices(scenario, nu)
-    expected = np.linalg.solve(m, np.array([tau_u, 0.0, tau_r]) - c @ nu - d @ nu)
-    np.testing.assert_allclose(vehicle.acceleration((u, v, r), (tau_u, tau_r), FULL), expected, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("munk", [True, False])
-@given(speed, speed, speed, st.floats(-3000, 3000), st.floats(-0.5, 0.5))
-def test_lift_rudder_and_the_munk_moment_enter_equation_2(munk, u, v, r, thrust, angle):
-    """The rudder's coefficients are Fossen's: an angle that is positive there turns to port."""
-    scenario = load_scenario("tracking", overrides=COUPLED | LIFT | RUDDER | {"vehicle.munk_moment": munk})
-    nu, act = np.array([u, v, r]), scenario.actuators
-    m, c, d = matrices(scenario, nu)
-    fin = np.array([0.0, act.Y_uud, act.N_uud]) * max(u, 0.0) ** 2 * -angle
-    expected = np.linalg.solve(m, np.array([thrust, 0.0, 0.0]) + fin - c @ nu - d @ nu)
-    got = vehicle.acceleration((u, v, r), (thrust, angle), plant(scenario))
-    np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9)
-
-
 zeros_too = st.one_of(speed, st.sampled_from([0.0, -0.0]))
 
 
