@@ -37,7 +37,7 @@ benchmark: .venv/base.stamp
 	$(BIN)/uuv-marl benchmark $(ARGS)
 
 reproduce: .venv/base.stamp
-	$(BIN)/uuv-marl reproduce $(ARGS)
+	$(BIN)/python -m research.paper $(ARGS)
 
 paper: reproduce
 	$(BIN)/python tools/ship_paper.py results/reproduce

@@ -253,7 +253,8 @@ def test_the_command_line_from_end_to_end(tmp_path):
         (["benchmark", "--policy=bio"], "did you mean"),
         (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within 0.001 to 1,000,000"),
         (["benchmark", "--set=vehicle"], "must look like field=value"),
-        (["scenarios", "--show=trackin"], "did you mean"),
+        (["list", "--show=trackin"], "did you mean"),
+        (["list", "policies", "--show=sff"], "a policy has no file"),
         (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy has its own"),
         (["benchmark", "--scenario=tracking", "--scenario=tracking"], "different names"),
         (["benchmark", "--policy=nowhere:Thing"], "can't be imported"),
@@ -273,13 +274,13 @@ def test_lists_and_help():
     for arguments in (
         ["--help"],
         ["benchmark", "--help"],
-        ["scenarios"],
-        ["policies"],
+        ["list"],
+        ["list", "policies"],
         ["--version"],
         ["tune", "--help"],
     ):
         assert CliRunner().invoke(app, arguments).exit_code == 0
-    shown = CliRunner().invoke(app, ["scenarios", "--show", "random_field"]).output
+    shown = CliRunner().invoke(app, ["list", "--show", "random_field"]).output
     assert "Repoulias" in shown
     assert "[random_field]" in shown
 

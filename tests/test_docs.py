@@ -73,7 +73,7 @@ def stop_at_once(*args, **kwargs):
             line.split("#")[0].strip()
             for param in blocks("console")
             for line in param.values[0].splitlines()
-            if "uuv-marl" in line
+            if "uuv-marl" in line or "-m research." in line
         }
     ),
 )
@@ -82,21 +82,20 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     for work in (
         "benchmark.runner.run_missing",
         "benchmark.tuning.tune",
-        "studies.reproduce.make",
-        "studies.dynamics.identify.identify",
-        "studies.heldout.job.run",
-        "studies.robustness.job.run",
-        "studies.robustness.pilot.run",
-        "studies.verify.check.check",
+        "benchmark.robustness.job.run",
         "replay.record.record",
         "replay.traces.from_folder",
     ):
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
+    for work in ("paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check"):
+        monkeypatch.setattr(f"research.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.training.train", stop_at_once)
     monkeypatch.chdir(tmp_path)
-    line = line.replace("verify docs/", f"verify {ROOT / 'docs'}/")
+    line = line.replace(" docs/", f" {ROOT / 'docs'}/")
     line = re.sub(r"--policy (runs/\S+|mine:\w+)", "--policy mappo", line)  # a reader's own
-    done = CliRunner().invoke(app, line.split()[1:])
+    words = line.removeprefix("python -m ").split()
+    command = app if words[0] == "uuv-marl" else importlib.import_module(f"{words[0]}.__main__").app
+    done = CliRunner().invoke(command, words[1:])
     # Ray has an environment of its own; without it a command says so once its options are understood.
     assert done.exit_code in (0, 130) or "needs ray" in done.output, done.output
 

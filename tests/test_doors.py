@@ -284,7 +284,7 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     assert load_scenario("starter", overrides={"vehicle": "~/v.toml", "scale": "vehicle"}).vehicle.name == "lauv"
     assert "lauv" in show("~/mine.toml")
     assert "lauv" in show_vehicle("~/v.toml")
-    for arguments in (["scenarios", "--show", "~/mine.toml"], ["vehicles", "--show", "~/v.toml"]):
+    for arguments in (["list", "--show", "~/mine.toml"], ["list", "vehicles", "--show", "~/v.toml"]):
         assert CliRunner().invoke(app, arguments).exit_code == 0
     trained = POLICIES["mappo"]
     (home / "best").mkdir()
@@ -356,7 +356,7 @@ def printed(monkeypatch):
 def test_lists_help_and_errors_can_be_printed_in_any_encoding(encoding, printed):
     for name in COMMANDS:
         assert printed([*name.split(), "--help"], encoding)[0] == 0, name
-    for arguments, word in (("policies", "scout"), ("scenarios", "starter"), ("scenarios --show=lossy", "loss")):
+    for arguments, word in (("list policies", "scout"), ("list scenarios", "starter"), ("list --show=lossy", "loss")):
         status, text, _ = printed(arguments.split(), encoding)
         assert status == 0
         assert word in text
@@ -366,7 +366,7 @@ def test_lists_help_and_errors_can_be_printed_in_any_encoding(encoding, printed)
 
 
 def test_vehicles_can_be_printed_in_plain_ascii(printed):
-    status, text, _ = printed(["vehicles"], "ascii")
+    status, text, _ = printed(["list", "vehicles"], "ascii")
     assert status == 0
     assert "remus100" in text
 
@@ -389,7 +389,7 @@ def test_a_table_fits_a_notebook(tmp_path):
 
 def test_commands_work_without_docstrings(tmp_path):
     """``python -OO`` drops them, and every assert."""
-    lines = [["policies"], ["scenarios"], ["vehicles", "--show=lauv"]]
+    lines = [["list"], ["list", "--show=lauv"]]
     lines += [[*name.split(), "--help"] for name in COMMANDS]
     code = f"""import sys
 from uuv_marl.cli import main

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from research.heldout import across, figures, job, page, sets
+from research.heldout.__main__ import app
+from research.heldout.across import efficiency, improvement, overall, success
+from research.heldout.episodes import Episode, read_episodes, write_episodes
+from research.heldout.marl_eval import write_marl_eval
+from research.heldout.sets import GROUPS, LEADING, SETS, HeldOut
+from research.heldout.targets import later, targets, upper_bound
+from research.heldout.trainings import Trained, Validation, find_trainings
 from uuv_marl import baselines
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark.tables import shown
-from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
-from uuv_marl.studies.heldout import across, figures, job, page, sets
-from uuv_marl.studies.heldout.across import efficiency, improvement, overall, success
-from uuv_marl.studies.heldout.episodes import Episode, read_episodes, write_episodes
-from uuv_marl.studies.heldout.marl_eval import write_marl_eval
-from uuv_marl.studies.heldout.sets import GROUPS, LEADING, SETS, HeldOut
-from uuv_marl.studies.heldout.targets import later, targets, upper_bound
-from uuv_marl.studies.heldout.trainings import Trained, Validation, find_trainings
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "heldout"
 SHIPPED = Path(baselines.__file__).parent / "trained" / "mappo.safetensors"
@@ -187,7 +187,7 @@ def trainings(folder, weights):
 
 def test_the_command_runs_what_is_missing_and_tells_of_it(tmp_path, quick):
     where = trainings(tmp_path / "trainings", SHIPPED)
-    command = ["heldout", f"--output={tmp_path / 'out'}", f"--trainings={where}"]
+    command = [f"--output={tmp_path / 'out'}", f"--trainings={where}"]
     done = CliRunner().invoke(app, [*command, "--seeds=1"])
     assert done.exit_code == 0, done.output
     done = CliRunner().invoke(app, command)
@@ -240,7 +240,7 @@ def check_marl_eval(data):
 
 def test_the_page_shows_what_was_asked_for_and_not_what_else_is_there(tmp_path, quick):
     where = trainings(tmp_path / "trainings", SHIPPED)
-    command = ["heldout", f"--output={tmp_path / 'out'}"]
+    command = [f"--output={tmp_path / 'out'}"]
     assert CliRunner().invoke(app, [*command, f"--trainings={where}"]).exit_code == 0
     done = CliRunner().invoke(app, [*command, "--seeds=1"])
     assert done.exit_code == 0, done.output
@@ -253,7 +253,7 @@ def test_the_page_shows_what_was_asked_for_and_not_what_else_is_there(tmp_path, 
 
 def test_a_training_that_went_on_is_run_anew_where_that_is_said(tmp_path, quick):
     where = trainings(tmp_path / "trainings", SHIPPED)
-    command = ["heldout", f"--output={tmp_path / 'out'}", f"--trainings={where}", "--seeds=1"]
+    command = [f"--output={tmp_path / 'out'}", f"--trainings={where}", "--seeds=1"]
     assert CliRunner().invoke(app, command).exit_code == 0
     other = SHIPPED.with_name("ppo.safetensors")
     shutil.copyfile(other, where / "mappo-0" / "best" / WEIGHTS_FILE)
@@ -265,7 +265,7 @@ def test_a_training_that_went_on_is_run_anew_where_that_is_said(tmp_path, quick)
 
 def test_ablations_alone_make_a_page(tmp_path, quick):
     where = trainings(tmp_path / "ablations", SHIPPED)
-    done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", f"--trainings={where}", "--seeds=1"])
+    done = CliRunner().invoke(app, [f"--output={tmp_path / 'out'}", f"--trainings={where}", "--seeds=1"])
     assert done.exit_code == 0, done.output
     assert "| mappo-0* | 1 |" in (tmp_path / "out" / "report.md").read_text()
     assert not (tmp_path / "out" / "marl_eval.json").exists()
@@ -291,7 +291,7 @@ def test_what_is_shipped_is_found_again(tmp_path, monkeypatch):
 
 
 def test_without_trainings_the_command_ends_with_its_report(tmp_path, quick):
-    done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", "--seeds=1"])
+    done = CliRunner().invoke(app, [f"--output={tmp_path / 'out'}", "--seeds=1"])
     assert done.exit_code == 0, done.output
     text = (tmp_path / "out" / "report.md").read_text()
     assert text.count("No trainings were given.") == 2
@@ -305,7 +305,7 @@ def test_trainings_without_a_set_of_the_comparison_make_no_table(tmp_path, quick
         monkeypatch.setattr(module, "SETS", (quick._replace(across=0),))
     weights = Path(uuv_marl.baselines.__file__).parent / "trained" / "mappo.safetensors"
     where = trainings(tmp_path / "trainings", weights)
-    done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", "--seeds=1", f"--trainings={where}"])
+    done = CliRunner().invoke(app, [f"--output={tmp_path / 'out'}", "--seeds=1", f"--trainings={where}"])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "out" / "figures" / "training.png").exists()
 
@@ -350,10 +350,10 @@ def test_the_picture_of_fields_hides_no_collision(tmp_path, monkeypatch):
 
 
 def test_what_is_not_there_is_explained(tmp_path):
-    done = CliRunner().invoke(app, ["heldout", "--only=single", f"--output={tmp_path}"])
+    done = CliRunner().invoke(app, ["--only=single", f"--output={tmp_path}"])
     assert done.exit_code == 2
     assert "there is no set 'single'; there are tracking" in " ".join(done.output.split())
-    done = CliRunner().invoke(app, ["heldout", f"--trainings={tmp_path}", f"--output={tmp_path}"])
+    done = CliRunner().invoke(app, [f"--trainings={tmp_path}", f"--output={tmp_path}"])
     assert done.exit_code == 2
     assert "no trainings with a best policy" in " ".join(done.output.split())
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from research.columns import read_columns
+from research.dynamics import identify, unknowns
+from research.dynamics.unknowns import DEFAULTS, OBJECTIVES, UNKNOWNS, Numbers
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.paper import PAPER
-from uuv_marl.studies.columns import read_columns
-from uuv_marl.studies.dynamics import identify, unknowns
-from uuv_marl.studies.dynamics.unknowns import DEFAULTS, OBJECTIVES, UNKNOWNS, Numbers
 
 HIT = Numbers(10.03, 12.29, 11.0, 205.0, 0.0)
 

@@ -9,17 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from research.dynamics import acceptance
+from research.heldout.episodes import ByPolicy, read_episodes
+from research.heldout.targets import later
+from research.paper.ledger import read_ledger
+from research.paper.reproduce import NAMES
 from uuv_marl import baselines, load_scenario, scenario_names
+from uuv_marl.benchmark import handling
 from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.robustness import job
+from uuv_marl.benchmark.robustness.scores import EVERY, by_seed, group_score
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import conditions, load_vehicle, vehicle_names
-from uuv_marl.studies.dynamics import acceptance
-from uuv_marl.studies.heldout.episodes import ByPolicy, read_episodes
-from uuv_marl.studies.heldout.targets import later
-from uuv_marl.studies.paper.ledger import read_ledger
-from uuv_marl.studies.reproduce import NAMES
-from uuv_marl.studies.robustness import job
-from uuv_marl.studies.robustness.scores import EVERY, by_seed, group_score
 
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
@@ -62,7 +63,7 @@ def agility(vehicle):
 
 
 def growth(speed):
-    return acceptance.sway_yaw(acceptance.alone(VEHICLE), speed)[0].real
+    return acceptance.sway_yaw(handling.alone(VEHICLE), speed)[0].real
 
 
 def tabled():

@@ -13,10 +13,10 @@ from uuv_marl.baselines.checkpoint import load_checkpoint
 from uuv_marl.baselines.gains import PLUS
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import ScoutWary
+from uuv_marl.benchmark.robustness.axes import AXES
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.studies.robustness.axes import AXES
 
 pytestmark = pytest.mark.needs("torch")
 
@@ -185,7 +185,7 @@ def test_a_filter_that_sees_nothing_changes_nothing():
 
 
 def test_the_robustness_page_marks_what_was_trained_with():
-    from uuv_marl.studies.robustness.page import _LEARNED
+    from uuv_marl.benchmark.robustness.page import _LEARNED
     from uuv_marl.train.recipe import load_recipe
 
     for policy, told in _LEARNED.items():

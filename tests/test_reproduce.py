@@ -10,15 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from uuv_marl.baselines.bio_inspired import Gains
-from uuv_marl.cli import app
-from uuv_marl.errors import ResultsError
-from uuv_marl.studies import reproduce as job
-from uuv_marl.studies.columns import columns, groups, read_columns, where, write_columns
-from uuv_marl.studies.dynamics import literal, rest, sensitivity
-from uuv_marl.studies.paper import cases, measures
-from uuv_marl.studies.paper.assumptions import ASSUMPTIONS, READINGS
-from uuv_marl.studies.paper.cases import (
+from research.columns import columns, groups, read_columns, where, write_columns
+from research.dynamics import literal, rest, sensitivity
+from research.paper import cases, measures
+from research.paper import reproduce as job
+from research.paper.__main__ import app
+from research.paper.assumptions import ASSUMPTIONS, READINGS
+from research.paper.cases import (
     COMPARATORS,
     DELTA_LARGE,
     DELTA_SMALL,
@@ -28,10 +26,12 @@ from uuv_marl.studies.paper.cases import (
     ZETA_LARGE,
     ZETA_SMALL,
 )  # fmt: skip
-from uuv_marl.studies.paper.claims import CLAIMS
-from uuv_marl.studies.paper.ledger import assumption_entries, difference, given_entries, ledger, read_ledger, verdict
-from uuv_marl.studies.report import page
-from uuv_marl.studies.suite import Case, Suite
+from research.paper.claims import CLAIMS
+from research.paper.ledger import assumption_entries, difference, given_entries, ledger, read_ledger, verdict
+from research.paper.report import page
+from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.benchmark.suite import Case, Suite
+from uuv_marl.errors import ResultsError
 
 ROOT = Path(__file__).resolve().parent.parent
 SHIPPED = ROOT / "docs" / "paper"
@@ -356,7 +356,7 @@ def test_tables_survive_the_disk(tmp_path):
 
 
 def test_names_of_parts_are_checked():
-    done = CliRunner().invoke(app, ["reproduce", "--only", "figure-6"])
+    done = CliRunner().invoke(app, ["--only", "figure-6"])
     assert done.exit_code == 2
     assert "--only figure-6 is unknown; there are figure-7," in done.output
 

@@ -309,9 +309,7 @@ def test_an_error_in_a_users_policy_shows_the_users_lines_alone(tmp_path, monkey
     [
         (["benchmark", "--policy=:"], "policy ':' can't be imported"),
         (["tune", "--output=/dev/null"], "/dev/null can't be written"),
-        (["identify", "--output=/dev/null"], "/dev/null can't be written"),
-        (["reproduce", "--output=/dev/null/below"], "/dev/null/below can't be written"),
-        (["heldout", "--only=lossy", "--output=/dev/null"], "can't be written"),
+        (["robustness", "--output=/dev/null/below"], "/dev/null/below can't be written"),
     ],
 )
 def test_mistakes_are_explained(arguments, message, tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""The robustness suite: axes as data, one start at every level, scores by hand, resuming, the command, the pilot."""
+"""The robustness suite: axes as data, one start at every level, scores by hand, resuming, the command."""
 
 import itertools
 import json
@@ -11,14 +11,14 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.evaluate import evaluate
+from uuv_marl.benchmark.robustness import job, page, scores
+from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS, overrides
 from uuv_marl.benchmark.success import GRACE_S
 from uuv_marl.cli import app
 from uuv_marl.scenario import ScenarioError, disturbances
 from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.sea.actuation import victims
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.studies.robustness import job, page, pilot, scores
-from uuv_marl.studies.robustness.axes import AXES, BASE, CALM, GROUPS, overrides
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "robustness"
 PLACES = [(axis.name, level) for axis in AXES.values() for level in axis.levels]
@@ -309,7 +309,6 @@ def test_the_page_says_which_policy_has_fewer_seeds(tmp_path):
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        ("--quick --full", "exclude each other"),
         ("--axis W9", "there is no axis 'W9'; there are W1, "),
         ("--policy mapo", "did you mean 'mappo'"),
     ],
@@ -325,36 +324,3 @@ def test_what_cannot_be_run_is_refused_with_the_remedy(tmp_path, args, message):
 def test_the_shipped_pages_are_made_of_the_shipped_episodes(name):
     folder = DOCS / name
     assert (folder / "report.md").read_text() == page.report(job.read_episodes(folder / job.EPISODES))
-
-
-# The pilot
-
-
-def test_the_pilot_s_claims_are_scenarios():
-    every = pilot.claims(20)
-    assert len({(claim.case.name, claim.case.policy) for claim in every}) == len(every) > 100
-    for claim in every:
-        loaded = claim.case.load()
-        assert bool(disturbances(loaded)) == (claim.what != "nothing"), claim.what
-        assert loaded.arrival.ends_episode
-        assert 0 <= claim.claimed <= pilot.CLAIMED_SEEDS
-
-
-def test_verdicts_are_within_one_seed_of_the_pilot_s():
-    assert pilot.verdict(5, 16, 20) == "confirmed"
-    assert pilot.verdict(5, 15, 20) == "corrected"
-    assert pilot.verdict(0, 4, 20) == "confirmed"
-    assert pilot.verdict(0, 5, 20) == "corrected"
-
-
-def test_the_pilot_s_table(tmp_path, monkeypatch):
-    rows = [
-        {"what": "nothing", "scenario": "starter", "claims": [5, "-", "-"]},
-        {"what": "lag", "scenario": "starter", "claims": [5, "-", "-"], "set": {"actuators.yaw_lag_s": 5.0}},
-    ]
-    monkeypatch.setitem(pilot._TOLD, "rows", rows)
-    text, table = (path.read_text() for path in pilot.run(tmp_path, 2, silent))
-    assert "| nothing | 5/5; 2/2 |" in text
-    assert "| lag | **5/5; 0/2** |" in text
-    assert "1 of 2 are confirmed" in " ".join(text.split())
-    assert table.count("\n") == 3

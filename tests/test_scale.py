@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario, scenario_names
+from uuv_marl.benchmark import handling
 from uuv_marl.scenario import Scenario, ScenarioError, to_toml, vehicle_names
 from uuv_marl.scenario.dimensions import NUMBER, Units, converted, dimension
 from uuv_marl.scenario.scale import PAPER_FORCE_N, PAPER_LENGTH_M, PAPER_SPEED_MPS, PAPER_TURN_M, scale_of
 from uuv_marl.scenario.turning import turning_radius
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.studies.dynamics import acceptance
 
-EVERY = acceptance.every()
+EVERY = handling.every()
 
 
 def in_scale(name, vehicle, **changes):
@@ -94,7 +94,7 @@ def test_the_turning_radius_is_that_of_the_acceptance_test(name):
     """That one turns at full thrust, which loses speed to the turn; a hull with linear damping turns wider then."""
     vehicle = load_scenario("tracking", overrides={"vehicle": name, "scale": "vehicle"})
     radius = turning_radius(vehicle.vehicle, vehicle.actuators, vehicle.vehicle.cruise_mps)
-    assert radius == pytest.approx(acceptance.turn(acceptance.alone(name))[2], rel=0.02)
+    assert radius == pytest.approx(handling.turn(handling.alone(name))[2], rel=0.02)
 
 
 @pytest.mark.parametrize("name", vehicle_names())

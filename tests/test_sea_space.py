@@ -5,7 +5,7 @@ import pytest
 
 import uuv_marl
 from uuv_marl.baselines import make
-from uuv_marl.studies.robustness.axes import AXES, overrides
+from uuv_marl.benchmark.robustness.axes import AXES, overrides
 
 CELLS = [(axis, level) for axis, told in AXES.items() for level in told.levels]
 WORLDS, VEHICLES = 16, 5

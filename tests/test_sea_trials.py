@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from research.dynamics import sea_trials
+from research.dynamics.sea_trials import POLICIES, SCENARIOS, SEEDS, Episode
 from uuv_marl.scenario import vehicle_names
-from uuv_marl.studies.dynamics import sea_trials
-from uuv_marl.studies.dynamics.sea_trials import POLICIES, SCENARIOS, SEEDS, Episode
 
 SHIPPED = Path(__file__).parent.parent / "docs" / "sea-trials.csv"
 

@@ -122,7 +122,7 @@ def test_the_wheel_is_the_package_with_its_data_and_nothing_else(distributions):
 def test_the_wheel_holds_its_data_and_licences_and_is_small(distributions):
     _, wheel, metadata = distributions
     for needed in (
-        "scenario/starter.toml", "scenario/vehicles/lauv.toml", "studies/heldout/sets.toml", "py.typed",
+        "scenario/starter.toml", "scenario/vehicles/lauv.toml", "benchmark/robustness/axes.toml", "py.typed",
         "baselines/trained/mappo.safetensors", "baselines/tuned/sdc.json", "replay/page/uPlot.iife.min.js",
     ):  # fmt: skip
         assert f"uuv_marl/{needed}" in wheel

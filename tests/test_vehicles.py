@@ -9,14 +9,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
+from research.dynamics import acceptance
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
+from uuv_marl.benchmark import handling
 from uuv_marl.cli import app
 from uuv_marl.replay.traces import from_folder
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, variant_names, vehicle_names
 from uuv_marl.scenario.vehicle_files import VEHICLES
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.studies.dynamics import acceptance
 
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
 
@@ -65,13 +66,13 @@ def test_a_vehicle_does_what_another_program_made_of_its_numbers(vehicle, measur
     ],
 )
 def test_going_straight_is_as_stable_as_another_program_found(vehicle, speed, expected):
-    np.testing.assert_allclose(acceptance.sway_yaw(acceptance.alone(vehicle), speed), expected, atol=0.012)
+    np.testing.assert_allclose(acceptance.sway_yaw(handling.alone(vehicle), speed), expected, atol=0.012)
 
 
 def test_the_lauv_turns_from_cruise_as_another_program_found():
     """Full rudder at the thrust that holds 1.5 m/s ahead."""
     thrust = (2.4 + 2.4 * 1.5) * 1.5 / 14.0
-    *_, (_, _, _, u, v, r) = acceptance.swim(acceptance.alone("lauv"), (thrust, 1.0), 60.0, 1.5)
+    *_, (_, _, _, u, v, r) = handling.swim(handling.alone("lauv"), (thrust, 1.0), 60.0, 1.5)
     assert math.hypot(u, v) == pytest.approx(1.2, abs=0.05)
     assert math.degrees(r) == pytest.approx(24.0, abs=0.5)
     assert math.hypot(u, v) / r == pytest.approx(2.85, abs=0.02)
@@ -79,9 +80,9 @@ def test_the_lauv_turns_from_cruise_as_another_program_found():
 
 def test_presteros_sums_without_the_munk_moment_turn_as_lift_with_it():
     """They hold the added masses' part of sway and yaw; of the surge they don't, so the speed in the turn differs."""
-    sums, lift = (acceptance.turn(acceptance.alone(f"remus100+{name}")) for name in ("sums", "munk_on"))
+    sums, lift = (handling.turn(handling.alone(f"remus100+{name}")) for name in ("sums", "munk_on"))
     assert sums[2] == pytest.approx(lift[2], rel=0.002)
-    eigenvalues = [acceptance.sway_yaw(acceptance.alone(f"remus100+{name}"), 1.3) for name in ("sums", "munk_on")]
+    eigenvalues = [acceptance.sway_yaw(handling.alone(f"remus100+{name}"), 1.3) for name in ("sums", "munk_on")]
     np.testing.assert_allclose(*eigenvalues, rtol=1e-6)
     with pytest.raises(ScenarioError, match="N_uv = -24 .* adds energy .* give the lift's part alone"):
         load_scenario("tracking", overrides={"vehicle": "remus100+munk_on+sums"})
@@ -183,7 +184,7 @@ def test_every_number_of_a_vehicle_has_its_source(name):
     assert data["vehicle"]["source"]
 
 
-@pytest.mark.parametrize("name", acceptance.every())
+@pytest.mark.parametrize("name", handling.every())
 def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
     changes = SLOW | {"vehicle": name, "trajectory.speed_mps": 0.5}
     scenario = granted("bio_inspired_plus", load_scenario("single_obstacle", num_vehicles=4, overrides=changes))
@@ -265,16 +266,16 @@ def test_a_vehicle_that_a_scenario_is_too_fast_for_is_refused_with_the_remedy():
 
 
 def test_the_command_lists_the_catalogue_and_shows_one():
-    listed = CliRunner().invoke(app, ["vehicles"], env={"COLUMNS": "200"})
+    listed = CliRunner().invoke(app, ["list", "vehicles"], env={"COLUMNS": "200"})
     assert listed.exit_code == 0, listed.output
-    assert all(name in listed.output for name in acceptance.every())
+    assert all(name in listed.output for name in handling.every())
     row = next(line for line in listed.output.splitlines() if "remus100+munk_on" in line)
     assert "5.8 m" in row
     assert "2.59" in row
     assert "variant: munk_moment = true" in row
-    shown = CliRunner().invoke(app, ["vehicles", "--show", "lauv"])
+    shown = CliRunner().invoke(app, ["list", "--show", "lauv"])
     assert shown.output == show_vehicle("lauv") + "\n"
-    wrong = CliRunner().invoke(app, ["vehicles", "--show", "remus"])
+    wrong = CliRunner().invoke(app, ["list", "vehicles", "--show", "remus"])
     assert wrong.exit_code != 0
     assert "did you mean 'remus100'" in wrong.output
 

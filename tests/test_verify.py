@@ -1,4 +1,4 @@
-"""``uuv-marl verify``: shipped rows come out again, a changed digit is found, and what can't be run is named."""
+"""``research.verify``: shipped rows come out again, a changed digit is found, and what can't be run is named."""
 
 import csv
 import json
@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from research.verify import check
+from research.verify.__main__ import app
+from research.verify.check import Verdict
+from research.verify.rows import rows_of
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.runner import run_missing
-from uuv_marl.cli import app
-from uuv_marl.studies.verify import check
-from uuv_marl.studies.verify.check import Verdict
-from uuv_marl.studies.verify.rows import rows_of
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SAME_BITS = pytest.mark.skipif(
@@ -32,7 +32,7 @@ def here(tmp_path, monkeypatch):
 
 def verify(*words):
     """The exit status, and the output as one line, of its table the last column alone."""
-    done = CliRunner().invoke(app, ["verify", *map(str, words)])
+    done = CliRunner().invoke(app, [*map(str, words)])
     lines = (line.split("│")[-2] if "│" in line else line for line in done.output.splitlines())
     return done.exit_code, " ".join(" ".join(lines).split())
 

@@ -7,10 +7,10 @@ import shutil
 import sys
 from pathlib import Path
 
+from research.heldout.episodes import read_episodes
+from research.heldout.page import write_page
+from research.heldout.trainings import ABLATIONS, find_trainings
 from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
-from uuv_marl.studies.heldout.episodes import read_episodes
-from uuv_marl.studies.heldout.page import write_page
-from uuv_marl.studies.heldout.trainings import ABLATIONS, find_trainings
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "heldout"
 

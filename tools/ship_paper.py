@@ -4,8 +4,8 @@ import shutil
 import sys
 from pathlib import Path
 
-from uuv_marl.studies.report import NEEDED, write_page
-from uuv_marl.studies.reproduce import PARTS
+from research.paper.report import NEEDED, write_page
+from research.paper.reproduce import PARTS
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "paper"
 

@@ -1,4 +1,4 @@
-"""Run the sea trials (``uuv_marl.studies.dynamics.sea_trials``) and keep their episodes for docs/sea-trials.md.
+"""Run the sea trials (``research.dynamics.sea_trials``) and keep their episodes for docs/sea-trials.md.
 
 python tools/ship_sea_trials.py results/sea_trials; then python tools/write_tables.py
 """
@@ -6,7 +6,7 @@ python tools/ship_sea_trials.py results/sea_trials; then python tools/write_tabl
 import sys
 from pathlib import Path
 
-from uuv_marl.studies.dynamics import sea_trials
+from research.dynamics import sea_trials
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "sea-trials.csv"
 

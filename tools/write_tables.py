@@ -6,13 +6,13 @@ from decimal import Decimal
 from pathlib import Path
 
 import uuv_marl
+from research.dynamics import acceptance, sea_trials
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v0
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
-from uuv_marl.studies.dynamics import acceptance, sea_trials
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = tuple(

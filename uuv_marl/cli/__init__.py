@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl import __version__
-from uuv_marl.cli import benchmark, export, lists, replay, robustness, studies, train, verify
+from uuv_marl.cli import benchmark, export, lists, replay, robustness, train
 from uuv_marl.cli.console import console, print_everywhere
 
 app = typer.Typer(
@@ -17,10 +17,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
-    benchmark.benchmark, robustness.robustness, replay.replay, studies.heldout, studies.reproduce, verify.verify,
-    lists.scenarios, lists.vehicles, lists.policies, benchmark.tune, export.export, studies.identify,
+    benchmark.benchmark, robustness.robustness, benchmark.tune, replay.replay, export.export,
 ):  # fmt: skip
     app.command()(command)
+app.command("list")(lists.show_list)
 app.add_typer(train.app, name="train")
 
 

@@ -64,12 +64,18 @@ def path_argument(told: str, **more: Any) -> Any:
 
 
 @contextmanager
-def explained() -> Iterator[None]:
-    """Turn what a user can mend into one message: no traceback but the lines of the user's own code."""
+def explained(*ours: str) -> Iterator[None]:
+    """Turn what a user can mend into one message: no traceback but the lines of the user's own code.
+
+    Args:
+        ours: folders, beside the package, whose code is not the user's.
+    """
     try:
         yield
+    except typer.Exit:
+        raise
     except Exception as error:
-        frames = _own_frames(error) or _own_frames(error.__cause__)
+        frames = _own_frames(error, ours) or _own_frames(error.__cause__, ours)
         if isinstance(error, MENDABLE):
             message = str(error)
         elif frames:
@@ -87,10 +93,10 @@ def explained() -> Iterator[None]:
         raise typer.Exit(2) from None
 
 
-def _own_frames(error: BaseException | None) -> list[traceback.FrameSummary]:
+def _own_frames(error: BaseException | None, ours: tuple[str, ...]) -> list[traceback.FrameSummary]:
     """The part of an error's traceback that lies in files which belong to neither this package nor a library."""
     frames = traceback.extract_tb(error.__traceback__ if error else None)
-    return [f for f in frames if Path(f.filename).is_file() and not f.filename.startswith(_NOT_THE_USERS)]
+    return [f for f in frames if Path(f.filename).is_file() and not f.filename.startswith((*_NOT_THE_USERS, *ours))]
 
 
 def progress_bar() -> Progress:
@@ -129,7 +135,7 @@ def changes_of(overrides: Sequence[str]) -> dict[str, object]:
 
     changes = dict(parse_override(text) for text in overrides)
     for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
-        raise PolicyError(f"{field} can't be set here: every policy has its own ('uuv-marl policies'); leave it out")
+        raise PolicyError(f"{field} can't be set here: every policy has its own (uuv-marl list policies); leave it out")
     return changes
 
 

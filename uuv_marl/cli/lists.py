@@ -1,5 +1,6 @@
-"""``uuv-marl scenarios``, ``uuv-marl vehicles`` and ``uuv-marl policies``: what there is."""
+"""``uuv-marl list``: the scenarios, vehicles and policies that there are."""
 
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -9,64 +10,83 @@ from rich.table import Table
 from uuv_marl.cli.console import console, explained
 
 
-def scenarios(
-    show: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Print this scenario with the source of every number.")
-    ] = None,
-) -> None:
-    """List the scenarios, or show one."""
-    with explained():
-        from uuv_marl.scenario import load_scenario, scenario_names
-        from uuv_marl.scenario import show as show_scenario
+class Kind(StrEnum):
+    """What can be listed."""
 
-        if show is not None:
-            _print_toml(show_scenario(show))
-            return
-        table = Table("name", "version", "what", "source")
-        for name in scenario_names():
-            loaded = load_scenario(name)
-            table.add_row(name, str(loaded.version), loaded.title, loaded.source)
-        console.print(table)
+    SCENARIOS = "scenarios"
+    VEHICLES = "vehicles"
+    POLICIES = "policies"
 
 
-def vehicles(
+def show_list(
+    what: Annotated[Kind | None, typer.Argument(help="What to list. Default: all three.")] = None,
     show: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Print this vehicle's file with the source of every number: lauv, remus100+munk_on."
+            metavar="NAME",
+            help="Print this scenario's or vehicle's file, with the source of every number: lauv, remus100+munk_on.",
         ),
     ] = None,
 ) -> None:
-    """List the vehicles and how they move, or show one. Other commands take a vehicle by ``--set vehicle=NAME``."""
+    """List scenarios, vehicles and how they move, or policies; or show one scenario or vehicle.
+
+    Other commands take a vehicle by ``--set vehicle=NAME``.
+
+    Example: uuv-marl list scenarios --show random_field
+    """
     with explained():
-        from uuv_marl.scenario import show_vehicle
-
         if show is not None:
-            _print_toml(show_vehicle(show))
+            _print_toml(_file(what, show))
             return
-        from uuv_marl.studies.dynamics.acceptance import alone, changes, every, turn
-
-        table = Table("name", "length [m]", "mass [kg]", "top speed [m/s]", "turn", "source")
-        for name in every():
-            scenario = alone(name)
-            hull = scenario.vehicle
-            top, rate, radius = turn(scenario)
-            how = f"{rate:.0f} deg/s" + (f", radius {radius:.1f} m" if radius > 0.01 else " on the spot")
-            length = "-" if hull.length_m is None else f"{hull.length_m:g}"
-            source = f"variant: {', '.join(changes(name))}" if "+" in name else hull.source
-            table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, source)
-        console.print(table)
+        tables = {Kind.SCENARIOS: _scenarios, Kind.VEHICLES: _vehicles, Kind.POLICIES: _policies}
+        for kind, table in tables.items():
+            if what in (kind, None):
+                console.print(table())
 
 
-def policies() -> None:
-    """List the policies and what they need beyond the percept."""
+def _file(what: Kind | None, name: str) -> str:
+    """The text of a scenario's or a vehicle's file."""
+    from uuv_marl.scenario import show, show_vehicle, vehicle_names
+
+    if what is Kind.POLICIES:
+        raise typer.BadParameter("a policy has no file to show; docs/policies.md describes each", param_hint="--show")
+    known = name.partition("+")[0] in vehicle_names()
+    return show_vehicle(name) if what is Kind.VEHICLES or (what is None and known) else show(name)
+
+
+def _scenarios() -> Table:
+    from uuv_marl.scenario import load_scenario, scenario_names
+
+    table = Table("name", "version", "what", "source")
+    for name in scenario_names():
+        loaded = load_scenario(name)
+        table.add_row(name, str(loaded.version), loaded.title, loaded.source)
+    return table
+
+
+def _vehicles() -> Table:
+    from uuv_marl.benchmark.handling import alone, changes, every, turn
+
+    table = Table("name", "length [m]", "mass [kg]", "top speed [m/s]", "turn", "source")
+    for name in every():
+        scenario = alone(name)
+        hull = scenario.vehicle
+        top, rate, radius = turn(scenario)
+        how = f"{rate:.0f} deg/s" + (f", radius {radius:.1f} m" if radius > 0.01 else " on the spot")
+        length = "-" if hull.length_m is None else f"{hull.length_m:g}"
+        source = f"variant: {', '.join(changes(name))}" if "+" in name else hull.source
+        table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, source)
+    return table
+
+
+def _policies() -> Table:
     from uuv_marl.baselines import POLICIES
 
     table = Table("name", "channels", "yaw damping [N m s]", "what")
     for name, made in POLICIES.items():
         what = (made.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
         table.add_row(name, ", ".join(made.channels) or "-", f"{made.yaw_damping_nms:g}", what)
-    console.print(table)
+    return table
 
 
 def _print_toml(text: str) -> None:

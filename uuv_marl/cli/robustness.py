@@ -13,10 +13,6 @@ def robustness(
     quick: Annotated[
         bool, typer.Option("--quick", help="Eight axes, two scenarios, 5 seeds: about ten minutes.")
     ] = False,
-    full: Annotated[
-        bool,
-        typer.Option("--full", help="All levels, three scenarios, 50 seeds: days on two cores; see --ray."),
-    ] = False,
     axis: Annotated[
         list[str] | None, typer.Option(help="Only this axis, such as W1 or S7. Repeat it for several. Default: all.")
     ] = None,
@@ -35,14 +31,6 @@ def robustness(
         list[str] | None, typer.Option(help="Name or TOML file. Repeat it for several. Default: random_field.")
     ] = None,
     seeds: Annotated[int | None, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1. Default: 20.")] = None,
-    pilot: Annotated[
-        bool,
-        typer.Option(
-            "--pilot",
-            help="Instead confirm or correct the findings of a pilot study, in pilot.md. Only the options --seeds, "
-            "--ray and --output count then.",
-        ),
-    ] = False,
     ray: Annotated[
         str | None,
         typer.Option(
@@ -55,9 +43,9 @@ def robustness(
 ) -> None:
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
 
-    Each axis is one disturbance in five levels (uuv_marl/studies/robustness/axes.toml, with sources). The command
+    Each axis is one disturbance in five levels (uuv_marl/benchmark/robustness/axes.toml, with sources). The command
     writes report.md (scores, critical severities, every cell), a picture of each scenario (in figures) and episodes.csv
-    (a row for each episode). Without --quick or --full it makes the report that ships in docs/robustness: 30 to 50
+    (a row for each episode). Without --quick it makes the report that ships in docs/robustness: 30 to 50
     minutes of one core for each of its policies with memory. It needs the extra "analysis". Ctrl-C keeps the finished
     episodes, and the same command continues.
 
@@ -65,14 +53,10 @@ def robustness(
     """
     with explained():
         from uuv_marl.benchmark.frame import need_pandas
-        from uuv_marl.errors import ResultsError
-        from uuv_marl.studies.robustness import axes, job, page
-        from uuv_marl.studies.robustness import pilot as findings
+        from uuv_marl.benchmark.robustness import axes, job, page
 
-        if quick and full:
-            raise ResultsError("--quick and --full exclude each other; give one of them")
         need_pandas("uuv-marl robustness")
-        plan = job.QUICK if quick else job.FULL if full else job.SHIPPED
+        plan = job.QUICK if quick else job.SHIPPED
         plan = plan._replace(
             axes=axes.known(axis) if axis else plan.axes,
             levels=sorted(set(level)) if level else plan.levels,
@@ -88,11 +72,8 @@ def robustness(
             def report(what: str, share: float) -> None:
                 bar.update(task, completed=share, description=what[-60:])
 
-            if pilot:
-                written = findings.run(output, seeds or job.SHIPPED.seeds, report, evaluator)
-            else:
-                episodes = job.run(output, plan, report, evaluator, anew=anew)
-                written = [*page.write_report(output), episodes]
+            episodes = job.run(output, plan, report, evaluator, anew=anew)
+            written = [*page.write_report(output), episodes]
             report("robustness", 1.0)
         for path in written:
             console.print(f"  {path}", highlight=False)

@@ -12,10 +12,10 @@ from uuv_marl.baselines.checkpoint import Trims
 from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.trims import ALL_TRIMS
+from uuv_marl.benchmark.robustness.axes import AXES, known
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import load_scenario
-from uuv_marl.studies.robustness.axes import AXES, known
 from uuv_marl.train import ppo
 from uuv_marl.train.acting import Sees
 from uuv_marl.train.group import Conditions

@@ -1,0 +1,67 @@
+"""What sections 5.1-5.3 say in words, each with a measure that can fail: the sentences of ``stated.toml``."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from research.data import read_toml
+from research.paper import measures
+from research.paper.cases import BY_NAME
+from uuv_marl.benchmark.suite import NOTHING, Case, Suite
+from uuv_marl.types import Bool, Float64
+
+_TABLES = read_toml("paper", "stated.toml")
+
+
+def stated(kind: str) -> list[dict[str, Any]]:
+    """The tables of a kind in ``stated.toml``, each ``why`` in full."""
+    return [{**table, "why": _TABLES["reasons"].get(table.get("why"), "")} for table in _TABLES[kind]]
+
+
+class Claim(NamedTuple):
+    """A sentence of the paper, and what is measured in its stead."""
+
+    section: str
+    says: str
+    """The claim in our words."""
+    measured: str
+    """What is measured, in words."""
+    unit: str
+    cases: Sequence[str]
+    """Names of the cases it is measured on."""
+    metric: str = ""
+    measure: str = ""
+    """Where it is no metric: a function of ``measures``, of each trace and of what is ``given``."""
+    given: Mapping[str, object] = NOTHING
+    combined: str = ""
+    """Of several cases: ``ratio`` of the first to the second, or the smallest ``gain`` from each to the next."""
+    least: float = -np.inf
+    """The claim holds from here ..."""
+    most: float = np.inf
+    """... to here."""
+    why: str = ""
+    """Why it does not hold."""
+
+    def values(self, suite: Suite) -> Float64:
+        """What is measured, by seed."""
+        found = [self._of(suite, BY_NAME[name]) for name in self.cases]
+        if self.combined == "gain":
+            return np.diff(found, axis=0).min(axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return found[0] / found[1] if self.combined == "ratio" else found[0]
+
+    def holds(self, values: Float64) -> Bool:
+        """Whether the claim holds, by seed."""
+        return (values >= self.least) & (values <= self.most)
+
+    def _of(self, suite: Suite, case: Case) -> Float64:
+        """A case's values by seed."""
+        if self.metric:
+            return suite.metric(case, self.metric)
+        measure: Callable[..., float] = getattr(measures, self.measure)
+        return np.array([measure(trace, **self.given) for trace in suite.traces(case)])
+
+
+CLAIMS = tuple(Claim(**table) for table in stated("claim"))
+"""The claims in the paper's order; the last for both forms of the comparators."""

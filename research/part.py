@@ -1,0 +1,38 @@
+"""Parts of the reproduction: tables from runs, and a picture from the tables alone."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from research.columns import Columns
+from research.data import read_toml
+from uuv_marl.benchmark.suite import Case, Suite
+
+Tables = Mapping[str, Columns]
+Share = Callable[[float], None]
+"""Called with the share of the work that is done."""
+_WORDS = read_toml("paper", "parts.toml")
+
+
+class Part(NamedTuple):
+    """A figure of the paper, or a study beyond it."""
+
+    name: str
+    """``figure-11``; names the picture, and the option ``--only``."""
+    cases: tuple[Case, ...]
+    """What must have been run; nothing where the tables are computed by themselves, and take their time."""
+    tables: Callable[[Suite, Share], Tables]
+    """Makes tables from the runs, by name; each becomes ``data/NAME.csv``."""
+    draw: Callable[[Tables], Figure]
+    """Draws the picture from the tables alone."""
+
+    @property
+    def title(self) -> str:
+        """The text above the picture, see ``parts.toml``."""
+        return _WORDS[self.name]["title"]
+
+    @property
+    def caption(self) -> str:
+        """The text below the picture, see ``parts.toml``."""
+        return _WORDS[self.name]["caption"]

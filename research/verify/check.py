@@ -1,0 +1,176 @@
+"""Rows drawn at random, run again and compared, digit by digit."""
+
+import secrets
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import uuv_marl
+from research.heldout.targets import upper_bound
+from research.verify.rows import NoEpisodesError, Row, rows_of
+from uuv_marl.baselines import granted
+from uuv_marl.baselines.checkpoint import is_checkpoint
+from uuv_marl.baselines.registry import GUARDED
+from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
+from uuv_marl.benchmark.results import FILE
+from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
+
+_HOME = Path("heldout") / "episodes.csv"
+_HINT = (
+    "They are not in the installed package, only in the repository and in the source distribution "
+    "(pip download --no-deps --no-binary :all: uuv_marl): work in its folder, or give the file, as in "
+    "python -m research.verify path/to/docs/heldout/episodes.csv"
+)
+
+
+class Difference(NamedTuple):
+    """A number that differs today."""
+
+    field: str
+    shipped: str
+    now: str
+
+
+class Verdict(NamedTuple):
+    """The outcome of a row."""
+
+    row: Row
+    differences: Sequence[Difference] = ()
+    reason: str = ""
+    """Why the row can't be made again here; empty where it was."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the episode was run again, and every number is the same."""
+        return not self.reason and not self.differences
+
+
+def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
+    """All rows of these files and of the files in these folders; and the folders' tables that hold no episodes.
+
+    Args:
+        paths: files and folders; empty for the documents of the checkout that holds this package, or of this folder.
+
+    Raises:
+        ResultsError: there are no episodes, or a file is broken.
+    """
+    rows: list[Row] = []
+    others: list[Path] = []
+    for path in paths or [_docs()]:
+        if not path.is_dir():
+            rows += rows_of(path)
+            continue
+        for file in sorted([*path.rglob("*.csv"), *path.rglob(FILE)]):
+            try:
+                rows += rows_of(file)
+            except NoEpisodesError:
+                others.append(file)
+    if not rows:
+        raise ResultsError(f"{', '.join(map(str, paths))} holds no episodes; give a file such as docs/{_HOME}")
+    return rows, others
+
+
+def _docs() -> Path:
+    checkout = Path(uuv_marl.__file__).resolve().parent.parent
+    for folder in (Path("docs"), checkout / "docs"):
+        if (folder / _HOME).is_file():
+            return folder
+    raise ResultsError(f"the shipped episodes are not here: there is no {Path('docs') / _HOME}. {_HINT}")
+
+
+def only(rows: Sequence[Row], places: Collection[str], policies: Collection[str]) -> list[Row]:
+    """The rows of these sets or scenarios and of these policies; empty means all. Raises ResultsError for none."""
+    for what, wanted, there in (
+        ("set or scenario", places, {row.place for row in rows}),
+        ("policy", policies, {policy_of(row) for row in rows}),
+    ):
+        for name in wanted:
+            if name not in there:
+                raise ResultsError(f"no episode has the {what} {name!r}; there are {', '.join(sorted(there))}")
+    found = [
+        row for row in rows if row.place in (places or {row.place}) and policy_of(row) in (policies or {policy_of(row)})
+    ]
+    if not found:
+        raise ResultsError("no episode has both this set or scenario and this policy; leave one of the two out")
+    return found
+
+
+def policy_of(row: Row) -> str:
+    """The policy's name; a file of the paper's own policy names none."""
+    return row.cells.get("policy", "bio_inspired")
+
+
+def fresh_seed() -> int:
+    """A seed that nobody chose."""
+    return secrets.randbelow(1_000_000)
+
+
+def draw(rows: Sequence[Row], sample: int, seed: int) -> list[Row]:
+    """At most ``sample`` rows in random order, so that the first of them are a fair sample, too."""
+    picked = np.random.default_rng(seed).choice(len(rows), min(sample, len(rows)), replace=False)
+    return [rows[k] for k in picked.tolist()]
+
+
+def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -> Verdict:
+    """Run a row's episode again and compare it.
+
+    Args:
+        row: to check.
+        allowed: policies that are no names of the package but may be opened or imported, because the reader named them.
+        report: called with the share of the episode that is done.
+    """
+    try:
+        _need_trust(policy_of(row), allowed)
+        run = _rerun(row, report)
+    except DivergenceError as error:
+        return Verdict(row, [Difference("episode", "ended", f"diverged: {error}")])
+    except (*MENDABLE, ModuleNotFoundError) as error:
+        return Verdict(row, reason=str(error))
+    now = dict(zip(row.kind.measured, row.kind.written(row.cells, run.metrics), strict=True))
+    return Verdict(row, [Difference(f, row.cells[f], now[f]) for f in row.kind.measured if row.cells[f] != now[f]])
+
+
+def _need_trust(policy: str, allowed: Collection[str]) -> None:
+    plain = policy.removeprefix(GUARDED)
+    if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
+        raise PolicyError(f"policy {policy!r} is not part of the package; if you trust it, give --policy {policy}")
+
+
+def _rerun(row: Row, report: Callable[[float], None]) -> Run:
+    if not row.cells["seed"].isdecimal():
+        raise ResultsError(f"seed must be a whole number, got {row.cells['seed']!r}")
+    source, seed = row.kind.source(row.cells), int(row.cells["seed"])
+    with blaming(source.policy):
+        for event in evaluate(
+            granted(source.policy, source.scenario), source.policy, [seed], None, **source.parameters
+        ):
+            if isinstance(event, Run):
+                return event
+            report(event.share)
+    raise AssertionError("an episode ends in a run or in an error")
+
+
+def failed(verdicts: Sequence[Verdict]) -> bool:
+    """Whether a row differs, or nothing could be compared."""
+    return any(verdict.differences for verdict in verdicts) or all(verdict.reason for verdict in verdicts)
+
+
+def summary(verdicts: Sequence[Verdict], rows: int) -> str:
+    """How many agree, and what that says of all rows.
+
+    Args:
+        verdicts: of the rows that were drawn.
+        rows: how many there are to draw from.
+    """
+    run = [verdict for verdict in verdicts if not verdict.reason]
+    if not verdicts:
+        return "No row was run."
+    differ, left = sum(not verdict.agrees for verdict in run), len(verdicts) - len(run)
+    words = [f"{len(run) - differ} of {len(run)} rows that were run agree in every digit, {differ} differ."]
+    if left:
+        words.append(f"{left} more can't be reproduced here and count as neither.")
+    if run and len(run) < rows:
+        words.append(f"Fewer than {upper_bound(differ, len(run)):.1%} of the {rows:,} rows differ (95 % confidence).")
+    return " ".join(words)

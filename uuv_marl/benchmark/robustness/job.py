@@ -1,0 +1,128 @@
+"""The suite as a job: its cells as cases, their missing runs, and all episodes as one table."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from uuv_marl.baselines import granted, make
+from uuv_marl.benchmark.evaluate import evaluate
+from uuv_marl.benchmark.frame import need_pandas
+from uuv_marl.benchmark.robustness.axes import AXES, CALM, overrides
+from uuv_marl.benchmark.runner import Evaluate
+from uuv_marl.benchmark.suite import Case, Report, Suite
+from uuv_marl.scenario import ScenarioError, load_scenario
+
+EPISODES = "episodes.csv"
+METRICS = (
+    "success_share", "safe_share", "done_share", "swarm_success", "vehicles_faulty", "collisions",
+    "min_obstacle_distance_m", "min_spacing_m", "centre_error_m", "task_time_s", "effort",
+)  # fmt: skip
+"""What is kept of an episode; docs/results-format.md defines them."""
+
+
+class Plan(NamedTuple):
+    """The episodes to run."""
+
+    axes: Sequence[str]
+    levels: Sequence[int]
+    """Levels to run beside level 0."""
+    scenarios: Sequence[str]
+    policies: Sequence[str]
+    seeds: int
+    """Benchmark seeds 0 to ``seeds - 1``."""
+
+
+SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
+    "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "scout_lead", "scout_wary", "mappo", "mappo_v2",
+    "mappo_v3", "mappo_v4", "mappo_v2_calm", "mappo_v3_seed1", "mappo_v4_seed1",
+    "scout_plus,pull_at_rest=6,push_at_rest=3",
+), 20)  # fmt: skip
+"""The plan whose report is in docs/robustness; the last policy is the law of ``mappo_v3``."""
+QUICK = SHIPPED._replace(
+    axes=("W1", "S4", "S7", "S9", "N1", "A1", "F3", "X"), scenarios=("single_obstacle", "random_field"), seeds=5,
+    policies=("bio_inspired", "bio_inspired_plus", "mappo"),
+)  # fmt: skip
+"""A first look, in about ten minutes."""
+FULL = SHIPPED._replace(levels=(1, 2, 3, 4, 5), scenarios=("single_obstacle", "random_field", "tracking"), seeds=50)
+"""All of it, for hours."""
+
+
+class Cell(NamedTuple):
+    """A policy at one level of one axis; ``CALM`` is the axis of level 0."""
+
+    axis: str
+    level: int
+    case: Case
+
+
+def cells(plan: Plan) -> list[Cell]:
+    """All cells of a plan, level 0 of each scenario first."""
+    return [
+        Cell(axis, level, case_of(scenario, axis, level, policy)._replace(seeds=range(plan.seeds)))
+        for scenario in plan.scenarios
+        for axis, level in _places(plan)
+        for policy in plan.policies
+        if axis == CALM or AXES[axis].concerns(policy)
+    ]  # fmt: skip
+
+
+def case_of(scenario: str, axis: str, level: int, policy: str) -> Case:
+    """A policy on a scenario at one level of an axis."""
+    name = f"{load_scenario(scenario).name}.{axis}.{level}"
+    return Case(name, scenario, policy, overrides(axis, level, scenario), shared=True)
+
+
+def _places(plan: Plan) -> Iterator[tuple[str, int]]:
+    yield CALM, 0
+    for axis in plan.axes:
+        yield from ((axis, level) for level in plan.levels if level in AXES[axis].levels)
+
+
+def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> Path:
+    """Run what is missing of a plan, and write all its episodes to ``EPISODES``, a row each.
+
+    Args:
+        folder: holds a benchmark's results of each scenario, axis and level, in ``cells``.
+        plan: what to run.
+        report: called as it goes on.
+        evaluator: runs a policy over seeds, here or elsewhere.
+        anew: drop the runs of policies whose file has changed since, and make them again.
+
+    Returns:
+        The file.
+
+    Raises:
+        PolicyError: a policy does not exist, or cannot be run on one of the scenarios.
+        ScenarioError: two scenarios have the same name.
+        ResultsError: the folder holds other results.
+    """
+    names = [load_scenario(scenario).name for scenario in plan.scenarios]
+    if len(set(names)) < len(names):
+        raise ScenarioError(f"scenarios of one report need different names, got {', '.join(names)}; rename a file")
+    planned = cells(plan)
+    for cell in planned:
+        make(cell.case.policy, granted(cell.case.policy, cell.case.load()))  # refused now, not after hours
+    suite = Suite(folder / "cells", traces=False)
+    suite.run([cell.case for cell in planned], report, evaluator, anew=anew)
+    path = folder / EPISODES
+    write_episodes(path, (row for cell in planned for row in _rows(suite, cell)))
+    return path
+
+
+def _rows(suite: Suite, cell: Cell) -> Iterator[dict[str, Any]]:
+    results, seeds = suite.results(cell.case), suite.seeds_of(cell.case)
+    for row in results.select(cell.case.load().name, cell.case.policy, seeds):
+        metrics: dict[str, Any] = dict(row.metrics)
+        place = {"scenario": row.scenario, "axis": cell.axis, "level": cell.level, "policy": row.policy}
+        yield {**place, "seed": row.seed, **{name: metrics[name] for name in METRICS}}
+
+
+def write_episodes(path: Path, rows: Iterator[dict[str, Any]]) -> None:
+    """Rows of scenario, axis, level, policy, seed and metrics as CSV, six significant digits, NaN as nothing."""
+    pandas = need_pandas("uuv-marl robustness")
+    pandas.DataFrame.from_records(list(rows)).to_csv(path, index=False, float_format="%.6g")
+
+
+def read_episodes(path: Path) -> Any:
+    """What ``write_episodes`` wrote, as a pandas data frame."""
+    return need_pandas("uuv-marl robustness").read_csv(path, dtype={"axis": str, "policy": str, "scenario": str})

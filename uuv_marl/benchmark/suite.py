@@ -1,0 +1,116 @@
+"""Suites: cases whose missing runs are made and kept in a folder, so that a stopped job goes on."""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.benchmark.evaluate import evaluate
+from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.runner import Evaluate, run_missing
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.types import Float32
+
+Trace = dict[str, Float32]
+Report = Callable[[str, float], None]
+"""Called with what is being done, and the share of the work that is done."""
+NOTHING: Mapping[str, object] = MappingProxyType({})
+
+
+class Case(NamedTuple):
+    """A policy on a scenario over seeds."""
+
+    name: str
+    """Names its folder."""
+    scenario: str
+    policy: str = "bio_inspired"
+    overrides: Mapping[str, object] = NOTHING
+    """Fields of the scenario that are changed."""
+    parameters: Mapping[str, object] = NOTHING
+    """Parameters of the policy."""
+    seeds: Sequence[int] | None = None
+    """None for all of the suite's."""
+    routes: bool = False
+    """Whether routes of the suite's seeds are kept."""
+    shared: bool = False
+    """Whether cases of one name are policies on the same scenario, whose runs lie together."""
+
+    def load(self) -> Scenario:
+        """The scenario, before it grants what the policy declares."""
+        return load_scenario(self.scenario, overrides=self.overrides)
+
+    @property
+    def folder(self) -> str:
+        """Its name; unless it is shared, also a mark of the case's changes: a changed case never finds old runs."""
+        if self.shared:
+            return self.name
+        changed = hashlib.sha256(repr((self.load(), self.policy, sorted(self.parameters.items()))).encode())
+        words = "".join(c if c.isalnum() or c in ".-" else "_" for c in self.name)
+        return f"{words}.{changed.hexdigest()[:8]}"
+
+
+class Suite:
+    """Runs of cases in a folder.
+
+    Args:
+        folder: one sub-folder for each case, with a benchmark's results.
+        seeds: benchmark seeds 0 to ``seeds - 1``, for cases that name none.
+        traces: whether runs leave their time series.
+    """
+
+    def __init__(self, folder: Path, seeds: int = 1, traces: bool = True) -> None:
+        self.folder, self._traces = folder, traces
+        self.seeds = range(seeds)
+        self._open: dict[str, Results] = {}
+
+    def run(self, cases: Sequence[Case], report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> None:
+        """Run what is missing of these cases, here or where the evaluator does.
+
+        Args:
+            cases: in the order in which they are run.
+            report: called as it goes on.
+            evaluator: runs a policy over seeds.
+            anew: drop the runs of policies whose file has changed since, and make them again.
+
+        Raises:
+            ResultsError: the folder holds other results, or those of a policy before its file changed.
+        """
+        work = [case.load().swarm.num_vehicles * len(self.seeds_of(case)) for case in cases]
+        for k, case in enumerate(cases):
+
+            def note(_scenario: str, policy: str, share: float, k: int = k, name: str = case.name) -> None:
+                report(f"{name}: {policy}", (sum(work[:k]) + share * work[k]) / sum(work))
+
+            if anew:
+                self.results(case).forget_changed(case.policy)
+            how = partial(evaluator, **case.parameters)
+            run_missing(self.results(case), [case.load()], [case.policy], self.seeds_of(case), note, how)
+
+    def seeds_of(self, case: Case) -> Sequence[int]:
+        """The seeds of a case."""
+        return self.seeds if case.seeds is None else case.seeds
+
+    def metric(self, case: Case, name: str) -> NDArray[np.float64]:
+        """A metric by seed; NaN where there is none."""
+        rows = self.results(case).select(case.scenario, case.policy, self.seeds_of(case))
+        return np.array([dict[str, Any](row.metrics)[name] for row in rows], np.float64)
+
+    def trace(self, case: Case, seed: int) -> Trace:
+        """A run's time series and routes, see ``Results.trace``."""
+        return self.results(case).trace(case.scenario, case.policy, seed)
+
+    def traces(self, case: Case) -> list[Trace]:
+        """The traces of all seeds."""
+        return [self.trace(case, seed) for seed in self.seeds_of(case)]
+
+    def results(self, case: Case) -> Results:
+        """The results in the case's folder."""
+        if case.name not in self._open:
+            routes = self.seeds if case.routes else ()
+            self._open[case.name] = Results(self.folder / case.folder, [case.load()], routes, self._traces)
+        return self._open[case.name]

@@ -1,1 +1,0 @@
-"""The paper again, research on the model, and all policies on held-out seeds and in disturbed water."""
