@@ -83,14 +83,14 @@ def test_an_actor_may_trim_a_part(saved, tmp_path):
 
 
 def test_mappo_v3_is_its_law_where_nothing_lags():
-    law = "scout_plus,pull_at_rest=6,push_at_rest=3"
+    law = "scout,preset=plus,pull_at_rest=6,push_at_rest=3"
     np.testing.assert_allclose(actions("mappo_v3"), actions(law), rtol=0, atol=1e-4)
     assert np.abs(actions("mappo_v3", overrides=FEW | LAG) - actions(law, overrides=FEW | LAG)).max() > 0.1
 
 
 def test_mappo_v4_is_its_law_where_nothing_lags():
     done = []
-    for name in ("mappo_v4", "scout_wary"):
+    for name in ("mappo_v4", "scout,preset=wary"):
         scenario = granted(name, load_scenario("random_field", overrides=FEW))
         swarm, policy = Swarm(scenario), make(name, scenario)
         percept = swarm.reset(10_007)
@@ -167,8 +167,8 @@ def test_old_readings_do_not_make_a_vehicle_steer_softly(saved):
 @pytest.mark.parametrize(("noise_deg", "least", "most"), [(0.0, 0.9, 1.0), (10.0, 0.0, 0.1)], ids=["exact", "noisy"])
 def test_who_makes_up_for_its_lag_steers_softly_only_where_it_hears_well(noise_deg, least, most):
     rough = LAG | {"noise.bearing_deg": noise_deg}
-    scenario = granted("scout_lead", load_scenario("random_field", num_vehicles=20, overrides=rough))
-    swarm, policy, told = Swarm(scenario), make("scout_lead", scenario), []
+    scenario = granted("scout,preset=lead", load_scenario("random_field", num_vehicles=20, overrides=rough))
+    swarm, policy, told = Swarm(scenario), make("scout,preset=lead", scenario), []
     percept = swarm.reset(10_007)
     for k in range(300):
         percept = swarm.step(policy.act(percept))
@@ -196,7 +196,7 @@ def test_who_doubts_keeps_farther_from_others_where_it_is_told_to(noise_deg, lea
     overrides = {"noise.bearing_deg": noise_deg}
     near = []
     for push in (0.0, 1.1):
-        law = f"scout_lead,push_in_doubt={push}"
+        law = f"scout,preset=lead,push_in_doubt={push}"
         scenario = granted(law, load_scenario("single_obstacle", overrides=overrides))
         swarm, policy, spacings = Swarm(scenario), make(law, scenario), []
         percept = swarm.reset(10_007)

@@ -131,8 +131,8 @@ CLAIMS = {
         * (outcome("mappo_v4") == (1000, 1000, 0))
     ),
     "the strongest, disturbed": lambda: (
-        "In the robustness suite `mappo_v4` and its hand-made law, [`scout_wary`](docs/guarded.md#scout_wary), have "
-        "the highest scores." * (strongest(3) == {"mappo_v4", "mappo_v4_seed1", "scout_wary"})
+        "In the robustness suite `mappo_v4` and its hand-made law, [`scout,preset=wary`](docs/guarded.md#presets), "
+        "have the highest scores." * (strongest(3) == {"mappo_v4", "mappo_v4_seed1", "scout_wary"})
     ),
     "passive arrays": lambda: (
         f"positions from passive arrays at up to "

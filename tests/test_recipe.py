@@ -10,9 +10,7 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import load_checkpoint
-from uuv_marl.baselines.gains import PLUS
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ScoutWary
+from uuv_marl.baselines.gains import PRESETS
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 from uuv_marl.sim.swarm import Swarm
@@ -94,7 +92,7 @@ def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
 def test_the_shipped_recipe_trims_the_law_of_scout_plus():
     from uuv_marl.train.recipe import load_recipe
 
-    assert load_recipe("mappo_v2").settings(0).law == PLUS
+    assert load_recipe("mappo_v2").settings(0).law == PRESETS["plus"].gains
 
 
 @pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
@@ -145,9 +143,10 @@ def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
     said = {"chosen": "last", "safety": list(card.safety), "trims": list(card.trims), **card.training}
     said |= {"law": list(card.law), "algorithm": {"first_outputs": [], **card.training["algorithm"]}}
     assert {field: said[field] for field in told} == told
-    at_rest = PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0)
-    assert card.law == {"mappo_v3": at_rest, "mappo_v4": ScoutWary.usual}.get(recipe, PLUS)
-    assert card.safety == {"mappo_v4": ScoutWary.usual_barrier}.get(recipe, Barrier())
+    plus, wary = PRESETS["plus"], PRESETS["wary"]
+    at_rest = plus.gains._replace(pull_at_rest=6.0, push_at_rest=3.0)
+    assert card.law == {"mappo_v3": at_rest, "mappo_v4": wary.gains}.get(recipe, plus.gains)
+    assert card.safety == {"mappo_v4": wary.barrier}.get(recipe, plus.barrier)
 
 
 def test_a_recipe_like_another_says_only_what_differs(tmp_path):

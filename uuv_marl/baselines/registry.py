@@ -21,7 +21,7 @@ from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_granted
 from uuv_marl.baselines.pull import Pull
 from uuv_marl.baselines.safety import GUARD, Barrier
-from uuv_marl.baselines.scout import Scout, ScoutLead, ScoutPlus, ScoutWary
+from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
 from uuv_marl.baselines.units import Reader, in_own_units
@@ -41,9 +41,6 @@ POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
     "bio_inspired_plus": BioInspiredPlus,
     "scout": Scout,
-    "scout_plus": ScoutPlus,
-    "scout_lead": ScoutLead,
-    "scout_wary": ScoutWary,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,

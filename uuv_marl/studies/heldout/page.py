@@ -13,7 +13,7 @@ from uuv_marl.studies.heldout.across import SCORES, improvement, overall, runs, 
 from uuv_marl.studies.heldout.episodes import ByPolicy, Episode, measured, read_episodes, write_episodes
 from uuv_marl.studies.heldout.figures import draw_fields, draw_trainings
 from uuv_marl.studies.heldout.marl_eval import write_marl_eval
-from uuv_marl.studies.heldout.sets import FIRST, SETS, HeldOut
+from uuv_marl.studies.heldout.sets import FIRST, LEADING, SETS, HeldOut
 from uuv_marl.studies.heldout.targets import later, targets
 from uuv_marl.studies.heldout.trainings import Trained
 from uuv_marl.studies.robustness.scores import scored
@@ -27,8 +27,8 @@ _HEADERS = (
 _GUARDED = "guarded:"
 _BESIDE = "scout", "scout_plus", "mappo"
 """Policies that ship, beside the trainings."""
-_ORDER = (*POLICIES, *(f"{_GUARDED}{name}" for name in POLICIES))
-"""Policies in the order of tables."""
+_ORDER = (*dict.fromkeys((*POLICIES, *LEADING)), *(f"{_GUARDED}{name}" for name in POLICIES))
+"""Policies in the order of tables; those of the shipped episodes that do not ship any more are among ``LEADING``."""
 
 
 def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trained]) -> list[Path]:

@@ -33,9 +33,9 @@ class Plan(NamedTuple):
 
 
 SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
-    "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "scout_lead", "scout_wary", "mappo", "mappo_v2",
-    "mappo_v3", "mappo_v4", "mappo_v2_calm", "mappo_v3_seed1", "mappo_v4_seed1",
-    "scout_plus,pull_at_rest=6,push_at_rest=3",
+    "bio_inspired", "bio_inspired_plus", "scout", "scout,preset=plus", "scout,preset=lead", "scout,preset=wary",
+    "mappo", "mappo_v2", "mappo_v3", "mappo_v4", "mappo_v2_calm", "mappo_v3_seed1", "mappo_v4_seed1",
+    "scout,preset=plus,pull_at_rest=6,push_at_rest=3",
 ), 20)  # fmt: skip
 """The plan whose report is in docs/robustness; the last policy is the law of ``mappo_v3``."""
 QUICK = SHIPPED._replace(
