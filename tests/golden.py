@@ -40,9 +40,8 @@ LAWS = {name: name for name in (
 )} | {f"scout_{preset}": f"scout,preset={preset}" for preset in ("plus", "lead", "wary")}  # fmt: skip
 """Hand-made policies: as a key names them, and the name that makes them today."""
 NETWORKS = {name: name for name in (
-    "mappo", "ppo", "mappo_v2", "mappo_v2_seed1", "mappo_v3", "mappo_v3_seed1", "mappo_v4", "mappo_v4_seed1",
-    "mappo_v2_calm", "guarded:mappo",
-)}  # fmt: skip
+    "mappo", "ppo", "guarded:mappo",
+)} | {"mappo_v4": "trimmed_scout"}  # fmt: skip
 """The same of policies whose actions are compared, not hashed."""
 DRIVER = "bio_inspired"
 """Whose percepts ``NETWORKS`` see."""

@@ -151,7 +151,7 @@ def test_the_file_says_what_it_is(tmp_path):
     assert "yaw torque" in action.doc_string
 
 
-@pytest.mark.parametrize("policy", ["bio_inspired", "scout", "guarded:mappo", "mappo_v4"])
+@pytest.mark.parametrize("policy", ["bio_inspired", "scout", "guarded:mappo", "trimmed_scout"])
 def test_what_is_no_network_on_one_observation_is_refused_with_the_remedy(policy, tmp_path):
     with pytest.raises(
         PolicyError, match=rf"'{policy}' can't be exported.*not laws.*Export mappo.*run this policy with"

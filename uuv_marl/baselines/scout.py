@@ -19,7 +19,7 @@ from uuv_marl.baselines.memory.doubt import trim_weights
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
-from uuv_marl.baselines.trims import trimmed, wary, widened
+from uuv_marl.baselines.trims import softened, wary
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
@@ -47,7 +47,7 @@ class Scout(Filtered):
 
     yaw_damping_nms: ClassVar[float] = 600.0
     num_trims: ClassVar[int] = 0
-    """Changes of each vehicle's numbers."""
+    """1 where an actor trims each vehicle's steering."""
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: Gains | None = None,
@@ -183,24 +183,24 @@ def decide_all(
         gain: force per velocity error [N s/m].
         kept: what vehicles remember.
         planes: room for half-planes, shape (disc + sector, 3).
-        trims: changes of the law, see ``trimmed`` and ``widened``, shape (world, vehicle, TRIMS), of which as much
-            counts as a vehicle doubts (of steering: as its actuators lag); or (world, vehicle, 0) for none.
+        trims: of steering, which count as far as actuators lag, shape (world, vehicle, 1); or (world, vehicle, 0) for
+            none.
         action: filled with shares of full force, shape (world, vehicle, 2).
     """
     doubts = trims.shape[2] > 0 or g.pull_in_doubt != 0.0 or g.push_in_doubt != 0.0
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                own, keep = g, barrier
+                own = g
                 if doubts:
                     lags, share = trim_weights(w, i, g.lead, kept)
                     if kept.reference_speed[w, i] > 0.0:
                         own = wary(own, share)
                     if trims.shape[2] > 0:
-                        own, keep = trimmed(own, trims[w, i], share, lags), widened(barrier, trims[w, i], share)
+                        own = softened(own, float(trims[w, i, 0]), lags)
                 w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
-                num = planes_of(w, i, period, keep, kept, planes)
+                num = planes_of(w, i, period, barrier, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain * own.steering, limits, kept, action)
                 if g.lead > 0.0 and limits.helm == 0.0:
                     _lead(w, i, g.lead, limits, kept, action)

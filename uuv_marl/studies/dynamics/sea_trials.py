@@ -23,7 +23,7 @@ from uuv_marl.studies.suite import Case, Report, Suite
 SCENARIOS = ("sea_trial", "random_field")
 POLICIES = (
     "bio_inspired", "bio_inspired_plus", "guarded:bio_inspired_plus", "sff", "sdc", "scout",
-    "scout,preset=plus", "scout,preset=lead", "mappo", "mappo_v4",
+    "scout,preset=plus", "scout,preset=lead", "mappo", "trimmed_scout",
 )  # fmt: skip
 SEEDS = 20
 _PAPERS = "literature_185"
