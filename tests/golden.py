@@ -34,15 +34,14 @@ REWARD = "individual"
 """The name of the reward of commit 3eb4921."""
 
 LAWS = {name: name for name in (
-    "bio_inspired", "bio_inspired,obstacle_term=per_obstacle", "bio_inspired_plus", "scout", "scout_plus", "scout_lead",
-    "scout_wary", "sff", "sdc", "sff_informed", "sdc_informed", "apf", "olfati_saber", "olfati_saber_informed",
-    "orca_informed", "pull", "random", "idle", "guarded:bio_inspired", "guarded:random",
-)}  # fmt: skip
+    "bio_inspired", "bio_inspired,obstacle_term=per_obstacle", "bio_inspired_plus", "scout", "sff", "sdc",
+    "sff_informed", "sdc_informed", "apf", "olfati_saber", "olfati_saber_informed", "orca_informed", "pull", "random",
+    "idle", "guarded:bio_inspired", "guarded:random",
+)} | {f"scout_{preset}": f"scout,preset={preset}" for preset in ("plus", "lead", "wary")}  # fmt: skip
 """Hand-made policies: as a key names them, and the name that makes them today."""
 NETWORKS = {name: name for name in (
-    "mappo", "ppo", "mappo_v2", "mappo_v2_seed1", "mappo_v3", "mappo_v3_seed1", "mappo_v4", "mappo_v4_seed1",
-    "mappo_v2_calm", "guarded:mappo",
-)}  # fmt: skip
+    "mappo", "ppo", "guarded:mappo",
+)} | {"mappo_v4": "trimmed_scout"}  # fmt: skip
 """The same of policies whose actions are compared, not hashed."""
 DRIVER = "bio_inspired"
 """Whose percepts ``NETWORKS`` see."""

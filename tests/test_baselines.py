@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, bio_inspired, granted, make, sdc, sff
+from uuv_marl.baselines.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -322,6 +323,15 @@ def test_gains_and_parameters_can_be_written_behind_a_name():
     assert granted("sff,cluster=3", scenario).sonar.channels == ("link",)
 
 
+def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
+    scenario = granted("scout", load_scenario("starter"))
+    assert make("scout", scenario).gains == make(f"scout,preset={DEFAULT_PRESET}", scenario).gains
+    for name, preset in PRESETS.items():
+        policy = make(f"guarded:scout,preset={name},push=3.5", scenario).inner
+        assert (policy.gains, policy.barrier) == (preset.gains._replace(push=3.5), preset.barrier)
+        assert make("scout", scenario, preset=name).gains == preset.gains
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -330,6 +340,7 @@ def test_gains_and_parameters_can_be_written_behind_a_name():
         ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
         ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
+        ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, got 'bold'"),
         ("idle,gain=1", "has no parameter 'gain'; It has none"),
         ("guarded:bio_insp", "did you mean 'bio_inspired'"),
         ("bio_insp,zeta_n=1", "did you mean 'bio_inspired'"),

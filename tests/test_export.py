@@ -151,9 +151,16 @@ def test_the_file_says_what_it_is(tmp_path):
     assert "yaw torque" in action.doc_string
 
 
-def test_what_is_no_network_is_refused_with_the_remedy(tmp_path):
-    with pytest.raises(PolicyError, match="'bio_inspired' is no network.*give a learned policy"):
-        write_onnx("bio_inspired", load_scenario("tracking"), tmp_path / "policy.onnx")
+@pytest.mark.parametrize("policy", ["bio_inspired", "scout", "guarded:mappo", "trimmed_scout"])
+def test_what_is_no_network_on_one_observation_is_refused_with_the_remedy(policy, tmp_path):
+    with pytest.raises(
+        PolicyError, match=rf"'{policy}' can't be exported.*not laws.*Export mappo.*run this policy with"
+    ):
+        write_onnx(policy, load_scenario("tracking"), tmp_path / "policy.onnx")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_was_trained_for_something_else_is_refused(tmp_path):
     best = saved(tmp_path, load_scenario("tracking"), 0.1)
     other = load_scenario("tracking", overrides={"sonar.arrays.bow.sub_sectors": 5})
     with pytest.raises(PolicyError, match="trained on another percept"):
@@ -178,4 +185,4 @@ def test_the_command(tmp_path):
     assert "can't be written" in unwritable.output
     done = CliRunner().invoke(app, ["export", "idle", str(output)])
     assert done.exit_code == 2
-    assert "no network" in done.output
+    assert "can't be exported" in done.output

@@ -84,7 +84,7 @@ def test_with_a_lead_vehicles_do_not_swing(overrides, least):
     scenario = granted("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
     rates = []
     for share in (0.0, 1.0):
-        swarm, policy, rate = Swarm(scenario), make("scout_plus", scenario, lead=share), []
+        swarm, policy, rate = Swarm(scenario), make("scout,preset=plus", scenario, lead=share), []
         percept = swarm.reset(10_501)
         for k in range(500):
             percept = swarm.step(policy.act(percept))

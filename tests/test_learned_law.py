@@ -16,8 +16,7 @@ from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS, MOST_TRIM, TRIMS, trimmed, wary, widened
+from uuv_marl.baselines.trims import MOST_TRIM, softened, wary
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -37,7 +36,7 @@ def actor(scale, seed=0):
     rng = np.random.default_rng(seed)
     return [
         Layer(scale * rng.standard_normal((a, b), np.float32), scale * rng.standard_normal(b, np.float32))
-        for a, b in itertools.pairwise((RECALLED, 16, TRIMS))
+        for a, b in itertools.pairwise((RECALLED, 16, 1))
     ]
 
 
@@ -62,35 +61,14 @@ def actions(policy, seed=10_007, decisions=150, worlds=1, overrides=FEW):
 
 
 def test_an_actor_that_says_nothing_is_scout(saved):
-    np.testing.assert_array_equal(actions(saved(0.0)), actions("scout"))
-    assert not np.array_equal(actions(saved(0.3)), actions("scout"))
-
-
-def test_an_actor_may_trim_a_part(saved, tmp_path):
-    whole = load_checkpoint(Path(saved(0.3)))
-    *first, last = whole.layers
-    columns = [ALL_TRIMS.index(name) for name in ("steering", "push")]
-    silent = np.isin(np.arange(TRIMS), columns)
-    told = {"all": (ALL_TRIMS, last.weight * silent, last.bias * silent)}
-    told["part"] = ("steering", "push"), last.weight[:, columns], last.bias[columns]
-    for name, (trims, weight, bias) in told.items():
-        card = whole.card.model_copy(update={"trims": trims})
-        save_checkpoint(tmp_path / name / WEIGHTS_FILE, card, [*first, Layer(weight, bias)])
     lagging = FEW | LAG
-    part = actions(str(tmp_path / "part"), overrides=lagging)
-    np.testing.assert_allclose(part, actions(str(tmp_path / "all"), overrides=lagging), rtol=0, atol=1e-6)
-    assert not np.allclose(part, actions("scout", overrides=lagging), rtol=0, atol=1e-3)
+    np.testing.assert_array_equal(actions(saved(0.0), overrides=lagging), actions("scout", overrides=lagging))
+    assert not np.array_equal(actions(saved(0.3), overrides=lagging), actions("scout", overrides=lagging))
 
 
-def test_mappo_v3_is_its_law_where_nothing_lags():
-    law = "scout_plus,pull_at_rest=6,push_at_rest=3"
-    np.testing.assert_allclose(actions("mappo_v3"), actions(law), rtol=0, atol=1e-4)
-    assert np.abs(actions("mappo_v3", overrides=FEW | LAG) - actions(law, overrides=FEW | LAG)).max() > 0.1
-
-
-def test_mappo_v4_is_its_law_where_nothing_lags():
+def test_trimmed_scout_is_its_law_where_nothing_lags():
     done = []
-    for name in ("mappo_v4", "scout_wary"):
+    for name in ("trimmed_scout", "scout,preset=wary"):
         scenario = granted(name, load_scenario("random_field", overrides=FEW))
         swarm, policy = Swarm(scenario), make(name, scenario)
         percept = swarm.reset(10_007)
@@ -100,15 +78,10 @@ def test_mappo_v4_is_its_law_where_nothing_lags():
     np.testing.assert_allclose(*done, rtol=0, atol=1e-3)
 
 
-@pytest.mark.parametrize("trims", [ALL_TRIMS, ("steering",)], ids=["all", "steering"])
 @pytest.mark.parametrize("overrides", [FEW, FEW | LAG], ids=["calm", "lag"])
-def test_the_network_is_asked_only_where_its_output_counts(trims, overrides, tmp_path):
-    *first, last = actor(0.3)
-    columns = [ALL_TRIMS.index(name) for name in trims]
+def test_the_network_is_asked_only_where_its_output_counts(overrides, saved):
     scenario = granted("scout", load_scenario("random_field", overrides=overrides))
-    card = Card(percept=rows_of(PerceptLayout.of(scenario)), features="memory", trims=trims)
-    save_checkpoint(tmp_path / WEIGHTS_FILE, card, [*first, Layer(last.weight[:, columns], last.bias[columns])])
-    swarm, policy, asked = Swarm(scenario), make(str(tmp_path), scenario), []
+    swarm, policy, asked = Swarm(scenario), make(saved(0.3), scenario), []
     percept, features = swarm.reset(10_007), np.zeros((1, 12, RECALLED), np.float32)
     for _ in range(100):
         policy.hear(percept)
@@ -119,14 +92,13 @@ def test_the_network_is_asked_only_where_its_output_counts(trims, overrides, tmp
         np.testing.assert_array_equal(action, policy.trim(everywhere))
         policy.acted(action, policy.active)
         percept = swarm.step(action)
-    if trims == ("steering",):
-        assert (np.mean(asked) > 0.9) == (overrides != FEW), "hardly anybody's in calm water, nearly all where they lag"
+    assert (np.mean(asked) > 0.9) == (overrides != FEW), "hardly anybody's in calm water, nearly all where they lag"
 
 
 @pytest.mark.parametrize("trims", [[], ["steering", "steering"], ["thrust"]])
-def test_a_card_names_each_trim_once(trims, saved):
+def test_a_card_names_what_can_be_trimmed(trims, saved):
     card = load_checkpoint(Path(saved(0.3))).card.model_dump()
-    with pytest.raises(ValueError, match="each once|'steering'"):
+    with pytest.raises(ValueError, match="trims"):
         Card.model_validate({**card, "trims": trims})
 
 
@@ -167,8 +139,8 @@ def test_old_readings_do_not_make_a_vehicle_steer_softly(saved):
 @pytest.mark.parametrize(("noise_deg", "least", "most"), [(0.0, 0.9, 1.0), (10.0, 0.0, 0.1)], ids=["exact", "noisy"])
 def test_who_makes_up_for_its_lag_steers_softly_only_where_it_hears_well(noise_deg, least, most):
     rough = LAG | {"noise.bearing_deg": noise_deg}
-    scenario = granted("scout_lead", load_scenario("random_field", num_vehicles=20, overrides=rough))
-    swarm, policy, told = Swarm(scenario), make("scout_lead", scenario), []
+    scenario = granted("scout,preset=lead", load_scenario("random_field", num_vehicles=20, overrides=rough))
+    swarm, policy, told = Swarm(scenario), make("scout,preset=lead", scenario), []
     percept = swarm.reset(10_007)
     for k in range(300):
         percept = swarm.step(policy.act(percept))
@@ -196,7 +168,7 @@ def test_who_doubts_keeps_farther_from_others_where_it_is_told_to(noise_deg, lea
     overrides = {"noise.bearing_deg": noise_deg}
     near = []
     for push in (0.0, 1.1):
-        law = f"scout_lead,push_in_doubt={push}"
+        law = f"scout,preset=lead,push_in_doubt={push}"
         scenario = granted(law, load_scenario("single_obstacle", overrides=overrides))
         swarm, policy, spacings = Swarm(scenario), make(law, scenario), []
         percept = swarm.reset(10_007)
@@ -222,14 +194,14 @@ def test_whatever_the_actor_says_the_filter_has_the_last_word(saved):
     assert [run.metrics["collisions"] for run in runs] == [0, 0]
 
 
-def test_trims_are_bounded_factors_of_a_vehicle_s_own_gains():
+def test_a_trim_is_a_bounded_factor_of_a_vehicle_s_own_steering():
     scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
     swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
     policy.hear(swarm.reset(0))
     policy.memory.response[..., PRODUCTS] = policy.memory.response[..., SQUARES] = 9.0
-    quiet = policy.trim(np.zeros((1, 2, TRIMS), np.float32)).copy()
-    first = np.zeros((1, 2, TRIMS), np.float32)
-    first[0, 0, 0] = MOST_TRIM
+    quiet = policy.trim(np.zeros((1, 2, 1), np.float32)).copy()
+    first = np.zeros((1, 2, 1), np.float32)
+    first[0, 0] = -MOST_TRIM
     once = policy.trim(first).copy()
     np.testing.assert_array_equal(policy.trim(20.0 * first), once)
     assert (once[0, 0] != quiet[0, 0]).any()
@@ -237,21 +209,10 @@ def test_trims_are_bounded_factors_of_a_vehicle_s_own_gains():
 
 
 def test_trims_by_hand():
-    law = Gains(together=0.1, behind_m=1.0)
-    trims = np.array([math.log(2.0), 1.5, math.log(1.5), 0.5, -0.25, 1.0], np.float32)
-    wanted = law._replace(pull=0.1, together=0.1 + 1.5 * 0.04, push=15.0, behind_m=2.0, steering=math.exp(-2.0))
-    np.testing.assert_allclose(trimmed(law, trims, 1.0, 1.0), wanted, rtol=1e-6)
-    np.testing.assert_allclose(trimmed(law, 4.0 * trims, 0.25, 0.25), wanted, rtol=1e-6)
-    assert trimmed(law, -trims, 1.0, 0.0).together == pytest.approx(0.04), "a sum"
-    assert trimmed(law, -3.0 * trims, 1.0, 0.0).together == 0.0, "and never below none"
-    back = trimmed(law, -trims, 1.0, 1.0)
-    assert (back.steering, back.push) == (1.0, 10.0), "never harder steering, never weaker pushes"
-    soft = trimmed(law, 3.0 * trims, 1.0, 1.0)
-    assert soft.steering == pytest.approx(math.exp(-3.0)), "and never so soft that a vehicle drifts"
-    assert widened(Barrier(), -trims, 1.0) == Barrier(), "never nearer"
-    still = np.zeros(TRIMS, np.float32)
-    assert trimmed(law, still, 1.0, 1.0) == trimmed(law, trims, 0.0, 0.0) == law
-    assert trimmed(law, trims, 1.0, 0.0).steering == 1.0, "what is heard badly is no reason to steer softly"
+    law = Gains(steering=0.8)
+    assert softened(law, -0.25, 1.0) == law._replace(steering=0.8 * math.exp(-2.0)) == softened(law, -1.0, 0.25)
+    assert softened(law, 0.25, 1.0) == softened(law, 0.0, 1.0) == softened(law, -0.25, 0.0) == law, "never harder"
+    assert softened(law, -3.0, 1.0).steering == pytest.approx(0.8 * math.exp(-3.0)), "nor so soft that a vehicle drifts"
 
 
 @pytest.mark.parametrize("overrides", [FEW, FEW | ROUGH], ids=["calm", "rough"])
@@ -264,7 +225,7 @@ def test_what_an_actor_sees_is_bounded(overrides):
         policy.hear(percept)
         policy.look(features)
         most = np.maximum(most, np.abs(features[0]).max(axis=0))
-        action = policy.trim(np.zeros((1, 12, TRIMS), np.float32))
+        action = policy.trim(np.zeros((1, 12, 1), np.float32))
         policy.acted(action, policy.active)
         percept = swarm.step(action)
     assert np.isfinite(most).all()
@@ -352,8 +313,8 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
         asked = policy._heeded.reshape(-1)
         np.testing.assert_array_equal(policy._features.reshape(-1, RECALLED)[asked], features[asked])
         seen += asked.sum()
-        rows = np.zeros((env.rows, TRIMS), np.float32)
-        rows[env._rows[0]] = policy._trims.reshape(-1, TRIMS)
+        rows = np.zeros((env.rows, 1), np.float32)
+        rows[env._rows[0]] = policy._trims.reshape(-1, 1)
         env.step(rows)
         np.testing.assert_array_equal(acting._policy.memory.action, used)
     assert seen > 0
@@ -374,7 +335,7 @@ def test_what_the_filter_changes_is_charged():
         env = TrainingEnv(problem, lambda num: range(10_007, 10_007 + num))
         paid = []
         for _ in range(120):
-            paid.append(env.step(np.zeros((24, TRIMS), np.float32)).reward)
+            paid.append(env.step(np.zeros((24, 1), np.float32)).reward)
             changed = env._groups[0].acting.changed.reshape(-1)
             np.testing.assert_allclose(paid[-1], -cost * 0.4 * changed, atol=1e-6)
         rewards.append(np.sum(paid))

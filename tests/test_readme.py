@@ -85,7 +85,7 @@ def fast():
 
 
 def earlier():
-    """By how much ``mappo_v4`` arrives before ``scout`` [s]."""
+    """By how much ``trimmed_scout`` arrives before ``scout`` [s]."""
     return f"{-later(fields('mappo_v4'), fields('scout')).value:.1f}"
 
 
@@ -126,14 +126,19 @@ CLAIMS = {
         "On 1,000 [held-out fields](docs/heldout/report.md) `scout` always arrives, and touches nothing."
         * (outcome("scout") == (1000, 1000, 0))
     ),
-    "mappo, held out": lambda: "The older `mappo` arrives in {1} and collides in {2}.".format(*outcome("mappo")),
-    "mappo_v4, held out": lambda: (
-        f"The trained [`mappo_v4`](docs/mappo.md#card-of-mappo_v4) does the same {earlier()} s earlier."
+    "mappo, held out": lambda: (
+        "`mappo`, a network without law, filter and memory, arrives in {1} and collides in {2}.".format(
+            *outcome("mappo")
+        )
+    ),
+    "trimmed_scout, held out": lambda: (
+        f"The trained [`trimmed_scout`](docs/mappo.md#card-of-trimmed_scout) does the same {earlier()} s earlier."
         * (outcome("mappo_v4") == (1000, 1000, 0))
     ),
     "the strongest, disturbed": lambda: (
-        "In the robustness suite `mappo_v4` and its hand-made law, [`scout_wary`](docs/guarded.md#scout_wary), have "
-        "the highest scores." * (strongest(3) == {"mappo_v4", "mappo_v4_seed1", "scout_wary"})
+        "In the robustness suite `trimmed_scout` and its hand-made law, "
+        "[`scout,preset=wary`](docs/guarded.md#presets), have the highest scores."
+        * (strongest(3) == {"mappo_v4", "mappo_v4_seed1", "scout_wary"})
     ),
     "passive arrays": lambda: (
         f"positions from passive arrays at up to "
@@ -147,7 +152,7 @@ CLAIMS = {
         f"measures what each of {len({r['axis'] for r in table('robustness/episodes.csv')} - {'0'})} disturbances"
     ),
     "results": lambda: "[Results](docs/results.md): {} policies on {} scenarios,".format(
-        *({5: "five", 12: "twelve"}.get(n, n) for n in tabled())
+        *({5: "five", 10: "ten"}.get(n, n) for n in tabled())
     ),
     "held-out seeds": lambda: f"up to {len({e.seed for e in HELD_OUT}):,} seeds that nothing was made with.",
     "speed": lambda: f"about {fast()} million agent-steps/s on two cores, beside MPE2, VMAS and JaxMARL.",
@@ -178,9 +183,9 @@ def test_the_table_is_that_of_other_shipped_episodes(policy):
 
 
 def test_the_row_of_the_latest_training_is_that_of_its_episodes_run_again():
-    scenario = baselines.granted("mappo_v4", paper_scenario())
-    runs = [event for event in evaluate(scenario, "mappo_v4", range(20)) if isinstance(event, Run)]
-    check_row("mappo_v4", [run.metrics for run in runs])
+    scenario = baselines.granted("trimmed_scout", paper_scenario())
+    runs = [event for event in evaluate(scenario, "trimmed_scout", range(20)) if isinstance(event, Run)]
+    check_row("trimmed_scout", [run.metrics for run in runs])
 
 
 def check_row(policy, rows):
@@ -255,7 +260,7 @@ def test_the_index_counts_what_there_is():
     minutes = {re.search(r"\*\*Time\*\*: about (\d) minute", page.read_text())[1] for page in notebooks}
     assert (len(notebooks), minutes) == (6, {"1", "2"})
     assert "Six [notebooks](tutorials/README.md) of one or two minutes each:" in INDEX
-    assert tabled() == (12, 5)
-    assert "twelve policies on five scenarios, 20 seeds" in INDEX
+    assert tabled() == (10, 5)
+    assert "ten policies on five scenarios, 20 seeds" in INDEX
     assert "what each of 22 disturbances costs" in INDEX
     assert f"{hostile():,} hostile inputs" in INDEX

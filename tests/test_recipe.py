@@ -10,9 +10,7 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.checkpoint import load_checkpoint
-from uuv_marl.baselines.gains import PLUS
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import ScoutWary
+from uuv_marl.baselines.gains import PRESETS
 from uuv_marl.benchmark.robustness.axes import AXES
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
@@ -94,7 +92,7 @@ def test_episodes_take_their_conditions_in_turn_and_an_output_is_held(tmp_path):
 def test_the_shipped_recipe_trims_the_law_of_scout_plus():
     from uuv_marl.train.recipe import load_recipe
 
-    assert load_recipe("mappo_v2").settings(0).law == PLUS
+    assert load_recipe("mappo_v2").settings(0).law == PRESETS["plus"].gains
 
 
 @pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
@@ -127,13 +125,7 @@ def test_a_recipe_can_choose_the_last_policy(tmp_path):
 @pytest.mark.parametrize(
     ("recipe", "seed", "name"),
     [
-        ("mappo_v2", 0, "mappo_v2"),
-        ("mappo_v2", 1, "mappo_v2_seed1"),
-        ("mappo_v2_calm", 0, "mappo_v2_calm"),
-        ("mappo_v3", 0, "mappo_v3"),
-        ("mappo_v3", 1, "mappo_v3_seed1"),
-        ("mappo_v4", 0, "mappo_v4"),
-        ("mappo_v4", 1, "mappo_v4_seed1"),
+        ("mappo_v4", 0, "trimmed_scout"),
     ],
 )
 def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
@@ -145,9 +137,7 @@ def test_what_ships_says_that_it_was_trained_by_the_recipe(recipe, seed, name):
     said = {"chosen": "last", "safety": list(card.safety), "trims": list(card.trims), **card.training}
     said |= {"law": list(card.law), "algorithm": {"first_outputs": [], **card.training["algorithm"]}}
     assert {field: said[field] for field in told} == told
-    at_rest = PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0)
-    assert card.law == {"mappo_v3": at_rest, "mappo_v4": ScoutWary.usual}.get(recipe, PLUS)
-    assert card.safety == {"mappo_v4": ScoutWary.usual_barrier}.get(recipe, Barrier())
+    assert (card.law, card.safety) == PRESETS["wary"]
 
 
 def test_a_recipe_like_another_says_only_what_differs(tmp_path):
@@ -202,7 +192,7 @@ def test_the_robustness_page_marks_what_was_trained_with():
         ({"held_s": -1}, "held_s"),
         ({"ppo": "{ noise = [0.4, 0.2] }"}, "noise"),
         ({"mappo": "{ noize = [0.4, 0.2] }"}, "noize"),
-        ({"mappo": "{ first_outputs = [0.1] }"}, "first_outputs must have a number for each of 6 outputs, got 1"),
+        ({"mappo": "{ first_outputs = [0.1, 0.2] }"}, "first_outputs must have a number for each of 1 outputs, got 2"),
         ({"safety": "{ horizon_km = 0.0 }"}, "horizon_km"),
         ({"mappo": "{ noise_kept = 1.2 }"}, "noise_kept"),
         ({"mappo": "{ horizon = 0 }"}, "horizon"),

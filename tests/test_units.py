@@ -48,7 +48,7 @@ def alike(scenario, length, speed, force):
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 16.0), (0.5, 2.0, 1.0), (4.0, 0.5, 0.25)])
 @pytest.mark.parametrize(
-    ("policy", "vehicle"), [*((name, {}) for name in POLICIES), ("scout_lead", LAGGING), ("scout", RUDDER)]
+    ("policy", "vehicle"), [*((name, {}) for name in POLICIES), ("scout,preset=lead", LAGGING), ("scout", RUDDER)]
 )
 def test_a_vehicle_that_is_alike_swims_alike_bit_for_bit(policy, vehicle, scale):
     """By powers of two, so that nothing is rounded otherwise: the same places over L and velocities over V."""

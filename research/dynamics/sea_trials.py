@@ -22,8 +22,8 @@ from uuv_marl.scenario.scale import PAPER_LENGTH_M
 
 SCENARIOS = ("sea_trial", "random_field")
 POLICIES = (
-    "bio_inspired", "bio_inspired_plus", "guarded:bio_inspired_plus", "sff", "sdc", "scout", "scout_plus", "scout_lead",
-    "mappo", "mappo_v4",
+    "bio_inspired", "bio_inspired_plus", "guarded:bio_inspired_plus", "sff", "sdc", "scout",
+    "scout,preset=plus", "scout,preset=lead", "mappo", "trimmed_scout",
 )  # fmt: skip
 SEEDS = 20
 _PAPERS = "literature_185"

@@ -10,7 +10,7 @@ from research.heldout.across import SCORES, improvement, overall, runs, tasks
 from research.heldout.episodes import ByPolicy, Episode, measured, read_episodes, write_episodes
 from research.heldout.figures import draw_fields, draw_trainings
 from research.heldout.marl_eval import write_marl_eval
-from research.heldout.sets import FIRST, SETS, HeldOut
+from research.heldout.sets import FIRST, LEADING, SETS, HeldOut
 from research.heldout.targets import later, targets
 from research.heldout.trainings import Trained
 from uuv_marl.baselines import POLICIES
@@ -27,8 +27,8 @@ _HEADERS = (
 _GUARDED = "guarded:"
 _BESIDE = "scout", "scout_plus", "mappo"
 """Policies that ship, beside the trainings."""
-_ORDER = (*POLICIES, *(f"{_GUARDED}{name}" for name in POLICIES))
-"""Policies in the order of tables."""
+_ORDER = (*dict.fromkeys((*POLICIES, *LEADING)), *(f"{_GUARDED}{name}" for name in POLICIES))
+"""Policies in the order of tables; those of the shipped episodes that do not ship any more are among ``LEADING``."""
 
 
 def write_page(folder: Path, episodes: Sequence[Episode], trained: Sequence[Trained]) -> list[Path]:

@@ -11,7 +11,7 @@ FIRST: int = _TOLD["first"]
 """The first held-out seed. Benchmarks count from 0, and tuning and training use seeds from 10,000 on."""
 GROUPS: dict[str, list[str]] = _TOLD["groups"]
 """Policies by the name of their group."""
-LEADING = tuple(GROUPS["leading"])
+LEADING: tuple[str, ...] = tuple(_TOLD["shown"])
 """The strongest policies, which the targets are for."""
 
 

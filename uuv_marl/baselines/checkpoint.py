@@ -81,16 +81,6 @@ def _all_gains(gains: Any) -> Any:
     return cast(Any, gains)
 
 
-def _distinct(trims: tuple[Trim, ...]) -> tuple[Trim, ...]:
-    if len(set(trims)) < max(len(trims), 1):
-        raise ValueError(f"must name some of {', '.join(ALL_TRIMS)}, each once, got {trims}")
-    return trims
-
-
-Trims = Annotated[tuple[Trim, ...], pydantic.AfterValidator(_distinct)]
-"""Names of what an actor trims, in the order of its outputs."""
-
-
 class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Facts about a policy and its training, in the header of its checkpoint."""
 
@@ -99,7 +89,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """What the tensors are: ``mlp``, tanh layers."""
     features: Literal["percept", "memory"] = "percept"
     """What the first layer is given: ``percept``, what ``Features`` make of one percept, and the last gives a force; or
-    ``memory``, what ``recall`` makes of what is remembered, and the last trims the gains of ``law``."""
+    ``memory``, what ``recall`` makes of what is remembered, and the last trims ``law``."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every field of the percept."""
     decision_period_s: tuple[float, float] = PERIODS_S
@@ -111,9 +101,9 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     barrier: Annotated[Gains, pydantic.BeforeValidator(_all_gains)] = BARRIER
     """Gains of Eq. 20-21, whose force is added to what an actor without memory says."""
     law: Law = Law()
-    """Gains of the hand-made law that an actor with memory trims."""
-    trims: Trims = ALL_TRIMS
-    """What such an actor trims."""
+    """Gains of ``scout``'s law, which an actor with memory trims."""
+    trims: tuple[Trim] = ALL_TRIMS
+    """What such an actor trims, in the order of its outputs."""
     safety: Barrier = Barrier()
     """Margins and rates of the filter around it."""
     vehicle: dict[str, float | str] = pydantic.Field(default_factory=lambda: _numbers(load_vehicle(_FIRST_VEHICLE)))

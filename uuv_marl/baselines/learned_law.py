@@ -1,10 +1,8 @@
-"""A learned policy with memory: a network trims the gains of the hand-made law, and the filter has the last word.
+"""A learned policy with memory: a network trims the steering of ``scout``, and the filter has the last word.
 
-Each vehicle has gains of its own at each decision. The network changes them in proportion to the vehicle's doubt
-(``memory.doubt``): hardly at all in still water with exact echoes. If the network gives zeros, the policy is the law.
+The network says how softly each vehicle steers at each decision, as far as its actuators lag (``memory.doubt``): not at
+all where they answer at once. If the network gives zeros, the policy is the law.
 """
-
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,12 +12,10 @@ from uuv_marl.baselines.learned import forward, need_same
 from uuv_marl.baselines.recall import RECALLED, recall
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.baselines.scout import Scout
-from uuv_marl.baselines.trims import ALL_TRIMS, MOST_TRIM, TRIMS, Trim, heeded
+from uuv_marl.baselines.trims import MOST_TRIM, heeded
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Bool, Float32
-
-_STEERING = ALL_TRIMS.index("steering")
 
 
 class TrimmedLaw(Scout):
@@ -30,18 +26,14 @@ class TrimmedLaw(Scout):
         num_worlds: first axis of the percepts.
         gains: of the law.
         barrier: margins and rates of the filter.
-        trims: what the actor changes, in the order of its outputs; the rest is as in the law.
     """
 
-    num_trims = TRIMS
+    num_trims = 1
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None,
-        trims: Sequence[Trim] = ALL_TRIMS,
-    ) -> None:  # fmt: skip
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
+    ) -> None:
         super().__init__(scenario, num_worlds, gains=gains, barrier=barrier)
-        self.columns = [ALL_TRIMS.index(name) for name in trims]
-        """Where the actor's output stands among all trims."""
 
     def look(self, features: Float32, rows: Bool | None = None) -> None:
         """Fill the features of the memory that an actor sees.
@@ -58,8 +50,8 @@ class TrimmedLaw(Scout):
         )  # fmt: skip
 
     def trim(self, output: Float32) -> Float32:
-        """The actions, shape (world, vehicle, 2), for an actor's output, shape (world, vehicle, trim)."""
-        self._trims[:, :, self.columns] = np.clip(output, -MOST_TRIM, MOST_TRIM)
+        """The actions, shape (world, vehicle, 2), for an actor's output, shape (world, vehicle, 1)."""
+        self._trims[...] = np.clip(output, -MOST_TRIM, MOST_TRIM)
         return self._decided()
 
 
@@ -82,7 +74,7 @@ class LearnedLaw(TrimmedLaw):
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
         self.declare_as(card)
-        super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety, trims=card.trims)
+        super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety)
         need_same(self, card, any_vehicle)
         worlds_and_vehicles = self._trims.shape[:2]
         self._features = np.zeros((*worlds_and_vehicles, RECALLED), np.float32)
@@ -90,8 +82,8 @@ class LearnedLaw(TrimmedLaw):
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2). The network is asked only where its output counts."""
-        heeded(self.active, self.columns == [_STEERING], float(self.gains.lead), self.memory, self._heeded)
+        heeded(self.active, float(self.gains.lead), self.memory, self._heeded)
         self.look(self._features, self._heeded)
-        output = np.zeros((*self._heeded.shape, len(self.columns)), np.float32)
+        output = np.zeros(self._trims.shape, np.float32)
         output[self._heeded] = forward(self.checkpoint.layers, self._features[self._heeded])
         return self.trim(output)

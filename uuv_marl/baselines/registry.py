@@ -20,7 +20,7 @@ from uuv_marl.baselines.orca import OrcaInformed
 from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_granted
 from uuv_marl.baselines.pull import Pull
 from uuv_marl.baselines.safety import GUARD, Barrier
-from uuv_marl.baselines.scout import Scout, ScoutLead, ScoutPlus, ScoutWary
+from uuv_marl.baselines.scout import Scout
 from uuv_marl.baselines.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.sff import Sff, SffInformed
 from uuv_marl.baselines.units import Reader, in_own_units
@@ -39,9 +39,6 @@ POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
     "bio_inspired_plus": BioInspiredPlus,
     "scout": Scout,
-    "scout_plus": ScoutPlus,
-    "scout_lead": ScoutLead,
-    "scout_wary": ScoutWary,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,
@@ -53,19 +50,9 @@ POLICIES: dict[str, Kind] = {
     "pull": Pull,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
     "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on random_field: as mappo, an actor plus a barrier."),
-    "mappo_v2": shipped(
-        "mappo_v2", "Trained by MAPPO: an actor that trims the gains of scout_plus by what vehicles remember."
+    "trimmed_scout": shipped(
+        "trimmed_scout", "Trained by MAPPO: scout,preset=wary, steered more softly where a vehicle's actuators lag."
     ),
-    "mappo_v2_seed1": shipped("mappo_v2_seed1", "The same recipe as mappo_v2 with another training seed."),
-    "mappo_v3": shipped(
-        "mappo_v3", "Trained by MAPPO: scout_plus, steered more softly where a vehicle's actuators lag."
-    ),
-    "mappo_v3_seed1": shipped("mappo_v3_seed1", "The same recipe as mappo_v3 with another training seed."),
-    "mappo_v4": shipped(
-        "mappo_v4", "Trained by MAPPO: scout_wary, steered more softly where a vehicle's actuators lag."
-    ),
-    "mappo_v4_seed1": shipped("mappo_v4_seed1", "The same recipe as mappo_v4 with another training seed."),
-    "mappo_v2_calm": shipped("mappo_v2_calm", "The recipe of mappo_v2 without disturbances, for comparison."),
     "random": Random,
     "idle": Idle,
 }

@@ -1,4 +1,4 @@
-"""The strongest hand-made laws here: they remember, flow round obstacles before they are near, and keep to the filter.
+"""The strongest hand-made law here: it remembers, flows round obstacles before they are near, and keeps to the filter.
 
 A vehicle's wished velocity is l(t)'s velocity, a pull to l(t), and pushes from near neighbours. This velocity is bent
 round remembered obstacles and made safe; the vehicle then steers to it.
@@ -10,15 +10,15 @@ from typing import ClassVar
 import numpy as np
 
 from uuv_marl.baselines.filtered import Filtered
-from uuv_marl.baselines.gains import LEAD, PLUS, WARY, Gains
+from uuv_marl.baselines.gains import DEFAULT_PRESET, PRESETS, Gains
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import trim_weights
 from uuv_marl.baselines.memory.neighbours import middle
-from uuv_marl.baselines.policy import Limits
+from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
-from uuv_marl.baselines.trims import trimmed, wary, widened
+from uuv_marl.baselines.trims import softened, wary
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
@@ -33,23 +33,27 @@ class Scout(Filtered):
     Args:
         scenario: gives the vehicle, the decision period and the percept's layout.
         num_worlds: first axis of the percepts.
-        gains: of the wished velocity.
-        barrier: margins and rates of the filter.
+        preset: name of the set of numbers, of ``PRESETS``.
+        gains: of the wished velocity, instead of the preset's.
+        barrier: margins and rates of the filter, instead of the preset's.
+
+    Raises:
+        PolicyError: no preset has that name.
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
-    usual: ClassVar[Gains] = Gains()
-    """The gains, unless others are given."""
-    usual_barrier: ClassVar[Barrier] = Barrier()
-    """The same of margins and rates of the filter."""
     num_trims: ClassVar[int] = 0
-    """Changes of each vehicle's numbers."""
+    """1 where an actor trims each vehicle's steering."""
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
-    ) -> None:
-        super().__init__(scenario, num_worlds, barrier or self.usual_barrier)
-        self.gains = gains or self.usual
+        self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: Gains | None = None,
+        barrier: Barrier | None = None,
+    ) -> None:  # fmt: skip
+        if preset not in PRESETS:
+            raise PolicyError(f"preset of scout must be one of {', '.join(PRESETS)}, got {preset!r}")
+        numbers = PRESETS[preset]
+        super().__init__(scenario, num_worlds, barrier or numbers.barrier)
+        self.gains = gains or numbers.gains
         self._growth = growth(scenario.swarm.num_vehicles)
         self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, self.num_trims), np.float32)
 
@@ -78,35 +82,6 @@ class Scout(Filtered):
             pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
             together=by.together / g**3,
         )  # fmt: skip
-
-
-class ScoutPlus(Scout):
-    """``scout`` with a swarm that moves as a whole, longer pushes, and silent neighbours remembered twice as long.
-
-    Arguments as for ``Scout``.
-    """
-
-    usual = PLUS
-
-
-class ScoutLead(Scout):
-    """``scout_plus`` that makes up for actuators that lag, as far as a vehicle sees it, with weaker gains at rest.
-
-    Arguments as for ``Scout``.
-    """
-
-    usual = LEAD
-
-
-class ScoutWary(Scout):
-    """``scout_lead`` that keeps farther from others where a vehicle doubts its model or its sonar, and from obstacles.
-
-    Arguments as for ``Scout``.
-    """
-
-    usual = WARY
-    usual_barrier = Barrier(obstacle_m=13.7)
-    """With 13.5 m the smallest distance of ``scout_lead`` was 12.55 m on 80 tuning seeds; the paper states 12.63 m."""
 
 
 @compiled
@@ -174,23 +149,22 @@ def decide_all(
 ) -> None:  # fmt: skip
     """The law for every vehicle.
 
-    ``trims``, shape (world, vehicle, TRIMS), change the law as ``trimmed`` and ``widened`` say, as far as a vehicle
-    doubts (that of steering: as its actuators lag); shape (world, vehicle, 0) for none.
+    ``trims`` of steering, shape (world, vehicle, 1), count as far as actuators lag; shape (world, vehicle, 0) for none.
     """
     doubts = trims.shape[2] > 0 or g.pull_in_doubt != 0.0 or g.push_in_doubt != 0.0
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                own, keep = g, barrier
+                own = g
                 if doubts:
                     lags, share = trim_weights(w, i, g.lead, kept)
                     if kept.reference_speed[w, i] > 0.0:
                         own = wary(own, share)
                     if trims.shape[2] > 0:
-                        own, keep = trimmed(own, trims[w, i], share, lags), widened(barrier, trims[w, i], share)
+                        own = softened(own, float(trims[w, i, 0]), lags)
                 w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
-                num = planes_of(w, i, period, keep, kept, planes)
+                num = planes_of(w, i, period, barrier, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain * own.steering, limits, kept, action)
                 if g.lead > 0.0 and limits.helm == 0.0:
                     _lead(w, i, g.lead, limits, kept, action)

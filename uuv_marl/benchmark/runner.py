@@ -13,7 +13,7 @@ from uuv_marl.benchmark.results import Results, Row
 from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
 from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
 
-DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "mappo_v4")
+DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "ppo", "trimmed_scout")
 """The paper's Table 2, the safest hand-made law, and the learned policies of 0.1.0 and of today; all others by name."""
 
 Report = Callable[[str, str, float], None]

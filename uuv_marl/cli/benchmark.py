@@ -32,7 +32,7 @@ def benchmark(
         typer.Option(
             help="Name, checkpoint (runs/mappo/best) or module:Class, whose module is looked for in the current folder "
             "too, after all installed ones; repeat for several. "
-            "Default: bio_inspired, sff, sdc, scout, mappo and mappo_v4."
+            "Default: bio_inspired, sff, sdc, scout, mappo, ppo and trimmed_scout."
         ),
     ] = None,
     seeds: Annotated[

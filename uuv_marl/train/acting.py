@@ -128,8 +128,8 @@ class Trims:
     size = RECALLED
     most = MOST_TRIM
 
-    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]) -> None:
-        self._policy = TrimmedLaw(scenario, num_worlds, gains=law, barrier=safety, trims=trims)
+    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]) -> None:  # noqa: ARG002
+        self._policy = TrimmedLaw(scenario, num_worlds, gains=law, barrier=safety)
         self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
 
     @staticmethod

@@ -8,10 +8,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pydantic
 
-from uuv_marl.baselines.checkpoint import Trims
 from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS
+from uuv_marl.baselines.trims import ALL_TRIMS, Trim
 from uuv_marl.benchmark.robustness.axes import AXES, known
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import user_path
@@ -99,7 +98,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     validate_every: int = pydantic.Field(Settings.validate_every, ge=1)
     law: dict[str, float] = {}
     safety: dict[str, float] = {}
-    trims: Trims = ALL_TRIMS
+    trims: tuple[Trim] = ALL_TRIMS
     weights: dict[str, float] = {}
     mappo: dict[str, Any] = {}
     ppo: dict[str, Any] = {}

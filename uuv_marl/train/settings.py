@@ -70,7 +70,7 @@ class Settings:
     """With memory: of the hand-made law that the actor trims."""
     safety: Barrier = field(default_factory=Barrier)
     """With memory: margins and rates of the safety filter; with a horizon of 0 m it changes nothing."""
-    trims: tuple[Trim, ...] = ALL_TRIMS
+    trims: tuple[Trim] = ALL_TRIMS
     """With memory: what the actor changes."""
     held_s: float = 0.0
     """An output of the actor is held for so long, rounded to whole decisions; 0: for one decision."""

@@ -33,11 +33,10 @@ class Plan(NamedTuple):
 
 
 SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
-    "bio_inspired", "bio_inspired_plus", "scout", "scout_plus", "scout_lead", "scout_wary", "mappo", "mappo_v2",
-    "mappo_v3", "mappo_v4", "mappo_v2_calm", "mappo_v3_seed1", "mappo_v4_seed1",
-    "scout_plus,pull_at_rest=6,push_at_rest=3",
+    "bio_inspired", "bio_inspired_plus", "scout", "scout,preset=plus", "scout,preset=lead", "scout,preset=wary",
+    "mappo", "trimmed_scout",
 ), 20)  # fmt: skip
-"""The plan whose report is in docs/robustness; the last policy is the law of ``mappo_v3``."""
+"""The usual plan."""
 QUICK = SHIPPED._replace(
     axes=("W1", "S4", "S7", "S9", "N1", "A1", "F3", "X"), scenarios=("single_obstacle", "random_field"), seeds=5,
     policies=("bio_inspired", "bio_inspired_plus", "mappo"),
