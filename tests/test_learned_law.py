@@ -304,17 +304,15 @@ def test_refusals_name_what_is_wrong(saved, tmp_path):
 
 
 @pytest.mark.needs("torch")
-@pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
-def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, monkeypatch):
-    import importlib
-
+def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(tmp_path, monkeypatch):
     from uuv_marl.train import training as trainings
+    from uuv_marl.train.mappo import Hyperparameters
     from uuv_marl.train.settings import Settings
     from uuv_marl.train.validation import ValidationResult
 
     verdict = ValidationResult(-1.0, 1.0, 0, 1.0, 7.0, 15.0)
     monkeypatch.setattr(trainings, "validate", lambda *_: verdict)
-    by = importlib.import_module(f"uuv_marl.train.{algorithm}").Hyperparameters(hidden=(8,), horizon=8, minibatch=64)
+    by = Hyperparameters(hidden=(8,), horizon=8, minibatch=64)
     overrides = {
         "timing.decision_period_s": 0.5,
         "actuators.yaw_damping_nms": 600.0,
@@ -342,7 +340,7 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
     made = load_checkpoint(tmp_path / "whole" / "best")
     assert made.card.features == "memory"
     trainer = trainings.Trainer(settings(4))
-    env = trainer.algorithm.env if algorithm == "mappo" else trainer.algorithm._vec_env.env
+    env = trainer.algorithm.env
     swarm, acting = env._groups[0].swarm, env._groups[0].acting
     policy, seen = make(str(tmp_path / "whole" / "best"), swarm.scenario, swarm.num_worlds), 0
     for _ in range(10):

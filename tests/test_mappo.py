@@ -729,9 +729,8 @@ def test_numbers_that_cannot_be_learned_with_are_refused(field, value):
     ("module", "library", "name"),
     [
         ("train.mappo", "torch", "train"),
-        ("train.ppo", "stable_baselines3", "train"),
+        ("train.sb3", "stable_baselines3", "sb3"),
         ("train.training", "torch.utils.tensorboard.writer", "train"),
-        ("train.rllib", "ray", "distributed"),
         ("baselines.export", "onnx", "onnx"),
     ],
 )

@@ -97,12 +97,11 @@ def test_the_shipped_recipe_trims_the_law_of_scout_plus():
     assert load_recipe("mappo_v2").settings(0).law == PLUS
 
 
-@pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
-def test_a_recipe_resumes_bit_for_bit(algorithm, tmp_path):
+def test_a_recipe_resumes_bit_for_bit(tmp_path):
     from uuv_marl.train import training as trainings
     from uuv_marl.train.recipe import load_recipe
 
-    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(3, algorithm)
+    settings = load_recipe(recipe(tmp_path / "r.toml")).settings(3)
     settings = dataclasses.replace(settings, checkpoint_every=1)
     list(trainings.train(tmp_path / "whole", settings))
     stopped = iter([False, True])
@@ -200,13 +199,11 @@ def test_the_robustness_page_marks_what_was_trained_with():
         ({"sizez": "[[4, 2]]"}, "sizez"),
         ({"scenario": '"nowhere"'}, "nowhere"),
         ({"held_s": -1}, "held_s"),
-        ({"ppo": "{ noise = [0.4, 0.2] }"}, "noise"),
         ({"mappo": "{ noize = [0.4, 0.2] }"}, "noize"),
         ({"mappo": "{ first_outputs = [0.1] }"}, "first_outputs must have a number for each of 6 outputs, got 1"),
         ({"safety": "{ horizon_km = 0.0 }"}, "horizon_km"),
         ({"mappo": "{ noise_kept = 1.2 }"}, "noise_kept"),
         ({"mappo": "{ horizon = 0 }"}, "horizon"),
-        ({"ppo": "{ epochs = 0 }"}, "epochs"),
         ({"like": '"nowhere"'}, "like = 'nowhere' must name another recipe"),
     ],
 )

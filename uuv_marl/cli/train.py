@@ -25,7 +25,6 @@ from uuv_marl.cli.train_options import (
     Sees,
     Sizes,
     Start,
-    Steps,
     Task,
     Vehicles,
     alone,
@@ -94,47 +93,6 @@ def train_mappo(
             algorithm = replace(Hyperparameters(), **{name: value for name, value in given.items() if value})
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
-        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed, start)
-        _train(output, resume, task.settings(algorithm), steps, device)
-
-
-@app.command("ppo", cls=Command)
-def train_ppo(
-    context: typer.Context,
-    recipe: Recipe = None,
-    scenario: Scenario = "random_field",
-    num_vehicles: Vehicles = None,
-    sizes: Sizes = None,
-    overrides: Changes = None,
-    reward: Reward = None,
-    network: Network = None,
-    sees: Sees = "percept",
-    steps: Length = None,
-    seed: Seed = 0,
-    start: Start = None,
-    device: Device = "cpu",
-    output: Output = Path("results/ppo"),
-    resume: Resume = False,
-) -> None:
-    """Train one policy for all vehicles with Stable-Baselines3's PPO, on swarms of 10 to 100 at once, on one core.
-
-    It trains on the same problem and writes the same files as uuv-marl train mappo. But the critic sees only what the
-    actor sees, and noise is learned. It needs the extra "train".
-
-    Example: uuv-marl train ppo --output runs/ppo
-    """
-    with explained():
-        with extra("train", "training with Stable-Baselines3"):
-            from uuv_marl.train.ppo import Hyperparameters
-
-        alone(context, "recipe", _BESIDE_RECIPE)
-        if recipe is not None:
-            from uuv_marl.train.recipe import load_recipe
-
-            _train(output, resume, load_recipe(recipe).settings(seed, "ppo"), steps, device)
-            return
-        units = whole_numbers("--network", network)
-        algorithm = replace(Hyperparameters(), hidden=units or Hyperparameters.hidden)
         task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed, start)
         _train(output, resume, task.settings(algorithm), steps, device)
 
@@ -217,48 +175,3 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
             rest = "Nothing was written yet; the same command begins again."
         console.print(f"Stopped. {rest}")
         raise typer.Exit(130)
-
-
-@app.command("rllib", cls=Command)
-def train_rllib(
-    scenario: Scenario = "single_obstacle",
-    num_vehicles: Annotated[
-        int | None, typer.Option(min=1, help="Vehicles of the swarm. Default: those of the scenario.")
-    ] = None,
-    steps: Steps = 1_000_000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the first worlds and of the weights.")] = 0,
-    env_runners: Annotated[int, typer.Option(min=0, max=1000, help="Processes that sample; each uses a core.")] = 2,
-    ray: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster (auto: the local one). Default: this machine.")
-    ] = None,
-    output: Output = Path("results/rllib"),
-    resume: Resume = False,
-) -> None:
-    """Train one policy for all vehicles with RLlib's PPO, on this machine or a Ray cluster.
-
-    Vehicles decide every 0.5 s, with yaw damping. This needs the extra "distributed". It writes config.json (settings,
-    seeds, versions), progress.csv (a row per iteration) and checkpoints/. Ctrl-C stops the training after the current
-    iteration, with a checkpoint; the same command with --resume continues, also to more --steps.
-
-    Example: uuv-marl train rllib --scenario tracking --num-vehicles 8 --steps 200000
-    """
-    with explained():
-        with extra("distributed", "training with RLlib"):
-            from uuv_marl.train.rllib import Settings, train
-            from uuv_marl.train.shaping import overrides_for
-
-        changes = overrides_for(scenario, {})
-        settings = Settings(scenario=scenario, num_vehicles=num_vehicles, overrides=changes, seed=seed)
-        texts = {
-            "agent_steps": "{agent_steps:,} agent-steps",
-            "episode_return": "last return per vehicle {episode_return:.1f}",
-        }
-        console.print("Starting Ray takes about 15 s.")
-        with _stoppable(output) as stop:
-            last = _follow(
-                train(
-                    output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume,
-                    say=console.print, stop=stop,
-                ), steps, texts,
-            )  # fmt: skip
-        console.print(f"Done: {last}. Progress: {output}/progress.csv   checkpoint: {output}/checkpoints")

@@ -41,12 +41,6 @@ Vehicles = Annotated[
         help="Vehicles of every swarm. Default: those of the scenario; if these are 54, several sizes from 10 to 100.",
     ),
 ]
-Steps = Annotated[
-    int,
-    typer.Option(
-        parser=whole_number, metavar="NUMBER", help="Agent-steps in all, such as 3e6: decisions times vehicles."
-    ),
-]
 Length = Annotated[
     int | None,
     typer.Option(

@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import pydantic
@@ -16,14 +16,12 @@ from uuv_marl.errors import ResultsError
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import load_scenario
 from uuv_marl.studies.robustness.axes import AXES, known
-from uuv_marl.train import ppo
 from uuv_marl.train.acting import Sees
 from uuv_marl.train.group import Conditions
 from uuv_marl.train.mappo import Hyperparameters
 from uuv_marl.train.settings import Settings
 from uuv_marl.train.shaping import Weights, overrides_for
 
-Algorithm = Literal["mappo", "ppo"]
 _VALIDATION_DRAW = 2**31
 """Seed of what is drawn for validation."""
 
@@ -102,14 +100,14 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
     trims: Trims = ALL_TRIMS
     weights: dict[str, float] = {}
     mappo: dict[str, Any] = {}
-    ppo: dict[str, Any] = {}
     episodes: Episodes | None = None
 
-    def settings(self, seed: int, algorithm: Algorithm = "mappo") -> Settings:
+    def settings(self, seed: int) -> Settings:
         """The settings of a training, whose seed draws the episodes' conditions too."""
         taken = {name: getattr(self, name) for name in _TAKEN}
-        told, kind = (self.mappo, Hyperparameters) if algorithm == "mappo" else (self.ppo, ppo.Hyperparameters)
-        numbers: dict[str, Any] = {k: tuple(value) if isinstance(value, list) else value for k, value in told.items()}
+        numbers: dict[str, Any] = {
+            k: tuple(value) if isinstance(value, list) else value for k, value in self.mappo.items()
+        }
         return Settings(
             **taken,
             seed=seed,
@@ -117,7 +115,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
             law=Gains(**self.law),
             safety=Barrier(**self.safety),
             weights=Weights(**self.weights),
-            algorithm=pydantic.TypeAdapter(kind).validate_python(vars(kind(**numbers))),
+            algorithm=pydantic.TypeAdapter(Hyperparameters).validate_python(vars(Hyperparameters(**numbers))),
             conditions=self.episodes.draw(self.scenario, seed) if self.episodes else (),
             validation_conditions=self.episodes.draw_validated(self.scenario) if self.episodes else (),
         )
@@ -145,8 +143,7 @@ def load_recipe(name: str) -> Recipe:
     """
     try:
         recipe = Recipe(**_told(name))
-        for algorithm in get_args(Algorithm):
-            recipe.settings(0, algorithm)
+        recipe.settings(0)
     except (pydantic.ValidationError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
         raise ResultsError(f"recipe {name!r} can't be used: {error}") from None
     return recipe

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, cast
+from typing import Literal, cast
 
 from uuv_marl.baselines.checkpoint import PERIODS_S
 from uuv_marl.baselines.gains import Gains
@@ -16,9 +16,6 @@ from uuv_marl.train.acting import ACTING, Sees
 from uuv_marl.train.group import Conditions
 from uuv_marl.train.mappo import Hyperparameters
 from uuv_marl.train.shaping import OVERRIDES, Weights, in_si_units
-
-if TYPE_CHECKING:
-    from uuv_marl.train import ppo
 
 Sizes = tuple[tuple[int, int], ...]
 
@@ -76,7 +73,7 @@ class Settings:
     """An output of the actor is held for so long, rounded to whole decisions; 0: for one decision."""
     conditions: Conditions = ()
     """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
-    algorithm: "Hyperparameters | ppo.Hyperparameters" = field(default_factory=Hyperparameters)
+    algorithm: Hyperparameters = field(default_factory=Hyperparameters)
     checkpoint_every: int = 20
     """Iterations."""
     validate_every: int = 20
@@ -93,7 +90,7 @@ class Settings:
         usual = "swarm.num_vehicles" not in self.overrides and n == _usual_size()
         sizes = self.sizes or (MIXED if usual else swarms_of([n]))
         validation = self.validation or (MIXED_VALIDATION if sizes == MIXED else tuple((n, 4) for n, _ in sizes))
-        first = self.algorithm.first_outputs if isinstance(self.algorithm, Hyperparameters) else ()
+        first = self.algorithm.first_outputs
         outputs = ACTING[self.sees].num_outputs(self.trims)
         if len(first) not in (0, outputs):
             raise ValueError(f"first_outputs must have a number for each of {outputs} outputs, got {len(first)}")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import safetensors.numpy
@@ -29,7 +29,6 @@ from uuv_marl.scenario.overrides import plain
 from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
 from uuv_marl.train.group import Problem
-from uuv_marl.train.mappo import Mappo
 from uuv_marl.train.settings import Settings
 from uuv_marl.train.validation import ValidationResult, validate
 
@@ -37,10 +36,7 @@ with extra("train", "training"):
     import torch
     from torch.utils.tensorboard.writer import SummaryWriter
 
-if TYPE_CHECKING:
-    from uuv_marl.train import ppo
-
-_LIBRARIES = ("torch", "stable-baselines3", "numpy", "numba", "safetensors")
+_LIBRARIES = ("torch", "numpy", "numba", "safetensors")
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
 
 
@@ -80,7 +76,7 @@ class Trainer:
     def __init__(self, settings: Settings, device: str = "cpu", checkpoint: Path | None = None) -> None:
         self.settings = settings
         self.scenario = settings.load()
-        self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
+        self.algorithm = settings.algorithm.begin(
             Problem(
                 self.scenario,
                 settings.sizes,
@@ -165,7 +161,7 @@ def train(
     """Train to ``settings.steps``; a record for each iteration.
 
     Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
-    come without the break, on the CPU bit for bit (of a GPU, PPO's generator of noise is not kept). Uses two threads of
+    come without the break, on the CPU bit for bit. Uses two threads of
     torch: actor and critic learn side by side.
 
     Args:
