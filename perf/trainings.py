@@ -1,7 +1,6 @@
 """Whole trainings for perf/compare.py: the same task, networks and batch, each in its library's own environment."""
 
 import logging
-import math
 import runpy
 from contextlib import ExitStack
 from pathlib import Path
@@ -20,7 +19,7 @@ MINIBATCH = 2304
 """A factor of the rows, so that no gradient step has fewer."""
 OURS: dict[str, Any] = {
     "hidden": HIDDEN, "gamma": GAMMA, "gae_lambda": GAE_LAMBDA, "horizon": DECISIONS, "minibatch": MINIBATCH,
-    "clip": CLIP, "kl_stop": math.inf, "learning_rate": (LEARNING_RATE, LEARNING_RATE),
+    "clip": CLIP, "kl_stop": 1e9, "learning_rate": (LEARNING_RATE, LEARNING_RATE),
 }  # fmt: skip
 END = ExitStack()
 """What is to be done when all is measured."""
@@ -32,12 +31,11 @@ def scenario(agents: int) -> Scenario:
 
 
 def mappo(agents: int, worlds: int) -> Case:
-    from uuv_marl.train.env import Problem
-    from uuv_marl.train.mappo import Hyperparameters
-    from uuv_marl.train.shaping import Weights
+    from uuv_marl.train.mappo import Mappo
+    from uuv_marl.train.training import Training
 
-    by = Hyperparameters(**OURS, actor_epochs=EPOCHS, critic_epochs=EPOCHS)
-    training = by.begin(Problem(scenario(agents), [(agents, worlds)], Weights()), SEED)
+    by = {**OURS, "actor_epochs": EPOCHS, "critic_epochs": EPOCHS}
+    training = Mappo(Training(scenario=SCENARIO, sizes=[(agents, worlds)], mappo=by, seed=SEED))
     return repeated(lambda _: training.iterate(0.0), training.agent_steps)
 
 

@@ -92,7 +92,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "replay.traces.from_folder",
     ):
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
-    monkeypatch.setattr("uuv_marl.train.training.train", stop_at_once)
+    monkeypatch.setattr("uuv_marl.train.run.train", stop_at_once)
     monkeypatch.chdir(tmp_path)
     line = line.replace("verify docs/", f"verify {ROOT / 'docs'}/")
     line = re.sub(r"--policy (runs/\S+|mine:\w+)", "--policy mappo", line)  # a reader's own

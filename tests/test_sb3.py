@@ -20,7 +20,7 @@ from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import ScenarioError
-from uuv_marl.train import training
+from uuv_marl.train import run
 from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
@@ -30,7 +30,7 @@ QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_
 @pytest.fixture(autouse=True)
 def one_thread():
     """Sums in another order give other bits."""
-    with training.one_thread():
+    with run.one_thread():
         yield
 
 

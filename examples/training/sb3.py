@@ -11,8 +11,9 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.train.reward import Weights
 from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
-from uuv_marl.train.shaping import Weights, overrides_for
+from uuv_marl.train.training import overrides_for
 
 TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
 

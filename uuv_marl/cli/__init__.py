@@ -18,10 +18,10 @@ app = typer.Typer(
 )
 for command in (
     benchmark.benchmark, robustness.robustness, replay.replay, studies.heldout, studies.reproduce, verify.verify,
-    lists.scenarios, lists.vehicles, lists.policies, benchmark.tune, export.export, studies.identify,
+    lists.scenarios, lists.vehicles, lists.policies, train.train, benchmark.tune, export.export,
+    studies.identify,
 ):  # fmt: skip
     app.command()(command)
-app.add_typer(train.app, name="train")
 
 
 def _show_version(value: bool) -> None:
