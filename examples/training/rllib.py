@@ -1,6 +1,6 @@
 """Train one policy for all vehicles with RLlib's PPO, on this machine or on a Ray cluster.
 
-python examples/training/rllib.py --scenario single_obstacle --vehicles 8 --steps 1000000 --output results/rllib
+python examples/training/rllib.py --scenario single_obstacle --vehicles 8 --steps 1000000 --output runs/rllib
 """
 
 import argparse
@@ -75,7 +75,7 @@ def main() -> None:
     parser.add_argument("--runners", type=int, default=2, help="processes that sample, a core each")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--ray", help="address of a Ray cluster (auto: the local one); this machine unless given")
-    parser.add_argument("--output", type=Path, default=Path("results/rllib"), help="folder of the checkpoint")
+    parser.add_argument("--output", type=Path, default=Path("runs/rllib"), help="folder of the checkpoint")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint")
     given = parser.parse_args()
     with connected(given.ray, max(1, given.runners)):

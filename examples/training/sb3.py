@@ -1,7 +1,7 @@
 """Train one policy for all vehicles with Stable-Baselines3's PPO, and write a checkpoint for the benchmark.
 
-python examples/training/sb3.py --scenario starter --steps 300000 --output results/sb3
-uuv-marl benchmark --scenario starter --policy bio_inspired_plus --policy results/sb3
+python examples/training/sb3.py --scenario starter --steps 300000 --output runs/sb3
+uuv-marl benchmark --scenario starter --policy bio_inspired_plus --policy runs/sb3
 """
 
 import argparse
@@ -51,7 +51,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=300_000, help="decisions times vehicles")
     parser.add_argument("--worlds", type=int, default=32)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=Path("results/sb3"))
+    parser.add_argument("--output", type=Path, default=Path("runs/sb3"))
     given = parser.parse_args()
     model = train(given.scenario, given.steps, given.worlds, given.seed)
     given.output.mkdir(parents=True, exist_ok=True)

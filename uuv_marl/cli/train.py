@@ -47,7 +47,7 @@ def train(
         int | None, typer.Option(min=0, help="Seed of worlds, weights and noise. It fixes the training.")
     ] = None,
     output: Annotated[Path, path_option("Folder for the training's description, progress and checkpoints.")] = Path(
-        "results/train"
+        "runs/train"
     ),
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the folder's last checkpoint; only --steps may stand beside.")
