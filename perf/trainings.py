@@ -1,8 +1,9 @@
 """Whole trainings for perf/compare.py: the same task, networks and batch, each in its library's own environment."""
 
 import logging
-import math
+import runpy
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -18,7 +19,7 @@ MINIBATCH = 2304
 """A factor of the rows, so that no gradient step has fewer."""
 OURS: dict[str, Any] = {
     "hidden": HIDDEN, "gamma": GAMMA, "gae_lambda": GAE_LAMBDA, "horizon": DECISIONS, "minibatch": MINIBATCH,
-    "clip": CLIP, "kl_stop": math.inf, "learning_rate": (LEARNING_RATE, LEARNING_RATE),
+    "clip": CLIP, "kl_stop": 1e9, "learning_rate": (LEARNING_RATE, LEARNING_RATE),
 }  # fmt: skip
 END = ExitStack()
 """What is to be done when all is measured."""
@@ -29,25 +30,13 @@ def scenario(agents: int) -> Scenario:
     return load_scenario(SCENARIO, num_vehicles=agents, overrides=OVERRIDES)
 
 
-def recipe(by: Any, agents: int, worlds: int) -> Case:
-    """A training of ours; a unit is an iteration."""
-    from uuv_marl.train.env import Problem
-    from uuv_marl.train.shaping import Weights
-
-    training = by.begin(Problem(scenario(agents), [(agents, worlds)], Weights()), SEED)
-    return repeated(lambda _: training.iterate(0.0), training.agent_steps)
-
-
 def mappo(agents: int, worlds: int) -> Case:
-    from uuv_marl.train.mappo import Hyperparameters
+    from uuv_marl.train.mappo import Mappo
+    from uuv_marl.train.training import Training
 
-    return recipe(Hyperparameters(**OURS, actor_epochs=EPOCHS, critic_epochs=EPOCHS), agents, worlds)
-
-
-def ppo(agents: int, worlds: int) -> Case:
-    from uuv_marl.train.ppo import Hyperparameters
-
-    return recipe(Hyperparameters(**OURS, epochs=EPOCHS), agents, worlds)
+    by = {**OURS, "actor_epochs": EPOCHS, "critic_epochs": EPOCHS}
+    training = Mappo(Training(scenario=SCENARIO, sizes=[(agents, worlds)], mappo=by, seed=SEED))
+    return repeated(lambda _: training.iterate(0.0), training.agent_steps)
 
 
 def sb3_ppo(env: Any, seed: int | None) -> Case:
@@ -79,18 +68,17 @@ def supersuit(agents: int, worlds: int) -> Case:
 
 
 def rllib(agents: int, worlds: int) -> Case:
-    """PPO as ``uuv-marl train rllib`` has it, sampling and learning in this process."""
+    """PPO as ``examples/training/rllib.py`` has it, sampling and learning in this process."""
     from uuv_marl.benchmark.distributed import connected
-    from uuv_marl.train.rllib import Settings, ppo_config
 
     END.enter_context(connected(None))
-    settings = Settings(
-        scenario=SCENARIO, num_vehicles=agents, overrides=OVERRIDES, batch=DECISIONS * agents * worlds,
-        minibatch=MINIBATCH, epochs=EPOCHS, learning_rate=LEARNING_RATE, gamma=GAMMA, gae_lambda=GAE_LAMBDA,
-        hidden=HIDDEN,
-    )  # fmt: skip
-    config = ppo_config(settings, num_env_runners=0, world_seed=SEED)
+    example = runpy.run_path(str(Path(__file__).resolve().parent.parent / "examples" / "training" / "rllib.py"))
+    config = example["ppo_config"](SCENARIO, agents, 0, SEED)
     config.env_runners(num_envs_per_env_runner=worlds)
+    config.training(
+        train_batch_size_per_learner=DECISIONS * agents * worlds, minibatch_size=MINIBATCH, num_epochs=EPOCHS,
+        lr=LEARNING_RATE,
+    )  # fmt: skip
     logging.getLogger("ray.rllib").setLevel(logging.ERROR)
     algorithm = config.build_algo()
     torch.set_num_threads(1)  # Ray has its own mind
@@ -98,7 +86,7 @@ def rllib(agents: int, worlds: int) -> Case:
     return repeated(lambda _: algorithm.train(), int(rows))
 
 
-CASES: dict[str, Maker] = {case.__name__: case for case in (mappo, ppo, plain, supersuit, rllib)}
+CASES: dict[str, Maker] = {case.__name__: case for case in (mappo, plain, supersuit, rllib)}
 
 if __name__ == "__main__":
     torch.set_num_threads(1)  # Numba, OpenMP and BLAS are told by the environment's variables

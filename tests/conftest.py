@@ -18,7 +18,6 @@ NEEDS = {
     "test_export.py": "onnx",
     "test_film.py": "av",
     "test_mappo.py": "torch",
-    "test_ppo.py": "stable_baselines3",
     "test_rendering.py": "pygame",
     "test_sb3.py": "stable_baselines3",
     "test_torchrl.py": "torchrl",

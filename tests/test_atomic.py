@@ -91,7 +91,7 @@ def test_a_missing_library_names_its_extra():
 @pytest.mark.parametrize(
     ("module", "library", "name"),
     [
-        ("envs.sb3", "stable_baselines3", "train"),
+        ("envs.sb3", "stable_baselines3", "sb3"),
         ("envs.torchrl", "torchrl", "torchrl"),
         ("envs.benchmarl", "benchmarl", "benchmarl"),
         ("envs.rllib", "ray", "distributed"),

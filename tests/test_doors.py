@@ -230,11 +230,10 @@ def test_training_refuses_scenarios_in_which_vehicles_are_lost():
     pytest.importorskip("torch")
     from uuv_marl.scenario import ScenarioError
     from uuv_marl.train.env import TrainingEnv
-    from uuv_marl.train.group import Problem
-    from uuv_marl.train.shaping import Weights
+    from uuv_marl.train.training import Training
 
     with pytest.raises(ScenarioError, match="training can't show that a vehicle is lost"):
-        TrainingEnv(Problem(load_scenario("lossy"), [(6, 2)], Weights()), lambda num: None)
+        TrainingEnv(Training(scenario="lossy", sizes=[(6, 2)]), range)
 
 
 def commands(group, name=""):
@@ -309,16 +308,13 @@ def test_results_and_replays_go_to_the_home_folder(home):
 
 @pytest.mark.needs("torch")
 def test_trainings_and_recipes_in_the_home_folder(home):
-    from uuv_marl.train.mappo import Hyperparameters
-    from uuv_marl.train.recipe import load_recipe
-    from uuv_marl.train.settings import Settings
-    from uuv_marl.train.training import train
+    from uuv_marl.train.run import train
+    from uuv_marl.train.training import Training, read_recipe
 
-    (home / "r.toml").write_text('like = "mappo_v4"\ntitle = "mine"', encoding="utf-8")
-    assert load_recipe("~/r.toml").title == "mine"
-    settings = Settings(scenario="starter", steps=1, start="~/gone", algorithm=Hyperparameters())
+    (home / "r.toml").write_text('title = "mine"', encoding="utf-8")
+    assert read_recipe("~/r.toml") == {"title": "mine"}
     with pytest.raises(ResultsError, match=f"{home / 'gone'}"):
-        list(train("~/runs", settings))
+        list(train("~/runs", Training(scenario="starter", steps=1, start="~/gone")))
 
 
 def test_what_names_no_known_home_stays_as_it_is(monkeypatch):

@@ -265,35 +265,23 @@ def test_refusals_name_what_is_wrong(saved, tmp_path):
 
 
 @pytest.mark.needs("torch")
-@pytest.mark.parametrize("algorithm", ["mappo", "ppo"])
-def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, monkeypatch):
-    import importlib
-
-    from uuv_marl.train import training as trainings
-    from uuv_marl.train.settings import Settings
+def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(tmp_path, monkeypatch):
+    from uuv_marl.train import run as trainings
+    from uuv_marl.train.training import Training
     from uuv_marl.train.validation import ValidationResult
 
     verdict = ValidationResult(-1.0, 1.0, 0, 1.0, 7.0, 15.0)
     monkeypatch.setattr(trainings, "validate", lambda *_: verdict)
-    by = importlib.import_module(f"uuv_marl.train.{algorithm}").Hyperparameters(hidden=(8,), horizon=8, minibatch=64)
-    overrides = {
-        "timing.decision_period_s": 0.5,
-        "actuators.yaw_damping_nms": 600.0,
-        "time_limit.factor": 0.02,
-        "sonar.echo_reports": "surface",
-    }
-
-    def settings(steps):
-        return Settings(
-            sizes=((3, 3), (6, 2)), steps=steps * 8 * 21, algorithm=by, overrides=overrides, sees="memory",
-            checkpoint_every=1, validation=((3, 1),), change_cost=0.1,
-        )  # fmt: skip
-
-    whole = list(trainings.train(tmp_path / "whole", settings(4)))
-    first = trainings.train(tmp_path / "parts", settings(4))
+    training = Training(
+        sizes=((3, 3), (6, 2)), steps=4 * 8 * 21, mappo={"hidden": (8,), "horizon": 8, "minibatch": 64}, sees="memory",
+        overrides={"time_limit.factor": 0.02, "sonar.echo_reports": "surface"}, checkpoint_every=1,
+        validation=((3, 1),),
+    )  # fmt: skip
+    whole = list(trainings.train(tmp_path / "whole", training))
+    first = trainings.train(tmp_path / "parts", training)
     next(first), next(first)
     first.close()
-    rest = list(trainings.train(tmp_path / "parts", settings(4), resume=True))
+    rest = list(trainings.resume(tmp_path / "parts"))
     assert [record.reward for record in rest] == [record.reward for record in whole[2:]]
     weights = [
         (tmp_path / name / "checkpoints" / "000004" / "learner.safetensors").read_bytes() for name in ("whole", "parts")
@@ -302,8 +290,7 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
 
     made = load_checkpoint(tmp_path / "whole" / "best")
     assert made.card.features == "memory"
-    trainer = trainings.Trainer(settings(4))
-    env = trainer.algorithm.env if algorithm == "mappo" else trainer.algorithm._vec_env.env
+    env = trainings.Trainer(training).mappo.env
     swarm, acting = env._groups[0].swarm, env._groups[0].acting
     policy, seen = make(str(tmp_path / "whole" / "best"), swarm.scenario, swarm.num_worlds), 0
     for _ in range(10):
@@ -318,26 +305,3 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(algorithm, tmp_path, 
         env.step(rows)
         np.testing.assert_array_equal(acting._policy.memory.action, used)
     assert seen > 0
-
-
-@pytest.mark.needs("torch")
-def test_what_the_filter_changes_is_charged():
-    from uuv_marl.train.env import TrainingEnv
-    from uuv_marl.train.group import Problem
-
-    rewards = []
-    for cost in (0.0, 2.0):
-        overrides = FEW | {"actuators.yaw_damping_nms": 600.0}
-        problem = Problem(
-            load_scenario("random_field", overrides=overrides), [(12, 2)], lambda s: np.zeros(s.state.alive.shape),
-            "memory", cost,
-        )  # fmt: skip
-        env = TrainingEnv(problem, lambda num: range(10_007, 10_007 + num))
-        paid = []
-        for _ in range(120):
-            paid.append(env.step(np.zeros((24, 1), np.float32)).reward)
-            changed = env._groups[0].acting.changed.reshape(-1)
-            np.testing.assert_allclose(paid[-1], -cost * 0.4 * changed, atol=1e-6)
-        rewards.append(np.sum(paid))
-    assert rewards[0] == 0.0
-    assert rewards[1] < -1.0

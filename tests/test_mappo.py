@@ -1,12 +1,12 @@
 """MAPPO on problems with known answers, and trainings that can be stopped anywhere."""
 
 import csv
-import dataclasses
 import errno
 import itertools
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -26,19 +26,18 @@ from uuv_marl.baselines.features import BARRIER, Features
 from uuv_marl.baselines.learned import forward
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
-from uuv_marl.errors import ResultsError, RewardError, ScenarioError
+from uuv_marl.errors import ResultsError, RewardError, ScenarioError, TrainingError
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import group as group_module
-from uuv_marl.train import training as trainings
+from uuv_marl.train import run as trainings
+from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged_observation
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.exploration import exploration
-from uuv_marl.train.folder import steps_before
-from uuv_marl.train.group import Problem
-from uuv_marl.train.mappo import Hyperparameters, Learner, Mappo, gae
-from uuv_marl.train.settings import Settings
-from uuv_marl.train.shaping import OVERRIDES, PRIVILEGED_SIZE, Weights, lead, privileged_observation, shaped_reward
-from uuv_marl.train.shared import annealed
-from uuv_marl.train.training import Record, Trainer, train
+from uuv_marl.train.folder import Record, TrainingFolder
+from uuv_marl.train.mappo import Learner, Mappo, annealed, gae
+from uuv_marl.train.reward import Weights, lead, shaped_reward
+from uuv_marl.train.run import Trainer, resume, train
+from uuv_marl.train.training import Hyperparameters, Training
 from uuv_marl.train.validation import VALIDATION_SEEDS, cost, validation_result
 
 OPEN_WATER = {
@@ -137,7 +136,7 @@ def test_values_of_a_steady_income(cut_off, values):
 def test_an_actor_begins_with_the_outputs_that_it_is_given():
     observation = np.random.default_rng(1).standard_normal((20, 2), np.float32)
     for first in ((), (0.2, -0.15)):
-        by = dataclasses.replace(TINY, first_outputs=first)
+        by = TINY.model_copy(update={"first_outputs": first})
         action = Learner(2, 3, 2, by, np.random.default_rng(0)).act(observation)
         np.testing.assert_allclose(action, np.broadcast_to(first or (0.0, 0.0), (20, 2)), rtol=0, atol=0.05)
 
@@ -166,9 +165,9 @@ def test_the_actors_epochs_stop_where_it_has_gone_far(seed):
 
 
 def open_water(sizes, seed=0, weights=None, **overrides):
-    scenario = load_scenario("tracking", overrides={**OPEN_WATER, **overrides})
-    rng = np.random.default_rng(seed)
-    return TrainingEnv(Problem(scenario, sizes, weights or Weights()), lambda num: rng.integers(*TRAINING_SEEDS, num))
+    rng, changes = np.random.default_rng(seed), {**OPEN_WATER, **overrides}
+    training = Training(scenario="tracking", overrides=changes, sizes=sizes, weights=weights or Weights())
+    return TrainingEnv(training, lambda num: rng.integers(*TRAINING_SEEDS, num))
 
 
 def test_a_swarm_of_one_finds_the_force_that_follows():
@@ -247,7 +246,7 @@ def test_arrival_terminates():
 
 
 def test_training_worlds_are_not_those_of_validation():
-    env = TINY.begin(Problem(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights()), 0).env
+    env = Mappo(Training(scenario="tracking", overrides=OPEN_WATER, sizes=[(1, 2)], mappo=TINY)).env
     seeds = []
     env._groups[0].swarm.reset = lambda drawn, worlds: seeds.extend(drawn)
     for _ in range(500):
@@ -322,11 +321,11 @@ def test_the_critics_view_does_not_depend_on_the_order_of_vehicles():
     assert np.isfinite(views[0]).all()
 
 
-def settings(**changes):
+def small(**changes):
     few = {"sizes": ((3, 3), (6, 2)), "validation": ((3, 1),), "checkpoint_every": 2, "validate_every": 3}
     rows = 8 * (3 * 3 + 6 * 2)
-    overrides = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0, "time_limit.factor": 0.02}
-    return Settings(**{"steps": 5 * rows, "algorithm": TINY, "overrides": overrides, **few, **changes})
+    shorter = {"time_limit.factor": 0.02}
+    return Training(**{"steps": 5 * rows, "mappo": TINY, "overrides": shorter, **few, **changes})
 
 
 @pytest.fixture
@@ -345,42 +344,40 @@ def files(folder):
 
 def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, no_validation):
     """Bit for bit: weights, optimisers, worlds and random numbers; stopped after a checkpoint, and between two."""
-    records = list(train(tmp_path / "whole", settings()))
+    records = list(train(tmp_path / "whole", small()))
     assert [record.iteration for record in records] == [1, 2, 3, 4, 5]
     for stop in (2, 3):
-        first = train(tmp_path / f"{stop}", settings())
+        first = train(tmp_path / f"{stop}", small())
         for _ in range(stop):
             next(first)
         first.close()
-        rest = list(train(tmp_path / f"{stop}", settings(), resume=True))
+        rest = list(resume(tmp_path / f"{stop}"))
         assert [record.iteration for record in rest] == [3, 4, 5]
         assert [record.reward for record in rest] == [record.reward for record in records[2:]]
         assert files(tmp_path / f"{stop}") == files(tmp_path / "whole")
     with (tmp_path / "3" / "progress.csv").open() as file:
         assert [row["iteration"] for row in csv.DictReader(file)] == ["1", "2", "3", "4", "5"]
-    assert list(train(tmp_path / "whole", settings(), resume=True)) == []
+    assert list(resume(tmp_path / "whole")) == []
 
 
 def test_a_finished_training_goes_on_to_more_steps_as_it_ended(tmp_path, no_validation, monkeypatch):
     """Noise and rates stay what they were at its end; stopped and resumed it is the same bit for bit."""
     annealing = []
     monkeypatch.setattr(Mappo, "iterate", noting(Mappo.iterate, annealing))
-    first = list(train(tmp_path / "whole", settings(steps=2 * 168)))
+    first = list(train(tmp_path / "whole", small(steps=2 * 168)))
     assert len(first) == 2
-    rest = list(train(tmp_path / "whole", settings(steps=5 * 168), resume=True))
+    rest = list(resume(tmp_path / "whole", 5 * 168))
     assert [record.iteration for record in rest] == [3, 4, 5]
     assert annealing == [0.0, 0.5, 1.0, 1.5, 2.0]
     assert annealed((0.4, 0.1), 1.5) == annealed((0.4, 0.1), 1.0)
-    for steps in (2, 4, 5):
-        list(train(tmp_path / "parts", settings(steps=steps * 168), resume=steps > 2))
+    list(train(tmp_path / "parts", small(steps=2 * 168)))
+    for steps in (4, 5):
+        list(resume(tmp_path / "parts", steps * 168))
     assert files(tmp_path / "parts") == files(tmp_path / "whole")
     config = json.loads((tmp_path / "parts" / "config.json").read_text())
-    assert config["settings"]["steps"] == 2 * 168
-    assert steps_before(tmp_path / "parts") == 5 * 168
-    assert steps_before(tmp_path) == 0
-    assert [(session["steps"], session["device"]) for session in config["sessions"]] == [
-        (2 * 168, "cpu"), (4 * 168, "cpu"), (5 * 168, "cpu")
-    ]  # fmt: skip
+    assert config["training"]["steps"] == 2 * 168
+    assert TrainingFolder(tmp_path / "parts", None).until == 5 * 168
+    assert [session["steps"] for session in config["sessions"]] == [2 * 168, 4 * 168, 5 * 168]
 
 
 def noting(iterate, shares):
@@ -401,16 +398,16 @@ def test_a_reward_of_ones_own_is_learned_from(tmp_path, no_validation, monkeypat
         "number = 3\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    (record,) = train(tmp_path / "a", settings(steps=1, reward="mine:still"))
+    (record,) = train(tmp_path / "a", small(steps=1, reward="mine:still"))
     assert -6.0 < record.reward < 0.0
     with pytest.raises(RewardError, match=r"must give an array \(2, 2\), got \(2,\)"):
-        list(train(tmp_path / "b", settings(steps=1, sizes=((2, 2),), reward="mine:single")))
+        list(train(tmp_path / "b", small(steps=1, sizes=((2, 2),), reward="mine:single")))
     for name, message in (
         ("mine:nothing", "reward 'mine:nothing' can't be imported.*give module:function"),
         ("mine:number", "must be a function of the swarm, got 3"),
     ):
         with pytest.raises(RewardError, match=message):
-            list(train(tmp_path / name, settings(steps=1, reward=name)))
+            list(train(tmp_path / name, small(steps=1, reward=name)))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -419,7 +416,7 @@ def test_the_starter_scenario_is_learned_in_seconds(seed, tmp_path):
 
     All five were seen to arrive in 20 of 20 episodes, at most 3 s after l(t); with half of the steps none did.
     """
-    list(train(tmp_path / "a", Settings(scenario="starter", sizes=((5, 40),), steps=400_000, seed=seed)))
+    list(train(tmp_path / "a", Training(scenario="starter", sizes=((5, 40),), steps=400_000, seed=seed)))
     policy = str(tmp_path / "a" / "best")
     runs = evaluate(granted(policy, load_scenario("starter")), policy, range(10))
     times = [event.metrics["task_time_s"] for event in runs if isinstance(event, Run)]
@@ -428,10 +425,10 @@ def test_the_starter_scenario_is_learned_in_seconds(seed, tmp_path):
 
 
 def test_a_seed_is_a_training(tmp_path, no_validation):
-    trained = [Trainer(settings(seed=seed)) for seed in (0, 0, 1)]
+    trained = [Trainer(small(seed=seed)) for seed in (0, 0, 1)]
     for training in trained:
         training.iterate(Record())
-    one, same, other = (training.algorithm.arrays() for training in trained)
+    one, same, other = (training.mappo.learner.arrays() for training in trained)
     assert all(np.array_equal(one[name], same[name]) for name in one)
     assert not np.array_equal(one["actor.0.weight"], other["actor.0.weight"])
 
@@ -439,98 +436,84 @@ def test_a_seed_is_a_training(tmp_path, no_validation):
 def test_the_best_policy_is_kept_and_can_be_started_from(tmp_path, monkeypatch):
     scores = iter([-1.0, -0.5, -0.8, -0.9])
     monkeypatch.setattr(trainings, "validate", lambda *_: validation_result([episode()])._replace(score=next(scores)))
-    records = list(train(tmp_path / "a", settings(validate_every=1, steps=4 * 168)))
+    records = list(train(tmp_path / "a", small(validate_every=1, steps=4 * 168)))
     assert [record.best for record in records] == [-1.0, -0.5, -0.5, -0.5]
     made = load_checkpoint(tmp_path / "a" / "best")
     assert made.card.training["record"]["iteration"] == 2
-    again = Trainer(settings(start=str(tmp_path / "a" / "best"), seed=9))
-    x = np.random.default_rng(0).standard_normal((30, again.algorithm.env.features), np.float32)
-    np.testing.assert_allclose(forward(made.layers, x), again.algorithm.learner.act(x), atol=1e-5)
+    again = Trainer(small(start=str(tmp_path / "a" / "best"), seed=9))
+    x = np.random.default_rng(0).standard_normal((30, again.mappo.env.features), np.float32)
+    np.testing.assert_allclose(forward(made.layers, x), again.mappo.learner.act(x), atol=1e-5)
     with pytest.raises(ResultsError, match="learner.safetensors can't be used.*give a folder best or a checkpoint"):
-        Trainer(settings(start=str(tmp_path / "nowhere")))
+        Trainer(small(start=str(tmp_path / "nowhere")))
 
 
 def test_a_resumed_training_does_not_ask_for_what_it_started_from(tmp_path, no_validation):
-    list(train(tmp_path / "first", settings(validate_every=1, steps=1)))
-    begun = train(tmp_path / "a", settings(start=str(tmp_path / "first" / "best")))
+    list(train(tmp_path / "first", small(validate_every=1, steps=1)))
+    begun = train(tmp_path / "a", small(start=str(tmp_path / "first" / "best")))
     for _ in range(3):
         next(begun)
     begun.close()
     shutil.rmtree(tmp_path / "first")
-    rest = train(tmp_path / "a", settings(start=str(tmp_path / "first" / "best")), resume=True)
+    rest = resume(tmp_path / "a")
     assert [record.iteration for record in rest] == [3, 4, 5]
 
 
 def test_tensorboard_shows_every_iteration_once_after_a_resume(tmp_path, no_validation):
-    first = train(tmp_path, settings())
+    first = train(tmp_path, small())
     for _ in range(3):
         next(first)
     first.close()  # the checkpoint is that of the second iteration
     (events,) = (tmp_path / "tensorboard").iterdir()
     events.rename(events.with_name("events.out.tfevents.0"))  # read first, also where both are of one second
-    list(train(tmp_path, settings(), resume=True))
+    list(resume(tmp_path))
     shown = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
     assert [event.step for event in shown.Scalars("train/reward")] == [168, 336, 504, 672, 840]
 
 
 def test_how_many_vehicles_are_trained_on_is_what_was_said():
-    mixed = Settings().sizes
-    assert [n for n, _ in mixed] == [10, 25, 54, 100]
+    assert [n for n, _ in Training().sizes] == [10, 25, 54, 100]
+    assert Training(sizes=[5, 20]).sizes == ((5, 100), (20, 25))
     for n in (53, 54):
-        assert [size for size, _ in Settings(overrides={**OVERRIDES, "swarm.num_vehicles": n}).sizes] == [n]
+        assert [size for size, _ in Training(overrides={"swarm.num_vehicles": n}).sizes] == [n]
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        {"overrides": {"timing.decision_period_s": 1.0}},
-        {"conditions": ({"timing.decision_period_s": 1.0},)},
-        {"validation_conditions": ({"timing.decision_period_s": 1.0},)},
-    ],
+    "wrong", [{"overrides": {"timing.decision_period_s": 1.0}}, {"episodes": {"periods_s": [1.0]}}]
 )
 def test_periods_that_policies_do_not_run_with_are_refused_before_the_training(wrong):
     with pytest.raises(ScenarioError, match="is 1, but trained policies decide every 0.1 to 0.5 s; choose a period"):
-        Settings(**wrong)
+        Training(**wrong)
 
 
 def test_a_slow_scenario_is_refused_though_training_decides_faster(tmp_path):
     slow = tmp_path / "slow.toml"
     slow.write_text('extends = "starter"\nversion = 1\n[timing]\ndecision_period_s = 1.0\n')
     with pytest.raises(ScenarioError, match="'slow', with which policies are validated, is 1, but trained policies"):
-        Settings(scenario=str(slow))
+        Training(scenario=slow)
 
 
 def test_a_policy_is_validated_by_the_benchmark_itself(tmp_path):
-    (record,) = train(tmp_path / "a", settings(steps=1))
+    (record,) = train(tmp_path / "a", small(steps=1))
     assert record.score < -1.0
     assert record.arrived == 0.0
     config = json.loads((tmp_path / "a" / "config.json").read_text())
     assert config["sessions"][0]["versions"]["torch"]
-    assert config["settings"]["scenario"]["name"] == "random_field"
+    assert config["scenario"]["name"] == "random_field"
+    assert Training(**config["training"]) == small(steps=1)
     assert any((tmp_path / "a" / "tensorboard").iterdir())
 
 
-def test_a_folder_of_other_settings_is_refused(tmp_path, no_validation):
-    list(train(tmp_path / "a", settings(steps=200)))
+def test_a_folder_that_is_used_or_empty_or_of_another_scenario_is_refused(tmp_path, no_validation):
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "random_field"\nversion = 1\n')
+    list(train(tmp_path / "a", small(steps=200, scenario=mine)))
     with pytest.raises(ResultsError, match="not empty; give --resume"):
-        next(train(tmp_path / "a", settings()))
-    for change, message in (
-        ({"seed": 4}, "begun with seed = 0, and seed is 4 now; give the same options, or another --output"),
-        (
-            {"steps": 100},
-            "begun with steps = 200, and steps is 100 now; give the same options, or more: noise and rates anneal",
-        ),
-        ({"sizes": ((2, 2),)}, "begun with sizes = "),
-        (
-            {"overrides": {**settings().overrides, "time_limit.extra_s": 1.0}},
-            "begun with scenario.time_limit.extra_s = 60.0, and scenario.time_limit.extra_s is 1.0 now",
-        ),
-    ):
-        with pytest.raises(ResultsError, match=message):
-            next(train(tmp_path / "a", settings(**{"steps": 200, **change}), resume=True))
-    shutil.rmtree(tmp_path / "a")
+        next(train(tmp_path / "a", small()))
+    mine.write_text('extends = "random_field"\nversion = 1\n[arrival]\ndwell_s = 1.0\n')
+    with pytest.raises(ResultsError, match=r"with arrival.dwell_s = .*, and arrival.dwell_s is 1.0 now; give .* as it"):
+        next(resume(tmp_path / "a"))
     with pytest.raises(ResultsError, match="holds no training to resume"):
-        next(train(tmp_path / "a", settings(), resume=True))
+        next(resume(tmp_path / "b"))
 
 
 def episode(**changes):
@@ -549,11 +532,11 @@ def test_costs_by_hand():
 @pytest.mark.parametrize("stop", [1, 3])
 def test_a_training_that_is_told_to_stop_ends_with_a_checkpoint(stop, tmp_path, no_validation):
     """After the iteration under way, and a resume goes on exactly, also where no checkpoint was due."""
-    list(train(tmp_path / "whole", settings(validate_every=9)))
+    list(train(tmp_path / "whole", small(validate_every=9)))
     asked, said = iter(range(1, 9)), []
-    first = list(train(tmp_path / "a", settings(validate_every=9), stop=lambda: next(asked) == stop))
+    first = list(train(tmp_path / "a", small(validate_every=9), stop=lambda: next(asked) == stop))
     assert [record.iteration for record in first] == list(range(1, stop + 1))
-    rest = list(train(tmp_path / "a", settings(validate_every=9), resume=True, say=said.append))
+    rest = list(resume(tmp_path / "a", say=said.append))
     assert [record.iteration for record in rest] == list(range(stop + 1, 6))
     assert said[0] == f"going on from iteration {stop}, {168 * stop:,} agent-steps"
     assert files(tmp_path / "a") == files(tmp_path / "whole")
@@ -564,14 +547,14 @@ def test_a_first_start_that_was_cut_off_can_be_started_again(tmp_path, no_valida
     (tmp_path / "a").mkdir()
     for name in (".lock", ".owner", "config.partial.json"):
         (tmp_path / "a" / name).write_text("")
-    first = train(tmp_path / "a", settings())
+    first = train(tmp_path / "a", small())
     next(first)
     first.close()
     assert not list((tmp_path / "a" / "checkpoints").iterdir())
     with pytest.raises(ResultsError, match="not empty; give --resume"):
-        next(train(tmp_path / "a", settings()))
+        next(train(tmp_path / "a", small()))
     said = []
-    assert len(list(train(tmp_path / "a", settings(), resume=True, say=said.append))) == 5
+    assert len(list(resume(tmp_path / "a", say=said.append))) == 5
     assert "holds no checkpoint yet: starting at the beginning" in said[0]
     assert len(rows(tmp_path / "a")) == 5
 
@@ -582,7 +565,7 @@ def rows(folder):
 
 
 def test_what_is_not_its_own_stays(tmp_path, no_validation):
-    first = train(tmp_path, settings())
+    first = train(tmp_path, small())
     next(first)
     next(first)
     own = tmp_path / "checkpoints"
@@ -595,20 +578,20 @@ def test_what_is_not_its_own_stays(tmp_path, no_validation):
 
 
 def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
-    first = train(tmp_path / "a", settings())
+    first = train(tmp_path / "a", small())
     for _ in range(2):
         next(first)
     first.close()
     own = tmp_path / "a" / "checkpoints"
     shutil.copytree(own / "000002", tmp_path / "earlier")
-    for _ in train(tmp_path / "a", settings(), resume=True):
+    for _ in resume(tmp_path / "a"):
         pass
     (own / "000005" / "record.json").unlink()
     with pytest.raises(ResultsError, match="000005 is incomplete .record.json: No such file.*copy it again"):
-        next(train(tmp_path / "a", settings(), resume=True))
+        next(resume(tmp_path / "a"))
     shutil.copytree(tmp_path / "earlier", own / "000002")
     said = []
-    rest = list(train(tmp_path / "a", settings(), resume=True, say=said.append))
+    rest = list(resume(tmp_path / "a", say=said.append))
     assert [record.iteration for record in rest] == [3, 4, 5]
     assert "000005 is incomplete" in said[0]
     assert "going on from iteration 2" in said[0]
@@ -616,18 +599,18 @@ def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
 
 
 def test_two_trainings_do_not_share_a_folder(tmp_path, no_validation):
-    first = train(tmp_path, settings())
+    first = train(tmp_path, small())
     next(first)
     with pytest.raises(ResultsError, match="is in use by process"):
-        next(train(tmp_path, settings(), resume=True))
+        next(resume(tmp_path))
     first.close()
-    assert next(train(tmp_path, settings(), resume=True)).iteration == 1
+    assert next(resume(tmp_path)).iteration == 1
 
 
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
 def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_path, no_validation, monkeypatch):
-    list(train(tmp_path / "whole", settings()))
-    first = train(tmp_path / "a", settings())
+    list(train(tmp_path / "whole", small()))
+    first = train(tmp_path / "a", small())
     for _ in range(3):
         next(first)
     with monkeypatch.context() as full:
@@ -636,7 +619,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_pa
         with pytest.raises(kind, match=message):
             next(first)
     assert sorted(path.name for path in (tmp_path / "a" / "checkpoints").iterdir()) == ["000002", "000004.partial"]
-    assert [record.iteration for record in train(tmp_path / "a", settings(), resume=True)] == [3, 4, 5]
+    assert [record.iteration for record in resume(tmp_path / "a")] == [3, 4, 5]
     assert files(tmp_path / "a") == files(tmp_path / "whole")
 
 
@@ -653,7 +636,7 @@ def kept(tmp_path_factory):
     folder = tmp_path_factory.mktemp("kept") / "a"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trainings, "validate", lambda *_: validation_result([episode()]))
-        first = train(folder, settings())
+        first = train(folder, small())
         for _ in range(2):
             next(first)
         first.close()
@@ -669,7 +652,7 @@ def test_a_damaged_file_is_named_with_the_remedy(name, damage, kept, tmp_path):
     path = tmp_path / "a" / name if name == "config.json" else tmp_path / "a" / "checkpoints" / "000002" / name
     path.write_bytes(DAMAGES[damage](path.read_bytes()))
     with pytest.raises(ResultsError, match=f"{name}.*(copy|leave out --resume)"):
-        next(train(tmp_path / "a", settings(), resume=True))
+        next(resume(tmp_path / "a"))
 
 
 @pytest.mark.parametrize(
@@ -687,51 +670,70 @@ def test_numbers_that_make_no_training_are_refused(name, spoil, kept, tmp_path):
     path = tmp_path / "a" / "checkpoints" / "000002" / name
     path.write_bytes(safetensors.numpy.save(spoil(safetensors.numpy.load(path.read_bytes()))))
     with pytest.raises(ResultsError, match=f"{name} can't be used .*copy the checkpoint again"):
-        next(train(tmp_path / "a", settings(), resume=True))
+        next(resume(tmp_path / "a"))
 
 
 def test_a_damaged_table_loses_only_what_is_damaged(kept, tmp_path, no_validation):
     shutil.copytree(kept, tmp_path / "a")
     table = tmp_path / "a" / "progress.csv"
     table.write_bytes(table.read_bytes() + b"\r\n\xff\r\n3,12")
-    list(train(tmp_path / "a", settings(), resume=True))
+    list(resume(tmp_path / "a"))
     assert [row["iteration"] for row in rows(tmp_path / "a")] == ["1", "2", "3", "4", "5"]
 
 
 def test_a_scenario_of_another_size_is_trained_on_its_own(tmp_path):
-    assert Settings().sizes == ((10, 20), (25, 9), (54, 5), (100, 3))
-    assert Settings().validation == ((10, 4), (54, 8), (100, 2))
+    assert Training().sizes == ((10, 20), (25, 9), (54, 5), (100, 3))
+    assert Training().validation == ((10, 4), (54, 8), (100, 2))
     (tmp_path / "mine.toml").write_text('extends = "random_field"\n[swarm]\nnum_vehicles = 20\n')
-    mine = Settings(scenario=str(tmp_path / "mine.toml"))
+    mine = Training(scenario=tmp_path / "mine.toml")
     assert (mine.sizes, mine.validation) == (((20, 50),), ((20, 4),))
-    assert Settings(overrides={"swarm.num_vehicles": 2000}).sizes == ((2000, 1),)
-    assert Settings(scenario=mine.scenario, sizes=((5, 2),)).validation == ((5, 4),)
+    assert Training(overrides={"swarm.num_vehicles": 2000}).sizes == ((2000, 1),)
+    assert Training(scenario=mine.scenario, sizes=((5, 2),)).validation == ((5, 4),)
     # In validation the vehicle is that of the training, and the period the benchmark's.
-    heavy = Settings(overrides={"vehicle.m_kg": 300.0, **OVERRIDES}).load_for_validation()
+    heavy = Training(overrides={"vehicle.m_kg": 300.0}).loaded_for_validation
     assert heavy.vehicle.m_kg == 300.0
     assert heavy.timing == load_scenario("random_field").timing
 
 
 def test_another_vehicle_is_named_in_the_checkpoint(tmp_path, no_validation):
-    changed = {**settings().overrides, "vehicle.m_kg": 300.0}
-    list(train(tmp_path, settings(steps=1, overrides=changed)))
+    changed = {**small().overrides, "vehicle.m_kg": 300.0}
+    list(train(tmp_path, small(steps=1, overrides=changed)))
     assert load_checkpoint(tmp_path / "best").card.vehicle["vehicle.m_kg"] == 300.0
 
 
-@pytest.mark.parametrize("field", ["noise", "learning_rate"])
-@pytest.mark.parametrize("value", [(np.inf, 0.1), (0.1, np.nan), (0.1, 0.0), (-0.1, 0.1)])
-def test_numbers_that_cannot_be_learned_with_are_refused(field, value):
-    with pytest.raises(ValueError, match=f"{field} must be positive and finite"):
-        Hyperparameters(**{field: value})
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"mappo": {"noise": (-0.1, 0.1)}}, "mappo.noise.0 should be greater than 0, got -0.1"),
+        ({"mappo": {"learning_rate": (np.inf, 0.1)}}, "mappo.learning_rate.0 should be a finite number, got inf"),
+        ({"mappo": {"noize": 0.1}}, "mappo.noize is unknown; did you mean 'noise'?"),
+        ({"mappo": {"horizon": 0}}, "mappo.horizon should be greater than or equal to 1, got 0"),
+        ({"sees": "memory", "mappo": {"first_outputs": [0.1]}}, "a number for each of 6 outputs, got 1"),
+        ({"safety": {"horizon_km": 0.0}}, "safety.horizon_km is unknown; did you mean 'horizon_m'?"),
+        ({"seeds": 3}, "seeds is unknown; did you mean 'sees'?"),
+        ({"sees": "nothing"}, "sees should be 'percept' or 'memory', got 'nothing'"),
+        ({"held_s": -1}, "held_s should be greater than or equal to 0, got -1"),
+        ({"episodes": {"axes": ["W1", "X"], "levels": [2, 4]}}, "axis X has the levels [1, 3, 5]; add one of them"),
+    ],
+)
+def test_fields_that_cannot_be_trained_with_are_named_with_the_remedy(wrong, told):
+    with pytest.raises(TrainingError, match=re.escape(told)):
+        Training(**wrong)
+
+
+def test_what_is_written_is_what_was_told():
+    told = Training(law={"lead": 1.0}, weights={"late": 1.0}, episodes={"number": 3}, seed=np.int64(2))
+    written = json.loads(told.model_dump_json())
+    assert written["law"]["lead"] == 1.0
+    assert Training(**written) == told
 
 
 @pytest.mark.parametrize(
     ("module", "library", "name"),
     [
         ("train.mappo", "torch", "train"),
-        ("train.ppo", "stable_baselines3", "train"),
-        ("train.training", "torch.utils.tensorboard.writer", "train"),
-        ("train.rllib", "ray", "distributed"),
+        ("train.sb3", "stable_baselines3", "sb3"),
+        ("train.run", "torch.utils.tensorboard.writer", "train"),
         ("baselines.export", "onnx", "onnx"),
     ],
 )
@@ -741,61 +743,58 @@ def test_modules_of_optional_libraries_name_their_extra(module, library, name):
     assert f"pip install 'uuv_marl[{name}]'" in done.stderr
 
 
-OPTIONS = ["--sizes=5,20", "--network=32,16", "--reward=mine:reward", "--set", "sonar.echo_reports=surface",
-           "--sees=memory"]  # fmt: skip
-
-
 def test_the_command(tmp_path, monkeypatch):
     before = signal.getsignal(signal.SIGINT)  # ignored where the tests run in the background
-    calls = []
+    calls, interrupts = [], 0
 
-    def fake(output, settings, *, resume, device, say, stop):
-        calls.append((output, settings, resume))
+    def fake(output, given, *, say, stop):
+        calls.append(given)
         yield Record(1, 500, 2.0, -1.5, 0.01, 0.5, -0.25, -0.25, 1.0, 0, 3.0, 7.0, 15.0)
-        for _ in range(resume * seed):
+        for _ in range(interrupts):
             os.kill(os.getpid(), signal.SIGINT)
-        assert stop() is resume
+        assert stop() is bool(interrupts)
 
     monkeypatch.setattr(trainings, "train", fake)
-    seed = 1
-    command = ["train", "mappo", "--steps=1e3", "--seed=3", "--num-vehicles=20"]
-    command += [f"--output={tmp_path}", "--noise", "0.3", "0.1"]
-    command += ["--rate", "0.0002", "0.00002"]
-    done = CliRunner().invoke(app, command)
+    command = ["train", "--scenario=starter", "--steps=1e3", "--seed=3", f"--output={tmp_path}"]
+    command += ["--set=sizes=[5,20]", "--set=mappo.noise=[0.3, 0.1]", "--set=sonar.echo_reports=surface"]
+    done = CliRunner().invoke(app, [*command, "--set=reward=mine:reward", "--set=sees=memory"])
     assert done.exit_code == 0, done.output
     assert "250 agent-steps/s" in done.output
     assert "arrived 100%" in done.output
-    output, settings, resume = calls[0]
-    assert (output, settings.seed, settings.steps, settings.algorithm.noise, resume) == (
-        tmp_path,
-        3,
-        1000,
-        (0.3, 0.1),
-        False,
-    )
-    assert settings.algorithm.learning_rate == (2e-4, 2e-5)
-    assert settings.sizes == ((20, 50),)
-    assert CliRunner().invoke(app, [*[c for c in command if "vehicles" not in c], *OPTIONS]).exit_code == 0
-    _, settings, _ = calls[1]
-    assert settings.sizes == ((5, 100), (20, 25))
-    assert settings.algorithm.hidden == (32, 16)
-    assert settings.reward == "mine:reward"
-    assert settings.sees == "memory"
-    assert settings.load().sonar.echo_reports == "surface"
-    calls.clear()
-    stopped = CliRunner().invoke(app, [*command, "--resume"])
+    assert calls == [
+        Training(
+            title=calls[0].title, scenario="starter", steps=1000, seed=3, sizes=((5, 100), (20, 25)), sees="memory",
+            mappo={"noise": (0.3, 0.1)}, reward="mine:reward", overrides={"sonar.echo_reports": "surface"},
+        )
+    ]  # fmt: skip
+    interrupts = 1
+    stopped = CliRunner().invoke(app, command)
     assert stopped.exit_code == 130
     assert "Stopping after this iteration" in stopped.output
     assert "Stopped. Nothing was written yet; the same command begins again." in " ".join(stopped.output.split())
-    seed = 2
+    interrupts = 2
     (tmp_path / "config.json").write_text("{}")
-    at_once = CliRunner().invoke(app, [*command, "--resume"])
+    at_once = CliRunner().invoke(app, command)
     assert at_once.exit_code == 130
-    assert "Stopped. There is no checkpoint yet, only settings" in " ".join(at_once.output.split())
+    assert "Stopped. There is no checkpoint yet: uuv-marl train --resume" in " ".join(at_once.output.split())
     (tmp_path / "checkpoints" / "000001").mkdir(parents=True)
-    at_once = CliRunner().invoke(app, [*command, "--resume"])
-    assert "the same command with --resume continues." in " ".join(at_once.output.split())
+    at_once = CliRunner().invoke(app, command)
+    assert "continues." in " ".join(at_once.output.split())
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation):
+    list(train(tmp_path, small(steps=168)))
+    refused = CliRunner().invoke(app, ["train", "--resume", f"--output={tmp_path}", "--scenario=starter"])
+    assert refused.exit_code == 2
+    assert "goes on with the training that the folder holds; leave out starter" in " ".join(
+        refused.output.replace("│", " ").split()
+    )
+    done = CliRunner().invoke(app, ["train", "--resume", f"--output={tmp_path}", "--steps=336"])
+    assert done.exit_code == 0, done.output
+    assert [row["agent_steps"] for row in rows(tmp_path)] == ["168", "336"]
+    again = CliRunner().invoke(app, ["train", "--resume", f"--output={tmp_path}"])
+    assert "all --steps are done already" in again.output
 
 
 @pytest.mark.parametrize(
@@ -804,27 +803,19 @@ def test_the_command(tmp_path, monkeypatch):
         (["--steps=3.5"], "'3.5' is no whole number from 1 on"),
         (["--steps=inf"], "no whole number"),
         (["--steps=0"], "no whole number"),
-        (["--noise", "0.4"], "Give the value at the start and at the end: --noise 0.4 0.08"),
-        (["--noise", "inf", "inf"], "Invalid value for '--noise'"),
-        (["--noise", "nan", "0.1"], "Invalid value"),
-        (["--rate", "inf", "1"], "Invalid value for '--rate'"),
-        (["--num-vehicles=0"], "Invalid value for '--num-vehicles'"),
-        (["--sizes=5,x"], "--sizes must be whole numbers from 1 on, such as 96,96; got '5,x'"),
-        (["--network=0"], "--network must be whole numbers from 1 on"),
-        (["--sizes=5", "--num-vehicles=5"], "--num-vehicles and --sizes each say how many vehicles a swarm has"),
-        (["--sizes=5", "--set=swarm.num_vehicles=5"], "--sizes and --set swarm.num_vehicles each say how many"),
+        (["nowhere"], "recipe 'nowhere' can't be read (No such file or directory); give one of mappo, trimmed_scout"),
         (["--set=timing.decision_period_s=1"], "'random_field' is 1, but trained policies decide every 0.1 to 0.5 s"),
         (["--set", "sonar.echo_report=surface"], "sonar.echo_report"),
-        (["--reward=nowhere:reward"], "reward 'nowhere:reward' can't be imported"),
-        (["--sees=nothing"], "--sees must be percept or memory, got 'nothing'"),
-        (["--device=nothing"], "--device nothing can't be used"),
+        (["--set=reward=nowhere:reward"], "reward 'nowhere:reward' can't be imported"),
+        (["--set=mappo.gamma=2"], "mappo.gamma should be less than or equal to 1, got 2"),
+        (["--set=device=nothing"], "device 'nothing' can't be used"),
     ],
 )
 def test_options_that_cannot_work_are_explained(options, message, tmp_path):
-    done = CliRunner().invoke(app, ["train", "mappo", f"--output={tmp_path / 'a'}", *options])
+    done = CliRunner().invoke(app, ["train", f"--output={tmp_path / 'a'}", *options])
     assert done.exit_code == 2
     assert message in " ".join(done.output.replace("│", " ").split())
-    assert not (tmp_path / "a").exists()
+    assert not (tmp_path / "a" / "config.json").exists()
 
 
 def test_noise_is_standard_and_shared_and_kept_as_it_should_be():
@@ -844,8 +835,8 @@ def test_noise_is_standard_and_shared_and_kept_as_it_should_be():
 
 
 def test_the_critic_may_learn_alone_first():
-    by = dataclasses.replace(TINY, critic_first=0.5)
-    training = by.begin(Problem(load_scenario("tracking", overrides=OPEN_WATER), [(1, 2)], Weights()), 0)
+    by = TINY.model_copy(update={"critic_first": 0.5})
+    training = Mappo(Training(scenario="tracking", overrides=OPEN_WATER, sizes=[(1, 2)], mappo=by))
     nets = training.learner.actor, training.learner.critic
     before = [[x.detach().clone() for x in net.parameters()] for net in nets]
     training.iterate(0.0)
@@ -871,7 +862,7 @@ def test_a_training_gives_global_state_back(end, tmp_path, no_validation):
             raise LookupError("no")
         return False
 
-    records = train(tmp_path, settings(), stop=stop)
+    records = train(tmp_path, small(), stop=stop)
     if end == "whole":
         assert list(records)
     elif end == "closed":
@@ -883,9 +874,9 @@ def test_a_training_gives_global_state_back(end, tmp_path, no_validation):
     assert global_state() == before
 
 
-def test_settings_may_hold_numpys_numbers(tmp_path, no_validation):
+def test_a_training_may_be_told_numpys_numbers(tmp_path, no_validation):
     overrides = {"timing.decision_period_s": np.float64(0.5), "obstacles": np.array([]), "time_limit.factor": 0.02}
-    given = settings(seed=np.int64(3), steps=np.int64(168), overrides=overrides)
-    assert list(train(tmp_path, given))
-    kept = json.loads((tmp_path / "config.json").read_text(encoding="utf-8"))["settings"]
+    told = small(seed=np.int64(3), steps=np.int64(168), overrides=overrides)
+    assert list(train(tmp_path, told))
+    kept = json.loads((tmp_path / "config.json").read_text(encoding="utf-8"))["training"]
     assert (kept["seed"], kept["overrides"]["obstacles"]) == (3, [])

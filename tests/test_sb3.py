@@ -1,8 +1,13 @@
 """Stable-Baselines3 itself: its PPO and SAC, its wrappers, its checks, on our environments."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import gymnasium
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
@@ -10,9 +15,13 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from tests import contract
+from uuv_marl import load_scenario
+from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.percept import Percept
 from uuv_marl.scenario import ScenarioError
-from uuv_marl.train import training
+from uuv_marl.train import run
+from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
 QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
@@ -21,7 +30,7 @@ QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_
 @pytest.fixture(autouse=True)
 def one_thread():
     """Sums in another order give other bits."""
-    with training.one_thread():
+    with run.one_thread():
         yield
 
 
@@ -197,3 +206,57 @@ def test_sb3_evaluates_rows_without_a_wrapper():
     assert min(lengths) > 1
     assert env.env_is_wrapped(Monitor) == [True] * 8
     assert not any(env.env_is_wrapped(gymnasium.wrappers.TimeLimit))
+
+
+def actors(**overrides):
+    damped = {"actuators.yaw_damping_nms": 600.0, "time_limit.factor": 0.02, "time_limit.extra_s": 2.0}
+    return ActorVecEnv(swarm(overrides=damped | overrides))
+
+
+def test_a_checkpoint_acts_as_the_model_does(tmp_path):
+    """In NumPy, from the observations of the environment: the model's mean action and the barrier, at each decision."""
+    env = actors()
+    model = learn(VecNormalize(env, norm_obs=False))
+    save_sb3(model, tmp_path / "policy.safetensors")
+    rows = env.venv
+    policy = make(str(tmp_path), rows.scenario, 2)
+    features, observation = env.reset(), rows.swarm.percept.to_observation()
+    for _ in range(20):
+        wish = model.predict(features, deterministic=True)[0] + env.barrier
+        wish /= np.maximum(1.0, np.linalg.norm(wish, axis=1, keepdims=True))
+        action = policy.act(Percept.from_observation(observation, rows.swarm.layout))
+        np.testing.assert_allclose(action.reshape(-1, 2), wish, atol=1e-5)
+        features, *_ = env.step(model.predict(features, deterministic=True)[0])
+        observation = rows.swarm.percept.to_observation()
+
+
+def test_an_actor_sees_its_last_features_at_an_episodes_end():
+    env = actors()
+    env.reset()
+    for _ in range(100):
+        *_, dones, infos = env.step(np.zeros((8, 2), np.float32))
+        if dones.any():
+            break
+    last = np.stack([infos[row]["terminal_observation"] for row in np.flatnonzero(dones)])
+    assert last.shape[1:] == env.observation_space.shape
+
+
+def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
+    for env, message in (
+        (swarm(), r"train on ActorVecEnv\(SwarmVecEnv"), (VecNormalize(actors()), "train on ActorVecEnv"),
+    ):  # fmt: skip
+        with pytest.raises(PolicyError, match=message):
+            save_sb3(PPO("MlpPolicy", env, device="cpu"), tmp_path / "a")
+    relu = PPO("MlpPolicy", actors(), policy_kwargs={"activation_fn": torch.nn.ReLU}, device="cpu")
+    with pytest.raises(PolicyError, match="tanh layers, got .*leave activation_fn out"):
+        save_sb3(relu, tmp_path / "a")
+
+
+def test_the_example_trains_a_policy(tmp_path):
+    file = Path(__file__).resolve().parent.parent / "examples" / "training" / "sb3.py"
+    command = [sys.executable, file, "--scenario=tracking", "--worlds=1", "--steps=100", f"--output={tmp_path}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    assert f"--scenario tracking --policy {tmp_path}" in done.stdout
+    assert PPO.load(tmp_path / "model").num_timesteps > 100
+    scenario = granted(str(tmp_path), load_scenario("tracking", num_vehicles=3))
+    assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0

@@ -21,7 +21,7 @@ from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
 from uuv_marl.replay.traces import from_trace
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train.shaping import PRIVILEGED_SIZE, privileged_observation
+from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged_observation
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])

@@ -22,7 +22,7 @@ from uuv_marl.scenario import ScenarioError
 from uuv_marl.scenario.dimensions import converted
 from uuv_marl.scenario.scale import Scale
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train.shaping import in_si_units, overrides_for
+from uuv_marl.train.training import in_si_units, overrides_for
 
 POLICIES = (
     "bio_inspired", "bio_inspired_plus", "scout", "sff", "sdc", "apf", "olfati_saber", "orca_informed",

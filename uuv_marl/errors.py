@@ -25,6 +25,10 @@ class ClusterError(RuntimeError):
     """A cluster that can't do the work; the message says what to do."""
 
 
+class TrainingError(ValueError):
+    """A training that can't be run; the message says which field, what it is and what to do."""
+
+
 class RewardError(ValueError):
     """A reward of a user's own that can't be imported, or gives what is no reward; the message says which."""
 
@@ -34,7 +38,7 @@ class MissingExtraError(ModuleNotFoundError):
 
 
 MENDABLE = (
-    ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, ClusterError, RewardError,
-    MissingExtraError,
+    ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, ClusterError, TrainingError,
+    RewardError, MissingExtraError,
 )  # fmt: skip
 """All of them."""

@@ -1,15 +1,12 @@
-"""RLlib: the same environment bit for bit, training that goes on, and the benchmark's seeds on a cluster."""
+"""RLlib: the same environment bit for bit, its example, and the benchmark's seeds on a cluster."""
 
-import csv
+import importlib.util
 import json
 import os
-import pickle
-import re
 import subprocess
 import sys
 import time
 import warnings
-from functools import partial
 from pathlib import Path
 
 # Both before Ray is imported: it stays on 127.0.0.1, and reports nothing to anybody.
@@ -27,15 +24,12 @@ with warnings.catch_warnings():
     from ray.rllib.env.multi_agent_episode import MultiAgentEpisode
     from ray.rllib.utils.pre_checks.env import check_multiagent_environments
 
-    from uuv_marl.train import rllib
-    from uuv_marl.train.rllib import Settings, ppo_config, train
-
 import uuv_marl
 from tests import contract
 from uuv_marl.baselines import make
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.distributed import chunks, connected, evaluate_on_cluster
-from uuv_marl.benchmark.results import Results, ResultsError, origin
+from uuv_marl.benchmark.results import Results, origin
 from uuv_marl.cli import app
 from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
 from uuv_marl.errors import ClusterError
@@ -43,7 +37,12 @@ from uuv_marl.errors import ClusterError
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
 LOSES = {"disturbance.loss_times_s": [1.0, 2.0]}
-SMALL = Settings(scenario="lossy", num_vehicles=5, overrides={**SHORT, **LOSES}, batch=200, minibatch=100)
+EXAMPLE = ROOT / "examples" / "training" / "rllib.py"
+spec = importlib.util.spec_from_file_location("rllib_example", EXAMPLE)
+assert spec
+assert spec.loader
+example = importlib.util.module_from_spec(spec)  # not in sys.modules, so that Ray takes its functions along
+spec.loader.exec_module(example)
 FEW = ["--set=swarm.num_vehicles=5", "--set=time_limit.factor=0.02", "--set=time_limit.extra_s=2"]
 
 pytestmark = [
@@ -179,8 +178,14 @@ def test_a_policy_by_name_drives_it():
     assert ends[0].tobytes() == ends[1].tobytes()
 
 
+def config(scenario, seed=100_000):
+    """The example's, with five vehicles, two runners and small batches."""
+    made = example.ppo_config(scenario, 5, 2, seed)
+    return made.training(train_batch_size_per_learner=200, minibatch_size=100, num_epochs=1)
+
+
 def weights(algorithm):
-    return {name: np.array(value) for name, value in algorithm.get_module(rllib.POLICY).get_state().items()}
+    return {name: np.array(value) for name, value in algorithm.get_module("shared").get_state().items()}
 
 
 def same(one, other):
@@ -192,17 +197,17 @@ def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(joined
     """By class the second time: Ray keeps names under the first job of a process."""
     how = {"num_vehicles": 5, "overrides": contract.MEDIUM if at_sea else {}}
     env = SwarmMultiAgentEnv if at_sea else register()
-    config = ppo_config(SMALL, num_env_runners=2).environment(env, env_config=how)
-    assert at_sea or config.env == ENV_NAME
-    algorithm = config.build_algo()
+    chosen = config("tracking").environment(env, env_config=how)
+    assert at_sea or chosen.env == ENV_NAME
+    algorithm = chosen.build_algo()
     try:
         before = weights(algorithm)
         for _ in range(2):
             result = algorithm.train()
         assert not same(weights(algorithm), before)
-        assert sum(result["env_runners"]["num_agent_steps_sampled"].values()) >= SMALL.batch
+        assert sum(result["env_runners"]["num_agent_steps_sampled"].values()) >= 200
         on_runners = algorithm.env_runner_group.foreach_env_runner(
-            lambda it: it.module[rllib.POLICY].get_state(inference_only=True), local_env_runner=False
+            lambda it: it.module["shared"].get_state(inference_only=True), local_env_runner=False
         )
         assert len(on_runners) == 2
         assert all(same(state, weights(algorithm)) for state in on_runners)
@@ -211,8 +216,7 @@ def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(joined
 
 
 def test_every_runner_starts_from_its_own_world(joined):
-    settings = Settings(scenario="random_field", num_vehicles=5, batch=100, minibatch=100, epochs=1)
-    algorithm = ppo_config(settings, num_env_runners=2, world_seed=123_000).build_algo()
+    algorithm = config("random_field", 123_000).build_algo()
     try:
         algorithm.train()
         fields = algorithm.env_runner_group.foreach_env_runner(
@@ -222,118 +226,31 @@ def test_every_runner_starts_from_its_own_world(joined):
         algorithm.stop()
     expected = []
     for seed in (123_001, 123_002):
-        env = uuv_marl.parallel_env(settings.load())
+        env = uuv_marl.parallel_env("random_field", num_vehicles=5, overrides=example.TASK)
         env.reset(seed=seed)
         expected.append(env.swarm.course.obstacles)
     assert sorted(field.tobytes() for field in fields) == sorted(field.tobytes() for field in expected)
-
-
-def test_training_seeds_keep_their_range_and_differ():
-    seeds = {rllib.world_seed(seed, steps) for seed in range(50) for steps in (0, 100, 200)}
-    assert len(seeds) == 150
-    assert all(100_000 <= seed < 899_000 for seed in seeds), "900,000 and more are for validation"
-
-
-def rows(folder):
-    with (folder / "progress.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def test_training_is_kept_and_goes_on(tmp_path, joined, monkeypatch):
-    folder = tmp_path / "run"
-    first = list(train(folder, 400, SMALL, num_env_runners=1))
-    assert [record.iteration for record in first] == [1, 2]
-    assert [int(row["agent_steps"]) for row in rows(folder)] == [record.agent_steps for record in first]
-    assert [path.name for path in (folder / "checkpoints").iterdir()] == ["000002"]
-    assert any(record.episode_return is not None and record.episode_return < 0 for record in first)
-
-    # As after a kill between a row and its checkpoint.
-    with (folder / "progress.csv").open("a") as file:
-        file.write("3,99999,,,9.9\n")
-    (folder / "checkpoints" / "000003.partial").mkdir()
-
-    seen = []
-    original = rllib._iterate
-    monkeypatch.setattr(
-        rllib, "_iterate", lambda algorithm, *rest: seen.append(weights(algorithm)) or original(algorithm, *rest)
-    )
-    kept = folder / "checkpoints/000002/learner_group/learner/rl_module/shared/module_state.pkl"
-    with kept.open("rb") as file:
-        before = pickle.load(file)
-    second = list(train(folder, 800, SMALL, num_env_runners=1, resume=True))
-    assert same(seen[0], before)
-    assert [record.iteration for record in second] == [3, 4]
-    assert first[-1].agent_steps + 200 <= second[0].agent_steps < first[-1].agent_steps + 205
-    assert second[0].seconds > first[-1].seconds
-    assert [row["iteration"] for row in rows(folder)] == ["1", "2", "3", "4"]
-    assert list(train(folder, 800, SMALL, num_env_runners=1, resume=True)) == []
-
-    sessions = json.loads((folder / "config.json").read_text())["sessions"]
-    assert [session["agent_steps"] for session in sessions] == [0, first[-1].agent_steps]
-    assert len({session["world_seed"] for session in sessions}) == 2
-    assert sessions[0]["versions"]["ray"] == ray.__version__
-
-
-def test_an_interrupt_keeps_the_last_checkpoint(tmp_path, joined):
-    records = train(tmp_path, 10_000, SMALL, num_env_runners=1)
-    assert next(records).iteration == 1
-    records.close()
-    assert [record.iteration for record in train(tmp_path, 400, SMALL, num_env_runners=1, resume=True)] == [2]
-
-
-def test_folders_that_are_used_or_empty_or_of_other_settings_are_refused(tmp_path):
-    (tmp_path / "config.json").write_text('{"settings": {}, "sessions": []}')
-    with pytest.raises(ResultsError, match="is not empty; give --resume"):
-        next(train(tmp_path, 100, SMALL))
-    with pytest.raises(ResultsError, match="begun with .* give the same options"):
-        next(train(tmp_path, 100, SMALL, resume=True))
-    with pytest.raises(ResultsError, match="no training to resume"):
-        next(train(tmp_path / "new", 100, SMALL, resume=True))
-    assert not (tmp_path / "new").exists()
-
-
-def test_a_cluster_that_is_missing_or_too_small_is_explained(tmp_path, joined):
-    with pytest.raises(ClusterError, match="has 2; give --env-runners 2"):
-        next(train(tmp_path / "a", 100, SMALL, num_env_runners=3))
-    assert not (tmp_path / "a").exists()
 
 
 @pytest.mark.parametrize("nowhere", ["127.0.0.1:9", "nonsense", "127.0.0.1:nine"])
 def test_an_address_where_nobody_is_fails_soon(tmp_path, nowhere, monkeypatch):
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
     start = time.perf_counter()
-    done = CliRunner().invoke(app, ["train", "rllib", f"--ray={nowhere}", f"--output={tmp_path / 'out'}"])
+    done = CliRunner().invoke(app, ["benchmark", f"--ray={nowhere}", f"--output={tmp_path / 'out'}"])
     assert done.exit_code == 2
     assert "no Ray cluster can be joined" in " ".join(done.output.split())
     assert time.perf_counter() - start < 10
     assert not (tmp_path / "out").exists()
 
 
-def test_the_train_command(tmp_path, address, monkeypatch):
-    monkeypatch.setattr(rllib, "Settings", partial(Settings, batch=200, minibatch=100))
-    arguments = ["train", "rllib", "--scenario=tracking", "--num-vehicles=5", "--env-runners=2", f"--ray={address}"]
-    arguments += [f"--output={tmp_path}"]
-    done = CliRunner().invoke(app, [*arguments, "--steps=100"])
-    assert done.exit_code == 0, done.output
-    assert re.search(r"Done: [\d,]+ agent-steps/s, 200 agent-steps", " ".join(done.output.split()))
-    again = CliRunner().invoke(app, [*arguments, "--steps=100"])
-    assert again.exit_code == 2
-    assert "give --resume" in " ".join(again.output.split())
-    finished = CliRunner().invoke(app, [*arguments, "--steps=100", "--resume"])
-    assert "done already" in finished.output
-    assert not ray.is_initialized()
-
-
-def test_the_train_command_gives_a_vehicle_its_own_inner_loop(tmp_path, monkeypatch):
-    """With that of the paper's vehicle the scenario is refused: a rudder has none."""
-    mine = tmp_path / "mine.toml"
-    slow = "[trajectory]\nspeed_mps = 1.5\n[start]\nspeed_max_mps = 1.5\n"
-    mine.write_text(f'extends = "tracking"\nversion = 1\nvehicle = "lauv"\n{slow}')
-    seen = []
-    monkeypatch.setattr(rllib, "train", lambda output, steps, settings, **_: iter(seen.append(settings.load()) or ()))
-    done = CliRunner().invoke(app, ["train", "rllib", f"--scenario={mine}", f"--output={tmp_path / 'out'}"])
-    assert done.exit_code == 0, done.output
-    assert (seen[0].actuators.yaw_damping_nms, seen[0].timing.decision_period_s) == (0.0, 0.5)
+def test_the_example_trains_and_goes_on(tmp_path):
+    command = [sys.executable, EXAMPLE, "--scenario=starter", "--steps=100", "--runners=1", f"--output={tmp_path}"]
+    for more in ([], ["--resume"]):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        done = subprocess.run([*command, *more], env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert "agent-steps, return of all vehicles" in done.stdout
+        assert f"The checkpoint is in {tmp_path}." in done.stdout
 
 
 def benchmark(folder, policies, *more):
@@ -436,12 +353,11 @@ def test_ray_on_one_machine_is_closed_to_others():
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize("arguments", [["train", "rllib"], ["benchmark", "--ray=auto"]])
-def test_a_missing_ray_is_explained(arguments, tmp_path, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("uuv_marl.train.", "uuv_marl.benchmark.distrib"))]:
+def test_a_missing_ray_is_explained(tmp_path, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("uuv_marl.benchmark.distrib")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "ray", None)
-    done = CliRunner().invoke(app, [*arguments, f"--output={tmp_path / 'out'}"])
+    done = CliRunner().invoke(app, ["benchmark", "--ray=auto", f"--output={tmp_path / 'out'}"])
     assert done.exit_code == 2
     assert "needs ray, which comes with the extra 'distributed': pip install 'uuv_marl[distributed]'" in " ".join(
         done.output.split()

@@ -23,19 +23,14 @@ except SystemExit as end:
     assert not end.code, end.code
 """
 TRAINING = """
-import json
-from dataclasses import replace
-from uuv_marl.train.mappo import Hyperparameters
-from uuv_marl.train.settings import Settings
-from uuv_marl.train.shaping import OVERRIDES
-from uuv_marl.train.training import train
+from uuv_marl.train.run import resume, train
+from uuv_marl.train.training import Training
 shorter = {"time_limit.extra_s": 5.0, "time_limit.factor": 0.2}
-settings = Settings(
-    scenario="starter", overrides={**OVERRIDES, **shorter}, sizes=((5, 2),), steps=480, checkpoint_every=1,
-    validate_every=2, validation=((5, 1),),
-    algorithm=replace(Hyperparameters(), horizon=12, minibatch=60, hidden=(8, 8)),
+training = Training(
+    scenario="starter", overrides=shorter, sizes=((5, 2),), steps=480, checkpoint_every=1, validate_every=2,
+    validation=((5, 1),), mappo={"horizon": 12, "minibatch": 60, "hidden": (8, 8)},
 )
-for _ in train(folder, settings, resume=(folder / "config.json").exists()):
+for _ in resume(folder) if (folder / "config.json").exists() else train(folder, training):
     pass
 """
 # Ends the process before the k-th operation that changes something below the folder; k = 0 counts them instead.

@@ -17,11 +17,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (
-    benchmark.benchmark, robustness.robustness, benchmark.tune, replay.replay, export.export,
+    benchmark.benchmark, robustness.robustness, benchmark.tune, train.train, replay.replay, export.export,
 ):  # fmt: skip
     app.command()(command)
 app.command("list")(lists.show_list)
-app.add_typer(train.app, name="train")
 
 
 def _show_version(value: bool) -> None:

@@ -1,180 +1,104 @@
-"""``uuv-marl train``: a command for each library."""
+"""``uuv-marl train``: from a recipe and what differs from it to a policy."""
 
+import re
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from uuv_marl.cli.console import console, explained, extra, progress_bar, shown
-from uuv_marl.cli.train_options import (
-    Changes,
-    Command,
-    Device,
-    Length,
-    Network,
-    Output,
-    Recipe,
-    Resume,
-    Reward,
-    Scenario,
-    Seed,
-    Sees,
-    Sizes,
-    Start,
-    Steps,
-    Task,
-    Vehicles,
-    alone,
-    whole_numbers,
-)
-
-_BESIDE_RECIPE = ("seed", "steps", "device", "output", "resume")
-"""Options that a recipe leaves open."""
-app = typer.Typer(help="Train a policy; each command is named after its library.", no_args_is_help=True)
+from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, path_option, progress_bar, shown
 
 
-@app.command("mappo", cls=Command)
-def train_mappo(
+def _whole_number(text: str) -> int:
+    """A number such as 3000000 or 3e6."""
+    if not re.fullmatch(r"[1-9]\d{0,14}|[1-9](\.\d+)?e\d{1,2}", str(text)):
+        raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give a number such as 3000000 or 3e6")
+    return int(float(text))
+
+
+def train(
     context: typer.Context,
-    recipe: Recipe = None,
-    scenario: Scenario = "random_field",
-    num_vehicles: Vehicles = None,
-    sizes: Sizes = None,
-    overrides: Changes = None,
-    reward: Reward = None,
-    network: Network = None,
-    sees: Sees = "percept",
-    steps: Length = None,
-    seed: Seed = 0,
-    start: Start = None,
-    device: Device = "cpu",
-    noise: Annotated[
-        tuple[float, float] | None,
+    recipe: Annotated[
+        str,
+        typer.Argument(help="mappo, trimmed_scout, or a TOML file with fields of uuv_marl.train.training.Training."),
+    ] = "mappo",
+    scenario: Annotated[str | None, typer.Option(help="Name or TOML file, in place of the recipe's.")] = None,
+    overrides: Annotated[
+        list[str] | None,
         typer.Option(
-            min=1e-3, max=10.0, help="Noise of actions at the start and at the end [full force]. Default: 0.4 0.08."
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Change a field of the training, such as `sizes=[5,10]`, `reward=mine:reward` or `mappo.gamma=0.99`, "
+            "or of the scenario, such as `sonar.echo_reports=surface`.",
         ),
     ] = None,
-    rate: Annotated[
-        tuple[float, float] | None,
+    steps: Annotated[
+        int | None,
         typer.Option(
-            min=1e-9, max=1.0, help="The actor's learning rate, at the start and at the end. Default: 0.0015 0.00015."
+            parser=_whole_number,
+            metavar="NUMBER",
+            help="Agent-steps in all, such as 3e6: decisions times vehicles. With --resume, more prolong the training.",
         ),
     ] = None,
-    output: Output = Path("results/mappo"),
-    resume: Resume = False,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of worlds, weights and noise. It fixes the training.")
+    ] = None,
+    output: Annotated[Path, path_option("Folder for the training's description, progress and checkpoints.")] = Path(
+        "runs/train"
+    ),
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the folder's last checkpoint; only --steps may stand beside.")
+    ] = False,
 ) -> None:
-    """Train one policy for all vehicles with MAPPO, on swarms of 10 to 100 at once, on one core.
+    """Train one policy for all vehicles with MAPPO, on one core.
 
-    Vehicles decide every 0.5 s, with yaw damping, whatever the scenario says. Noise and rates fall over --steps. This
-    needs the extra "train". It writes config.json (settings, seeds, versions), progress.csv (a row per iteration),
-    checkpoints/, tensorboard/ and best/: the policy that was best on validation seeds, or the last if the recipe says
-    so. Compare it with uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops the training after the current iteration,
-    with a checkpoint; the same command with --resume continues exactly. A killed training leaves its last checkpoint,
-    which is written every 20 iterations. With --resume and more --steps a finished training continues with its last
-    noise and rates.
+    The recipe says all of a training; the options change it. Vehicles decide every 0.5 s, with yaw damping, unless you
+    set other values. This needs the extra "train". It writes config.json (the training, versions), progress.csv (a row
+    per iteration), checkpoints/, tensorboard/ and best/: the policy that was best on validation seeds, or the last if
+    the recipe says so. Compare it with uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops the training after the
+    current iteration, with a checkpoint; with --resume it continues exactly. A killed training leaves its last
+    checkpoint, which is written every 20 iterations. With --resume and more --steps a finished training continues with
+    its last noise and rates.
 
-    Example: uuv-marl train mappo --scenario starter --steps 2e6 --output runs/starter
+    Example: uuv-marl train --scenario starter --steps 2e6 --output runs/starter
     """
     with explained():
-        with extra("train", "training with MAPPO"):
-            from uuv_marl.train.mappo import Hyperparameters
+        with extra("train", "training"):
+            from uuv_marl.train import run
+        from uuv_marl.train.folder import TrainingFolder
+        from uuv_marl.train.training import Training, changed, read_recipe
 
-        alone(context, "recipe", _BESIDE_RECIPE)
-        if recipe is not None:
-            from uuv_marl.train.recipe import load_recipe
-
-            _train(output, resume, load_recipe(recipe).settings(seed), steps, device)
-            return
-        given = {"noise": noise, "learning_rate": rate, "hidden": whole_numbers("--network", network)}
-        try:
-            algorithm = replace(Hyperparameters(), **{name: value for name, value in given.items() if value})
-        except ValueError as error:
-            raise typer.BadParameter(str(error)) from None
-        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed, start)
-        _train(output, resume, task.settings(algorithm), steps, device)
-
-
-@app.command("ppo", cls=Command)
-def train_ppo(
-    context: typer.Context,
-    recipe: Recipe = None,
-    scenario: Scenario = "random_field",
-    num_vehicles: Vehicles = None,
-    sizes: Sizes = None,
-    overrides: Changes = None,
-    reward: Reward = None,
-    network: Network = None,
-    sees: Sees = "percept",
-    steps: Length = None,
-    seed: Seed = 0,
-    start: Start = None,
-    device: Device = "cpu",
-    output: Output = Path("results/ppo"),
-    resume: Resume = False,
-) -> None:
-    """Train one policy for all vehicles with Stable-Baselines3's PPO, on swarms of 10 to 100 at once, on one core.
-
-    It trains on the same problem and writes the same files as uuv-marl train mappo. But the critic sees only what the
-    actor sees, and noise is learned. It needs the extra "train".
-
-    Example: uuv-marl train ppo --output runs/ppo
-    """
-    with explained():
-        with extra("train", "training with Stable-Baselines3"):
-            from uuv_marl.train.ppo import Hyperparameters
-
-        alone(context, "recipe", _BESIDE_RECIPE)
-        if recipe is not None:
-            from uuv_marl.train.recipe import load_recipe
-
-            _train(output, resume, load_recipe(recipe).settings(seed, "ppo"), steps, device)
-            return
-        units = whole_numbers("--network", network)
-        algorithm = replace(Hyperparameters(), hidden=units or Hyperparameters.hidden)
-        task = Task(scenario, num_vehicles, sizes, overrides, reward, sees, seed, start)
-        _train(output, resume, task.settings(algorithm), steps, device)
+        if resume:
+            _alone(context)
+            folder = TrainingFolder(output, None)
+            training, until = folder.training, steps or folder.until
+        else:
+            named = {"scenario": scenario, "steps": steps, "seed": seed}
+            changes = {name: value for name, value in named.items() if value is not None}
+            training = Training(**changed(read_recipe(recipe), {**changes_of(overrides or []), **changes}))
+            until = training.steps
+        find_modules([training.reward or ""])
+        texts = {
+            "reward": "reward {reward:.3f}",
+            "score": "validation: score {score:z.3f} (best {best:z.3f}), arrived {arrived:.0%}, "
+            "collisions {collisions}",
+        }
+        with _stoppable(output) as stop:
+            told: Any = {"say": console.print, "stop": stop}
+            records = run.resume(output, until, **told) if resume else run.train(output, training, **told)
+            last = _follow(records, until, texts)
+        console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
 
 
-def _train(output: Path, resume: bool, settings: Any, steps: int | None, device: str) -> None:
-    """Train, and show how it goes.
-
-    Args:
-        output: folder of the training.
-        resume: go on with it.
-        settings: of the training.
-        steps: agent-steps in all; None for those of the settings, or at a resume those of before.
-        device: where networks and batches are.
-    """
-    from uuv_marl.train.folder import steps_before
-    from uuv_marl.train.training import train
-
-    _check_device(device)
-    chosen = replace(settings, steps=steps or (steps_before(output) if resume else 0) or settings.steps)
-    texts = {
-        "reward": "reward {reward:.3f}",
-        "score": "validation: score {score:z.3f} (best {best:z.3f}), arrived {arrived:.0%}, collisions {collisions}",
-    }
-    with _stoppable(output) as stop:
-        records = train(output, chosen, resume=resume, device=device, say=console.print, stop=stop)
-        last = _follow(records, chosen.steps, texts)
-    console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
-
-
-def _check_device(device: str) -> None:
-    """Refuse what torch can't compute on here."""
-    import torch
-
-    try:
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError) as error:
-        reason = str(error).splitlines()[0]
-        raise typer.BadParameter(
-            f"--device {device} can't be used: {reason}; give cpu, or install a torch that can"
-        ) from None
+def _alone(context: typer.Context) -> None:
+    """Refuse what the folder says already."""
+    for name, value in context.params.items():
+        source = context.get_parameter_source(name)
+        if name not in ("resume", "output", "steps") and source is not None and source.name == "COMMANDLINE":
+            raise typer.BadParameter(f"--resume goes on with the training that the folder holds; leave out {value}")
 
 
 def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str:
@@ -210,55 +134,10 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
     if noted:
         if any((output / "checkpoints").glob("[0-9]*[0-9]")):
-            rest = f"The last checkpoint is in {output}; the same command with --resume continues."
+            rest = f"The last checkpoint is in {output}; uuv-marl train --resume --output {output} continues."
         elif (output / "config.json").exists():
-            rest = f"There is no checkpoint yet, only settings in {output}; give the command with --resume."
+            rest = f"There is no checkpoint yet: uuv-marl train --resume --output {output} begins again."
         else:
             rest = "Nothing was written yet; the same command begins again."
         console.print(f"Stopped. {rest}")
         raise typer.Exit(130)
-
-
-@app.command("rllib", cls=Command)
-def train_rllib(
-    scenario: Scenario = "single_obstacle",
-    num_vehicles: Annotated[
-        int | None, typer.Option(min=1, help="Vehicles of the swarm. Default: those of the scenario.")
-    ] = None,
-    steps: Steps = 1_000_000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the first worlds and of the weights.")] = 0,
-    env_runners: Annotated[int, typer.Option(min=0, max=1000, help="Processes that sample; each uses a core.")] = 2,
-    ray: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster (auto: the local one). Default: this machine.")
-    ] = None,
-    output: Output = Path("results/rllib"),
-    resume: Resume = False,
-) -> None:
-    """Train one policy for all vehicles with RLlib's PPO, on this machine or a Ray cluster.
-
-    Vehicles decide every 0.5 s, with yaw damping. This needs the extra "distributed". It writes config.json (settings,
-    seeds, versions), progress.csv (a row per iteration) and checkpoints/. Ctrl-C stops the training after the current
-    iteration, with a checkpoint; the same command with --resume continues, also to more --steps.
-
-    Example: uuv-marl train rllib --scenario tracking --num-vehicles 8 --steps 200000
-    """
-    with explained():
-        with extra("distributed", "training with RLlib"):
-            from uuv_marl.train.rllib import Settings, train
-            from uuv_marl.train.shaping import overrides_for
-
-        changes = overrides_for(scenario, {})
-        settings = Settings(scenario=scenario, num_vehicles=num_vehicles, overrides=changes, seed=seed)
-        texts = {
-            "agent_steps": "{agent_steps:,} agent-steps",
-            "episode_return": "last return per vehicle {episode_return:.1f}",
-        }
-        console.print("Starting Ray takes about 15 s.")
-        with _stoppable(output) as stop:
-            last = _follow(
-                train(
-                    output, steps, settings, num_env_runners=env_runners, address=ray, resume=resume,
-                    say=console.print, stop=stop,
-                ), steps, texts,
-            )  # fmt: skip
-        console.print(f"Done: {last}. Progress: {output}/progress.csv   checkpoint: {output}/checkpoints")

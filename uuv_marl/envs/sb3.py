@@ -1,7 +1,7 @@
 """``SwarmVecEnv``: worlds as a Stable-Baselines3 ``VecEnv``, a row per vehicle, for one policy that all share."""
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Unpack
 
 import numpy as np
@@ -16,47 +16,14 @@ from uuv_marl.extras import extra
 from uuv_marl.sim.arguments import action_array, rounding, whole_number
 from uuv_marl.types import Bool, Float32
 
-with extra("train", "SwarmVecEnv"):
+with extra("sb3", "SwarmVecEnv"):
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 
 Indices = None | int | Iterable[int]
 
 
-class SharedEnvMixin:
-    """What SB3 asks of each row's environment, for rows that share one environment."""
-
-    _get_indices: Callable[[Indices], Iterable[int]]
-
-    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """The attribute of this object, once per row: rows share it."""
-        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
-        """Not possible: a row has no environment of its own."""
-        raise NotImplementedError(
-            f"rows are vehicles of shared worlds; set {attr_name!r} when you make the environment"
-        )
-
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Not possible: a row has no environment of its own.
-
-        Args:
-            method_name: what was to be called.
-            method_args: what with.
-            indices: for which rows.
-            method_kwargs: what with.
-        """
-        raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of the whole environment")
-
-    def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:  # noqa: ARG002
-        """False for every row."""
-        return [False for _ in self._get_indices(indices)]
-
-
-class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
+class SwarmVecEnv(EnvMixin, VecEnv):
     """``num_worlds`` x vehicles rows; row ``world * vehicles + i`` is vehicle i of a world.
 
     Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
@@ -157,6 +124,29 @@ class SwarmVecEnv(SharedEnvMixin, EnvMixin, VecEnv):
 
     def _forget(self, worlds: Bool) -> None:
         self._returns[worlds], self._lengths[worlds], self._starts[worlds] = 0.0, 0, time.perf_counter()
+
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+        """The attribute of this object, once per row: rows share it."""
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+        """Not possible: a row has no environment of its own."""
+        raise NotImplementedError(
+            f"rows are vehicles of shared worlds; set {attr_name!r} when you make the environment"
+        )
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Not possible: a row has no environment of its own.
+
+        Args:
+            method_name: what was to be called.
+            method_args: what with.
+            indices: for which rows.
+            method_kwargs: what with.
+        """
+        raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of the whole environment")
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
         """Whether rows tell what SB3's ``Monitor`` tells: ``episode``, at an episode's end."""

@@ -1,65 +1,20 @@
 """How the actor in training sees a swarm and drives it: as the policies do that its checkpoints become."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Protocol
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_features
-from uuv_marl.baselines.gains import Gains
+from uuv_marl.baselines.features import BARRIER, Features, num_features
 from uuv_marl.baselines.learned_law import TrimmedLaw
 from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import MOST_TRIM, Trim
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
+from uuv_marl.train.training import Training
 from uuv_marl.types import Float32
 
 Arrays = dict[str, NDArray[Any]]
-Sees = Literal["percept", "memory"]
-"""What an actor sees: features of one percept, or of what is remembered."""
-
-
-class Acting(Protocol):
-    """The way from percepts to features, and from an actor's output to actions, for a swarm."""
-
-    size: int
-    """Features of a vehicle, see ``num_features``."""
-    most: float
-    """Outputs mean no more beyond this."""
-    changed: Float32
-    """1 where the safety filter changed the latest action, shape (world, vehicle)."""
-
-    @staticmethod
-    def num_features(scenario: Scenario) -> int:
-        """Features of a vehicle in a scenario."""
-        ...
-
-    @staticmethod
-    def num_outputs(trims: Sequence[Trim]) -> int:
-        """Numbers that the actor gives for a vehicle."""
-        ...
-
-    def hear(self, percept: Percept) -> None:
-        """Take in what is perceived while an output is held."""
-        ...
-
-    def look(self, percept: Percept, features: Float32) -> None:
-        """The same, and fill the features, shape (world, vehicle, ``size``); twice where worlds begin anew."""
-        ...
-
-    def actions(self, output: Float32) -> Float32:
-        """The actions, shape (world, vehicle, 2), for an output, shape (world, vehicle, ``num_outputs``)."""
-        ...
-
-    def snapshot(self) -> Arrays:
-        """All that ``restore`` needs, besides a ``look`` at the same percept."""
-        ...
-
-    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot."""
-        ...
 
 
 class Forces:
@@ -68,46 +23,35 @@ class Forces:
     Args:
         scenario: what is simulated.
         num_worlds: of the swarm.
-        law: of the hand-made law, which it does not use.
-        safety: of the safety filter, which it does not use.
-        trims: of an actor with memory.
+        training: not used.
     """
 
-    most = MOST_BARRIER
-
-    def __init__(
-        self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]  # noqa: ARG002
-    ) -> None:  # fmt: skip
+    def __init__(self, scenario: Scenario, num_worlds: int, training: Training) -> None:  # noqa: ARG002
         self._features = Features(scenario, BARRIER)
         self.size = self._features.size
-        shape = num_worlds, scenario.swarm.num_vehicles
-        self._barrier, self.changed = np.zeros((*shape, 2), np.float32), np.zeros(shape, np.float32)
+        """Features of a vehicle."""
+        self._barrier = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
         self._clamps = np.zeros(num_worlds, np.int64)
 
     @staticmethod
     def num_features(scenario: Scenario) -> int:
-        """Features that the actor sees."""
+        """Features of a vehicle in a scenario."""
         return num_features(scenario.sonar.num_sectors, scenario.sonar.num_active_sectors)
 
-    @staticmethod
-    def num_outputs(trims: Sequence[Trim]) -> int:  # noqa: ARG004
-        """A force, forward and to starboard."""
-        return 2
-
     def hear(self, percept: Percept) -> None:
-        """The barrier's force from what is perceived."""
-        self.look(percept, np.empty((*self.changed.shape, self.size), np.float32))
+        """Take in what is perceived while an output is held: the barrier's force."""
+        self.look(percept, np.empty((*self._barrier.shape[:2], self.size), np.float32))
 
     def look(self, percept: Percept, features: Float32) -> None:
-        """Fill the features, and the barrier's force."""
+        """The same, and fill the features, shape (world, vehicle, ``size``); twice where worlds begin anew."""
         self._features.look(percept.flat, features, self._barrier, self._clamps)
 
     def actions(self, output: Float32) -> Float32:
-        """The force and the barrier's."""
+        """The actions, shape (world, vehicle, 2): the force, and the barrier's."""
         return output + self._barrier
 
     def snapshot(self) -> Arrays:
-        """Nothing: there is no memory."""
+        """All that ``restore`` needs, besides a ``look`` at the same percept: nothing, there is no memory."""
         return {}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
@@ -120,27 +64,18 @@ class Trims:
     Args:
         scenario: what is simulated.
         num_worlds: of the swarm.
-        law: gains of the hand-made law.
-        safety: margins and rates of the safety filter.
-        trims: what the actor changes.
+        training: says the law's gains, the filter's margins, and what the actor changes.
     """
 
     size = RECALLED
-    most = MOST_TRIM
 
-    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]) -> None:  # noqa: ARG002
-        self._policy = TrimmedLaw(scenario, num_worlds, gains=law, barrier=safety)
-        self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
+    def __init__(self, scenario: Scenario, num_worlds: int, training: Training) -> None:
+        self._policy = TrimmedLaw(scenario, num_worlds, gains=training.law, barrier=training.safety)
 
     @staticmethod
     def num_features(scenario: Scenario) -> int:  # noqa: ARG004 - of what is remembered, whatever the sonar
-        """Features that the actor sees."""
+        """Features of a vehicle."""
         return RECALLED
-
-    @staticmethod
-    def num_outputs(trims: Sequence[Trim]) -> int:
-        """One for each trim."""
-        return len(trims)
 
     def hear(self, percept: Percept) -> None:
         """Remember what is perceived."""
@@ -153,10 +88,9 @@ class Trims:
         self._policy.look(features)
 
     def actions(self, output: Float32) -> Float32:
-        """Those of the policy, which is told what it did."""
+        """Those of the policy, which is told what it did, for a number for each trim."""
         action = self._policy.steered(self._percept, self._policy.trim(output))
         self._policy.acted(action, self._policy.active)
-        self.changed[...] = self._policy.memory.filtered[:, :, 0]
         return action
 
     def snapshot(self) -> Arrays:
@@ -168,5 +102,5 @@ class Trims:
         self._policy.restore(snapshot)
 
 
-ACTING: dict[Sees, type[Forces] | type[Trims]] = {"percept": Forces, "memory": Trims}
+ACTING = {"percept": Forces, "memory": Trims}
 """How actors act, by what they see."""

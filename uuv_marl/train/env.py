@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.train.acting import ACTING
-from uuv_marl.train.group import Group, Problem, Seeds
-from uuv_marl.train.shaping import PRIVILEGED_SIZE
+from uuv_marl.train.critic import PRIVILEGED_SIZE
+from uuv_marl.train.group import Group, Seeds
+from uuv_marl.train.training import Training
 from uuv_marl.types import Bool, Float32
 
 TRAINING_SEEDS = (100_000, 900_000)
@@ -47,21 +48,20 @@ class TrainingEnv:
     everywhere (``Swarm.ended``), but waits no longer than ``PATIENCE_S`` for stragglers.
 
     Args:
-        problem: what is trained on.
+        training: says what is trained on.
         seeds: asked for seeds whenever worlds start; a snapshot and what it draws from determine all that follows.
 
     Raises:
         ScenarioError: vehicles can be lost in this scenario: their rows would be learned from.
     """
 
-    def __init__(self, problem: Problem, seeds: Seeds) -> None:
-        refuse_losses(problem.scenario, "training")
+    def __init__(self, training: Training, seeds: Seeds) -> None:
+        refuse_losses(training.loaded, "training")
         self._seeds = seeds
-        sizes, turns = list(problem.sizes), len(problem.conditions)
+        sizes, turns = list(training.sizes), len(training.conditions)
         if turns:
             sizes = [(n, 1) for n, worlds in sizes for _ in range(worlds)]
-        acting = ACTING[problem.sees]
-        self.features, self.outputs = acting.num_features(problem.scenario), acting.num_outputs(problem.trims)
+        self.features, self.outputs = ACTING[training.sees].num_features(training.loaded), training.outputs
         self.size = self.features + PRIVILEGED_SIZE
         ends = np.cumsum([0, *(n * worlds for n, worlds in sizes)]).tolist()
         self.rows: int = ends[-1]
@@ -71,7 +71,7 @@ class TrainingEnv:
         """Index of each row's world."""
         self._rows = [slice(first, end) for first, end in itertools.pairwise(ends)]
         self._groups = [
-            Group(problem, n, worlds, k * turns // len(sizes), self.observation[self._rows[k]])
+            Group(training, n, worlds, k * turns // len(sizes), self.observation[self._rows[k]])
             for k, (n, worlds) in enumerate(sizes)
         ]
         self._ended = np.zeros(len(EpisodeStats._fields))
@@ -83,7 +83,7 @@ class TrainingEnv:
             group.start(self._seeds, np.ones(group.num_worlds, np.bool_))
 
     def step(self, action: Float32) -> Transition:
-        """Act on the actor's output, shape (row, ``outputs``), as ``Acting`` takes it."""
+        """Act on the actor's output, shape (row, ``outputs``), as ``acting`` takes it."""
         reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
         final = [np.empty((0, self.size), np.float32)]
         outcomes = map(Group.step, self._groups, [action[rows] for rows in self._rows])
@@ -108,7 +108,7 @@ class TrainingEnv:
         return kept | {"episodes": self._ended.copy()}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot of an environment for the same problem."""
+        """Go on from a snapshot of an environment for the same training."""
         for k, group in enumerate(self._groups):
             mine = {name.removeprefix(f"{k}."): array for name, array in snapshot.items() if name.startswith(f"{k}.")}
             group.restore(mine)

@@ -1,28 +1,27 @@
-"""A training on disk: its settings, a row per iteration, and the last checkpoint, whole at any time."""
+"""A training on disk: what it is, a row per iteration, and the last checkpoint, whole at any time."""
 
 import json
 import re
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, NamedTuple
 
 from pydantic import TypeAdapter
 
 from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
 from uuv_marl.errors import ResultsError
-from uuv_marl.scenario.overrides import plain
+from uuv_marl.train.training import Training
 
 _MADE_HERE = re.compile(r"\d{6,}(\.partial)?")
 """Names of checkpoints; everything else under ``checkpoints`` is the user's."""
 _HIDDEN = re.compile(r"\..*|config\.partial\.json")
 """What a first start may leave behind that was killed before it wrote its settings."""
+_LIBRARIES = ("torch", "numpy", "numba", "safetensors")
 
-R = TypeVar("R", bound=Any)
-"""A NamedTuple with ``iteration`` and ``agent_steps``: a row of ``progress.csv``."""
 Say = Callable[[str], object]
 """Tells whoever started a training how it goes on."""
 
@@ -31,54 +30,75 @@ def quiet(_: str) -> None:
     """Says nothing."""
 
 
-class TrainingFolder(Generic[R]):
+class Record(NamedTuple):
+    """One iteration, a row of ``progress.csv``."""
+
+    iteration: int = 0
+    agent_steps: int = 0
+    seconds: float = 0.0
+    """Spent on training and validation so far."""
+    reward: float | None = None
+    """Mean per decision and vehicle, of this iteration's samples."""
+    kl: float | None = None
+    """Divergence from the policy that sampled to the one that learned."""
+    explained: float | None = None
+    """Share of the returns' variance that the critic explains."""
+    best: float | None = None
+    """Score of the best validation so far."""
+    score: float | None = None
+    """Score of this iteration's validation, None without one. The fields below are of this validation, too."""
+    arrived: float | None = None
+    collisions: int | None = None
+    lateness_s: float | None = None
+    min_spacing_m: float | None = None
+    min_obstacle_distance_m: float | None = None
+
+
+class TrainingFolder:
     """``config.json``, ``progress.csv`` and ``checkpoints/`` of a training; ``opened`` makes one.
 
     Nothing is written before ``begin``.
 
     Args:
-        path: new or empty, or with ``resume`` that of an earlier training.
-        settings: what must be the same throughout a training, as JSON can hold it once it is plain.
-        resume: go on with what the folder holds.
-        start: the record before the first iteration, all of whose fields have defaults.
+        path: new or empty, or that of an earlier training.
+        training: to begin; None to go on with what the folder holds.
 
     Raises:
-        ResultsError: the folder is used, holds no training, or one of other settings.
+        ResultsError: the folder is used, or holds no training to go on with.
     """
 
-    def __init__(self, path: Path, settings: Mapping[str, Any], resume: bool, start: R) -> None:
+    def __init__(self, path: Path, training: Training | None) -> None:
         self.path = path
-        self._settings: dict[str, Any] = json.loads(json.dumps(plain(settings)))
         self._sessions: list[dict[str, Any]] = []
-        self._start = start
-        self.record: R = start
+        self.record = Record()
         """The last iteration that is kept; iteration 0 where there is none."""
         self.found = ""
         """What a resume goes on from, in words."""
-        if resume:
-            self._resume()
-        elif path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
+        if training is None:
+            self.training = self._read()
+            self._find()
+            return
+        self.training = training
+        if path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
             raise ResultsError(f"{path} is not empty; give --resume to continue it, or another --output")
 
-    def _resume(self) -> None:
+    def _read(self) -> Training:
+        """The training that the folder holds."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
-            before, self._sessions = dict(config["settings"]), list(config["sessions"])
+            before, self._sessions = dict(config["scenario"]), list(config["sessions"])
+            training = Training(**config["training"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultsError(
                 f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
                 "empty --output"
             ) from None
-        other = _differences(before, self._settings)
-        if other:
-            field, then, now = other[0]
-            remedy = ", or another --output"
-            if field == "steps":
-                remedy = ", or more: noise and rates anneal over them"
+        for field, then, now in _differences(before, training.loaded.model_dump(mode="json")):
             raise ResultsError(
-                f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give the same options{remedy}"
+                f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {training.scenario} as "
+                "it was, or begin anew with another --output"
             )
-        self._find()
+        return training
 
     def _find(self) -> None:
         """The last whole checkpoint."""
@@ -87,7 +107,7 @@ class TrainingFolder(Generic[R]):
         for path in sorted(made, reverse=True):
             try:
                 text = (path / "record.json").read_text(encoding="utf-8")
-                record = TypeAdapter(type(self._start)).validate_json(text)
+                record = TypeAdapter(Record).validate_json(text)
                 if record.iteration != int(path.name):
                     raise ValueError
             except (OSError, ValueError) as error:
@@ -102,6 +122,11 @@ class TrainingFolder(Generic[R]):
         self.found = f"{self.path} holds no checkpoint yet: starting at the beginning"
 
     @property
+    def until(self) -> int:
+        """Agent-steps to which the training was to go when it was run last."""
+        return int(self._sessions[-1]["steps"]) if self._sessions else self.training.steps
+
+    @property
     def _checkpoints(self) -> Path:
         return self.path / "checkpoints"
 
@@ -110,10 +135,14 @@ class TrainingFolder(Generic[R]):
         """Where the last iteration's checkpoint is."""
         return self._checkpoints / f"{self.record.iteration:06d}" if self.record.iteration else None
 
-    def begin(self, session: Mapping[str, Any], libraries: Sequence[str]) -> None:
-        """Make the folder ready for the next iteration, and note how it comes about: seeds, versions."""
-        now = {"agent_steps": self.record.agent_steps, **session, "versions": versions(libraries)}
-        config = plain({"settings": self._settings, "sessions": [*self._sessions, now]})
+    def begin(self, steps: int) -> None:
+        """Make the folder ready for the next iteration, and note how it comes about: steps to go to, versions."""
+        now = {"agent_steps": self.record.agent_steps, "steps": steps, "versions": versions()}
+        config = {
+            "training": self.training.model_dump(mode="json"),
+            "scenario": self.training.loaded.model_dump(mode="json"),
+            "sessions": [*self._sessions, now],
+        }
         write_text(self.path / "config.json", json.dumps(config, indent=1) + "\n")
         with writing(self._checkpoints):
             self._checkpoints.mkdir(exist_ok=True)
@@ -121,14 +150,14 @@ class TrainingFolder(Generic[R]):
         rows = [line.split(",") for line in lines]
         # An iteration whose checkpoint was cut off will come again.
         kept = [row for row in rows if row[0].isdecimal() and int(row[0]) <= self.record.iteration]
-        write_text(self._table, "".join(map(_line, [self._start._fields, *kept])))
+        write_text(self._table, "".join(map(_line, [Record._fields, *kept])))
 
-    def note(self, record: R) -> None:
+    def note(self, record: Record) -> None:
         """A row for an iteration."""
         with writing(self._table), self._table.open("a", encoding="utf-8") as file:
             file.write(_line(record))
 
-    def keep(self, record: R, save: Callable[[Path], object]) -> None:
+    def keep(self, record: Record, save: Callable[[Path], object]) -> None:
         """A checkpoint, which ``save`` writes into the folder it is given; older ones go, once it is whole.
 
         Raises:
@@ -153,50 +182,29 @@ class TrainingFolder(Generic[R]):
 
 
 @contextmanager
-def opened(
-    path: Path, settings: Mapping[str, Any], resume: bool, start: R, say: Say = quiet
-) -> Iterator[TrainingFolder[R]]:
+def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[TrainingFolder]:
     """The folder of a training, for the block alone.
 
     Args:
-        path: new or empty, or with ``resume`` that of an earlier training.
-        settings: what must be the same throughout a training, as JSON can hold it once it is plain.
-        resume: go on with what the folder holds.
-        start: the record before the first iteration, all of whose fields have defaults.
+        path: new or empty, or that of an earlier training.
+        training: to begin; None to go on with what the folder holds.
         say: told from where a resume goes on.
 
     Raises:
-        ResultsError: the folder is used, by another process too, holds no training, or one of other settings, or it
-            can't be written.
+        ResultsError: the folder is used, by another process too, or holds no training to go on with, or it can't be
+            written.
     """
-    TrainingFolder(path, settings, resume, start)  # refuses before anything is written
+    TrainingFolder(path, training)  # refuses before anything is written
     with locked(path):
-        folder = TrainingFolder(path, settings, resume, start)
+        folder = TrainingFolder(path, training)
         if folder.found:
             say(folder.found)
         yield folder
 
 
-def begun_with(path: Path) -> dict[str, Any]:
-    """The settings that a training was begun with; empty where there is none that can be read."""
-    try:
-        return dict(json.loads((path / "config.json").read_text(encoding="utf-8"))["settings"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
-
-
-def steps_before(path: Path) -> int:
-    """Agent-steps to which a training was to go when it was run last; 0 where none can be read."""
-    try:
-        config = json.loads((path / "config.json").read_text(encoding="utf-8"))
-        return int(config["sessions"][-1].get("steps", config["settings"]["steps"]))
-    except (OSError, ValueError, KeyError, IndexError, TypeError, AttributeError):
-        return 0
-
-
-def versions(libraries: Sequence[str]) -> dict[str, str]:
-    """Versions of this package and of libraries."""
-    return {"uuv_marl": __version__, **{library: version(library) for library in libraries}}
+def versions() -> dict[str, str]:
+    """Versions of this package and of the libraries that a training depends on."""
+    return {"uuv_marl": __version__, **{library: version(library) for library in _LIBRARIES}}
 
 
 def _ours(path: Path) -> bool:
@@ -207,9 +215,10 @@ def _line(row: Sequence[object]) -> str:
     return ",".join("" if value is None else str(value) for value in row) + "\n"
 
 
-def _differences(then: Any, now: Any, field: str = "") -> list[tuple[str, object, object]]:
-    """Where settings are not what they were: field, before, now."""
+def _differences(then: Any, now: Any, field: str = "") -> Iterator[tuple[str, object, object]]:
+    """Where a scenario is not what it was: field, before, now."""
     if isinstance(then, dict) and isinstance(now, dict):
-        names = ((name, f"{field}.{name}" if field else name) for name in {**now, **then})
-        return [found for name, path in names for found in _differences(then.get(name), now.get(name), path)]
-    return [] if then == now else [(field, then, now)]
+        for name in {**now, **then}:
+            yield from _differences(then.get(name), now.get(name), f"{field}.{name}" if field else name)
+    elif then != now:
+        yield field, then, now

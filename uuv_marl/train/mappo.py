@@ -1,7 +1,7 @@
 """MAPPO (Yu et al. 2022): PPO for all vehicles at once, with one actor that they share and a critic that sees all.
 
 The actor is local and small, so that it runs without torch (``uuv_marl.baselines.learned``). The critic's input adds
-means and extremes over the world (``shaping.privileged_observation``), so that neither depends on how many vehicles
+means and extremes over the world (``uuv_marl.train.critic``), so that neither depends on how many vehicles
 there are. Action noise is not learned but annealed. Actor and critic learn side by side, each on one thread:
 one seed gives one training, bit for bit. Needs ``train``.
 """
@@ -10,7 +10,6 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
@@ -20,8 +19,7 @@ from uuv_marl.baselines.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.exploration import exploration
-from uuv_marl.train.group import Problem
-from uuv_marl.train.shared import Count, PPOHyperparameters, Share, Update, adam_arrays, annealed, restore_adam
+from uuv_marl.train.training import Hyperparameters, Training
 from uuv_marl.types import Bool, Float32, Int64
 
 with extra("train", "training with MAPPO"):
@@ -29,43 +27,11 @@ with extra("train", "training with MAPPO"):
     from torch import Tensor, nn
 
 
-@dataclass(frozen=True, kw_only=True)
-class Hyperparameters(PPOHyperparameters):
-    """Numbers of the algorithm; see ``Learner`` and ``gae``."""
+class Update(NamedTuple):
+    """How an update went."""
 
-    name: str = "mappo"
-    actor_epochs: Count = 3
-    critic_epochs: Count = 2
-    critic_rate: float = 1.0
-    """The critic's learning rate, in the actor's."""
-    critic_first: Share = 0.0
-    """Share of the training in which the critic learns alone: an actor that begins well is spoilt by a critic that
-    knows nothing (Silver, Allen, Tenenbaum and Kaelbling, Residual policy learning, 2018)."""
-    noise: tuple[float, float] = (0.4, 0.08)
-    """Standard deviation of outputs [1], at the start and at the end."""
-    shared_noise: Share = 0.0
-    """Share of that variance which all vehicles of a world have in common, so that what a swarm does together is
-    tried: one vehicle alone moves its centre by 1/n. The objective takes each output as if it were drawn alone."""
-    noise_kept: Share = 0.0
-    """Share of the noise that is left at the next decision [1]: what takes seconds to show is tried for seconds."""
-    first_outputs: tuple[float, ...] = ()
-    """Outputs of the actor before it has learned [1]; zeros unless given. A trim that is bounded on one side can't be
-    learned from beyond its bound, where it changes nothing: begin on the side where it does."""
-    max_gradient: float = 1.0
-    value_decay: Share = 0.99
-    """Decay of the running mean and variance by which returns are normalised [1]."""
-    average: Share = 0.98
-    """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
-
-    def begin(self, problem: Problem, seed: int, device: str = "cpu") -> "Mappo":
-        """A training that has not begun.
-
-        Args:
-            problem: what is trained on.
-            seed: of weights, worlds and noise.
-            device: where networks and batches are.
-        """
-        return Mappo(self, problem, seed, device)
+    kl: float
+    explained: float
 
 
 class Environment(Protocol):
@@ -289,24 +255,18 @@ class Mappo:
     """A learner with its environment, taken an iteration at a time.
 
     Args:
-        by: the algorithm's numbers.
-        problem: what is trained on.
-        seed: of weights, worlds and noise.
-        device: where networks and batches are.
+        training: what is trained on, and how.
     """
 
-    def __init__(self, by: Hyperparameters, problem: Problem, seed: int, device: str = "cpu") -> None:
-        self._by = by
-        self._rng = np.random.default_rng(seed)
-        self.env = TrainingEnv(problem, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
-        self.learner = Learner(self.env.features, self.env.size, self.env.outputs, by, self._rng, device)
-        self.agent_steps = by.horizon * self.env.rows
-        """Agent-steps of an iteration."""
-        self.pop_episode_stats = self.env.pop_episode_stats
-        self.arrays, self.restore, self.start_from = (
-            self.learner.arrays, self.learner.restore, self.learner.start_from
+    def __init__(self, training: Training) -> None:
+        self._by = training.mappo
+        self._rng = np.random.default_rng(training.seed)
+        self.env = TrainingEnv(training, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
+        self.learner = Learner(
+            self.env.features, self.env.size, self.env.outputs, self._by, self._rng, training.device
         )  # fmt: skip
-        self.snapshot, self.put_back = self.env.snapshot, self.env.restore
+        self.agent_steps = self._by.horizon * self.env.rows
+        """Agent-steps of an iteration."""
 
     def iterate(self, share: float) -> tuple[float, Update]:
         """Sample and update once, ``share`` of the training done: mean reward, and how the update went."""
@@ -314,11 +274,6 @@ class Mappo:
         batch, reward = self.learner.sample(self.env, noise)
         learns = share >= self._by.critic_first
         return reward, self.learner.update(batch, noise, annealed(self._by.learning_rate, share), learns)
-
-    @property
-    def layers(self) -> list[Layer]:
-        """The policy's, for a checkpoint."""
-        return self.learner.layers
 
     @property
     def random(self) -> Any:
@@ -349,3 +304,23 @@ def network(
 
 def _standard(x: Tensor) -> Tensor:
     return (x - x.mean()) / (x.std() + 1e-8)
+
+
+def adam_arrays(optimiser: torch.optim.Optimizer, name: str) -> dict[str, NDArray[Any]]:
+    """Moments and counters of an optimiser, as ``name.parameter.key``."""
+    states = optimiser.state_dict()["state"].items()
+    return {f"{name}.{k}.{key}": value.cpu().numpy().copy() for k, state in states for key, value in state.items()}
+
+
+def restore_adam(optimiser: torch.optim.Optimizer, name: str, tensors: Mapping[str, Tensor]) -> None:
+    """Go on with what ``adam_arrays`` gave."""
+    state: dict[int, dict[str, Tensor]] = {}
+    for path in (path for path in tensors if path.startswith(f"{name}.")):
+        _, k, key = path.split(".")
+        state.setdefault(int(k), {})[key] = tensors[path]
+    optimiser.load_state_dict({**optimiser.state_dict(), "state": state})
+
+
+def annealed(ends: tuple[float, float], share: float) -> float:
+    """A number that goes from the first to the second in equal ratios, as ``share`` goes from 0 to 1."""
+    return ends[0] * (ends[1] / ends[0]) ** min(share, 1.0)

@@ -1,277 +1,332 @@
-"""A training from its settings: iterations, validation, TensorBoard, and files from which it goes on exactly.
+"""``Training``: all that a training is. Its TOML is a recipe, and ``config.json`` of a run repeats it."""
 
-``config.json``, ``progress.csv`` and ``checkpoints/`` as ``uuv_marl.train.folder`` keeps them; ``best/``, the policy of
-the best validation, or of the last one (``Settings.chosen``); ``tensorboard/``. Needs ``train``.
-"""
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from importlib import resources
+from typing import Annotated, Any, Literal, cast
 
-import json
-import shutil
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import asdict, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+import pydantic
 
-import numpy as np
-import safetensors.numpy
-from numpy.typing import NDArray
+from uuv_marl.baselines.checkpoint import PERIODS_S
+from uuv_marl.baselines.gains import Gains
+from uuv_marl.baselines.policy import Policy, inner_loop_nms
+from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.envs.reward import RewardFunction
+from uuv_marl.errors import RewardError, ScenarioError, TrainingError
+from uuv_marl.modules import named_object
+from uuv_marl.paths import user_path
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.overrides import assign, plain
+from uuv_marl.scenario.scale import Scale
+from uuv_marl.train.episodes import Conditions, Episodes
+from uuv_marl.train.reward import Weights
 
-from uuv_marl.atomic import writing
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
-from uuv_marl.baselines.features import BARRIER
-from uuv_marl.errors import ResultsError
-from uuv_marl.extras import extra
-from uuv_marl.paths import UserPath, user_path
-from uuv_marl.percept import PerceptLayout
-from uuv_marl.scenario import conditions
-from uuv_marl.scenario.overrides import plain
-from uuv_marl.train.env import EpisodeStats
-from uuv_marl.train.folder import Say, begun_with, opened, quiet, versions
-from uuv_marl.train.group import Problem
-from uuv_marl.train.mappo import Mappo
-from uuv_marl.train.settings import Settings
-from uuv_marl.train.validation import ValidationResult, validate
+_PERIOD, _LOOP, _LOOP_NMS = "timing.decision_period_s", "actuators.yaw_damping_nms", 600.0
+OVERRIDES: Mapping[str, object] = {_PERIOD: 0.5, _LOOP: _LOOP_NMS}
+"""What training changes in a scenario of the paper's vehicle: a fifth of the decisions, and an inner loop, as our tuned
+policies have it, so that noise on the torque does not spin a vehicle."""
+MIXED = ((10, 20), (25, 9), (54, 5), (100, 3))
+"""Vehicles and worlds of each swarm: about as many vehicles of each size."""
+MIXED_VALIDATION = ((10, 4), (54, 8), (100, 2))
+"""Vehicles and episodes of each size."""
 
-with extra("train", "training"):
-    import torch
-    from torch.utils.tensorboard.writer import SummaryWriter
-
-if TYPE_CHECKING:
-    from uuv_marl.train import ppo
-
-_LIBRARIES = ("torch", "stable-baselines3", "numpy", "numba", "safetensors")
-_LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
+Count = Annotated[int, pydantic.Field(ge=1)]
+Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, pydantic.Field(gt=0.0)]
+AsTable = pydantic.PlainSerializer(lambda numbers: numbers._asdict())
+"""Numbers are written with their names, as a recipe has them."""
 
 
-class Record(NamedTuple):
-    """One iteration, a row of ``progress.csv``."""
-
-    iteration: int = 0
-    agent_steps: int = 0
-    seconds: float = 0.0
-    """Spent on training and validation so far."""
-    reward: float | None = None
-    """Mean per decision and vehicle, of this iteration's samples."""
-    kl: float | None = None
-    """Divergence from the policy that sampled to the one that learned."""
-    explained: float | None = None
-    """Share of the returns' variance that the critic explains."""
-    best: float | None = None
-    """Score of the best validation so far."""
-    score: float | None = None
-    """Score of this iteration's validation, None without one. The fields below are of this validation, too."""
-    arrived: float | None = None
-    collisions: int | None = None
-    lateness_s: float | None = None
-    min_spacing_m: float | None = None
-    min_obstacle_distance_m: float | None = None
+def swarms_of(sizes: Sequence[int]) -> tuple[tuple[int, int], ...]:
+    """Vehicles and worlds for these sizes: about as many vehicles of each, and in all as many as ``MIXED`` has."""
+    share = sum(n * worlds for n, worlds in MIXED) / len(sizes)
+    return tuple((n, max(1, round(share / n))) for n in sizes)
 
 
-class Trainer:
-    """An algorithm at work, and how it is kept on disk.
-
-    Args:
-        settings: of the training.
-        device: torch's name of where networks and batches are; worlds are on the CPU.
-        checkpoint: where to go on, see ``restore``; else the training begins, from ``settings.start`` if there is one.
-    """
-
-    def __init__(self, settings: Settings, device: str = "cpu", checkpoint: Path | None = None) -> None:
-        self.settings = settings
-        self.scenario = settings.load()
-        self.algorithm: Mappo | ppo.Ppo = settings.algorithm.begin(
-            Problem(
-                self.scenario,
-                settings.sizes,
-                settings.paid(),
-                settings.sees,
-                settings.change_cost,
-                settings.held_s,
-                settings.law,
-                settings.safety,
-                settings.trims,
-                settings.conditions,
-            ),
-            settings.seed,
-            device,
-        )
-        if checkpoint is not None:
-            self.restore(checkpoint)
-        elif settings.start is not None:
-            remedy = "give a folder best or a checkpoint of the same algorithm and sizes of network"
-            with _reading(user_path(settings.start) / _LEARNER_FILE, remedy) as data:
-                self.algorithm.start_from(_learned(data))
-
-    def iterate(self, before: Record) -> Record:
-        """Sample and update once."""
-        started = time.perf_counter()
-        reward, update = self.algorithm.iterate(before.agent_steps / self.settings.steps)
-        return Record(
-            iteration=before.iteration + 1,
-            agent_steps=before.agent_steps + self.algorithm.agent_steps,
-            seconds=before.seconds + time.perf_counter() - started,
-            reward=reward,
-            kl=update.kl,
-            explained=update.explained,
-            best=before.best,
-        )
-
-    def save(self, folder: Path, record: Record) -> None:
-        """All that ``restore`` needs, and the policy."""
-        folder.mkdir(parents=True, exist_ok=True)
-        self.save_policy(folder, record)
-        (folder / _WORLDS_FILE).write_bytes(safetensors.numpy.save(self.algorithm.snapshot()))
-        (folder / _RANDOM_FILE).write_text(json.dumps(self.algorithm.random) + "\n", encoding="utf-8")
-
-    def save_policy(self, folder: Path, record: Record) -> None:
-        """The policy, and the learner that a later training may start from."""
-        training = plain({**asdict(self.settings), "versions": versions(_LIBRARIES), "record": record._asdict()})
-        card = Card(
-            percept=rows_of(PerceptLayout.of(self.scenario)),
-            yaw_damping_nms=self.scenario.actuators.yaw_damping_nms,
-            channels=self.scenario.sonar.channels,
-            features=self.settings.sees,
-            barrier=BARRIER,
-            law=self.settings.law,
-            trims=self.settings.trims,
-            safety=self.settings.safety,
-            vehicle=vehicle_of(self.scenario),
-            training=training,
-        )
-        save_checkpoint(folder / WEIGHTS_FILE, card, self.algorithm.layers)
-        (folder / _LEARNER_FILE).write_bytes(safetensors.numpy.save(self.algorithm.arrays()))
-
-    def restore(self, folder: Path) -> None:
-        """Go on from what ``save`` wrote, as if there had been no break. Raises ResultsError naming a damaged file."""
-        remedy = "copy the checkpoint again as a whole, or give --start with a policy and another --output"
-        with _reading(folder / _LEARNER_FILE, remedy) as data:
-            self.algorithm.restore(_learned(data))
-        with _reading(folder / _WORLDS_FILE, remedy) as data:
-            self.algorithm.put_back(safetensors.numpy.load(data))
-        with _reading(folder / _RANDOM_FILE, remedy) as data:
-            self.algorithm.random = json.loads(data)
+def _with_worlds(sizes: Any) -> Any:
+    alone = isinstance(sizes, list) and sizes and all(isinstance(n, int) and n > 0 for n in cast(list[Any], sizes))
+    return swarms_of(cast(list[int], sizes)) if alone else sizes
 
 
-def train(
-    output: UserPath,
-    settings: Settings | None = None,
-    *,
-    resume: bool = False,
-    device: str = "cpu",
-    say: Say = quiet,
-    stop: Callable[[], bool] = lambda: False,
-) -> Iterator[Record]:
-    """Train to ``settings.steps``; a record for each iteration.
+class Hyperparameters(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """Numbers of MAPPO, see ``uuv_marl.train.mappo``."""
 
-    Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
-    come without the break, on the CPU bit for bit (of a GPU, PPO's generator of noise is not kept). Uses two threads of
-    torch: actor and critic learn side by side.
+    hidden: tuple[Count, ...] = (96, 96)
+    """Units of the actor's and of the critic's layers, tanh."""
+    gamma: Share = 0.98
+    """Discount per decision; with 0.5 s a horizon of 25 s, about the time that passing an obstacle takes."""
+    gae_lambda: Share = 0.95
+    """Weight of longer returns in advantages [1]."""
+    horizon: Count = 48
+    """Decisions between updates."""
+    minibatch: Count = 2048
+    """Rows of a gradient step, at most."""
+    actor_epochs: Count = 3
+    critic_epochs: Count = 2
+    """Passes over a batch."""
+    clip: Positive = 0.2
+    """Clip range of PPO's ratio [1]."""
+    kl_stop: Positive = 0.02
+    """The actor's epochs end where a minibatch diverges further from the policy that sampled it."""
+    learning_rate: tuple[Positive, Positive] = (1.5e-3, 1.5e-4)
+    """The actor's, at the start and at the end. Where noise is small, so is the share of a return that it caused, and
+    steps must be small too."""
+    critic_rate: Positive = 1.0
+    """The critic's learning rate, in the actor's."""
+    critic_first: Share = 0.0
+    """Share of the training in which the critic learns alone: an actor that begins well is spoilt by a critic that
+    knows nothing (Silver, Allen, Tenenbaum and Kaelbling, Residual policy learning, 2018)."""
+    noise: tuple[Positive, Positive] = (0.4, 0.08)
+    """Standard deviation of outputs [1], at the start and at the end."""
+    shared_noise: Share = 0.0
+    """Share of that variance which all vehicles of a world have in common, so that what a swarm does together is
+    tried: one vehicle alone moves its centre by 1/n. The objective takes each output as if it were drawn alone."""
+    noise_kept: Share = 0.0
+    """Share of the noise that is left at the next decision [1]: what takes seconds to show is tried for seconds."""
+    first_outputs: tuple[float, ...] = ()
+    """Outputs of the actor before it has learned [1]; zeros unless given. A trim that is bounded on one side can't be
+    learned from beyond its bound, where it changes nothing: begin on the side where it does."""
+    max_gradient: Positive = 1.0
+    """Norm to which gradients are clipped."""
+    value_decay: Share = 0.99
+    """Decay of the running mean and variance by which returns are normalised [1]."""
+    average: Share = 0.98
+    """Decay per update of the mean over the actor's past weights, which is the policy: the last weights oscillate."""
 
-    Args:
-        output: a new or empty folder, or with ``resume`` that of an earlier training.
-        settings: the default ones if None; a resume needs the same, but for more steps: it goes on to them, with noise
-            and rates as they were at the end.
-        resume: go on from the last checkpoint.
-        device: torch's name of where networks and batches are (cpu, cuda); may change at a resume.
-        say: told on what is trained, and from where a resume goes on.
-        stop: asked after every iteration; where it says so, the training ends with a checkpoint.
+
+class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """A training, field by field.
 
     Raises:
-        ResultsError: the folder is used, by another process too, holds no training of these settings, or can't be
-            written; the last checkpoint is whole.
-        RewardError: the reward can't be imported, or gives what is no reward.
+        TrainingError: a field is unknown or can't be used; the message names it, its value and the remedy.
+        ScenarioError: the scenario can't be used.
     """
-    output, settings = user_path(output), settings or Settings()
-    until = settings.steps
-    if resume:
-        settings = replace(settings, steps=min(until, begun_with(output).get("steps", until)))
-    scenario = settings.load()
-    described = {**asdict(settings), "scenario": scenario.model_dump(mode="json")}
-    with opened(output, described, resume, Record(), say) as folder, one_thread():
-        record, stopped = folder.record, False
-        if record.agent_steps >= until:
-            return
-        sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in settings.sizes)
-        own = f"{len(settings.conditions)} conditions, an episode each" if settings.conditions else conditions(scenario)
-        say(f"Training on swarms of {sizes}; {own}.")
-        trainer = Trainer(settings, device, folder.checkpoint)
-        folder.begin({"seed": settings.seed, "steps": until, "device": device}, _LIBRARIES)
-        # TensorBoard hides what was written from the purge step on: what a break has left after the checkpoint.
-        with writing(output), SummaryWriter(str(output / "tensorboard"), purge_step=record.agent_steps + 1) as board:
-            while record.agent_steps < until and not stopped:
-                record = trainer.iterate(record)
-                episodes = trainer.algorithm.pop_episode_stats()
-                done = record.agent_steps >= until
-                if done or record.iteration % settings.validate_every == 0:
-                    record = _validated(trainer, record, output)
-                folder.note(record)
-                stopped = stop()
-                if done or stopped or record.iteration % settings.checkpoint_every == 0:
-                    folder.keep(record, lambda path, record=record: trainer.save(path, record))
-                _show(board, record, episodes)
-                yield record
+
+    title: str = ""
+    """What it is for, in words."""
+
+    # What is trained on.
+    scenario: str = "random_field"
+    """Name or TOML file."""
+    overrides: dict[str, Any] = {}
+    """Fields of the scenario that differ from its file; ``OVERRIDES`` are added where they are not here."""
+    sizes: Annotated[tuple[tuple[Count, Count], ...], pydantic.BeforeValidator(_with_worlds)] = ()
+    """Vehicles and worlds of each swarm, or vehicles alone (``swarms_of``). If empty: 10 to 100 vehicles at once
+    (``MIXED``), or only swarms of the scenario's own size where ``overrides`` name it, or it is another than usual."""
+    episodes: Episodes | None = None
+    """What differs from one episode to the next."""
+
+    # What is paid.
+    weights: Annotated[Weights, AsTable] = Weights()
+    """Weights of the training's reward."""
+    reward: str | None = None
+    """A reward of one's own in its place, ``module:function``: from the swarm after a decision to an array (world,
+    vehicle)."""
+
+    # What acts.
+    sees: Literal["percept", "memory"] = "percept"
+    """What the actor sees: features of one percept, its output being a force; or ``memory``, what is remembered, its
+    output trimming the gains of ``law``, inside the safety filter."""
+    held_s: float = pydantic.Field(0.0, ge=0.0, le=10.0)
+    """An output of the actor is held for so long [s], rounded to whole decisions; 0: for one decision."""
+    law: Annotated[Gains, AsTable] = Gains()
+    """With memory: of the hand-made law that the actor trims."""
+    safety: Annotated[Barrier, AsTable] = Barrier()
+    """With memory: margins and rates of the safety filter."""
+    trims: tuple[Trim] = ALL_TRIMS
+    """With memory: what the actor changes."""
+
+    # How it learns, and for how long.
+    mappo: Hyperparameters = Hyperparameters()
+    """Numbers of the algorithm."""
+    steps: Count = 30_000_000
+    """Agent-steps: one is one decision of one vehicle. Annealing ends here."""
+    seed: int = pydantic.Field(0, ge=0)
+    """Of weights, worlds, noise and drawn conditions: it fixes a training."""
+    start: str | None = None
+    """A folder with a learner to start from: ``best`` or a checkpoint of another training."""
+    device: str = "cpu"
+    """Torch's name of where networks and batches are: cpu, cuda. Worlds are always on the CPU."""
+
+    # How it is judged and kept.
+    validation: tuple[tuple[Count, Count], ...] = ()
+    """Vehicles and episodes of each size. If empty: those of ``MIXED_VALIDATION``, or four of each size trained on."""
+    validate_every: Count = 20
+    """Iterations; a multiple of ``checkpoint_every`` wastes least where a training is cut off."""
+    checkpoint_every: Count = 20
+    """Iterations."""
+    chosen: Literal["best", "last"] = "best"
+    """Which policy ``best`` holds: that of the best validation, or the last one."""
+
+    def __init__(self, **told: Any) -> None:
+        try:
+            super().__init__(**plain(told))
+        except pydantic.ValidationError as error:
+            raise _explained(error) from None
+
+    @pydantic.model_validator(mode="after")
+    def _whole(self) -> "Training":
+        """Fill sizes in, and refuse what can't be run."""
+        usual = load_scenario(Training.model_fields["scenario"].default).swarm.num_vehicles
+        n = self.loaded.swarm.num_vehicles
+        mixed = "swarm.num_vehicles" not in self.overrides and n == usual
+        sizes = self.sizes or (MIXED if mixed else swarms_of([n]))
+        validation = self.validation or (MIXED_VALIDATION if sizes == MIXED else tuple((n, 4) for n, _ in sizes))
+        object.__setattr__(self, "sizes", sizes)
+        object.__setattr__(self, "validation", validation)
+        if len(self.mappo.first_outputs) not in (0, self.outputs):
+            raise TrainingError(
+                f"mappo.first_outputs must have a number for each of {self.outputs} outputs, got "
+                f"{len(self.mappo.first_outputs)}"
+            )
+        _need_periods(self)
+        return self
+
+    @property
+    def outputs(self) -> int:
+        """Numbers that the actor gives for a vehicle: one for each trim, or a force."""
+        return len(self.trims) if self.sees == "memory" else 2
+
+    @cached_property
+    def loaded(self) -> Scenario:
+        """The scenario that is trained on."""
+        return in_si_units(load_scenario(self.scenario, overrides=overrides_for(self.scenario, self.overrides)))
+
+    @cached_property
+    def loaded_for_validation(self) -> Scenario:
+        """The scenario that is validated on: that of the training, but with the benchmark's decision period."""
+        kept = {
+            field: value for field, value in overrides_for(self.scenario, self.overrides).items() if field != _PERIOD
+        }
+        return load_scenario(self.scenario, overrides=kept)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """Fields of the scenario for one episode: every world goes through these, an episode each, in this order."""
+        return self.episodes.draw(self.scenario, self.seed) if self.episodes else ()
+
+    @cached_property
+    def validation_conditions(self) -> Conditions:
+        """Fields of the scenario of further validation episodes."""
+        return self.episodes.draw_validated(self.scenario) if self.episodes else ()
+
+    @cached_property
+    def paid(self) -> RewardFunction:
+        """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
+        if self.reward is None:
+            return self.weights
+        try:
+            function = named_object(self.reward)
+        except ImportError as error:
+            raise RewardError(f"reward {self.reward!r} {error}; give module:function") from None
+        if not callable(function):
+            raise RewardError(f"reward {self.reward!r} must be a function of the swarm, got {function!r}")
+        return cast(RewardFunction, function)
 
 
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Torch computes on one thread in this block: sums in another order give other bits."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
+def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]:
+    """What training changes in a scenario: ``OVERRIDES``, with the inner loop of its vehicle, and fields of one's own.
+
+    Args:
+        scenario: name or TOML file.
+        own: go before the others; they may name another vehicle.
+
+    Raises:
+        ScenarioError: the scenario can't be loaded with them, or is in another scale.
+    """
+    # Before the decision period, which is no multiple of a hold in another scale, so that the scale is what is named.
+    clock = OVERRIDES if "timing.control_hold_s" in own else {}
+    bare = in_si_units(load_scenario(scenario, overrides={**clock, **own, _LOOP: own.get(_LOOP, 0.0)}))
+    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, Policy.full_torque_nm, bare), **own}
 
 
-def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
-    """The record with a validation of the policy as it stands, which becomes ``best`` where it is."""
-    started, settings = time.perf_counter(), trainer.settings
-    candidate, best = output / "candidate", output / "best"
-    trainer.save_policy(candidate, record)
-    result: ValidationResult = validate(
-        candidate, settings.load_for_validation(), settings.validation, settings.validation_conditions
+def in_si_units(scenario: Scenario) -> Scenario:
+    """The scenario. Raises ScenarioError for one in a vehicle's scale, in whose units learners do not read percepts."""
+    if scenario.scale == Scale():
+        return scenario
+    raise ScenarioError(
+        f"scale = 'vehicle' puts scenario {scenario.name!r} into the scale of {scenario.vehicle.name}, which training "
+        "does not know; leave scale out, and set trajectory.speed_mps and start.speed_max_mps"
     )
-    better = settings.chosen == "last" or record.best is None or result.score > record.best
-    record = record._replace(
-        seconds=record.seconds + time.perf_counter() - started,
-        best=result.score if better else record.best,
-        **result._asdict(),
-    )
-    if better:
-        trainer.save_policy(candidate, record)
-        best.mkdir(exist_ok=True)
-        for file in (_LEARNER_FILE, WEIGHTS_FILE):
-            (candidate / file).replace(best / file)
-    shutil.rmtree(candidate)
-    return record
 
 
-def _show(board: SummaryWriter, record: Record, episodes: EpisodeStats) -> None:
-    """Numbers for TensorBoard; of episodes the means."""
-    numbers = {f"train/{name}": getattr(record, name) for name in ("reward", "kl", "explained")}
-    numbers |= {f"validation/{name}": getattr(record, name) for name in ("best", *ValidationResult._fields)}
-    if episodes.number:
-        names = {"returns": "return", "arrived": "arrived", "collisions": "collisions", "decisions": "decisions"}
-        numbers |= {f"episodes/{tag}": getattr(episodes, name) / episodes.number for name, tag in names.items()}
-    for name, value in numbers.items():
-        if value is not None:
-            board.add_scalar(name, value, record.agent_steps)
+def _need_periods(training: Training) -> None:
+    """Raise ScenarioError where a policy would be trained or validated at a period that it can't be run with."""
+    drawn = [float(str(c[_PERIOD])) for c in (*training.conditions, *training.validation_conditions)]
+    of = f"{_PERIOD} of scenario {training.loaded.name!r}"
+    periods = [(training.loaded.timing.decision_period_s, of), *((t, f"{_PERIOD} of an episode") for t in drawn)]
+    judged = training.loaded_for_validation.timing.decision_period_s
+    for period, what in [*periods, (judged, f"{of}, with which policies are validated,")]:
+        if not PERIODS_S[0] - 1e-9 <= period <= PERIODS_S[1] + 1e-9:
+            raise ScenarioError(
+                f"{what} is {period:g}, but trained policies decide every {PERIODS_S[0]:g} to {PERIODS_S[1]:g} s; "
+                "choose a period in this range"
+            )
 
 
-@contextmanager
-def _reading(path: Path, remedy: str) -> Iterator[bytes]:
-    """Turn whatever data from outside can cause into one message that names the file."""
+def recipes() -> Sequence[str]:
+    """Names of the recipes that come with the package."""
+    return sorted(path.name.removesuffix(".toml") for path in _folder().iterdir() if path.name.endswith(".toml"))
+
+
+def _folder() -> Any:
+    return resources.files("uuv_marl.train") / "recipes"
+
+
+def read_recipe(name: str) -> dict[str, Any]:
+    """The fields that a recipe gives, by its name or from a TOML file: ``Training(**read_recipe("mappo"))``.
+
+    Raises:
+        TrainingError: it can't be read.
+    """
+    path = user_path(name) if name.endswith(".toml") else _folder() / f"{name}.toml"
     try:
-        yield path.read_bytes()
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise ResultsError(f"{path} can't be used ({type(error).__name__}: {reason}); {remedy}") from error
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TrainingError(
+            f"recipe {name!r} can't be read ({error.strerror}); give one of {', '.join(recipes())}, or a TOML file"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise TrainingError(f"recipe {name!r} is no TOML ({error}); mend it there") from None
 
 
-def _learned(data: bytes) -> Mapping[str, NDArray[Any]]:
-    arrays = safetensors.numpy.load(data)
-    spoilt = [name for name, array in arrays.items() if not np.isfinite(array).all()]
-    if spoilt:
-        raise ValueError(f"{spoilt[0]} must hold finite numbers")
-    return arrays
+TABLES: Mapping[str, Sequence[str]] = {
+    "": [*Training.model_fields], "mappo": [*Hyperparameters.model_fields], "episodes": [*Episodes.model_fields],
+    "weights": Weights._fields, "law": Gains._fields, "safety": Barrier._fields,
+}  # fmt: skip
+"""Names of all fields, by table."""
+
+
+def changed(told: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
+    """Fields of a training with others in their place: its own, or fields of the scenario, which become ``overrides``.
+
+    Args:
+        told: of a recipe; changed in place.
+        changes: by field, with dots as in ``mappo.gamma``.
+    """
+    for field, value in changes.items():
+        table, dot, _ = field.partition(".")
+        if table in (TABLES if dot else Training.model_fields):
+            assign(told, field, value)
+        else:
+            told.setdefault("overrides", {})[field] = value
+    return told
+
+
+def _explained(error: pydantic.ValidationError) -> Exception:
+    """What is wrong first, as an error of ours."""
+    first = error.errors()[0]
+    if first["type"] == "value_error" and "ctx" in first:
+        told = first["ctx"]["error"]
+        return told if isinstance(told, ScenarioError | TrainingError) else TrainingError(str(told))
+    *place, last = map(str, first["loc"])
+    field = ".".join([*place, last])
+    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        there = TABLES.get(".".join(place), ())
+        near = difflib.get_close_matches(last, there, n=1)
+        remedy = f"did you mean {near[0]!r}?" if near else f"the fields here are {', '.join(there)}"
+        return TrainingError(f"{field} is unknown; {remedy}")
+    return TrainingError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}")

@@ -9,7 +9,7 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.env import TRAINING_SEEDS
-from uuv_marl.train.group import Conditions
+from uuv_marl.train.training import Training
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
 """The first of the validation seeds: up to 999,999, which no training uses."""
@@ -35,22 +35,19 @@ class ValidationResult(NamedTuple):
     """Smallest distance to an obstacle of the worst episode [m]."""
 
 
-def validate(
-    policy: Path, scenario: Scenario, sizes: Sequence[tuple[int, int]], conditions: Conditions = ()
-) -> ValidationResult:
-    """Run a checkpoint on a scenario's validation seeds.
+def validate(policy: Path, training: Training) -> ValidationResult:
+    """Run a checkpoint on a training's validation seeds: with each size of swarm, and under each of its conditions.
 
     Args:
         policy: the checkpoint.
-        scenario: with any number of vehicles.
-        sizes: number of vehicles, and of episodes with so many.
-        conditions: fields of the scenario of further episodes, each with as many vehicles as the scenario has.
+        training: its own; under the conditions there are as many vehicles as its scenario has.
     """
     metrics: list[Metrics] = []
-    for n, count in sizes:
+    scenario = training.loaded_for_validation
+    for n, count in training.validation:
         seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + count)
         metrics += _run(policy, load_scenario(scenario, num_vehicles=n), seeds)
-    for k, changes in enumerate(conditions):
+    for k, changes in enumerate(training.validation_conditions):
         metrics += _run(policy, load_scenario(scenario, overrides=changes), [VALIDATION_SEEDS + 1000 + k])
     return validation_result(metrics)
 

@@ -1,0 +1,92 @@
+"""Train one policy for all vehicles with RLlib's PPO, on this machine or on a Ray cluster.
+
+python examples/training/rllib.py --scenario single_obstacle --vehicles 8 --steps 1000000 --output runs/rllib
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ray.rllib.algorithms.ppo import PPOConfig  # pyright: ignore[reportMissingImports]
+from ray.rllib.core.rl_module.default_model_config import (  # pyright: ignore[reportMissingImports]
+    DefaultModelConfig,
+)
+
+from uuv_marl.benchmark.distributed import connected
+from uuv_marl.envs.rllib import SwarmMultiAgentEnv
+
+TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
+TASK = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}  # what training changes in a scenario
+
+
+def ppo_config(scenario: str, vehicles: int | None, runners: int, seed: int) -> PPOConfig:
+    """RLlib's configuration, ready for ``build_algo()``; runner k, from 1 on, starts from world ``seed + k``."""
+    env = {"scenario": scenario, "num_vehicles": vehicles, "overrides": TASK}
+    return (
+        PPOConfig()
+        # RLlib's check of the environment would put all unseeded runners onto the same worlds (it resets with 42).
+        .environment(SwarmMultiAgentEnv, env_config=env, disable_env_checking=True)
+        # Two environments in a runner would share worlds with its neighbours: RLlib seeds by runner + environment.
+        # It throws samples away that take longer than the timeout: the first run compiles.
+        .env_runners(num_env_runners=runners, num_envs_per_env_runner=1, sample_timeout_s=600.0)
+        .multi_agent(policies={"shared"}, policy_mapping_fn=shared, count_steps_by="agent_steps")
+        .rl_module(
+            model_config=DefaultModelConfig(
+                fcnet_hiddens=[64, 64], fcnet_activation="tanh", free_log_std=True, vf_share_layers=False
+            )
+        )
+        .training(
+            train_batch_size_per_learner=16_384,
+            minibatch_size=512,
+            num_epochs=10,
+            lr=1e-3,
+            gamma=0.98,  # a horizon of 25 s
+            lambda_=0.95,
+            clip_param=0.2,
+            use_kl_loss=False,
+            vf_clip_param=float("inf"),  # RLlib's 10 would stop the critic's learning where returns are large
+            grad_clip=0.5,
+        )
+        .debugging(seed=seed)
+    )
+
+
+def shared(*_: Any, **__: Any) -> str:
+    """All vehicles have one policy."""
+    return "shared"
+
+
+def train(algorithm: Any, steps: int, output: Path) -> None:
+    """Train for so many agent-steps, and keep a checkpoint after every iteration."""
+    done = 0
+    while done < steps:
+        sampled = algorithm.train()["env_runners"]
+        done += int(sum(sampled["num_agent_steps_sampled"].values()))
+        algorithm.save_to_path(str(output.resolve()))
+        print(f"{done:,} agent-steps, return of all vehicles {sampled.get('episode_return_mean', float('nan')):.1f}")
+
+
+def main() -> None:
+    """Train as the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenario", default="single_obstacle", help="name or TOML file")
+    parser.add_argument("--vehicles", type=int, help="those of the scenario unless given")
+    parser.add_argument("--steps", type=int, default=1_000_000, help="decisions times vehicles")
+    parser.add_argument("--runners", type=int, default=2, help="processes that sample, a core each")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--ray", help="address of a Ray cluster (auto: the local one); this machine unless given")
+    parser.add_argument("--output", type=Path, default=Path("runs/rllib"), help="folder of the checkpoint")
+    parser.add_argument("--resume", action="store_true", help="go on from the checkpoint")
+    given = parser.parse_args()
+    with connected(given.ray, max(1, given.runners)):
+        config = ppo_config(given.scenario, given.vehicles, given.runners, TRAINING_SEEDS + given.seed)
+        algorithm = config.build_algo()
+        if given.resume:
+            algorithm.restore_from_path(str(given.output.resolve()))
+        train(algorithm, given.steps, given.output)
+        algorithm.stop()
+    print(f"The checkpoint is in {given.output}.")
+
+
+if __name__ == "__main__":
+    main()
