@@ -8,13 +8,12 @@ PYTEST := -m pytest --durations=15
 HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark reproduce paper test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
+.PHONY: help benchmark reproduce test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
 .PHONY: docs test-docs docs-links check dist test-release test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
 	@echo "make reproduce [ARGS='--seeds 5']   the paper's figures, numbers and a ledger: about ten minutes"
-	@echo "make paper                          the same, then the page in docs/paper from it"
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make docs-check                     pages, tables and pictures are those of the code and of the shipped data"
 	@echo "make docs                           the site of these pages and of the code: build/site/index.html"
@@ -38,9 +37,6 @@ benchmark: .venv/base.stamp
 
 reproduce: .venv/base.stamp
 	$(BIN)/python -m research.paper $(ARGS)
-
-paper: reproduce
-	$(BIN)/python tools/ship_paper.py results/reproduce
 
 test: check tests
 

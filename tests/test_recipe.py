@@ -184,15 +184,6 @@ def test_a_filter_that_sees_nothing_changes_nothing():
     assert changed["mappo_v2"] > 0.0 == changed["mappo_v2_unfiltered"]
 
 
-def test_the_robustness_page_marks_what_was_trained_with():
-    from uuv_marl.benchmark.robustness.page import _LEARNED
-    from uuv_marl.train.recipe import load_recipe
-
-    for policy, told in _LEARNED.items():
-        episodes = load_recipe(policy.removesuffix("_seed1")).episodes
-        assert told == (frozenset(episodes.axes), frozenset(episodes.levels)), policy
-
-
 @pytest.mark.parametrize(
     ("changes", "told"),
     [

@@ -62,7 +62,7 @@ def _axis(name: str, told: dict[str, Any]) -> Axis:
     )  # fmt: skip
 
 
-_TOLD = tomllib.loads((resources.files(__package__) / "axes.toml").read_text(encoding="utf-8"))
+_TOLD = tomllib.loads((resources.files("uuv_marl.benchmark.robustness") / "axes.toml").read_text(encoding="utf-8"))
 BASE: dict[str, Any] = _TOLD["base"]
 """Fields of every scenario of the suite, at level 0 too."""
 _EXTRA = "time_limit.extra_s"
