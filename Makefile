@@ -8,13 +8,12 @@ PYTEST := -m pytest --durations=15
 HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark reproduce paper test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
-.PHONY: docs test-docs docs-links check dist test-release test-attacks perf perf-training clean
+.PHONY: help benchmark reproduce test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
+.PHONY: docs test-docs docs-links check size dist test-release test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
 	@echo "make reproduce [ARGS='--seeds 5']   the paper's figures, numbers and a ledger: about ten minutes"
-	@echo "make paper                          the same, then the page in docs/paper from it"
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make docs-check                     pages, tables and pictures are those of the code and of the shipped data"
 	@echo "make docs                           the site of these pages and of the code: build/site/index.html"
@@ -31,6 +30,7 @@ help:
 	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS and JaxMARL, about 15 minutes: docs/speed.md"
 	@echo "make perf-training                  training beside SuperSuit and RLlib: perf/training.md"
 	@echo "make versions OTHER=path            is another checkout the same, bit for bit, and as fast?"
+	@echo "make size                           lines, words, megabytes, commands and options of this repository"
 	@echo "make clean                          remove .venv and .venv-*"
 
 benchmark: .venv/base.stamp
@@ -38,9 +38,6 @@ benchmark: .venv/base.stamp
 
 reproduce: .venv/base.stamp
 	$(BIN)/python -m research.paper $(ARGS)
-
-paper: reproduce
-	$(BIN)/python tools/ship_paper.py results/reproduce
 
 test: check tests
 
@@ -95,6 +92,9 @@ check: .venv/dev.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	$(BIN)/pyright
+
+size: .venv/base.stamp
+	@$(BIN)/python tools/size.py
 
 dist: .venv/dev.stamp
 	$(BIN)/python -m build

@@ -187,7 +187,7 @@ def test_the_readme_begins_with_what_a_stranger_needs():
     for target in (
         "mappo.md",
         "results.md",
-        "paper/report.md",
+        "paper.md",
         "environment.md",
         "README.md#your-library",
         "glossary.md",

@@ -231,7 +231,7 @@ def test_a_uniform_flow_carries_a_vehicle_along_and_changes_nothing_else(north, 
 
 @pytest.mark.parametrize(("damping", "limit_mps"), [(0.0, 0.682), (600.0, 2.459)])
 def test_the_hull_is_directionally_unstable_above_the_speed_that_the_docs_state(damping, limit_mps):
-    """The Munk moment: det < 0 of the sway-yaw equations, linearised at a speed u. docs/paper/report.md."""
+    """The Munk moment: det < 0 of the sway-yaw equations, linearised at a speed u. docs/paper.md."""
     assert sway_yaw(0.99 * limit_mps, damping).max() < 0.0 < sway_yaw(1.01 * limit_mps, damping).max()
 
 

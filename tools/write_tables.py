@@ -7,6 +7,7 @@ from pathlib import Path
 
 import uuv_marl
 from research.dynamics import acceptance, sea_trials
+from research.episodes import read_rows
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v0
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
@@ -15,13 +16,10 @@ from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = tuple(
-    ROOT / page
-    for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md", "docs/sea-trials.md")
-)
+PAGES = tuple(ROOT / page for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md"))
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
-TRIALS = sea_trials.read(ROOT / "docs" / "sea-trials.csv")
+TRIALS = read_rows(ROOT / "docs" / "sea-trials.csv.gz")
 
 
 def table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
@@ -106,7 +104,7 @@ TABLES = filled() | {
     "figures": rows(acceptance.figures()),
     "stability": rows(acceptance.stability()),
     "scales": rows(sea_trials.scales()),
-    **{name: rows(sea_trials.table(TRIALS, name)) for name in sea_trials.SCENARIOS},
+    "sea_trials": rows(sea_trials.table(TRIALS)),
     "history": table(("version", "what changed"), list(uuv_swarm_v0.HISTORY.items())),
 }
 """The tables by the names of their marks."""

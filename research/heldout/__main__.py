@@ -9,7 +9,7 @@ from research import FOLDER
 from research.heldout.job import run
 from research.heldout.page import write_page
 from uuv_marl.atomic import locked
-from uuv_marl.cli.console import Anew, console, explained, path_option, shown, working
+from uuv_marl.cli.console import console, explained, path_option, shown, working
 
 app = typer.Typer(add_completion=False)
 
@@ -22,30 +22,23 @@ def main(
     seeds: Annotated[
         int | None, typer.Option(min=1, max=10_000, help="At most this many seeds of a policy on a set. Default: all.")
     ] = None,
-    trainings: Annotated[
-        Path | None, path_option("Folder that holds outputs of uuv-marl train, one for each algorithm and seed.")
-    ] = None,
-    anew: Anew = False,
     output: Annotated[Path, path_option("Folder for results, page and pictures.")] = Path("results/heldout"),
 ) -> None:
     """Evaluate every policy on seeds that no training, no tuning and no choice has used.
 
     The sets are 1,000 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 300, echoes of the surface,
-    and other decision periods. The command writes report.md, episodes.csv and pictures; with --trainings it also
-    compares algorithms over training seeds, and writes marl_eval.json. All sets took about two hours in two processes,
-    each with its own --only. Ctrl-C keeps the finished episodes, and the same command continues.
+    and other decision periods. The command writes heldout.md, heldout.csv.gz and a picture. All sets took about two
+    hours in two processes, each with its own --only. Ctrl-C keeps the finished episodes; the same command continues.
 
     Example: python -m research.heldout --only single_obstacle --seeds 5
     """
     with explained(FOLDER):
         with working(f"The finished episodes are in {output}") as bar:
             report = shown(bar, "held out")
-            episodes, trained = run(
-                output, trainings, only or [], seeds, lambda what, share: report(share, what[-60:]), anew
-            )
+            rows = run(output, only or [], seeds, lambda what, share: report(share, what[-60:]))
             report(1.0)
         with locked(output, wait_s=60.0):
-            for path in write_page(output, episodes, trained):
+            for path in write_page(output, rows):
                 console.print(f"  {path}", highlight=False)
 
 

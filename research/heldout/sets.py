@@ -1,6 +1,6 @@
 """What is held out: seeds, worlds, swarm sizes, losses, echoes and decision periods that nothing was made with."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from research.data import read_toml
@@ -11,8 +11,6 @@ FIRST: int = _TOLD["first"]
 """The first held-out seed. Benchmarks count from 0, and tuning and training use seeds from 10,000 on."""
 GROUPS: dict[str, list[str]] = _TOLD["groups"]
 """Policies by the name of their group."""
-LEADING: tuple[str, ...] = tuple(_TOLD["shown"])
-"""The strongest policies, which the targets are for."""
 
 
 class HeldOut(NamedTuple):
@@ -23,17 +21,10 @@ class HeldOut(NamedTuple):
     seeds: Mapping[str, int]
     """How many of each group of ``GROUPS``, from ``FIRST`` on."""
     overrides: Mapping[str, object] = NOTHING
-    note: str = ""
-    """What is different from the scenario as it is."""
-    across: int = 0
-    """On so many seeds the policies of all training seeds are compared; 0 where they are not."""
-    aimed: bool = True
-    """Whether the targets concern it."""
 
-    def cases(self, trained: Iterable[str], most: int | None) -> list[Case]:
-        """All that is run, with the policies of trainings; at most so many seeds of each."""
+    def cases(self, most: int | None) -> list[Case]:
+        """All that is run, at most so many seeds of each policy."""
         counts = {policy: count for group, count in self.seeds.items() for policy in GROUPS[group]}
-        counts |= dict.fromkeys(trained if self.across else (), self.across)
         return [
             Case(
                 self.name, self.scenario, policy, self.overrides, shared=True,

@@ -26,7 +26,7 @@ def main(
     """Make the paper's figures 7 to 15 and Table 2 again, and a ledger of what matches.
 
     It writes pictures (folder figures), the data behind each (folder data), the ledger (ledger.json, ledger.md) and a
-    page that tells the story (report.md). It also studies what the paper does not: readings that fail, sensitivities,
+    summary (paper.md). It also studies what the paper does not: readings that fail, sensitivities,
     stability, time steps, swarm sizes and lost vehicles. It takes about ten minutes on two cores. Ctrl-C keeps the
     finished runs, and the same command continues.
 

@@ -1,118 +1,61 @@
-"""The page that tells the story, written from the files of a reproduction: ledger, tables and pictures."""
+"""``paper.md``: the paper's numbers beside ours, written from the rows of the episodes alone."""
 
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from string import Template
 
 import numpy as np
 
-from research.columns import Columns, groups, read_columns, where
 from research.data import read_text
-from research.dynamics.identify import METRICS, pareto, trials
-from research.dynamics.unknowns import OBJECTIVES
-from research.paper.ledger import Entry, markdown, read_ledger
-from research.part import Part
+from research.episodes import Row, cells, select, write_rows
+from research.paper.ledger import NUMBERS, Entry, number_entry
 from uuv_marl.atomic import write_text
-from uuv_marl.benchmark.tables import estimate, markdown_table
-from uuv_marl.types import Float64
+from uuv_marl.benchmark.suite import Case, Suite
+from uuv_marl.benchmark.tables import markdown_table
 
-NEEDED = ("identification", "margins", "rest", "critical")
-"""Tables that the text takes numbers from."""
-
-
-def write_page(folder: Path, parts: Sequence[Part]) -> Path:
-    """Write ``report.md`` into the folder of a reproduction, from the files there."""
-    path = folder / "report.md"
-    write_text(path, page(folder, parts))
-    return path
+METRICS = tuple(dict.fromkeys(number.metric for number in NUMBERS))
+"""What is kept of an episode."""
+DIGITS = ".6g"
+_CASES = {(number.case.scenario, number.case.policy): number.case for number in NUMBERS}
 
 
-def page(folder: Path, parts: Sequence[Part]) -> str:
-    """The whole page: ``story.md`` filled with the results."""
-    entries = read_ledger(folder / "ledger.json")
-    seeds = json.loads((folder / "ledger.json").read_text(encoding="utf-8"))["seeds"]
-    tables = {name: read_columns(folder / "data" / f"{name}.csv") for name in NEEDED}
-    return Template(read_text("paper", "story.md")).substitute(
-        # A caption does not say again what the picture's title says.
-        {p.name.replace("-", "_"): f"![{p.title}](figures/{p.name}.png)\n\n*{p.caption}.*" for p in parts},
-        seeds=str(seeds),
-        summary="\n".join(summary(entries)),
-        **search_errors(),
-        prediction=prediction(tables["identification"]),
-        rest_table=rest_table(tables["rest"]),
-        ledger="\n".join(markdown(entries, "###")).strip(),
-        **growth_rates(tables["margins"], tables["critical"]),
-    )
+def case_of(scenario: str, policy: str) -> Case:
+    """A case of the paper's numbers. Raises KeyError where there is none."""
+    return _CASES[scenario, policy]
 
 
-def summary(entries: Sequence[Entry]) -> Iterator[str]:
-    """How many numbers and claims agree, and which do not."""
-    numbers, claims = ([entry for entry in entries if entry.kind == kind] for kind in ("number", "claim"))
-    verdicts = [entry.verdict for entry in (*numbers, *claims)]
-    yield (
-        f"- Of {len(numbers)} numbers, {verdicts.count('matches within 5 %')} match within 5 %, "
-        f"{verdicts.count('matches within 15 %')} more match within 15 %, and {verdicts.count('differs')} differ:"
-    )
-    for e in numbers:
-        if e.verdict == "differs" and e.ours is not None:
-            yield f"  - {e.section}, {e.quantity}: paper {e.paper} {e.unit}, ours {e.estimate}"
-    yield f"- Of {len(claims)} sentences, {verdicts.count('holds')} hold in every seed. These do not:"
-    for e in claims:
-        if e.verdict != "holds":
-            yield f"  - {e.section}, {e.quantity.partition(':')[0]}: {e.verdict}"
+def write_page(folder: Path, suite: Suite) -> list[Path]:
+    """The page and its rows, from the runs of a suite; the paths."""
+    rows, table, text = list(_rows(suite)), folder / "paper.csv.gz", folder / "paper.md"
+    write_rows(table, rows)
+    write_text(text, page(rows))
+    return [text, table]
 
 
-def search_errors() -> dict[str, str]:
-    """Largest errors of the identification's chosen point and of the defaults."""
-    table = trials()
-    _, chosen = pareto(table)
-    largest = np.max([table[name] for name in OBJECTIVES], axis=0)
-    return {"largest_error": f"{100 * largest[chosen]:.1f} %", "default_error": f"{100 * largest[0]:.1f} %"}
+def _rows(suite: Suite) -> Iterator[Row]:
+    for (scenario, policy), case in _CASES.items():
+        for run in suite.results(case).select(scenario, policy, suite.seeds):
+            place = {"scenario": scenario, "policy": policy, "seed": str(run.seed)}
+            yield place | cells(run.metrics, METRICS, DIGITS)
 
 
-def prediction(table: Columns) -> str:
-    """Every set of parameters, scenario by scenario."""
-    rows = [
-        (*names, *(_estimate(own[metric]) for metric in METRICS))
-        for names, own in groups(table, "scenario", "parameters").items()
+def page(rows: Sequence[Row]) -> str:
+    """The page's text."""
+    entries = [_entry(k, rows) for k in range(len(NUMBERS))]
+    verdicts = [entry.verdict for entry in entries]
+    head = ("section", "quantity", "paper", "ours", "difference")
+    table = [
+        (e.section, e.quantity, f"{e.paper} {e.unit}", e.estimate, f"{100 * (e.relative_difference or 0.0):+.0f} %")
+        for e in entries
     ]
-    return markdown_table(("scenario", "parameters", *METRICS), rows).rstrip("\n")
-
-
-def _estimate(values: Float64) -> str:
-    found = values[np.isfinite(values)].tolist()
-    if not found:
-        return "–"
-    return f"{estimate(found):.4g}" + ("" if len(found) == len(values) else f", {len(found)} seeds")
-
-
-def growth_rates(margins: Columns, critical: Columns) -> dict[str, str]:
-    """Texts of the growth rates, from the eigenvalues."""
-
-    def growth(parameter: str, value: float, hold: float) -> str:
-        found = where(margins, parameter=parameter, value=value, t_r_s=hold)["growth_per_s"]
-        return f"{found.min():.2f} to {found.max():.2f} /s"
-
-    lone = critical["lone_critical_hold_s"]
-    return {
-        "lone": f"{lone[0]:.3f}",
-        "damped": f"{lone[1]:.3f} s with a yaw damping of {critical['yaw_damping_nms'][1]:g} N m s",
-        "continuous": growth("t_r", 0.0, 0.0),
-        "held": growth("t_r", 0.1, 0.1),
-        "buckling": growth("yaw_damping_nms", 600.0, 0.1),
-        "residual": f"{where(margins, parameter='t_r')['residual_n'].max():.0f}",
-    }
-
-
-def rest_table(rest: Columns) -> str:
-    """Table of the swarm's motion once l(t) rests: means over seeds."""
-    headers = (
-        "variant", "t_r [s]", "yaw damping [N m s]", "yaw rate rms [rad/s]", "speed rms [m/s]", "exponents [1/s]",
+    return Template(read_text("paper", "story.md")).substitute(
+        seeds=str(len({row["seed"] for row in rows})), count=str(len(entries)),
+        near=str(verdicts.count("matches within 5 %")), fair=str(verdicts.count("matches within 15 %")),
+        far=str(verdicts.count("differs")), numbers=markdown_table(head, table),
     )  # fmt: skip
-    lines: list[tuple[str, ...]] = []
-    for (variant, hold, damping), own in groups(rest, "variant", "t_r_s", "yaw_damping_nms").items():
-        names = ("yaw_rate_rms_rad_per_s", "speed_rms_mps", "exponent_per_s", "small_exponent_per_s")
-        yaw, speed, large, small = (f"{own[name].mean():.2g}" for name in names)
-        lines.append((variant, f"{hold:g}", f"{damping:g}", yaw, speed, f"{large}, {small}"))
-    return markdown_table(headers, lines).rstrip("\n")
+
+
+def _entry(k: int, rows: Sequence[Row]) -> Entry:
+    number = NUMBERS[k]
+    mine = select(rows, scenario=number.case.scenario, policy=number.case.policy)
+    return number_entry(number, np.array([float(row[number.metric] or "nan") for row in mine]))

@@ -68,7 +68,8 @@ def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> 
     if not only or LEDGER in only:
         suite.run(ALL, lambda _, share: report(LEDGER, share))
         made += write_ledger(folder, ledger(suite), seeds)
-    return made if only else [*made, write_page(folder, PARTS)]
+        made += write_page(folder, suite)
+    return made
 
 
 def make(part: Part, suite: Suite, folder: Path, report: Share) -> Path:

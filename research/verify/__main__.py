@@ -23,8 +23,7 @@ def main(
     files: Annotated[
         list[Path] | None,
         path_argument(
-            "Files of episodes (episodes.csv, sea-trials.csv, identification.csv, results.json), or folders of such. "
-            "Default: docs, of this folder or of the checkout that holds the package.",
+            "Files of episodes (docs/*.csv.gz, episodes.csv, results.json), or folders of such. Default: docs.",
             metavar="[FILE|FOLDER]...",
         ),
     ] = None,

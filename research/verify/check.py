@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import binomtest
 
-import uuv_marl
-from research.heldout.targets import upper_bound
 from research.verify.rows import NoEpisodesError, Row, rows_of
 from uuv_marl.baselines import granted
 from uuv_marl.baselines.checkpoint import is_checkpoint
@@ -17,12 +16,7 @@ from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.benchmark.results import FILE
 from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
 
-_HOME = Path("heldout") / "episodes.csv"
-_HINT = (
-    "They are not in the installed package, only in the repository and in the source distribution "
-    "(pip download --no-deps --no-binary :all: uuv_marl): work in its folder, or give the file, as in "
-    "python -m research.verify path/to/docs/heldout/episodes.csv"
-)
+_HOME = "heldout.csv.gz"
 
 
 class Difference(NamedTuple):
@@ -51,7 +45,7 @@ def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
     """All rows of these files and of the files in these folders; and the folders' tables that hold no episodes.
 
     Args:
-        paths: files and folders; empty for the documents of the checkout that holds this package, or of this folder.
+        paths: files and folders; empty for the documents of the checkout.
 
     Raises:
         ResultsError: there are no episodes, or a file is broken.
@@ -62,7 +56,7 @@ def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
         if not path.is_dir():
             rows += rows_of(path)
             continue
-        for file in sorted([*path.rglob("*.csv"), *path.rglob(FILE)]):
+        for file in sorted([*path.rglob("*.csv"), *path.rglob("*.csv.gz"), *path.rglob(FILE)]):
             try:
                 rows += rows_of(file)
             except NoEpisodesError:
@@ -73,11 +67,8 @@ def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
 
 
 def _docs() -> Path:
-    checkout = Path(uuv_marl.__file__).resolve().parent.parent
-    for folder in (Path("docs"), checkout / "docs"):
-        if (folder / _HOME).is_file():
-            return folder
-    raise ResultsError(f"the shipped episodes are not here: there is no {Path('docs') / _HOME}. {_HINT}")
+    """Those of the checkout that holds this file."""
+    return Path(__file__).resolve().parents[2] / "docs"
 
 
 def only(rows: Sequence[Row], places: Collection[str], policies: Collection[str]) -> list[Row]:
@@ -157,6 +148,11 @@ def failed(verdicts: Sequence[Verdict]) -> bool:
     return any(verdict.differences for verdict in verdicts) or all(verdict.reason for verdict in verdicts)
 
 
+def _upper_bound(count: int, rows: int) -> float:
+    """The share that is exceeded with a probability of 5 % at most, where so many of the rows count (exact)."""
+    return float(binomtest(count, rows).proportion_ci(confidence_level=0.9, method="exact").high)
+
+
 def summary(verdicts: Sequence[Verdict], rows: int) -> str:
     """How many agree, and what that says of all rows.
 
@@ -172,5 +168,5 @@ def summary(verdicts: Sequence[Verdict], rows: int) -> str:
     if left:
         words.append(f"{left} more can't be reproduced here and count as neither.")
     if run and len(run) < rows:
-        words.append(f"Fewer than {upper_bound(differ, len(run)):.1%} of the {rows:,} rows differ (95 % confidence).")
+        words.append(f"Fewer than {_upper_bound(differ, len(run)):.1%} of the {rows:,} rows differ (95 % confidence).")
     return " ".join(words)

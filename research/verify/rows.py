@@ -1,32 +1,31 @@
 """Files of episodes, and how each of their rows is made again."""
 
 import csv
+import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from research.columns import written as six_digits
-from research.dynamics import identify, sea_trials
-from research.heldout import episodes as heldout
+from research.dynamics import sea_trials
+from research.episodes import Row as Cells
+from research.episodes import cells as told
+from research.episodes import read_text
+from research.heldout import job as heldout
 from research.heldout.sets import SETS
-from research.heldout.trainings import find_trainings
+from research.paper import report as paper
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import FILE, Content, knowledge, read_content
 from uuv_marl.benchmark.robustness import job as robustness
 from uuv_marl.benchmark.robustness.axes import AXES, CALM
 from uuv_marl.benchmark.suite import NOTHING, Case
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError
-from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario import Scenario
 
 
 class NoEpisodesError(ResultsError):
     """A table that holds no episodes."""
-
-
-Cells = Mapping[str, str]
-"""A row by its columns, as it stands in the file."""
 
 
 class Source(NamedTuple):
@@ -82,17 +81,16 @@ def rows_of(file: Path) -> list[Row]:
     if file.name == FILE:
         return list(_of_results(file))
     try:
-        with file.open(newline="", encoding="utf-8") as opened:
-            table = csv.reader(opened)
-            lines = [(table.line_num, line) for line in table]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        table = csv.reader(io.StringIO(read_text(file), newline=""))
+        lines = [(table.line_num, line) for line in table]
+    except (OSError, EOFError, ValueError, csv.Error) as error:
         raise ResultsError(f"{file} can't be read ({error}); give a file of episodes") from None
     head = lines[0][1] if lines else []
-    kind = _kinds(file).get(tuple(head))
+    kind = _kind(head)
     if kind is None:
         raise NoEpisodesError(
-            f"{file} is no file of episodes, its columns are {', '.join(head) or 'missing'}; give an episodes.csv of "
-            f"heldout or robustness, sea-trials.csv, identification.csv or a benchmark's {FILE}"
+            f"{file} is no file of episodes, its columns are {', '.join(head) or 'missing'}; give a .csv.gz of docs, "
+            f"an episodes.csv of uuv-marl robustness or a benchmark's {FILE}"
         )
     for number, line in lines[1:]:
         if len(line) != len(head):
@@ -100,48 +98,34 @@ def rows_of(file: Path) -> list[Row]:
     return [Row(file, number, kind, dict(zip(head, line, strict=True))) for number, line in lines[1:]]
 
 
-@cache
-def _kinds(file: Path) -> dict[tuple[str, ...], Kind]:
-    """The kinds of table by their heads."""
-    kinds = (
-        Kind(heldout.Episode._fields[:4], heldout.Episode._fields[4:], partial(_heldout, file), _heldout_written),
-        Kind(("scenario", "axis", "level", "policy", "seed"), robustness.METRICS, _robustness, _robustness_written),
-        Kind(("scenario", "vehicle", "policy", "seed"), sea_trials.MEASURED, _sea_trial, _sea_trial_written),
-        Kind(("parameters", "scenario", "seed"), identify.METRICS, _identified, _identified_written),
-    )  # fmt: skip
-    return {(*kind.keys, *kind.measured): kind for kind in kinds}
+def _kind(head: Sequence[str]) -> Kind | None:
+    """The kind of table that has these columns: those that say which episode it is, then metrics."""
+    kinds: tuple[tuple[tuple[str, ...], Callable[[Cells], Source], str], ...] = (
+        (("set", "policy", "seed"), _heldout, heldout.DIGITS),
+        (("scenario", "axis", "level", "policy", "seed"), _robustness, robustness.DIGITS),
+        (("scenario", "vehicle", "policy", "seed"), _sea_trial, sea_trials.DIGITS),
+        (("scenario", "policy", "seed"), _paper, paper.DIGITS),
+    )
+    for keys, source, digits in kinds:
+        measured = tuple(head[len(keys) :])
+        if tuple(head[: len(keys)]) == keys and measured and set(measured) <= set(Metrics.__annotations__):
+            return Kind(keys, measured, source, partial(_written, measured, digits))
+    return None
+
+
+def _written(measured: Sequence[str], digits: str, _: Cells, metrics: Metrics) -> Sequence[str]:
+    return list(told(metrics, measured, digits).values())
 
 
 def _of(case: Case) -> Source:
     return Source(case.load(), case.policy, case.parameters)
 
 
-def _heldout(file: Path, cells: Cells) -> Source:
+def _heldout(cells: Cells) -> Source:
     held = next((held for held in SETS if held.name == cells["set"]), None)
     if held is None:
         raise ResultsError(f"there is no set {cells['set']!r} in this version")
-    policy, training_seed = cells["policy"], cells["training_seed"]
-    if training_seed:
-        policy = _trained(file.parent / "trainings", policy, training_seed)
-    return _of(Case(held.name, held.scenario, policy, held.overrides))
-
-
-def _trained(folder: Path, algorithm: str, seed: str) -> str:
-    """Where the weights of a training are that an evaluation used; they lie beside its file."""
-    missing = f"weights do not ship: {folder} has no training of {algorithm} with seed {seed}"
-    try:
-        found = [one for one in find_trainings(folder) if (one.algorithm, str(one.seed)) == (algorithm, seed)]
-    except (ResultsError, OSError, ValueError, KeyError):
-        found = []
-    if not found:
-        raise ResultsError(missing)
-    return str(found[0].policy)
-
-
-def _heldout_written(cells: Cells, metrics: Metrics) -> Sequence[str]:
-    held = next(held for held in SETS if held.name == cells["set"])
-    limit_s = load_scenario(held.scenario, overrides=held.overrides).time_limit.of(metrics["duration_s"])
-    return heldout.written(heldout.episode_of(held.name, cells["policy"], None, 0, limit_s, metrics))[4:]
+    return _of(Case(held.name, held.scenario, cells["policy"], held.overrides))
 
 
 def _robustness(cells: Cells) -> Source:
@@ -152,30 +136,12 @@ def _robustness(cells: Cells) -> Source:
     return _of(robustness.case_of(scenario, axis, int(level), cells["policy"]))
 
 
-def _robustness_written(_: Cells, metrics: Metrics) -> Sequence[str]:
-    values = [dict[str, Any](metrics)[name] for name in robustness.METRICS]
-    return ["" if value is None else f"{value:.6g}" for value in values]
-
-
 def _sea_trial(cells: Cells) -> Source:
     return _of(sea_trials.case(cells["scenario"], cells["vehicle"], cells["policy"]))
 
 
-def _sea_trial_written(_: Cells, metrics: Metrics) -> Sequence[str]:
-    return sea_trials.written(metrics)
-
-
-def _identified(cells: Cells) -> Source:
-    cases = {(name, case.scenario): case for name, case in identify.SETS}
-    case = cases.get((cells["parameters"], cells["scenario"]))
-    if case is None:
-        raise ResultsError(f"there are no parameters {cells['parameters']!r} of {cells['scenario']!r} in this version")
-    return _of(case)
-
-
-def _identified_written(_: Cells, metrics: Metrics) -> Sequence[str]:
-    values = [dict[str, Any](metrics)[name] for name in identify.METRICS]
-    return [str(six_digits(float("nan" if value is None else value))) for value in values]
+def _paper(cells: Cells) -> Source:
+    return _of(paper.case_of(cells["scenario"], cells["policy"]))
 
 
 def _of_results(file: Path) -> Iterator[Row]:

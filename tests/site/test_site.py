@@ -95,10 +95,7 @@ def used(text):
     yield from re.findall(r"`(uuv_marl(?:\.[A-Za-z_]\w*)+)`", text)
 
 
-# The migration note names what is gone.
-@pytest.mark.parametrize(
-    "markdown", [path for path in PAGES if path.stem != "migration"], ids=lambda path: str(path.relative_to(ROOT))
-)
+@pytest.mark.parametrize("markdown", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_names_that_a_page_uses_are_in_the_reference(markdown, names):
     assert set(used(markdown.read_text())) <= names
 

@@ -24,7 +24,7 @@ def robustness(
         list[str] | None,
         typer.Option(
             help="Name, checkpoint or module:Class. Repeat it for several. Default: bio_inspired, bio_inspired_plus "
-            "and mappo; without --quick all that docs/robustness compares."
+            "and mappo; without --quick the strongest of docs/robustness.md."
         ),
     ] = None,
     scenario: Annotated[
@@ -44,9 +44,9 @@ def robustness(
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
 
     Each axis is one disturbance in five levels (uuv_marl/benchmark/robustness/axes.toml, with sources). The command
-    writes report.md (scores, critical severities, every cell), a picture of each scenario (in figures) and episodes.csv
-    (a row for each episode). Without --quick it makes the report that ships in docs/robustness: 30 to 50
-    minutes of one core for each of its policies with memory. It needs the extra "analysis". Ctrl-C keeps the finished
+    writes robustness.md (scores by group and axis), a picture of each scenario (in figures) and episodes.csv (a row for
+    each episode). Without --quick it runs what docs/robustness.md shows: 30 to 50 minutes of one core for each of its
+    policies with memory. It needs the extra "analysis". Ctrl-C keeps the finished
     episodes, and the same command continues.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5

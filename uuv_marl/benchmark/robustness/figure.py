@@ -15,7 +15,7 @@ from uuv_marl.benchmark.style import BLACK, COLOURS, legend, panels
 
 _AGAIN = ((".", "-"), ("x", "--"), ("^", ":"))
 """Marker and line of the policies that come first, and of those for which no new colour is left."""
-_CROWD = 8
+_CROWD = 5
 """Of more lines than this a panel shows no intervals."""
 
 

@@ -18,6 +18,7 @@ METRICS = (
     "min_obstacle_distance_m", "min_spacing_m", "centre_error_m", "task_time_s", "effort",
 )  # fmt: skip
 """What is kept of an episode; docs/results-format.md defines them."""
+DIGITS = ".6g"
 
 
 class Plan(NamedTuple):
@@ -36,14 +37,12 @@ SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
     "bio_inspired", "bio_inspired_plus", "scout", "scout,preset=plus", "scout,preset=lead", "scout,preset=wary",
     "mappo", "trimmed_scout",
 ), 20)  # fmt: skip
-"""The usual plan."""
+"""The plan of docs/robustness.md, which also has comparators, on 10 seeds."""
 QUICK = SHIPPED._replace(
     axes=("W1", "S4", "S7", "S9", "N1", "A1", "F3", "X"), scenarios=("single_obstacle", "random_field"), seeds=5,
     policies=("bio_inspired", "bio_inspired_plus", "mappo"),
 )  # fmt: skip
 """A first look, in about ten minutes."""
-FULL = SHIPPED._replace(levels=(1, 2, 3, 4, 5), scenarios=("single_obstacle", "random_field", "tracking"), seeds=50)
-"""All of it, for hours."""
 
 
 class Cell(NamedTuple):
@@ -119,7 +118,7 @@ def _rows(suite: Suite, cell: Cell) -> Iterator[dict[str, Any]]:
 def write_episodes(path: Path, rows: Iterator[dict[str, Any]]) -> None:
     """Rows of scenario, axis, level, policy, seed and metrics as CSV, six significant digits, NaN as nothing."""
     pandas = need_pandas("uuv-marl robustness")
-    pandas.DataFrame.from_records(list(rows)).to_csv(path, index=False, float_format="%.6g")
+    pandas.DataFrame.from_records(list(rows)).to_csv(path, index=False, float_format=f"%{DIGITS}")
 
 
 def read_episodes(path: Path) -> Any:

@@ -16,8 +16,6 @@ from uuv_marl.types import Float64, Int64
 
 ENOUGH = 0.9
 """Success at which a level still counts as passed. Assumed: a usual demand."""
-WORTH_KEEPING = 0.8
-"""Success at level 0 from which retention means something: little can be retained of little."""
 EVERY = "all"
 """The mean over the groups, without the combined axis."""
 _SEEDS = 5
@@ -43,8 +41,6 @@ class AxisScore(NamedTuple):
 
     success: Score
     """Mean over the levels that were run, without level 0."""
-    retention: Score | None
-    """Share of level 0's success that is kept; None where that success is below ``WORTH_KEEPING``."""
     critical: Score
     """Level up to which success is at least ``ENOUGH``, see ``critical_level``."""
     levels: tuple[int, ...]
@@ -84,11 +80,9 @@ def axis_score(table: Any, axis: str) -> AxisScore | None:
         return None
     levels = (0, *(int(level) for level in both[axis]))
     calm, rest = both[CALM].to_numpy()[:, 0], both[axis].to_numpy()
-    worth = calm.mean() >= WORTH_KEEPING
     shares = np.column_stack([calm, rest])
     return AxisScore(
         success=scored(rest.mean(axis=1)),
-        retention=scored(np.column_stack([rest.mean(axis=1), calm]), _ratio) if worth else None,
         critical=scored(shares, partial(_critical, levels)),
         levels=levels,
     )
@@ -96,10 +90,6 @@ def axis_score(table: Any, axis: str) -> AxisScore | None:
 
 def _critical(levels: tuple[int, ...], *shares: Float64, axis: int) -> Float64:
     return critical_level(np.stack([share.mean(axis) for share in shares]), levels)
-
-
-def _ratio(part: Float64, whole: Float64, axis: int) -> Float64:
-    return part.mean(axis) / whole.mean(axis)
 
 
 def critical_level(shares: Float64, levels: tuple[int, ...]) -> Float64:
@@ -149,24 +139,6 @@ def group_score(table: Any, group: str) -> Score | None:
     """A policy's mean over the axes of a group that were run; ``EVERY``: over the groups but X. None for none."""
     seeds = _group(table, group)
     return None if seeds is None else scored(seeds[~np.isnan(seeds)])
-
-
-def difference(table: Any, mine: str, other: str, group: str) -> Score | None:
-    """By how much ``group_score`` of one policy is above that of another, on cells and seeds that both have.
-
-    Args:
-        table: of ``by_seed``, for one scenario.
-        mine: name of the first policy.
-        other: name of the second.
-        group: as in ``group_score``.
-    """
-    both = [table.xs(name, level="policy").dropna(axis="columns", how="all") for name in (mine, other)]
-    rows, columns = (both[0].axes[k].intersection(both[1].axes[k]) for k in (0, 1))
-    first, second = (_group(one.loc[rows, columns], group) for one in both)
-    if first is None or second is None:
-        return None
-    more = first - second
-    return scored(more[~np.isnan(more)])
 
 
 def _group(table: Any, group: str) -> Float64 | None:

@@ -1,0 +1,58 @@
+"""Episodes as rows of a CSV file, compressed if its name ends in .gz: what pages are made of, and checked by."""
+
+import csv
+import gzip
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from uuv_marl.atomic import replacing
+from uuv_marl.benchmark.metrics import Metrics
+
+Row = Mapping[str, str]
+"""The cells of an episode by their columns; an empty one where there is nothing to measure."""
+
+
+def cells(metrics: Metrics, names: Sequence[str], digits: str) -> dict[str, str]:
+    """What was measured as it stands in a file, such as ``.6g``: six significant digits."""
+    values = {name: dict[str, Any](metrics)[name] for name in names}
+    return {k: "" if v is None else f"{v:{digits}}" if isinstance(v, float) else str(v) for k, v in values.items()}
+
+
+def write_rows(path: Path, rows: Iterable[Row]) -> None:
+    """Write rows, of which there is at least one, whole or not at all; the same rows give the same bytes."""
+    kept, text = list(rows), io.StringIO(newline="")
+    table = csv.DictWriter(text, kept[0], lineterminator="\n")
+    table.writeheader()
+    table.writerows(kept)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    data = text.getvalue().encode()
+    with replacing(path) as partial:
+        partial.write_bytes(gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
+
+
+def read_text(path: Path) -> str:
+    """The text of a file of rows. Raises OSError, EOFError or ValueError where it can't be read."""
+    data = path.read_bytes()
+    return (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
+
+
+def read_rows(path: Path) -> list[Row]:
+    """What ``write_rows`` wrote."""
+    return list(csv.DictReader(io.StringIO(read_text(path), newline="")))
+
+
+def measured(rows: Iterable[Row], name: str) -> list[float]:
+    """What was measured, one value for each row that has one."""
+    return [float(row[name]) for row in rows if row[name]]
+
+
+def succeeded(row: Row) -> bool:
+    """Whether the swarm arrived, and nobody touched anything."""
+    return bool(row["task_time_s"]) and row["collisions"] == "0"
+
+
+def select(rows: Iterable[Row], **values: str) -> list[Row]:
+    """The rows that have these values."""
+    return [row for row in rows if all(row[name] == value for name, value in values.items())]
