@@ -12,7 +12,7 @@ from uuv_marl.benchmark.suite import Case, Suite
 Tables = Mapping[str, Columns]
 Share = Callable[[float], None]
 """Called with the share of the work that is done."""
-_WORDS = read_toml("paper", "parts.toml")
+_TITLES = read_toml("paper", "parts.toml")
 
 
 class Part(NamedTuple):
@@ -30,9 +30,4 @@ class Part(NamedTuple):
     @property
     def title(self) -> str:
         """The text above the picture, see ``parts.toml``."""
-        return _WORDS[self.name]["title"]
-
-    @property
-    def caption(self) -> str:
-        """The text below the picture, see ``parts.toml``."""
-        return _WORDS[self.name]["caption"]
+        return _TITLES[self.name]

@@ -159,6 +159,14 @@ def test_every_page_can_be_reached_from_the_index():
     assert (INDEX, "") in links(README)
 
 
+@pytest.mark.parametrize("study", ["heldout", "paper", "robustness"])
+def test_a_study_has_a_short_page_and_few_rows(study):
+    text = (ROOT / "docs" / f"{study}.md").read_text()
+    assert len(text.split()) <= 1500
+    assert text.count("![") <= 2
+    assert (ROOT / "docs" / f"{study}.csv.gz").stat().st_size <= 1e6
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_a_page_has_one_title(page):
     text = re.sub(r"\A---\n.*?\n---\n+|```.*?```", "", page.read_text(), flags=re.S)  # front matter of notebooks

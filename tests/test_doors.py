@@ -266,7 +266,8 @@ def test_every_path_of_a_command_may_begin_with_the_home_folder(name, home, monk
     assert {"output"} & hints.keys() <= {option.name for option in paths}
     monkeypatch.setattr(command, "callback", lambda **values: given.update(values))
     options = [f"{option.opts[0]}=~/x" for option in paths if option.param_type_name == "option"]
-    positional = ["~/x" for option in command.params if option.param_type_name == "argument"]
+    wanted = [option for option in command.params if option in paths or option.required]
+    positional = ["~/x" for option in wanted if option.param_type_name == "argument"]
     command.main([*options, *positional], standalone_mode=False)
     for option in paths:
         assert given[option.name] in (home / "x", [home / "x"]), option.name

@@ -236,13 +236,13 @@ def _cells(k: int, e: Entry) -> dict[str, str]:
     }
 
 
-def markdown(entries: Sequence[Entry], heading: str = "##") -> list[str]:
-    """A table for each kind of row, under headings of this level; what is too long for a cell follows as a list."""
+def markdown(entries: Sequence[Entry]) -> list[str]:
+    """A table for each kind of row; what is too long for a cell follows as a list."""
     lines: list[str] = []
     for kind, (title, words) in _KINDS.items():
         chosen, headers = [entry for entry in entries if entry.kind == kind], words.split(", ")
         rows = [[_cells(k, entry)[header] for header in headers] for k, entry in enumerate(chosen, start=1)]
-        lines += [f"{heading} {title}", "", markdown_table(headers, rows), *_notes(kind, chosen)]
+        lines += [f"## {title}", "", markdown_table(headers, rows), *_notes(kind, chosen)]
     return lines
 
 
