@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, Policy, PolicyError, bio_inspired, granted, make, sdc, sff
-from uuv_marl.baselines.gains import DEFAULT_PRESET, PRESETS
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, granted, make
+from uuv_marl.baselines.paper import bio_inspired, sdc, sff
+from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm

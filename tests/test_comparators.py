@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import apf, granted, make, olfati_saber, orca
+from uuv_marl.baselines import granted, make
+from uuv_marl.baselines.comparators import apf, olfati_saber, orca
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.bio_inspired import Gains
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
-from uuv_marl.baselines.export import write_onnx
-from uuv_marl.baselines.features import BARRIER
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.learned.export import write_onnx
+from uuv_marl.baselines.learned.percept_features import BARRIER
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.cli import app
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from uuv_marl import baselines
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark.tables import shown
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
@@ -24,7 +24,7 @@ from uuv_marl.studies.heldout.targets import later, targets, upper_bound
 from uuv_marl.studies.heldout.trainings import Trained, Validation, find_trainings
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "heldout"
-SHIPPED = Path(baselines.__file__).parent / "trained" / "mappo.safetensors"
+SHIPPED = Path(baselines.__file__).parent / "weights" / "mappo.safetensors"
 QUICK = {"swarm.num_vehicles": 3, "time_limit.factor": 0.02, "time_limit.extra_s": 1.0}
 
 
@@ -301,7 +301,7 @@ def test_trainings_without_a_set_of_the_comparison_make_no_table(tmp_path, quick
 
     for module in (job, page, across):
         monkeypatch.setattr(module, "SETS", (quick._replace(across=0),))
-    weights = Path(uuv_marl.baselines.__file__).parent / "trained" / "mappo.safetensors"
+    weights = Path(uuv_marl.baselines.__file__).parent / "weights" / "mappo.safetensors"
     where = trainings(tmp_path / "trainings", weights)
     done = CliRunner().invoke(app, ["heldout", f"--output={tmp_path / 'out'}", "--seeds=1", f"--trainings={where}"])
     assert done.exit_code == 0, done.output

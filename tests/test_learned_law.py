@@ -9,14 +9,14 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.learned import forward
-from uuv_marl.baselines.learned_law import TrimmedLaw
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.network import forward
+from uuv_marl.baselines.learned.trimmed_scout import TrimmedLaw
 from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
-from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.trims import MOST_TRIM, softened, wary
+from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.trims import MOST_TRIM, softened, wary
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm

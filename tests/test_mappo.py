@@ -21,9 +21,9 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, load_checkpoint
-from uuv_marl.baselines.features import BARRIER, Features
-from uuv_marl.baselines.learned import forward
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint
+from uuv_marl.baselines.learned.network import forward
+from uuv_marl.baselines.learned.percept_features import BARRIER, Features
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError, RewardError, ScenarioError
@@ -732,7 +732,7 @@ def test_numbers_that_cannot_be_learned_with_are_refused(field, value):
         ("train.ppo", "stable_baselines3", "train"),
         ("train.training", "torch.utils.tensorboard.writer", "train"),
         ("train.rllib", "ray", "distributed"),
-        ("baselines.export", "onnx", "onnx"),
+        ("baselines.learned.export", "onnx", "onnx"),
     ],
 )
 def test_modules_of_optional_libraries_name_their_extra(module, library, name):

@@ -10,8 +10,8 @@ from gymnasium.spaces import Box
 from stable_baselines3.common.vec_env import VecEnv
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, load_checkpoint
-from uuv_marl.baselines.learned import forward
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint
+from uuv_marl.baselines.learned.network import forward
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import ppo as ppos

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
 from uuv_marl.studies import reproduce as job

@@ -8,7 +8,7 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.studies.columns import read_columns, write_columns
 from uuv_marl.studies.dynamics import formation, rest, softening, stability

@@ -7,7 +7,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.studies.heldout.episodes import read_episodes
 from uuv_marl.studies.heldout.page import write_page
 from uuv_marl.studies.heldout.trainings import ABLATIONS, find_trainings

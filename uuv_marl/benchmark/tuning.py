@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing, write_text
-from uuv_marl.baselines import apf, bio_inspired, granted, olfati_saber, orca, sdc, sff
+from uuv_marl.baselines import granted
+from uuv_marl.baselines.comparators import apf, olfati_saber, orca
+from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.extras import silenced
 from uuv_marl.paths import UserPath, user_path

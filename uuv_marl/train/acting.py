@@ -6,12 +6,12 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features, num_features
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.learned_law import TrimmedLaw
-from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import MOST_TRIM, Trim
+from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.percept_features import BARRIER, MOST_BARRIER, Features, num_features
+from uuv_marl.baselines.learned.trimmed_scout import TrimmedLaw
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.trims import MOST_TRIM, Trim
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Float32

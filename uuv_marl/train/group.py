@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.scenario import Scenario, load_scenario

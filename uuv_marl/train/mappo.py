@@ -1,6 +1,6 @@
 """MAPPO (Yu et al. 2022): PPO for all vehicles at once, with one actor that they share and a critic that sees all.
 
-The actor is local and small, so that it runs without torch (``uuv_marl.baselines.learned``). The critic's input adds
+The actor is local and small, so that it runs without torch (``baselines.learned.network``). The critic's input adds
 means and extremes over the world (``shaping.privileged_observation``), so that neither depends on how many vehicles
 there are. Action noise is not learned but annealed. Actor and critic learn side by side, each on one thread:
 one seed gives one training, bit for bit. Needs ``train``.
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.checkpoint import Layer
+from uuv_marl.baselines.learned.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.sim.arrays import Bool, Float32
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition

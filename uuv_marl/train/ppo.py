@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.checkpoint import Layer
+from uuv_marl.baselines.learned.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.train.env import TRAINING_SEEDS, EpisodeStats
 from uuv_marl.train.group import Problem

@@ -8,9 +8,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pydantic
 
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import load_scenario

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, cast
 
-from uuv_marl.baselines.checkpoint import PERIODS_S
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.baselines.learned.checkpoint import PERIODS_S
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.modules import named_object

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
+from uuv_marl.baselines.paper.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.studies.columns import Float64

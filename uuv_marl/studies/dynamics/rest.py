@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
-from uuv_marl.baselines.bio_inspired import BioInspired, Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspired, Gains
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, SKY, legend, panels
 from uuv_marl.scenario import Scenario, load_scenario

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from uuv_marl.atomic import replacing
-from uuv_marl.baselines.actors import Trained
+from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import load_scenario, load_vehicle, vehicle_names

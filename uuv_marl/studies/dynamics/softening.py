@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspired, Gains
+from uuv_marl.baselines.paper.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspired, Gains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.studies.columns import Float32, Float64

@@ -18,7 +18,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
 
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.benchmark.style import BLACK, BLUE, COLOURS, GREY, ORANGE, panels
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.vehicle import STILL, derivative, plant

@@ -1,6 +1,6 @@
 """What the paper runs: its controller on its three scenarios, other obstacle gains, and the methods it names."""
 
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.studies.suite import Case
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.style import BLACK, COLOURS, ORANGE, legend, panels
 from uuv_marl.studies.columns import Columns

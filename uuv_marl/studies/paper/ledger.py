@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uuv_marl.atomic import write_text
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.tables import Estimate, estimate, markdown_table
 from uuv_marl.studies.columns import Float64

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import obstacle_at
-from uuv_marl.baselines.bio_inspired import counts_once
-from uuv_marl.baselines.halfplanes import nearest_velocity
+from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned
+from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from uuv_marl.baselines.memory.neighbours import KEPT_S
-from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.safety.barrier import Barrier
 
 
 class Gains(NamedTuple):

@@ -10,16 +10,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.filtered import Filtered
-from uuv_marl.baselines.gains import DEFAULT_PRESET, PRESETS, Gains
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import trim_weights
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.policy import Limits, PolicyError
-from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
-from uuv_marl.baselines.trims import softened, wary
+from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of, steer_safely
+from uuv_marl.baselines.safety.remembering import Filtered
+from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS, Gains
+from uuv_marl.baselines.scout.trims import softened, wary
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth

@@ -5,9 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.features import put
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.halfplanes import nearest_velocity
+from uuv_marl.baselines.learned.percept_features import put
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import doubt
@@ -15,8 +13,10 @@ from uuv_marl.baselines.memory.neighbours import age_of, middle, noise_of
 from uuv_marl.baselines.memory.pose import to_body, to_body_axes
 from uuv_marl.baselines.memory.response import remains
 from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.safety import Barrier, margin, planes_of
-from uuv_marl.baselines.scout import modulated, wished
+from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of
+from uuv_marl.baselines.safety.halfplanes import nearest_velocity
+from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.law import modulated, wished
 from uuv_marl.baselines.steering import full_speed
 from uuv_marl.scenario.sections import NOMINAL_VEHICLES
 from uuv_marl.sim.compiled import compiled

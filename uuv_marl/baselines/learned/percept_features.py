@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
+from uuv_marl.baselines.paper.bio_inspired import Gains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario

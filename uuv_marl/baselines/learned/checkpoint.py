@@ -17,13 +17,13 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
-from uuv_marl.baselines.bio_inspired import Gains
-from uuv_marl.baselines.features import BARRIER, num_features
-from uuv_marl.baselines.gains import Gains as Law
+from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.percept_features import BARRIER, num_features
+from uuv_marl.baselines.paper.bio_inspired import Gains
 from uuv_marl.baselines.policy import Policy, PolicyError
-from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import Gains as Law
+from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle

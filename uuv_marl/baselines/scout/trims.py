@@ -3,9 +3,9 @@
 import math
 from typing import Literal, get_args
 
-from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.doubt import trim_weights
+from uuv_marl.baselines.scout.gains import Gains
 from uuv_marl.sim.arrays import Bool
 from uuv_marl.sim.compiled import compiled
 

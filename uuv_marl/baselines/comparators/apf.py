@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.avoidance import obstacle_at
-from uuv_marl.baselines.bio_inspired import MIN_DISTANCE_M, counts_once
+from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import noise_of
 from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
 from uuv_marl.baselines.policy import Limits
+from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.sim.compiled import compiled
 
