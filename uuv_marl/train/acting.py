@@ -10,7 +10,7 @@ from uuv_marl.baselines.learned.memory_features import RECALLED
 from uuv_marl.baselines.learned.percept_features import BARRIER, MOST_BARRIER, Features, num_features
 from uuv_marl.baselines.learned.trimmed_scout import TrimmedLaw
 from uuv_marl.baselines.safety.barrier import Barrier
-from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.trims import MOST_TRIM, Trim
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -76,7 +76,7 @@ class Forces:
     most = MOST_BARRIER
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]  # noqa: ARG002
+        self, scenario: Scenario, num_worlds: int, law: ScoutGains, safety: Barrier, trims: Sequence[Trim]  # noqa: ARG002
     ) -> None:  # fmt: skip
         self._features = Features(scenario, BARRIER)
         self.size = self._features.size
@@ -128,7 +128,9 @@ class Trims:
     size = RECALLED
     most = MOST_TRIM
 
-    def __init__(self, scenario: Scenario, num_worlds: int, law: Gains, safety: Barrier, trims: Sequence[Trim]) -> None:  # noqa: ARG002
+    def __init__(
+        self, scenario: Scenario, num_worlds: int, law: ScoutGains, safety: Barrier, trims: Sequence[Trim]  # noqa: ARG002
+    ) -> None:  # fmt: skip
         self._policy = TrimmedLaw(scenario, num_worlds, gains=law, barrier=safety)
         self.changed = np.zeros((num_worlds, scenario.swarm.num_vehicles), np.float32)
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.safety.barrier import Barrier
-from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.batched_env import refuse_losses
 from uuv_marl.envs.reward import RewardFunction, own_reward
@@ -40,7 +40,7 @@ class Problem(NamedTuple):
     """Paid for each 0.5 s in which the safety filter changed a vehicle's action."""
     held_s: float = 0.0
     """An output of the actor is held for so long, rounded to whole decisions; 0: for one decision."""
-    law: Gains = Gains()
+    law: ScoutGains = ScoutGains()
     """Gains of the hand-made law that an actor with memory trims."""
     safety: Barrier = Barrier()
     """Margins and rates of the safety filter around that law."""

@@ -9,7 +9,7 @@ import numpy as np
 import pydantic
 
 from uuv_marl.baselines.safety.barrier import Barrier
-from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import user_path
@@ -113,7 +113,7 @@ class Recipe(pydantic.BaseModel, frozen=True, extra="forbid"):
             **taken,
             seed=seed,
             overrides=overrides_for(self.scenario, self.overrides),
-            law=Gains(**self.law),
+            law=ScoutGains(**self.law),
             safety=Barrier(**self.safety),
             weights=Weights(**self.weights),
             algorithm=pydantic.TypeAdapter(kind).validate_python(vars(kind(**numbers))),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, cast
 
 from uuv_marl.baselines.learned.checkpoint import PERIODS_S
 from uuv_marl.baselines.safety.barrier import Barrier
-from uuv_marl.baselines.scout.gains import Gains
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import RewardError, ScenarioError
@@ -66,7 +66,7 @@ class Settings:
     """With memory: paid for each 0.5 s in which the filter changed a vehicle's action."""
     chosen: Literal["best", "last"] = "best"
     """Which policy ``best`` holds: that of the best validation, or the last one."""
-    law: Gains = field(default_factory=Gains)
+    law: ScoutGains = field(default_factory=ScoutGains)
     """With memory: of the hand-made law that the actor trims."""
     safety: Barrier = field(default_factory=Barrier)
     """With memory: margins and rates of the safety filter; with a horizon of 0 m it changes nothing."""

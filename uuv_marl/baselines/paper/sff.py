@@ -28,7 +28,7 @@ HORIZON_S = 1.0
 _MAX_RATE_MPS = 8.0
 
 
-class Gains(NamedTuple):
+class SffGains(NamedTuple):
     """Free parameters, found by tuning."""
 
     pull: float
@@ -81,9 +81,9 @@ class Sff(Policy):
     channels: ClassVar[tuple[str, ...]] = ("link",)
     tuned_as: ClassVar[str] = "sff"
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SffGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains(**tuned(self.tuned_as))
+        self.gains = gains or SffGains(**tuned(self.tuned_as))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Compare what is heard with what was heard."""
@@ -106,7 +106,7 @@ class SffInformed(Sff):
 
 
 @compiled
-def clustering(d: float, g: Gains) -> float:
+def clustering(d: float, g: SffGains) -> float:
     """Attraction [N] at distance d [m]; negative repels. Olfati-Saber's phi_alpha with a transition of set width."""
     z = (d - g.cluster_distance) / g.cluster_width
     return g.cluster * bump(d / g.cluster_range) * z / math.sqrt(1.0 + z * z)
@@ -172,7 +172,7 @@ def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None
 
 
 @compiled
-def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory, action: Float32) -> None:
+def _decide(flat: Float32, at: Starts, g: SffGains, limits: Limits, memory: Memory, action: Float32) -> None:
     """The law for every vehicle.
 
     Args:
@@ -191,7 +191,7 @@ def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory,
 
 
 @compiled
-def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, memory: Memory) -> tuple[float, float]:
+def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: Memory) -> tuple[float, float]:
     """Body-frame force on one vehicle [N], forward and to starboard.
 
     Args:
