@@ -19,7 +19,7 @@ from onnx.reference import ReferenceEvaluator
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, granted, make
-from uuv_marl.baselines.export import write_onnx
+from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm

@@ -12,13 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, Policy, PolicyError, bio_inspired, granted, make, sdc, sff
-from uuv_marl.baselines.gains import DEFAULT_PRESET, PRESETS
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, granted, make
+from uuv_marl.baselines.paper import bio_inspired, sdc, sff
+from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
-GAINS = bio_inspired.Gains()
+GAINS = bio_inspired.BioInspiredGains()
 
 
 def test_the_default_gains_are_table_1():
@@ -150,7 +151,7 @@ def test_echoes_of_one_obstacle_count_once_where_asked():
 
 @given(st.floats(10.0, 26.0), st.floats(4.0, 20.0))
 def test_clustering_repels_within_its_distance_and_attracts_beyond(distance, width):
-    gains = sff.Gains(1, 1, 100.0, distance, width, 60.0, 0, 0, 0, 1, 0, 1, 0)
+    gains = sff.SffGains(1, 1, 100.0, distance, width, 60.0, 0, 0, 0, 1, 0, 1, 0)
     assert sff.clustering(distance, gains) == 0.0
     assert sff.clustering(distance - 5.0, gains) < 0 < sff.clustering(distance + 5.0, gains)
     assert sff.clustering(60.0, gains) == 0.0
@@ -158,7 +159,7 @@ def test_clustering_repels_within_its_distance_and_attracts_beyond(distance, wid
 
 def test_sff_predicts_where_a_neighbour_will_be():
     """A neighbour that closes in is pushed away earlier than one that stands, in whatever frame the vehicle turns."""
-    gains = sff.Gains(0.001, 60, 600.0, 18.0, 12.0, 40.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0)
+    gains = sff.SffGains(0.001, 60, 600.0, 18.0, 12.0, 40.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0)
     scenario = granted("sff", load_scenario("tracking", num_vehicles=2))
     layout = PerceptLayout.of(scenario)
 
@@ -316,7 +317,7 @@ def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
 def test_gains_and_parameters_can_be_written_behind_a_name():
     scenario = load_scenario("starter")
     policy = make("bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle", scenario)
-    assert policy.gains == bio_inspired.Gains(zeta_n=0.5)
+    assert policy.gains == bio_inspired.BioInspiredGains(zeta_n=0.5)
     assert make("bio_inspired", scenario, zeta_n=0.5).gains == policy.gains
     percept = Swarm(scenario).reset(0)
     assert not np.array_equal(policy.act(percept), make("bio_inspired", scenario).act(percept))

@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import apf, granted, make, olfati_saber, orca
+from uuv_marl.baselines import granted, make
+from uuv_marl.baselines.comparators import apf, olfati_saber, orca
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
-APF = apf.Gains(80.0, 40_000.0, 50.0, 500_000.0, 20.0)
-FLOCK = olfati_saber.Gains(2.0, 14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
-ORCA = orca.Gains(3.0, 5.0, 6.0, 6.0, 0.1)
+APF = apf.ApfGains(80.0, 40_000.0, 50.0, 500_000.0, 20.0)
+FLOCK = olfati_saber.OlfatiSaberGains(2.0, 14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
+ORCA = orca.OrcaGains(3.0, 5.0, 6.0, 6.0, 0.1)
 METRES = st.floats(-60.0, 60.0)
 
 

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, PolicyError, granted, make
-from uuv_marl.baselines.checkpoint import load_checkpoint, save_checkpoint
+from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoint
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, load_trace
 from uuv_marl.cli import app, main

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.bio_inspired import Gains
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
-from uuv_marl.baselines.export import write_onnx
-from uuv_marl.baselines.features import BARRIER
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.learned.export import write_onnx
+from uuv_marl.baselines.learned.percept_features import BARRIER
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.cli import app
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -93,7 +93,7 @@ def test_it_takes_what_the_environment_gives(tmp_path):
 
 
 @pytest.mark.parametrize("arrays", [None, [BOW, RING], [RING]])
-@pytest.mark.parametrize("barrier", [BARRIER, Gains(zeta_n=0.8, delta_n=2.0, zeta_o=0.3, delta_o=5.0)])
+@pytest.mark.parametrize("barrier", [BARRIER, BioInspiredGains(zeta_n=0.8, delta_n=2.0, zeta_o=0.3, delta_o=5.0)])
 def test_hostile_percepts(arrays, barrier, scale, tmp_path):
     """Positions from on top of the vehicle to the ends of the bounds, flags at random, rubbish where none is set."""
     scenario = load_scenario("single_obstacle", overrides={"sonar.arrays": arrays} if arrays else {})

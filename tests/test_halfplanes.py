@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from uuv_marl.baselines.halfplanes import nearest_velocity
+from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 
 LIMIT = 4.0
 COORDINATES = st.floats(-6.0, 6.0).map(lambda value: round(value, 3))

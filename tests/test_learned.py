@@ -16,8 +16,8 @@ import safetensors.numpy
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, PolicyError, checkpoint, granted, learned, make
-from uuv_marl.baselines.checkpoint import (
+from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines.learned.checkpoint import (
     WEIGHTS_FILE,
     Card,
     Layer,
@@ -26,8 +26,8 @@ from uuv_marl.baselines.checkpoint import (
     save_checkpoint,
     vehicle_of,
 )
-from uuv_marl.baselines.features import BARRIER, Features
-from uuv_marl.baselines.learned import forward
+from uuv_marl.baselines.learned.network import forward
+from uuv_marl.baselines.learned.percept_features import BARRIER, Features
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, ResultsError, knowledge
@@ -36,8 +36,6 @@ from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.swarm import Swarm
 
-DOCUMENTED = ("Card", "Layer", "rows_of", "save_checkpoint")
-"""What the page on MAPPO imported from ``learned`` in version 0.1.0."""
 SHORT = {"trajectory.waypoints_m": [[0.0, 0.0], [40.0, 0.0]], "time_limit.extra_s": 1.0, "time_limit.factor": 1.0}
 
 
@@ -57,10 +55,6 @@ def card(**changes):
 def best(tmp_path):
     save_checkpoint(tmp_path / "best" / WEIGHTS_FILE, card(training={"seed": 3}), actor())
     return str(tmp_path / "best")
-
-
-def test_names_of_the_first_version_are_still_found_where_they_were():
-    assert all(getattr(learned, name) is getattr(checkpoint, name) for name in DOCUMENTED)
 
 
 def test_a_checkpoint_comes_back_as_it_was_written(best):

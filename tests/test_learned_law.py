@@ -9,14 +9,14 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.learned import forward
-from uuv_marl.baselines.learned_law import TrimmedLaw
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.network import forward
+from uuv_marl.baselines.learned.trimmed_scout import TrimmedLaw
 from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
-from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.trims import MOST_TRIM, softened, wary
+from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.scout.trims import MOST_TRIM, softened, wary
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -157,7 +157,7 @@ def test_who_makes_up_for_its_lag_steers_softly_only_where_it_hears_well(noise_d
 
 
 def test_who_does_not_doubt_has_the_gains_of_the_law():
-    law = Gains(pull_in_doubt=-0.3, push_in_doubt=0.7)
+    law = ScoutGains(pull_in_doubt=-0.3, push_in_doubt=0.7)
     assert wary(law, 0.0) == law
     assert wary(law, 1.0) == law._replace(pull=law.pull * math.exp(-0.3), push=law.push * math.exp(0.7))
 
@@ -209,7 +209,7 @@ def test_a_trim_is_a_bounded_factor_of_a_vehicle_s_own_steering():
 
 
 def test_trims_by_hand():
-    law = Gains(steering=0.8)
+    law = ScoutGains(steering=0.8)
     assert softened(law, -0.25, 1.0) == law._replace(steering=0.8 * math.exp(-2.0)) == softened(law, -1.0, 0.25)
     assert softened(law, 0.25, 1.0) == softened(law, 0.0, 1.0) == softened(law, -0.25, 0.0) == law, "never harder"
     assert softened(law, -3.0, 1.0).steering == pytest.approx(0.8 * math.exp(-3.0)), "nor so soft that a vehicle drifts"

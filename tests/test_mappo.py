@@ -21,9 +21,9 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, load_checkpoint
-from uuv_marl.baselines.features import BARRIER, Features
-from uuv_marl.baselines.learned import forward
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint
+from uuv_marl.baselines.learned.network import forward
+from uuv_marl.baselines.learned.percept_features import BARRIER, Features
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError, RewardError, ScenarioError, TrainingError

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
-from uuv_marl.baselines.checkpoint import load_checkpoint
+from uuv_marl.baselines.learned.checkpoint import load_checkpoint
 from uuv_marl.benchmark.robustness.axes import AXES
 from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances

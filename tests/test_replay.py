@@ -485,7 +485,7 @@ def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(tmp_path,
     monkeypatch.chdir(tmp_path)
     Path("my waters").mkdir()
     Path("my waters", "mine.toml").write_text('title = "Mine"\nsource = "own"\nextends = "single_obstacle"\n')
-    Path("own.py").write_text("from uuv_marl.baselines.floors import Random\n\n\nclass Mine(Random):\n    pass\n")
+    Path("own.py").write_text("from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n")
     monkeypatch.setattr(sys, "path", list(sys.path))
     arguments = ["--scenario=my waters/mine.toml", "--scenario=tracking", "--policy=own:Mine", "--seeds=2", *SETS]
     close = "--set=constraints.s_u_m=30.0"

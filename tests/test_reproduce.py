@@ -30,7 +30,7 @@ from research.paper.cases import (
 from research.paper.claims import CLAIMS
 from research.paper.ledger import assumption_entries, difference, given_entries, ledger, read_ledger, verdict
 from research.paper.report import page
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.benchmark.suite import Case, Suite
 from uuv_marl.errors import ResultsError
 
@@ -199,10 +199,10 @@ OBSTACLES = (ZETA_SMALL, ZETA_LARGE, DELTA_SMALL, DELTA_LARGE)
 FALSE = {
     "idle": swapped("idle", (TRACKING, SINGLE, MULTI), "idle"),
     "random": swapped("random", (TRACKING, SINGLE), "random"),
-    "no tau_n": swapped("alone", (TRACKING, MULTI), gains=Gains(zeta_n=0.0)),
-    "no tau_o": swapped("blind", (SINGLE, MULTI), gains=Gains(zeta_o=0.0)),
+    "no tau_n": swapped("alone", (TRACKING, MULTI), gains=BioInspiredGains(zeta_n=0.0)),
+    "no tau_o": swapped("blind", (SINGLE, MULTI), gains=BioInspiredGains(zeta_o=0.0)),
     "the same gains": {case.name: SINGLE for case in OBSTACLES},
-    "huge delta_o": swapped("huge", (DELTA_LARGE,), gains=Gains(delta_o=400.0)),
+    "huge delta_o": swapped("huge", (DELTA_LARGE,), gains=BioInspiredGains(delta_o=400.0)),
     "safer comparators": {case.name: DELTA_LARGE for case in COMPARATORS},
     "faster comparators": {case.name: ZETA_SMALL for case in COMPARATORS},
 }
@@ -320,7 +320,7 @@ def test_every_assumption_says_what_was_in_view():
 def test_a_case_that_changes_finds_no_old_runs(tmp_path):
     suite = Suite(tmp_path, 1)
     before = Case("x", "single_obstacle", overrides={"time_limit.factor": 0.01, "time_limit.extra_s": 1.0})
-    after = before._replace(parameters={"gains": Gains(zeta_o=1.0)})
+    after = before._replace(parameters={"gains": BioInspiredGains(zeta_o=1.0)})
     suite.run([before], lambda what, share: None)
     assert len(suite.metric(before, "effort")) == 1
     assert len(Suite(tmp_path, 1).metric(after, "effort")) == 0

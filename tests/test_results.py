@@ -166,7 +166,7 @@ def test_runs_are_sorted_whatever_the_order_in_which_they_came(tmp_path):
 def test_a_policy_that_has_changed_is_run_again_if_asked_for(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
-    own = "from uuv_marl.baselines.floors import Idle\n\nclass Own(Idle):\n    pass\n"
+    own = "from uuv_marl.baselines.random_idle import Idle\n\nclass Own(Idle):\n    pass\n"
     (tmp_path / "own_policy.py").write_text(own)
     wanted = "--policy=idle", "--policy=own_policy:Own", "--seeds=2"
     assert command(*wanted, output=tmp_path)[0].exit_code == 0

@@ -8,7 +8,7 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, granted, make
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.replay import traces
 from uuv_marl.sim.swarm import Swarm

@@ -10,10 +10,10 @@ from research.columns import read_columns, write_columns
 from research.dynamics import formation, rest, softening, stability
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.sim.swarm import Swarm
 
-GAINS = Gains()
+GAINS = BioInspiredGains()
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_a_law_with_jumps_parts_copies_faster_when_they_are_farther_apart():
 
 
 def test_a_stiff_pull_alone_keeps_a_vehicle_moving_and_yaw_damping_stops_it():
-    stiff = rest.Variant("", num_vehicles=1, gains=Gains(zeta_l=1000.0))
+    stiff = rest.Variant("", num_vehicles=1, gains=BioInspiredGains(zeta_l=1000.0))
     damped = dataclasses.replace(stiff, yaw_damping_nms=600.0)
     assert rest.measure(stiff, (0,))["yaw_rate_rms_rad_per_s"] > 1.0
     assert rest.measure(damped, (0,))["yaw_rate_rms_rad_per_s"] < 0.05

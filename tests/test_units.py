@@ -11,8 +11,8 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.bio_inspired import BioInspired
 from uuv_marl.baselines.memory.pose import Reckoning
+from uuv_marl.baselines.paper.bio_inspired import BioInspired
 from uuv_marl.baselines.policy import Limits, Policy, inner_loop_nms, write_action
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl import baselines, load_scenario
-from uuv_marl.baselines.bio_inspired import BioInspiredPlus
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredPlus
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
+from uuv_marl.baselines.paper.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspiredGains
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float64, Int32
@@ -60,7 +60,7 @@ def drag_n(scenario: Scenario) -> float:
     return (scenario.vehicle.X_u + scenario.vehicle.X_uu * speed) * speed
 
 
-def links(places: Float64, heard: Int32, gains: Gains) -> tuple[Float64, Float64, Float64]:
+def links(places: Float64, heard: Int32, gains: BioInspiredGains) -> tuple[Float64, Float64, Float64]:
     """Of every link: where the neighbour is [m], shape (..., vehicle, sector, 2), and its weight and slope.
 
     The force from a neighbour at p is weight p, and changes with p by weight I + slope p p^T. Both [N/m, N/m3] are 0
@@ -74,13 +74,13 @@ def links(places: Float64, heard: Int32, gains: Gains) -> tuple[Float64, Float64
     return p, -zeta_n * (value - np.e), zeta_n * value * gains.delta_n / distance**3
 
 
-def forces(places: Float64, heard: Int32, gains: Gains) -> Float64:
+def forces(places: Float64, heard: Int32, gains: BioInspiredGains) -> Float64:
     """Force of the law on every vehicle [N], in the leg's frame, shape (..., vehicle, 2). Eq. 18-20."""
     p, weight, _ = links(places, heard, gains)
     return -gains.zeta_l * places + (weight[..., None] * p).sum(axis=-2)
 
 
-def stiffness(places: Float64, heard: Int32, gains: Gains) -> Float64:
+def stiffness(places: Float64, heard: Int32, gains: BioInspiredGains) -> Float64:
     """How forces change with places [N/m], shape (2 vehicle, 2 vehicle): one world, frozen sets."""
     n, each = len(heard), np.arange(len(heard))
     p, weight, slope = links(places, heard, gains)
@@ -91,7 +91,9 @@ def stiffness(places: Float64, heard: Int32, gains: Gains) -> Float64:
     return total.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
 
 
-def formations(scenario: Scenario, gains: Gains, seeds: Sequence[int], rounds: int = ROUNDS) -> list[Formation]:
+def formations(
+    scenario: Scenario, gains: BioInspiredGains, seeds: Sequence[int], rounds: int = ROUNDS
+) -> list[Formation]:
     """A formation from each seed's start: relaxed with fresh neighbour sets, then solved with frozen ones.
 
     Where no balance is found, the relaxed state with the smallest residual of the second half stands for it.
@@ -141,7 +143,7 @@ def _rms(force: Float64) -> Float64:
     return np.sqrt((force**2).sum(axis=-1).mean(axis=-1))
 
 
-def _solve(places: Float64, heard: Int32, push: Float64, gains: Gains) -> Float64:
+def _solve(places: Float64, heard: Int32, push: Float64, gains: BioInspiredGains) -> Float64:
     """Places of balance with these sets by Newton's method; where it leaves for elsewhere, the last within reach.
 
     Args:

@@ -18,7 +18,7 @@ from research.columns import Columns, groups
 from research.dynamics.formation import straight_leg
 from research.dynamics.softening import PAPER, Softened, Softening
 from research.part import Part, Share, Tables
-from uuv_marl.baselines.bio_inspired import BioInspired, Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredGains
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, SKY, legend, panels
 from uuv_marl.benchmark.suite import Suite
@@ -41,7 +41,7 @@ SMALL_DISPLACEMENT = 3e-5
 with a jump, the larger one is that of displacements that can be measured: copies that switch a step apart part."""
 
 
-TABLE_1 = Gains()
+TABLE_1 = BioInspiredGains()
 """Its gains."""
 
 
@@ -53,7 +53,7 @@ class Variant:
     hold_s: float = 0.1
     yaw_damping_nms: float = 0.0
     softening: Softening = PAPER
-    gains: Gains = TABLE_1
+    gains: BioInspiredGains = TABLE_1
     num_vehicles: int = 54
     tracking: bool = False
     """Measured on a long straight leg instead of at rest."""
@@ -96,8 +96,10 @@ VARIANTS = (
     Variant("dead zone 600 N", softening=Softening(dead_zone_n=600.0)),
     Variant("dead zone 600 N", hold_s=0.05, softening=Softening(dead_zone_n=600.0)),
     Variant("one vehicle", num_vehicles=1),
-    Variant("one vehicle, zeta_l = 1000 N/m", num_vehicles=1, gains=Gains(zeta_l=1000.0)),
-    Variant("one vehicle, zeta_l = 1000 N/m", num_vehicles=1, gains=Gains(zeta_l=1000.0), yaw_damping_nms=600.0),
+    Variant("one vehicle, zeta_l = 1000 N/m", num_vehicles=1, gains=BioInspiredGains(zeta_l=1000.0)),
+    Variant(
+        "one vehicle, zeta_l = 1000 N/m", num_vehicles=1, gains=BioInspiredGains(zeta_l=1000.0), yaw_damping_nms=600.0
+    ),
 )
 """Rows of the table, in the order drawn."""
 

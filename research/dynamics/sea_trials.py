@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from research.episodes import Row, cells, select, succeeded, write_rows
-from uuv_marl.baselines.actors import Trained
+from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.suite import Case, Report, Suite
 from uuv_marl.scenario import load_scenario, vehicle_names

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspired, Gains
+from uuv_marl.baselines.paper.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspired, BioInspiredGains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Float32, Float64
@@ -41,7 +41,12 @@ class Softened(BioInspired):
     """
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, softening: Softening = PAPER
+        self,
+        scenario: Scenario,
+        num_worlds: int = 1,
+        *,
+        gains: BioInspiredGains | None = None,
+        softening: Softening = PAPER,
     ) -> None:
         super().__init__(scenario, num_worlds, gains=gains)
         self.softening = softening

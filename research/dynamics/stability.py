@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingType
 from research.columns import Columns, columns, groups, where
 from research.dynamics.formation import Formation, drag_n, formations, stiffness, straight_leg
 from research.part import Part, Share, Tables
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.benchmark.style import BLACK, BLUE, COLOURS, GREY, ORANGE, panels
 from uuv_marl.benchmark.suite import Suite
 from uuv_marl.scenario import Scenario
@@ -128,7 +128,7 @@ def rates(values: Complex128) -> Rates:
     )
 
 
-def lone_stiffness(gains: Gains) -> Float64:
+def lone_stiffness(gains: BioInspiredGains) -> Float64:
     """``stiffness`` of a vehicle without neighbours: the pull to l(t) alone."""
     return -gains.zeta_l * np.eye(2)
 
@@ -157,8 +157,8 @@ def tables(_suite: Suite, report: Share) -> Tables:
     """
     # Two BLAS threads fight over a busy core, and round differently.
     with threadpool_limits(1, user_api="blas"):
-        nominal = formations(straight_leg(), Gains(), SEEDS)
-        rigid = stiffness(nominal[0].places, nominal[0].heard, Gains())
+        nominal = formations(straight_leg(), BioInspiredGains(), SEEDS)
+        rigid = stiffness(nominal[0].places, nominal[0].heard, BioInspiredGains())
         spectrum = [
             {"loop": loop_name(hold_s), "real_per_s": value.real, "imaginary_rad_per_s": value.imag}
             for hold_s in SHOWN_HOLDS_S
@@ -170,7 +170,10 @@ def tables(_suite: Suite, report: Share) -> Tables:
             rows += _margins(parameter, value, nominal)
             report((k + 1) / len(cases))
         critical = [
-            {"yaw_damping_nms": damping, "lone_critical_hold_s": critical_hold_s(alone, lone_stiffness(Gains()))}
+            {
+                "yaw_damping_nms": damping,
+                "lone_critical_hold_s": critical_hold_s(alone, lone_stiffness(BioInspiredGains())),
+            }
             for damping in CRITICAL_DAMPING_NMS
             for alone in [straight_leg(1, yaw_damping_nms=damping)]
         ]
@@ -184,13 +187,13 @@ def loop_name(hold_s: float) -> str:
 
 def _margins(parameter: str, value: float, nominal: Sequence[Formation]) -> Iterator[dict[str, Any]]:
     """Rows of ``margins`` for one value of one parameter: per control hold and seed."""
-    gains, found = Gains(), nominal
+    gains, found = BioInspiredGains(), nominal
     scenario = straight_leg(yaw_damping_nms=value if parameter == "yaw_damping_nms" else 0.0)
     if parameter == "num_vehicles":
         scenario = straight_leg(round(value))
     elif parameter in gains._fields:
         gains = gains._replace(**{parameter: value})
-    if gains != Gains() or scenario.swarm.num_vehicles != len(nominal[0].places):
+    if gains != BioInspiredGains() or scenario.swarm.num_vehicles != len(nominal[0].places):
         found = formations(scenario, gains, SEEDS)
     for hold_s in (value,) if parameter == "t_r" else SWEEP_HOLDS_S:
         lone = rates(eigenvalues(scenario, lone_stiffness(gains), hold_s))

@@ -1,12 +1,12 @@
 """What the paper runs: its controller on its three scenarios, other obstacle gains, and the methods it names."""
 
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.benchmark.suite import Case
 
 
 def _gains(name: str, **gains: float) -> Case:
     """Figures 12 and 13: other obstacle gains on the single obstacle."""
-    return Case(name, "single_obstacle", parameters={"gains": Gains(**gains)}, routes=True)
+    return Case(name, "single_obstacle", parameters={"gains": BioInspiredGains(**gains)}, routes=True)
 
 
 TRACKING = Case("tracking", "tracking", routes=True)

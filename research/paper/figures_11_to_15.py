@@ -12,7 +12,7 @@ from research.columns import Columns
 from research.paper.cases import DELTA_LARGE, DELTA_SMALL, MULTI, SINGLE, ZETA_LARGE, ZETA_SMALL
 from research.paper.drawing import against_time, draw_routes, route_table
 from research.part import Part, Share, Tables
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.style import BLACK, COLOURS, ORANGE, legend, panels
 from uuv_marl.benchmark.suite import Case, Suite
@@ -61,13 +61,13 @@ def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
 
     Args:
         name: of the part.
-        symbol: of the gain, a field of ``Gains``.
+        symbol: of the gain, a field of ``BioInspiredGains``.
         small: the case in which it is too small.
         large: the case in which it is too large.
     """
 
     def gain(case: Case) -> float:
-        return float(getattr(case.parameters.get("gains", Gains()), symbol))
+        return float(getattr(case.parameters.get("gains", BioInspiredGains()), symbol))
 
     def draw(made: Tables) -> Figure:
         figure, axes = panels(2)

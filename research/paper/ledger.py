@@ -11,7 +11,7 @@ from research.paper.assumptions import ASSUMPTIONS
 from research.paper.cases import BY_NAME, SCENARIOS
 from research.paper.claims import CLAIMS, Claim, stated
 from uuv_marl.atomic import write_text
-from uuv_marl.baselines.bio_inspired import Gains
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.suite import Case, Suite
 from uuv_marl.benchmark.tables import Estimate, estimate, markdown_table
@@ -131,7 +131,7 @@ def given_entries() -> list[Entry]:
     """What the paper sets, against the scenarios and gains that are run."""
     tracking, single, multi = (case.load() for case in SCENARIOS)
     arrays = {array.kind: array for array in tracking.sonar.arrays}
-    start, gains = tracking.start, Gains()
+    start, gains = tracking.start, BioInspiredGains()
     pairs: list[tuple[str, str, str, object, object]] = [
         ("Table 1", "zeta_l", "N/m", 30, gains.zeta_l),
         ("Table 1", "zeta_n", "N/m", 0.8, gains.zeta_n),

@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 
 from research.verify.rows import NoEpisodesError, Row, rows_of
 from uuv_marl.baselines import granted
-from uuv_marl.baselines.checkpoint import is_checkpoint
+from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.registry import GUARDED
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.benchmark.results import FILE

@@ -280,7 +280,7 @@ OWN = """
 import os
 
 import numba
-from uuv_marl.baselines.floors import Idle
+from uuv_marl.baselines.random_idle import Idle
 from beside import NAME
 
 assert NAME == "found"

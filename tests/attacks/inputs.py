@@ -362,7 +362,7 @@ def states_by_hand(rng, folder):
 
 
 def checkpoints(rng, folder):
-    data = bytearray((PACKAGE / "baselines" / "trained" / f"{pick(rng, ('mappo', 'ppo'))}.safetensors").read_bytes())
+    data = bytearray((PACKAGE / "baselines" / "weights" / f"{pick(rng, ('mappo', 'ppo'))}.safetensors").read_bytes())
     length = struct.unpack("<Q", data[:8])[0]
     how = rng.integers(5)
     if how == 0:

@@ -9,20 +9,20 @@ from typing import Any, NamedTuple, Protocol, overload
 
 import numpy as np
 
-from uuv_marl.baselines.actors import Trained, shipped
-from uuv_marl.baselines.apf import Apf
-from uuv_marl.baselines.bio_inspired import BioInspired, BioInspiredPlus
-from uuv_marl.baselines.checkpoint import is_checkpoint
-from uuv_marl.baselines.floors import Idle, Random
-from uuv_marl.baselines.guarded import Guarded
-from uuv_marl.baselines.olfati_saber import OlfatiSaber, OlfatiSaberInformed
-from uuv_marl.baselines.orca import OrcaInformed
+from uuv_marl.baselines.comparators.apf import Apf
+from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaberInformed
+from uuv_marl.baselines.comparators.orca import OrcaInformed
+from uuv_marl.baselines.comparators.pull import Pull
+from uuv_marl.baselines.learned.checkpoint import is_checkpoint
+from uuv_marl.baselines.learned.trained import Trained, shipped
+from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
+from uuv_marl.baselines.paper.sdc import Sdc, SdcInformed
+from uuv_marl.baselines.paper.sff import Sff, SffInformed
 from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_granted
-from uuv_marl.baselines.pull import Pull
-from uuv_marl.baselines.safety import GUARD, Barrier
-from uuv_marl.baselines.scout import Scout
-from uuv_marl.baselines.sdc import Sdc, SdcInformed
-from uuv_marl.baselines.sff import Sff, SffInformed
+from uuv_marl.baselines.random_idle import Idle, Random
+from uuv_marl.baselines.safety.barrier import GUARD, Barrier
+from uuv_marl.baselines.safety.guarded import Guarded
+from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
@@ -248,7 +248,7 @@ def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters
         barrier = parameters.pop("barrier", GUARD)
         if not isinstance(barrier, Barrier):
             raise PolicyError(
-                f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
+                f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.barrier.Barrier, got {barrier!r}; "
                 "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
             )
         inner = _made(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing, write_text
-from uuv_marl.baselines import apf, bio_inspired, granted, olfati_saber, orca, sdc, sff
+from uuv_marl.baselines import granted
+from uuv_marl.baselines.comparators import apf, olfati_saber, orca
+from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.extras import silenced
 from uuv_marl.paths import UserPath, user_path
@@ -45,15 +47,18 @@ _RANGES = _ranges()
 _SFF = _RANGES["sff"] | _RANGES["obstacle"]
 _SDC = _RANGES["sdc"] | _RANGES["obstacle"] | _RANGES["informed"]
 SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
-    "bio_inspired_plus": (_RANGES["bio_inspired"], partial(bio_inspired.Gains, feed_forward=bio_inspired.FEED_FORWARD)),
-    "sff": (_SFF | _RANGES["uninformed"], sff.Gains),
-    "sff_informed": (_SFF | _RANGES["informed"], sff.Gains),
-    "sdc": (_SDC, sdc.Gains),
-    "sdc_informed": (_SDC, sdc.Gains),
-    "apf": (_RANGES["apf"], apf.Gains),
-    "olfati_saber": (_RANGES["olfati_saber"], olfati_saber.Gains),
-    "olfati_saber_informed": (_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.Gains),
-    "orca_informed": (_RANGES["orca"], orca.Gains),
+    "bio_inspired_plus": (
+        _RANGES["bio_inspired"],
+        partial(bio_inspired.BioInspiredGains, feed_forward=bio_inspired.FEED_FORWARD),
+    ),
+    "sff": (_SFF | _RANGES["uninformed"], sff.SffGains),
+    "sff_informed": (_SFF | _RANGES["informed"], sff.SffGains),
+    "sdc": (_SDC, sdc.SdcGains),
+    "sdc_informed": (_SDC, sdc.SdcGains),
+    "apf": (_RANGES["apf"], apf.ApfGains),
+    "olfati_saber": (_RANGES["olfati_saber"], olfati_saber.OlfatiSaberGains),
+    "olfati_saber_informed": (_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.OlfatiSaberGains),
+    "orca_informed": (_RANGES["orca"], orca.OrcaGains),
 }
 """Free parameters of every tuned policy, and how they become its gains."""
 

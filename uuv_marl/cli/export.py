@@ -25,7 +25,7 @@ def export(
     """
     with explained():
         with extra("onnx", "export to ONNX"):
-            from uuv_marl.baselines.export import write_onnx
+            from uuv_marl.baselines.learned.export import write_onnx
 
         from uuv_marl.scenario import load_scenario
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.features import BARRIER, Features, num_features
-from uuv_marl.baselines.learned_law import TrimmedLaw
-from uuv_marl.baselines.recall import RECALLED
+from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.percept_features import BARRIER, Features, num_features
+from uuv_marl.baselines.learned.trimmed_scout import TrimmedLaw
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.training import Training

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.checkpoint import Layer
+from uuv_marl.baselines.learned.checkpoint import Layer
 from uuv_marl.extras import extra
 from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.exploration import exploration

@@ -17,8 +17,8 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
-from uuv_marl.baselines.features import BARRIER
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.errors import ResultsError, TrainingError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path

@@ -6,8 +6,8 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.checkpoint import Card, Layer, rows_of, save_checkpoint, vehicle_of
-from uuv_marl.baselines.features import BARRIER, MOST_BARRIER, Features
+from uuv_marl.baselines.learned.checkpoint import Card, Layer, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.baselines.learned.percept_features import BARRIER, MOST_BARRIER, Features
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.errors import PolicyError
 from uuv_marl.extras import extra

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal, cast
 
 import pydantic
 
-from uuv_marl.baselines.checkpoint import PERIODS_S
-from uuv_marl.baselines.gains import Gains
+from uuv_marl.baselines.learned.checkpoint import PERIODS_S
 from uuv_marl.baselines.policy import Policy, inner_loop_nms
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
@@ -132,7 +132,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     output trimming the gains of ``law``, inside the safety filter."""
     held_s: float = pydantic.Field(0.0, ge=0.0, le=10.0)
     """An output of the actor is held for so long [s], rounded to whole decisions; 0: for one decision."""
-    law: Annotated[Gains, AsTable] = Gains()
+    law: Annotated[ScoutGains, AsTable] = ScoutGains()
     """With memory: of the hand-made law that the actor trims."""
     safety: Annotated[Barrier, AsTable] = Barrier()
     """With memory: margins and rates of the safety filter."""
@@ -295,7 +295,7 @@ def read_recipe(name: str) -> dict[str, Any]:
 
 TABLES: Mapping[str, Sequence[str]] = {
     "": [*Training.model_fields], "mappo": [*Hyperparameters.model_fields], "episodes": [*Episodes.model_fields],
-    "weights": Weights._fields, "law": Gains._fields, "safety": Barrier._fields,
+    "weights": Weights._fields, "law": ScoutGains._fields, "safety": Barrier._fields,
 }  # fmt: skip
 """Names of all fields, by table."""
 

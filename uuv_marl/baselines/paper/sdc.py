@@ -29,7 +29,7 @@ _MOST_VEHICLES = 2000
 """Slots are assigned in a time that grows with the cube of the swarm: 1.5 s here, a quarter of an hour for 16,384."""
 
 
-class Gains(NamedTuple):
+class SdcGains(NamedTuple):
     """Free parameters, found by tuning."""
 
     consensus: float
@@ -86,9 +86,9 @@ class Sdc(Policy):
     tuned_as: ClassVar[str] = "sdc"
     all_informed: ClassVar[bool] = False
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SdcGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains(**tuned(self.tuned_as))
+        self.gains = gains or SdcGains(**tuned(self.tuned_as))
         n = scenario.swarm.num_vehicles
         if n > _MOST_VEHICLES:
             raise PolicyError(
@@ -155,7 +155,7 @@ def hexagonal_slots(n: int) -> Float64:
 def _act(
     flat: Float32,
     at: Starts,
-    g: Gains,
+    g: SdcGains,
     limits: Limits,
     slots: Float64,
     depth: Float64,
@@ -190,7 +190,7 @@ def _force(
     w: int,
     i: int,
     see: Fields,
-    g: Gains,
+    g: SdcGains,
     limits: Limits,
     slots: Float64,
     depth: Float64,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uuv_marl.baselines.bio_inspired import Gains, neighbour_force, obstacle_force
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains, neighbour_force, obstacle_force
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.percept import PerceptLayout, Starts
 from uuv_marl.scenario import Scenario
@@ -10,7 +10,7 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Int64
 
-BARRIER = Gains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)
+BARRIER = BioInspiredGains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, delta_o=140.0)
 """Eq. 20-21 at short range, without the pull to l(t): half the paper's delta_n, and weaker but steeper at obstacles."""
 MOST_BARRIER = 8.0
 """The barrier is bounded here [full force]; the action is bounded by 1 after the sum."""
@@ -29,7 +29,7 @@ class Features:
         gains: of the barrier.
     """
 
-    def __init__(self, scenario: Scenario, gains: Gains) -> None:
+    def __init__(self, scenario: Scenario, gains: BioInspiredGains) -> None:
         self._at = PerceptLayout.of(scenario).offsets
         self._gains = gains
         self._limits = Limits.of(scenario)
@@ -61,7 +61,13 @@ def put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
 
 @compiled
 def _look(
-    flat: Float32, at: Starts, gains: Gains, limits: Limits, features: Float32, barrier: Float32, clamps: Int64
+    flat: Float32,
+    at: Starts,
+    gains: BioInspiredGains,
+    limits: Limits,
+    features: Float32,
+    barrier: Float32,
+    clamps: Int64,
 ) -> None:
     """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do.
 

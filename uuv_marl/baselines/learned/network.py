@@ -4,16 +4,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from uuv_marl.baselines.checkpoint import Card, Checkpoint, Layer, rows_of, save_checkpoint, vehicle_of
-from uuv_marl.baselines.features import Features
+from uuv_marl.baselines.learned.checkpoint import Card, Checkpoint, Layer, rows_of, vehicle_of
+from uuv_marl.baselines.learned.percept_features import Features
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
 from uuv_marl.types import Float32
-
-__all__ = ["Card", "Layer", "Learned", "forward", "need_same", "rows_of", "save_checkpoint"]
 
 
 def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:

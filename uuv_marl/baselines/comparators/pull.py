@@ -13,7 +13,7 @@ from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32
 
 
-class Gains(NamedTuple):
+class PullGains(NamedTuple):
     """Gains of the wished velocity."""
 
     pull: float = 0.05
@@ -26,9 +26,9 @@ class Pull(Policy):
     wishes_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: PullGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains()
+        self.gains = gains or PullGains()
         self._gain = velocity_gain(scenario)
 
     def decide(self, percept: Percept) -> Float32:
@@ -40,7 +40,7 @@ class Pull(Policy):
 
 
 @compiled
-def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, gain: float, action: Float32) -> None:
+def _act(flat: Float32, at: Starts, g: PullGains, limits: Limits, gain: float, action: Float32) -> None:
     """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, Gains
-from uuv_marl.baselines.checkpoint import Layer
-from uuv_marl.baselines.features import MOST_BARRIER
-from uuv_marl.baselines.learned import Learned
+from uuv_marl.baselines import granted, make
+from uuv_marl.baselines.learned.checkpoint import Layer
+from uuv_marl.baselines.learned.network import Learned
+from uuv_marl.baselines.learned.percept_features import MOST_BARRIER
+from uuv_marl.baselines.paper.bio_inspired import MAX_EXPONENT, MIN_DISTANCE_M, BioInspiredGains
 from uuv_marl.baselines.policy import Limits, PolicyError
-from uuv_marl.baselines.registry import granted, make
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
@@ -114,7 +114,9 @@ def _forward(g: "Graph", x: "Value", layers: Sequence[Layer]) -> "Value":
     return x
 
 
-def _look(g: "Graph", flat: "Value", layout: PerceptLayout, gains: Gains, limits: Limits) -> "tuple[Value, Value]":
+def _look(
+    g: "Graph", flat: "Value", layout: PerceptLayout, gains: BioInspiredGains, limits: Limits
+) -> "tuple[Value, Value]":
     """``features.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts.
 
     Args:

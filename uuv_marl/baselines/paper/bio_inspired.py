@@ -21,7 +21,7 @@ MIN_DISTANCE_M = 0.5
 """Distances in the exponent are at least this [m]."""
 
 
-class Gains(NamedTuple):
+class BioInspiredGains(NamedTuple):
     """Eq. 18-21; the defaults are Table 1."""
 
     zeta_l: float = 30.0
@@ -59,11 +59,11 @@ class BioInspired(Policy):
         scenario: Scenario,
         num_worlds: int = 1,
         *,
-        gains: Gains | None = None,
+        gains: BioInspiredGains | None = None,
         obstacle_term: ObstacleTerm = "per_echo",
     ) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains()
+        self.gains = gains or BioInspiredGains()
         if obstacle_term not in get_args(ObstacleTerm):
             raise PolicyError(f"obstacle_term must be 'per_echo' or 'per_obstacle', got {obstacle_term!r}")
         self._once = obstacle_term == "per_obstacle"
@@ -90,10 +90,17 @@ class BioInspiredPlus(BioInspired):
     yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, tuned_for: str | None = None
+        self,
+        scenario: Scenario,
+        num_worlds: int = 1,
+        *,
+        gains: BioInspiredGains | None = None,
+        tuned_for: str | None = None,
     ) -> None:
         name = "bio_inspired_plus" if tuned_for is None else f"bio_inspired_plus.{tuned_for}"
-        super().__init__(scenario, num_worlds, gains=gains or Gains(**tuned(name), feed_forward=FEED_FORWARD))
+        super().__init__(
+            scenario, num_worlds, gains=gains or BioInspiredGains(**tuned(name), feed_forward=FEED_FORWARD)
+        )
 
 
 @compiled
@@ -107,7 +114,7 @@ def bounded_exp(length: float, distance: float) -> tuple[float, int]:
 
 
 @compiled
-def neighbour_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]:
+def neighbour_force(p_x: float, p_y: float, g: BioInspiredGains) -> tuple[float, float, int]:
     """Force [N] from a neighbour at p, relative to the vehicle [m]; zero at delta_n. One term of Eq. 20."""
     value, clamped = bounded_exp(g.delta_n, math.hypot(p_x, p_y))
     weight = -g.zeta_n * (value - math.e)
@@ -115,7 +122,7 @@ def neighbour_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int
 
 
 @compiled
-def obstacle_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]:
+def obstacle_force(p_x: float, p_y: float, g: BioInspiredGains) -> tuple[float, float, int]:
     """Force [N] from an obstacle at p, relative to the vehicle [m]. One term of Eq. 21."""
     value, clamped = bounded_exp(g.delta_o, math.hypot(p_x, p_y))
     weight = -g.zeta_o * value
@@ -140,7 +147,14 @@ def counts_once(w: int, i: int, a: int, see: Fields, centres: bool) -> bool:
 
 @compiled
 def _act(
-    flat: Float32, at: Starts, g: Gains, limits: Limits, once: bool, centres: bool, action: Float32, clamps: Int64
+    flat: Float32,
+    at: Starts,
+    g: BioInspiredGains,
+    limits: Limits,
+    once: bool,
+    centres: bool,
+    action: Float32,
+    clamps: Int64,
 ) -> None:
     """The law for every vehicle. Eq. 18-22. With ``once``, adjacent echoes of one obstacle count once."""
     see = fields(flat, at)

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 from uuv_marl.baselines.memory.neighbours import KEPT_S
-from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.safety.barrier import Barrier
 
 
-class Gains(NamedTuple):
+class ScoutGains(NamedTuple):
     """Gains of the wished velocity and of memory, for all scenarios, swarm sizes, echoes and decision periods."""
 
     pull: float = 0.05
@@ -41,18 +41,18 @@ class Gains(NamedTuple):
 class Preset(NamedTuple):
     """A set of numbers for ``scout``."""
 
-    gains: Gains
+    gains: ScoutGains
     barrier: Barrier = Barrier()
     """Margins and rates of the safety filter."""
 
 
-_PLUS = Gains(
+_PLUS = ScoutGains(
     pull=0.04, push_range=15.0, pull_at_rest=10.0, push_at_rest=6.0, together=0.04, behind_m=1.0, kept_s=2.0
 )  # fmt: skip
 _LEAD = _PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0, kept_s=3.0, lead=1.0)
 DEFAULT_PRESET = "base"
 PRESETS = {
-    "base": Preset(Gains()),
+    "base": Preset(ScoutGains()),
     "plus": Preset(_PLUS),  # a swarm that moves as a whole, longer pushes, silent neighbours remembered twice as long
     "lead": Preset(_LEAD),  # makes up for actuators that lag, as far as a vehicle sees it, and is softer at rest
     # Keeps farther from others where it doubts, and from obstacles: with 13.5 m the smallest distance of ``lead`` was

@@ -17,13 +17,13 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
-from uuv_marl.baselines.bio_inspired import Gains
-from uuv_marl.baselines.features import BARRIER, num_features
-from uuv_marl.baselines.gains import Gains as Law
+from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.percept_features import BARRIER, num_features
+from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.baselines.policy import Policy, PolicyError
-from uuv_marl.baselines.recall import RECALLED
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.trims import ALL_TRIMS, Trim
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import Scenario, load_vehicle
@@ -76,8 +76,8 @@ def _numbers(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, float | str
 
 
 def _all_gains(gains: Any) -> Any:
-    if isinstance(gains, list) and len(cast(list[Any], gains)) != len(Gains._fields):
-        raise ValueError(f"must hold {', '.join(Gains._fields)}, got {gains}")
+    if isinstance(gains, list) and len(cast(list[Any], gains)) != len(BioInspiredGains._fields):
+        raise ValueError(f"must hold {', '.join(BioInspiredGains._fields)}, got {gains}")
     return cast(Any, gains)
 
 
@@ -98,9 +98,9 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """Inner loop that it was trained with [N m s]."""
     channels: tuple[str, ...] = ()
     """Channels beyond the percept."""
-    barrier: Annotated[Gains, pydantic.BeforeValidator(_all_gains)] = BARRIER
+    barrier: Annotated[BioInspiredGains, pydantic.BeforeValidator(_all_gains)] = BARRIER
     """Gains of Eq. 20-21, whose force is added to what an actor without memory says."""
-    law: Law = Law()
+    law: ScoutGains = ScoutGains()
     """Gains of ``scout``'s law, which an actor with memory trims."""
     trims: tuple[Trim] = ALL_TRIMS
     """What such an actor trims, in the order of its outputs."""

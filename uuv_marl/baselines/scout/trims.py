@@ -3,9 +3,9 @@
 import math
 from typing import Literal, get_args
 
-from uuv_marl.baselines.gains import Gains
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.doubt import trim_weights
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Bool
 
@@ -19,23 +19,23 @@ _TRIM_STEERING = 8.0
 
 
 @compiled
-def wary(g: Gains, share: float) -> Gains:
+def wary(g: ScoutGains, share: float) -> ScoutGains:
     """Gains of a vehicle that doubts: pull and push, changed. ``share``: how much it doubts, 0 to 1."""
     pull, push = math.exp(share * g.pull_in_doubt), math.exp(share * g.push_in_doubt)
-    return Gains(
+    return ScoutGains(
         g.pull * pull, g.push * push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m, g.steering,
         g.kept_s, g.lead, g.pull_in_doubt, g.push_in_doubt,
     )  # fmt: skip
 
 
 @compiled
-def softened(g: Gains, trim: float, lags: float) -> Gains:
+def softened(g: ScoutGains, trim: float, lags: float) -> ScoutGains:
     """Gains of a vehicle whose steering is trimmed: never harder than the law's, nor softer than a twentieth of it.
 
     A ``trim`` of 0 and more changes nothing; the share ``lags`` of it counts, 0 to 1.
     """
     steering = max(lags * _TRIM_STEERING * min(trim, 0.0), -MOST_TRIM)
-    return Gains(
+    return ScoutGains(
         g.pull, g.push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m,
         g.steering * math.exp(steering), g.kept_s, g.lead, g.pull_in_doubt, g.push_in_doubt,
     )  # fmt: skip

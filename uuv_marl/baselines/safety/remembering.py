@@ -7,7 +7,7 @@ import numpy as np
 from uuv_marl.baselines.memory import Model, Surroundings, listen
 from uuv_marl.baselines.memory.neighbours import KEPT_S
 from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.safety import Barrier
+from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario

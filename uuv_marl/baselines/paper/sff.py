@@ -24,7 +24,7 @@ HORIZON_S = 1.0
 _MAX_RATE_MPS = 8.0
 
 
-class Gains(NamedTuple):
+class SffGains(NamedTuple):
     """Free parameters, found by tuning."""
 
     pull: float
@@ -77,9 +77,9 @@ class Sff(Policy):
     channels: ClassVar[tuple[str, ...]] = ("link",)
     tuned_as: ClassVar[str] = "sff"
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SffGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains(**tuned(self.tuned_as))
+        self.gains = gains or SffGains(**tuned(self.tuned_as))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Compare what is heard with what was heard."""
@@ -102,7 +102,7 @@ class SffInformed(Sff):
 
 
 @compiled
-def clustering(d: float, g: Gains) -> float:
+def clustering(d: float, g: SffGains) -> float:
     """Attraction [N] at distance d [m]; negative repels. Olfati-Saber's phi_alpha with a transition of set width."""
     z = (d - g.cluster_distance) / g.cluster_width
     return g.cluster * bump(d / g.cluster_range) * z / math.sqrt(1.0 + z * z)
@@ -155,7 +155,7 @@ def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None
 
 
 @compiled
-def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory, action: Float32) -> None:
+def _decide(flat: Float32, at: Starts, g: SffGains, limits: Limits, memory: Memory, action: Float32) -> None:
     """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -165,7 +165,7 @@ def _decide(flat: Float32, at: Starts, g: Gains, limits: Limits, memory: Memory,
 
 
 @compiled
-def _force(w: int, i: int, see: Fields, g: Gains, limits: Limits, memory: Memory) -> tuple[float, float]:
+def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: Memory) -> tuple[float, float]:
     """Body-frame force on one vehicle [N], forward and to starboard."""
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])

@@ -6,13 +6,13 @@ all where they answer at once. If the network gives zeros, the policy is the law
 
 import numpy as np
 
-from uuv_marl.baselines.checkpoint import Checkpoint
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.learned import forward, need_same
-from uuv_marl.baselines.recall import RECALLED, recall
-from uuv_marl.baselines.safety import Barrier
-from uuv_marl.baselines.scout import Scout
-from uuv_marl.baselines.trims import MOST_TRIM, heeded
+from uuv_marl.baselines.learned.checkpoint import Checkpoint
+from uuv_marl.baselines.learned.memory_features import RECALLED, recall
+from uuv_marl.baselines.learned.network import forward, need_same
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.scout.law import Scout
+from uuv_marl.baselines.scout.trims import MOST_TRIM, heeded
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Bool, Float32
@@ -31,7 +31,12 @@ class TrimmedLaw(Scout):
     num_trims = 1
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None, barrier: Barrier | None = None
+        self,
+        scenario: Scenario,
+        num_worlds: int = 1,
+        *,
+        gains: ScoutGains | None = None,
+        barrier: Barrier | None = None,
     ) -> None:
         super().__init__(scenario, num_worlds, gains=gains, barrier=barrier)
 

@@ -2,9 +2,7 @@
 
 import math
 
-from uuv_marl.baselines.features import put
-from uuv_marl.baselines.gains import Gains
-from uuv_marl.baselines.halfplanes import nearest_velocity
+from uuv_marl.baselines.learned.percept_features import put
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import doubt
@@ -12,8 +10,10 @@ from uuv_marl.baselines.memory.neighbours import age_of, middle, noise_of
 from uuv_marl.baselines.memory.pose import to_body, to_body_axes
 from uuv_marl.baselines.memory.response import remains
 from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.safety import Barrier, margin, planes_of
-from uuv_marl.baselines.scout import modulated, wished
+from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of
+from uuv_marl.baselines.safety.halfplanes import nearest_velocity
+from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.scout.law import modulated, wished
 from uuv_marl.baselines.steering import full_speed
 from uuv_marl.scenario.sections import NOMINAL_VEHICLES
 from uuv_marl.sim.compiled import compiled
@@ -28,7 +28,7 @@ RECALLED = _OWN + 6 * NEIGHBOURS + 5 * SURFACES
 
 @compiled
 def recall(
-    rows: Bool, num_vehicles: int, period: float, g: Gains, barrier: Barrier, limits: Limits, kept: Surroundings,
+    rows: Bool, num_vehicles: int, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, kept: Surroundings,
     planes: Float64, features: Float32,
 ) -> None:  # fmt: skip
     """Fill the features of vehicles: their motion, l(t), the hand-made law's wish, who and what is near.
@@ -48,7 +48,7 @@ def recall(
 
 @compiled
 def _own(
-    w: int, i: int, period: float, g: Gains, barrier: Barrier, limits: Limits, kept: Surroundings, planes: Float64,
+    w: int, i: int, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, kept: Surroundings, planes: Float64,
     out: Float32,
 ) -> None:  # fmt: skip
     """A vehicle's motion, l(t), and what the hand-made law wishes and the filter leaves of it.

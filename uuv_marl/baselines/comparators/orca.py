@@ -12,9 +12,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uuv_marl.baselines.avoidance import obstacle_at
-from uuv_marl.baselines.bio_inspired import counts_once
-from uuv_marl.baselines.halfplanes import nearest_velocity
+from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned
+from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -26,7 +26,7 @@ _SHARE = 0.5
 """Share of a change that a vehicle takes; its neighbour takes the other half. Definition of ORCA^tau_A|B."""
 
 
-class Gains(NamedTuple):
+class OrcaGains(NamedTuple):
     """Free parameters, found by tuning."""
 
     radius: float
@@ -48,9 +48,9 @@ class OrcaInformed(Policy):
     channels: ClassVar[tuple[str, ...]] = ("link",)
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OrcaGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains(**tuned("orca_informed"))
+        self.gains = gains or OrcaGains(**tuned("orca_informed"))
         self._speed = full_speed(self.limits)
         self._follow = velocity_gain(scenario)
         self._centres = scenario.sonar.echo_reports == "centre"
@@ -123,7 +123,7 @@ def _add(
 def _act(
     flat: Float32,
     at: Starts,
-    g: Gains,
+    g: OrcaGains,
     limits: Limits,
     speed: float,
     follow: float,
@@ -147,7 +147,7 @@ def _act(
 
 
 @compiled
-def _obstacles(w: int, i: int, see: Fields, g: Gains, period: float, centres: bool, planes: Float64) -> int:
+def _obstacles(w: int, i: int, see: Fields, g: OrcaGains, period: float, centres: bool, planes: Float64) -> int:
     """Write the half-planes of obstacles, each once; how many. The vehicle takes the whole change.
 
     Of points of surfaces the nearest counts.
@@ -163,7 +163,7 @@ def _obstacles(w: int, i: int, see: Fields, g: Gains, period: float, centres: bo
 
 
 @compiled
-def _neighbours(w: int, i: int, see: Fields, g: Gains, period: float, planes: Float64, num: int) -> int:
+def _neighbours(w: int, i: int, see: Fields, g: OrcaGains, period: float, planes: Float64, num: int) -> int:
     """Add the half-planes of neighbours; how many planes there are then.
 
     One whose velocity has not been told (``modem``) counts as moving like the reference point. Written from row ``num``

@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uuv_marl.baselines.avoidance import bump, obstacle_at
-from uuv_marl.baselines.bio_inspired import counts_once
+from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -28,7 +28,7 @@ _H_BETA = 0.9
 """The same share for obstacles [1]."""
 
 
-class Gains(NamedTuple):
+class OlfatiSaberGains(NamedTuple):
     """Free parameters, found by tuning; the source's symbols in brackets."""
 
     unit: float
@@ -64,9 +64,9 @@ class OlfatiSaber(Policy):
     yaw_damping_nms: ClassVar[float] = 600.0
     tuned_as: ClassVar[str] = "olfati_saber"
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OlfatiSaberGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains(**tuned(self.tuned_as))
+        self.gains = gains or OlfatiSaberGains(**tuned(self.tuned_as))
         self._centres = scenario.sonar.echo_reports == "centre"
 
     def decide(self, percept: Percept) -> Float32:
@@ -109,7 +109,7 @@ def rho_h(z: float, h: float) -> float:
 
 
 @compiled
-def phi_alpha(z: float, g: Gains) -> float:
+def phi_alpha(z: float, g: OlfatiSaberGains) -> float:
     """Attraction [N] at a sigma-norm z of the distance to a neighbour; negative repels, 0 at the spacing."""
     a, b = g.attraction, g.repulsion
     c = abs(a - b) / math.sqrt(4.0 * a * b)
@@ -119,32 +119,32 @@ def phi_alpha(z: float, g: Gains) -> float:
 
 
 @compiled
-def alpha_weight(z: float, g: Gains) -> float:
+def alpha_weight(z: float, g: OlfatiSaberGains) -> float:
     """How much a neighbour counts at a sigma-norm z of its distance, from 1 to 0 [1]. a_ij of the source."""
     return rho_h(z / sigma_norm(g.reach * g.spacing / g.unit), _H_ALPHA)
 
 
 @compiled
-def neighbour_force(distance: float, g: Gains) -> float:
+def neighbour_force(distance: float, g: OlfatiSaberGains) -> float:
     """Attraction [N] by a neighbour at a distance [m]: the slope of the lattice's potential, per ``unit``."""
     return phi_alpha(sigma_norm(distance / g.unit), g) * slope(distance / g.unit)
 
 
 @compiled
-def beta_weight(reach: float, g: Gains) -> float:
+def beta_weight(reach: float, g: OlfatiSaberGains) -> float:
     """How much an obstacle counts at a distance to its surface [m], from 1 to 0 [1]. b_ik of the source."""
     return rho_h(sigma_norm(reach / g.unit) / sigma_norm(g.obstacle_range / g.unit), _H_BETA)
 
 
 @compiled
-def obstacle_force(reach: float, g: Gains) -> float:
+def obstacle_force(reach: float, g: OlfatiSaberGains) -> float:
     """Repulsion [N] by an obstacle at a distance to its surface [m]. Minus phi_beta n_ik of the source."""
     gap = sigma_norm(reach / g.unit) - sigma_norm(g.obstacle_range / g.unit)
     return g.obstacle * beta_weight(reach, g) * (1.0 - sigma_1(gap)) * slope(reach / g.unit)
 
 
 @compiled
-def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, action: Float32) -> None:
+def _act(flat: Float32, at: Starts, g: OlfatiSaberGains, limits: Limits, centres: bool, action: Float32) -> None:
     """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -162,7 +162,7 @@ def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, act
 
 
 @compiled
-def _alpha(w: int, i: int, see: Fields, g: Gains) -> tuple[float, float]:
+def _alpha(w: int, i: int, see: Fields, g: OlfatiSaberGains) -> tuple[float, float]:
     """Force [N] from neighbours: the lattice, and alignment where their velocities are told."""
     u, v, f_x, f_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0.0, 0.0
     for k in range(see.heard.shape[2]):
@@ -180,7 +180,7 @@ def _alpha(w: int, i: int, see: Fields, g: Gains) -> tuple[float, float]:
 
 
 @compiled
-def _beta(w: int, i: int, see: Fields, g: Gains, centres: bool) -> tuple[float, float]:
+def _beta(w: int, i: int, see: Fields, g: OlfatiSaberGains, centres: bool) -> tuple[float, float]:
     """Force [N] from obstacles: away from each one's nearest point, and against the velocity relative to it.
 
     That point runs along the surface as the vehicle's shadow: at radius / distance of the velocity across. Where echoes

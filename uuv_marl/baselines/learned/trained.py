@@ -3,9 +3,9 @@
 import functools
 from pathlib import Path
 
-from uuv_marl.baselines.checkpoint import Checkpoint, load_checkpoint
-from uuv_marl.baselines.learned import Learned
-from uuv_marl.baselines.learned_law import LearnedLaw
+from uuv_marl.baselines.learned.checkpoint import Checkpoint, load_checkpoint
+from uuv_marl.baselines.learned.network import Learned
+from uuv_marl.baselines.learned.trimmed_scout import LearnedLaw
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario
 
@@ -49,5 +49,5 @@ class Trained:
 
 
 def shipped(name: str, doc: str) -> Trained:
-    """The policy of a checkpoint in ``uuv_marl/baselines/trained``."""
-    return Trained(name, Path(__file__).parent / "trained" / f"{name}.safetensors", doc)
+    """The policy of a checkpoint in ``uuv_marl/baselines/weights``."""
+    return Trained(name, Path(__file__).parents[1] / "weights" / f"{name}.safetensors", doc)

@@ -12,11 +12,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.filtered import Filtered
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.pose import Reckoning, reckoned, to_map_axes
 from uuv_marl.baselines.policy import Limits, Policy
-from uuv_marl.baselines.safety import GUARD, Barrier, keeps, planes_of, steer_safely
+from uuv_marl.baselines.safety.barrier import GUARD, Barrier, keeps, planes_of, steer_safely
+from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.baselines.steering import wished_velocity
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario

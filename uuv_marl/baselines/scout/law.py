@@ -9,16 +9,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from uuv_marl.baselines.filtered import Filtered
-from uuv_marl.baselines.gains import DEFAULT_PRESET, PRESETS, Gains
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.doubt import trim_weights
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.policy import Limits, PolicyError
-from uuv_marl.baselines.safety import Barrier, margin, planes_of, steer_safely
-from uuv_marl.baselines.trims import softened, wary
+from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of, steer_safely
+from uuv_marl.baselines.safety.remembering import Filtered
+from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS, ScoutGains
+from uuv_marl.baselines.scout.trims import softened, wary
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
@@ -46,7 +46,7 @@ class Scout(Filtered):
     """1 where an actor trims each vehicle's steering."""
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: Gains | None = None,
+        self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: ScoutGains | None = None,
         barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
         if preset not in PRESETS:
@@ -75,9 +75,9 @@ class Scout(Filtered):
         )  # fmt: skip
         return action
 
-    def grown(self) -> Gains:
+    def grown(self) -> ScoutGains:
         """The gains for as many vehicles as the swarm has, all float: else compiled code would be made anew."""
-        by, g = Gains(*map(float, self.gains)), self._growth
+        by, g = ScoutGains(*map(float, self.gains)), self._growth
         return by._replace(
             pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
             together=by.together / g**3,
@@ -85,7 +85,7 @@ class Scout(Filtered):
 
 
 @compiled
-def wished(w: int, i: int, g: Gains, kept: Surroundings) -> tuple[float, float]:
+def wished(w: int, i: int, g: ScoutGains, kept: Surroundings) -> tuple[float, float]:
     """The velocity that a vehicle wishes where there are no obstacles, in its map [m/s]."""
     pose, reference, speed = kept.pose[w, i], kept.reference[w, i], kept.reference_speed[w, i]
     pull, push, together = g.pull, g.push, g.together
@@ -144,7 +144,7 @@ def _lead(w: int, i: int, share: float, limits: Limits, kept: Surroundings, acti
 
 @compiled
 def decide_all(
-    worlds: Bool, period: float, g: Gains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
+    worlds: Bool, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
     planes: Float64, trims: Float32, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle.

@@ -13,7 +13,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uuv_marl.baselines.avoidance import obstacle_at
-from uuv_marl.baselines.bio_inspired import MIN_DISTANCE_M, counts_once
+from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -22,7 +22,7 @@ from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Float32, Int64
 
 
-class Gains(NamedTuple):
+class ApfGains(NamedTuple):
     """Free parameters, found by tuning."""
 
     attraction: float
@@ -43,9 +43,9 @@ class Apf(Policy):
     wishes_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Gains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: ApfGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or Gains(**tuned("apf"))
+        self.gains = gains or ApfGains(**tuned("apf"))
         self._centres = scenario.sonar.echo_reports == "centre"
 
     def decide(self, percept: Percept) -> Float32:
@@ -57,7 +57,7 @@ class Apf(Policy):
 
 
 @compiled
-def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g: Gains) -> tuple[float, float, int]:
+def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g: ApfGains) -> tuple[float, float, int]:
     """Force [N] from an obstacle: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2 rho_goal^2 within rho_0.
 
     Ge and Cui 2000, with n = 2: one part points away from the obstacle, one to the goal. n is a unit vector to the
@@ -76,7 +76,7 @@ def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g
 
 
 @compiled
-def neighbour_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int]:
+def neighbour_force(p_x: float, p_y: float, g: ApfGains) -> tuple[float, float, int]:
     """Force [N] from a neighbour at p [m]: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2. Khatib 1986."""
     rho = math.hypot(p_x, p_y)
     near = max(rho, MIN_DISTANCE_M)
@@ -87,7 +87,7 @@ def neighbour_force(p_x: float, p_y: float, g: Gains) -> tuple[float, float, int
 
 
 @compiled
-def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, action: Float32, clamps: Int64) -> None:
+def _act(flat: Float32, at: Starts, g: ApfGains, limits: Limits, centres: bool, action: Float32, clamps: Int64) -> None:
     """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -98,7 +98,7 @@ def _act(flat: Float32, at: Starts, g: Gains, limits: Limits, centres: bool, act
 
 
 @compiled
-def _force(w: int, i: int, see: Fields, g: Gains, centres: bool) -> tuple[float, float, int]:
+def _force(w: int, i: int, see: Fields, g: ApfGains, centres: bool) -> tuple[float, float, int]:
     """Body-frame force on one vehicle [N], forward and to starboard, and how many bounds bound."""
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     f_x, f_y, bound = g.attraction * l_x, g.attraction * l_y, 0

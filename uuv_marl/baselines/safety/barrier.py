@@ -10,12 +10,12 @@ avoidance (van den Berg et al. 2011, see ``halfplanes``).
 import math
 from typing import NamedTuple
 
-from uuv_marl.baselines.halfplanes import nearest_velocity
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import noise_of
 from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
 from uuv_marl.baselines.policy import Limits
+from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float32, Float64

@@ -1,0 +1,1 @@
+"""Laws from published equations, and one that only pulls."""

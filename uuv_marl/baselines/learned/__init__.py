@@ -1,0 +1,1 @@
+"""Trained networks: from their checkpoints to policies, and to ONNX."""

@@ -1,0 +1,1 @@
+"""``scout``: the safest hand-made law here."""
