@@ -17,7 +17,7 @@ from statistics import median
 
 from compare import HERE, LIMIT_S, ROOT, Library, Process
 
-LEAST_RATIO, ROUND_S = 0.93, 0.4
+LEAST_RATIO, ROUND_S = 0.95, 0.4
 CASES = (("core", 1), ("vector_env", 64), ("parallel_env", 1))
 COLD = """
 import time, numpy, uuv_marl

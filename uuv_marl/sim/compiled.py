@@ -1,7 +1,7 @@
 """Numba behind one decorator: compiled code is kept on disk, and never serves old physics.
 
-Each function is kept under a hash of all the code that it is compiled from (``uuv_marl.sim.sources``), whatever
-checkout or version it belongs to: who edits a kernel compiles what uses it, and nothing else.
+Each function is kept under a hash of all the code that it can be compiled from (``uuv_marl.sim.sources``), whatever
+checkout or version it belongs to.
 """
 
 import contextlib
