@@ -153,7 +153,7 @@ def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
     assert policy.name == "guarded:bio_inspired,zeta_n=0.5"
     assert policy.inner.gains.zeta_n == 0.5
     assert policy.barrier.obstacle_m == 9.0
-    with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.barrier.Barrier, got '5'"):
+    with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"):
         make("guarded:bio_inspired,barrier=5", scenario)
     with pytest.raises(PolicyError, match="names the filter twice"):
         make("guarded:guarded:bio_inspired", scenario)

@@ -235,45 +235,55 @@ def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parame
 
 
 def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
-    """The policy with these parameters: keyword arguments of its kind, and single gains.
+    """The policy with these parameters, inside the safety filter where its name says so.
 
     Args:
         name: as the user wrote it, for messages.
         kind: what makes the policy.
         scenario: that it is made for.
         num_worlds: first axis of the percepts.
-        parameters: by name; texts stand for what they say.
+        parameters: by name; texts stand for what they say. ``barrier`` is the filter's where there is one.
     """
-    if name.startswith(GUARDED):
-        barrier = parameters.pop("barrier", GUARD)
-        if not isinstance(barrier, Barrier):
-            raise PolicyError(
-                f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.barrier.Barrier, got {barrier!r}; "
-                "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
-            )
-        inner = _made(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
-        return Guarded(scenario, num_worlds, inner=inner, barrier=barrier)
+    if not name.startswith(GUARDED):
+        return _alone(name, kind, scenario, num_worlds, parameters)
+    barrier = parameters.pop("barrier", GUARD)
+    if not isinstance(barrier, Barrier):
+        raise PolicyError(
+            f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
+            "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
+        )
+    inner = _alone(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
+    return Guarded(scenario, num_worlds, inner=inner, barrier=barrier)
+
+
+def _alone(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
+    """The policy with these parameters: keyword arguments of its kind, and single gains."""
     constructor: Any = kind
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     if isinstance(parameters.get("gains"), str):
         raise PolicyError(f"policy {name!r}: gains are written one by one, such as bio_inspired,zeta_n=0.5")
-    given = {key: _value(value) for key, value in parameters.items() if key in known}
-    policy: Policy = constructor(scenario, num_worlds, **given)
+    values = {key: _value(value) for key, value in parameters.items()}
+    policy: Policy = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
     policy.name = name
-    gains: Any = getattr(policy, "gains", None)
-    fields: tuple[str, ...] = getattr(gains, "_fields", ())
-    changed = {key: plain(_value(value)) for key, value in parameters.items() if key not in known}
-    for key, value in changed.items():
-        if key not in fields:
-            there = [*known, *fields]
-            near = difflib.get_close_matches(key, there, n=1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise PolicyError(f"policy {name!r} has no parameter {key!r}; {hint}It has {', '.join(there) or 'none'}")
-        if not (isinstance(value, float | int) and math.isfinite(value)):
-            raise PolicyError(f"policy {name!r}: the gain {key} must be a finite number, got {value!r}")
-    if changed:
+    if values:
+        gains: Any = getattr(policy, "gains", None)
+        changed = {key: _gain(name, key, value, gains, known) for key, value in values.items()}
         policy.gains = gains._replace(**changed)  # pyright: ignore[reportAttributeAccessIssue] - it has gains
     return policy
+
+
+def _gain(name: str, key: str, value: object, gains: Any, known: Sequence[str]) -> object:
+    """A gain's value. Raises PolicyError unless the policy has that gain and the value is a finite number."""
+    fields: tuple[str, ...] = getattr(gains, "_fields", ())
+    if key not in fields:
+        there = [*known, *fields]
+        near = difflib.get_close_matches(key, there, n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise PolicyError(f"policy {name!r} has no parameter {key!r}; {hint}It has {', '.join(there) or 'none'}")
+    value = plain(value)
+    if not (isinstance(value, float | int) and math.isfinite(value)):
+        raise PolicyError(f"policy {name!r}: the gain {key} must be a finite number, got {value!r}")
+    return value
 
 
 def _value(written: object) -> object:
