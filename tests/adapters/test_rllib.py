@@ -240,7 +240,6 @@ def test_an_address_where_nobody_is_fails_soon(tmp_path, nowhere, monkeypatch):
     assert done.exit_code == 2
     assert "no Ray cluster can be joined" in " ".join(done.output.split())
     assert time.perf_counter() - start < 10
-    assert not (tmp_path / "out").exists()
 
 
 def test_the_example_trains_and_goes_on(tmp_path):
