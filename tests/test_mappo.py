@@ -708,7 +708,7 @@ def test_another_vehicle_is_named_in_the_checkpoint(tmp_path, no_validation):
         ({"mappo": {"learning_rate": (np.inf, 0.1)}}, "mappo.learning_rate.0 should be a finite number, got inf"),
         ({"mappo": {"noize": 0.1}}, "mappo.noize is unknown; did you mean 'noise'?"),
         ({"mappo": {"horizon": 0}}, "mappo.horizon should be greater than or equal to 1, got 0"),
-        ({"sees": "memory", "mappo": {"first_outputs": [0.1]}}, "a number for each of 6 outputs, got 1"),
+        ({"sees": "memory", "mappo": {"first_outputs": [0.1, 0.2]}}, "a number for each of 1 outputs, got 2"),
         ({"safety": {"horizon_km": 0.0}}, "safety.horizon_km is unknown; did you mean 'horizon_m'?"),
         ({"seeds": 3}, "seeds is unknown; did you mean 'sees'?"),
         ({"sees": "nothing"}, "sees should be 'percept' or 'memory', got 'nothing'"),
@@ -734,7 +734,7 @@ def test_what_is_written_is_what_was_told():
         ("train.mappo", "torch", "train"),
         ("train.sb3", "stable_baselines3", "sb3"),
         ("train.run", "torch.utils.tensorboard.writer", "train"),
-        ("baselines.export", "onnx", "onnx"),
+        ("baselines.learned.export", "onnx", "onnx"),
     ],
 )
 def test_modules_of_optional_libraries_name_their_extra(module, library, name):

@@ -123,7 +123,7 @@ def test_the_wheel_holds_its_data_and_licences_and_is_small(distributions):
     _, wheel, metadata = distributions
     for needed in (
         "scenario/starter.toml", "scenario/vehicles/lauv.toml", "benchmark/robustness/axes.toml", "py.typed",
-        "baselines/trained/mappo.safetensors", "baselines/tuned/sdc.json", "replay/page/uPlot.iife.min.js",
+        "baselines/weights/mappo.safetensors", "baselines/tuned/sdc.json", "replay/page/uPlot.iife.min.js",
     ):  # fmt: skip
         assert f"uuv_marl/{needed}" in wheel
     for licence in PROJECT["license-files"]:
