@@ -14,6 +14,7 @@ from ray.rllib.core.rl_module.default_model_config import (  # pyright: ignore[r
 
 from uuv_marl.benchmark.distributed import connected
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
+from uuv_marl.paths import user_path
 
 TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
 TASK = {"timing.decision_period_s": 0.5, "actuators.yaw_damping_nms": 600.0}  # what training changes in a scenario
@@ -75,7 +76,7 @@ def main() -> None:
     parser.add_argument("--runners", type=int, default=2, help="processes that sample, a core each")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--ray", help="address of a Ray cluster (auto: the local one); this machine unless given")
-    parser.add_argument("--output", type=Path, default=Path("runs/rllib"), help="folder of the checkpoint")
+    parser.add_argument("--output", type=user_path, default=Path("runs/rllib"), help="folder of the checkpoint")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint")
     given = parser.parse_args()
     with connected(given.ray, max(1, given.runners)):

@@ -11,6 +11,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.paths import user_path
 from uuv_marl.train.reward import Weights
 from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
 from uuv_marl.train.training import overrides_for
@@ -51,7 +52,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=300_000, help="decisions times vehicles")
     parser.add_argument("--worlds", type=int, default=32)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=Path("runs/sb3"))
+    parser.add_argument("--output", type=user_path, default=Path("runs/sb3"))
     given = parser.parse_args()
     model = train(given.scenario, given.steps, given.worlds, given.seed)
     given.output.mkdir(parents=True, exist_ok=True)
