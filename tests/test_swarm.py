@@ -87,10 +87,13 @@ def test_an_error_of_any_thread_is_raised_once_all_have_ended():
         ended.append(thread)
         return False
 
-    with pytest.raises(IndexError, match="from 4 to 8"):
+    with pytest.raises(IndexError, match="from 4 to 7"):
         on_threads(work, 10, 3)
     assert sorted(ended) == [0, 2]
-    assert on_threads(lambda thread, begin, end: end == 10, 10, 3)
+    for threads, head in ((1, 0), (3, 0), (3, 2), (7, 2), (3, 40), (12, 0)):
+        done = []
+        assert on_threads(lambda thread, begin, end: done.extend(range(begin, end)) or end == 10, 10, threads, head)
+        assert sorted(done) == list(range(10))
     assert not on_threads(lambda thread, begin, end: begin > 9, 10, 7)
 
 

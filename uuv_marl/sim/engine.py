@@ -20,6 +20,10 @@ _LEAST = 200
 """Vehicles that a thread must have to be worth waking: that takes as long as moving about as many."""
 
 
+_HEAD = 110
+"""Vehicles that are moved while a thread wakes."""
+
+
 class Engine:
     """Reads and writes the arrays of ``World`` that it was made with; whatever else it holds, no later run needs.
 
@@ -29,6 +33,7 @@ class Engine:
     def __init__(self, scenario: Scenario, world: World, sea: Sea | None) -> None:
         n, self._num_worlds = scenario.swarm.num_vehicles, len(world.state.tick)
         self._threads = max(1, min(self._num_worlds, num_threads(), self._num_worlds * n // _LEAST))
+        self._head = _HEAD // n
         room = scratch(self._threads, n, scenario.sonar.num_sectors, max_cells(n))
         self._numbers = (world, model(scenario), room, sea)
         self._every = np.ones(self._num_worlds, np.bool_)
@@ -62,4 +67,4 @@ class Engine:
         def some(thread: int, begin: int, end: int) -> bool:
             return self._step(thread, begin, end, running, action, *self._numbers)
 
-        return on_threads(some, self._num_worlds, self._threads)
+        return on_threads(some, self._num_worlds, self._threads, self._head)

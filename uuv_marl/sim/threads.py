@@ -6,6 +6,7 @@ them survives a fork.
 """
 
 import functools
+import itertools
 import os
 from collections.abc import Callable
 from queue import SimpleQueue
@@ -40,16 +41,18 @@ if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
     os.register_at_fork(after_in_child=_helpers.cache_clear)
 
 
-def on_threads(work: Callable[[int, int, int], bool], amount: int, threads: int) -> bool:
+def on_threads(work: Callable[[int, int, int], bool], amount: int, threads: int, head: int = 0) -> bool:
     """Divide ``range(amount)`` among threads, the caller's own the first; whether any part of the work gave True.
 
     Args:
         work: takes the thread's index, and the first and the end of its part.
         amount: how much there is to do.
         threads: into how many parts it is divided, at most ``num_threads()`` of which are done at once.
+        head: how much the caller does while the others wake.
     """
-    share = -(-amount // threads)
-    parts = [(t, begin, min(begin + share, amount)) for t, begin in enumerate(range(0, amount, share))]
+    share = max(amount - head, 0) // threads
+    ends = [amount - k * share for k in reversed(range(threads))]
+    parts = [(t, begin, end) for t, (begin, end) in enumerate(itertools.pairwise([0, *ends])) if begin < end]
     done: SimpleQueue[bool | BaseException] = SimpleQueue()
 
     def do(part: tuple[int, int, int]) -> None:
