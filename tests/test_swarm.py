@@ -90,10 +90,6 @@ def test_an_error_of_any_thread_is_raised_once_all_have_ended():
     with pytest.raises(IndexError, match="from 4 to 7"):
         on_threads(work, 10, 3)
     assert sorted(ended) == [0, 2]
-    for threads, head in ((1, 0), (3, 0), (3, 2), (7, 2), (3, 40), (12, 0)):
-        done = []
-        assert on_threads(lambda thread, begin, end: done.extend(range(begin, end)) or end == 10, 10, threads, head)
-        assert sorted(done) == list(range(10))
     assert not on_threads(lambda thread, begin, end: begin > 9, 10, 7)
 
 
@@ -407,3 +403,10 @@ def test_a_swarm_that_has_run_can_be_pickled_and_goes_on_alike():
     swarm.step(action)
     copy = pickle.loads(pickle.dumps(swarm))
     assert copy.step(action).flat.tobytes() == swarm.step(action).flat.tobytes()
+
+
+@pytest.mark.parametrize(("threads", "head"), [(1, 0), (3, 0), (3, 2), (7, 2), (3, 40), (12, 0)])
+def test_threads_do_all_of_the_work_once(threads, head):
+    done = []
+    assert on_threads(lambda thread, begin, end: done.extend(range(begin, end)) or end == 10, 10, threads, head)
+    assert sorted(done) == list(range(10))
