@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.envs.observation import observe
-from uuv_marl.envs.reward import RewardFunction, compute_reward, named, own_reward, reward_weights
+from uuv_marl.envs.observation import observer
+from uuv_marl.envs.reward import RewardFunction, named, own_reward, payer, reward_weights
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
@@ -130,17 +130,24 @@ class BatchedEnv:
         self.need_reset("step")
         swarm = self.swarm
         before, running = swarm.state.alive.copy(), ~self.over
-        percept = swarm.step(action, running)
+        observation, observe = observer(swarm.percept)
+        reward, terms, pay = payer(swarm, self._weights, running)
+
+        def tell(begin: int, end: int) -> None:
+            observe(begin, end)
+            pay(begin, end)
+
+        swarm.step(action, running, tell)
         np.add(self.collisions, swarm.facts.collisions, out=self.collisions, where=running)
         alive = swarm.state.alive
-        reward, world_reward, weighted = self._rewards(before & running[:, None])
+        reward, world_reward, weighted = self._rewards(before & running[:, None], reward, terms)
         world_terminated, world_truncated = swarm.endings()
         if self._max_cycles is not None:
             last_tick = self._max_cycles * swarm.scenario.timing.holds_per_decision
             world_truncated |= (swarm.state.tick >= last_tick) & ~world_terminated
         self.over = world_terminated | world_truncated
         return StepResult(
-            observation=observe(percept),
+            observation=observation,
             reward=reward,
             terminated=before & (world_terminated[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
@@ -156,12 +163,14 @@ class BatchedEnv:
         self.need_reset("state()")
         return global_state(self.swarm, self.state_layout)
 
-    def _rewards(self, before: Bool) -> tuple[Float64, Float64, Float64 | None]:
-        """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step."""
+    def _rewards(self, before: Bool, reward: Float64, terms: Float64) -> tuple[Float64, Float64, Float64 | None]:
+        """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step.
+
+        ``reward`` and ``terms`` are those of the scenario, as ``compute_reward`` gives them.
+        """
         if callable(self._reward):
             own = own_reward(self._reward, self.swarm, before)
             return own, own.mean(axis=1), None
-        reward, terms = compute_reward(self.swarm, self._weights, ~self.over)
         mean = reward.sum(axis=1) / self.swarm.num_vehicles  # twice as fast as reward.mean(axis=1), and its bits
         if self._reward == "team":
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.

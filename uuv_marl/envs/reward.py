@@ -105,10 +105,20 @@ def compute_reward(swarm: Swarm, weights: RewardWeights, running: Bool) -> tuple
         The reward, shape (world, vehicle), and the weighted ``TERMS`` that it sums, shape (term, world, vehicle); zero
         for vehicles lost before.
     """
-    terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
-    reward = np.zeros(terms.shape[1:])
-    _fill_all(running, swarm.time_limit_s, swarm.state, swarm.facts, weights, terms, reward)
+    reward, terms, pay = payer(swarm, weights, running)
+    pay(0, swarm.num_worlds)
     return reward, terms
+
+
+def payer(swarm: Swarm, weights: RewardWeights, running: Bool) -> tuple[Float64, Float64, Callable[[int, int], None]]:
+    """The arrays of ``compute_reward``, still zero, and what fills them for a range of worlds: first and end."""
+    terms = np.zeros((len(TERMS), swarm.num_worlds, swarm.num_vehicles))
+    reward, limit_s = np.zeros(terms.shape[1:]), swarm.time_limit_s
+
+    def pay(begin: int, end: int) -> None:
+        _fill_some(begin, end, running, limit_s, swarm.state, swarm.facts, weights, terms, reward)
+
+    return reward, terms, pay
 
 
 @compiled
@@ -145,26 +155,11 @@ def _fill(
 
 
 @compiled
-def _fill_all(
-    running: Bool,
-    time_limit_s: Float64,
-    state: State,
-    facts: Facts,
-    weights: RewardWeights,
-    terms: Float64,
-    reward: Float64,
-) -> None:
-    """``_fill`` for the worlds that run.
-
-    Args:
-        running: worlds to fill, shape (world,); the others stay zero.
-        time_limit_s: when worlds are given up [s], shape (world,).
-        state: of all worlds.
-        facts: of all worlds.
-        weights: of the terms, and the lengths in them [m].
-        terms: the weighted terms, shape (term, world, vehicle), zero before; filled.
-        reward: their sum, shape (world, vehicle), zero before; filled.
-    """
-    for w in range(running.shape[0]):
+def _fill_some(
+    begin: int, end: int, running: Bool, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights,
+    terms: Float64, reward: Float64,
+) -> None:  # fmt: skip
+    """``_fill`` for those worlds of a range that are ``running``, shape (world,)."""
+    for w in range(begin, end):
         if running[w]:
             _fill(w, time_limit_s, state, facts, weights, terms, reward)

@@ -55,16 +55,20 @@ class Engine:
         """Facts and percepts of world w from its state and course, as after a reset."""
         self._observe(w, *self._numbers)
 
-    def step(self, action: Float32, active: Bool | None) -> bool:
+    def step(self, action: Float32, active: Bool | None, then: Callable[[int, int], None] | None = None) -> bool:
         """One decision period of the worlds that are ``active``, shape (world,), default all; whether any has diverged.
 
         ``action``, shape (world, vehicle, 2), is finite but for the lost. A world that has diverged stays as it is.
+        ``then`` is called with the first and the end of each range of worlds that has been stepped.
         """
         running = self._every if active is None else np.ascontiguousarray(active)
-        if self._threads == 1:
-            return self._step(0, 0, self._num_worlds, running, action, *self._numbers)
 
         def some(thread: int, begin: int, end: int) -> bool:
-            return self._step(thread, begin, end, running, action, *self._numbers)
+            diverged = self._step(thread, begin, end, running, action, *self._numbers)
+            if then is not None:
+                then(begin, end)
+            return diverged
 
+        if self._threads == 1:
+            return some(0, 0, self._num_worlds)
         return on_threads(some, self._num_worlds, self._threads, self._head)

@@ -1,7 +1,7 @@
 """Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -231,13 +231,17 @@ class Swarm:
             **{k: array for table in (*self._world, *sea_tables(self._sea)) for k, array in table._asdict().items()},
         }
 
-    def step(self, action: ArrayLike, active: Bool | None = None) -> Percept:
+    def step(
+        self, action: ArrayLike, active: Bool | None = None, then: Callable[[int, int], None] | None = None
+    ) -> Percept:
         """Advance by one decision period.
 
         Args:
             action: shares of full surge force and yaw torque, shape (world, vehicle, 2), rounded to float32 and
                 projected onto the unit disc. Entries of lost vehicles are ignored.
             active: worlds to step, shape (world,); the others stay as they are. Default all.
+            then: called with the first and the end of each range of worlds that has been stepped, by the thread that
+                stepped it.
         """
         action = action_array(action, (self.num_worlds, self.num_vehicles, 2), "action")
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
@@ -249,7 +253,7 @@ class Swarm:
             )
         if not (self._ready if active is None else self._ready | ~active).all():
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
-        if self._engine.step(np.ascontiguousarray(action), active):
+        if self._engine.step(np.ascontiguousarray(action), active, then):
             for w in np.flatnonzero((self.facts.diverged >= 0) & ~self._warned):
                 _log.warning(self.divergence(int(w)))
                 self._warned[w] = True
