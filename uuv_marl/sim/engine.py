@@ -20,8 +20,8 @@ _LEAST = 200
 """Vehicles that a thread must have to be worth waking: that takes as long as moving about as many."""
 
 
-_HEAD = 110
-"""Vehicles that are moved while a thread wakes."""
+_HEAD = 300
+"""Vehicles that are moved while a thread wakes, and some more: the caller, who would have to be woken, ends last."""
 
 
 class Engine:
