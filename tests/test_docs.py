@@ -20,8 +20,8 @@ ROOT = Path(__file__).resolve().parent.parent
 README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
 POLICY = [ROOT / name for name in ("SECURITY.md", "CODE_OF_CONDUCT.md", "ROADMAP.md")]
 PAGES = [README, CONTRIBUTING, *POLICY, *sorted((ROOT / "docs").rglob("*.md"))]
-ELSEWHERE = {"benchmarl.md", "rllib.md"}
-"""Pages whose Python runs in tests/adapters, where their libraries are."""
+ELSEWHERE = {"benchmarl": "from benchmarl.", "rllib": "from ray.rllib."}
+"""Imports by which the examples are known that run in tests/adapters, where their libraries are."""
 
 
 def blocks(language, pages=PAGES):
@@ -32,7 +32,11 @@ def blocks(language, pages=PAGES):
     ]
 
 
-@pytest.mark.parametrize("block", blocks("python", [page for page in PAGES if page.name not in ELSEWHERE]))
+def is_run_here(block):
+    return not any(line in block for line in ELSEWHERE.values())
+
+
+@pytest.mark.parametrize("block", [param for param in blocks("python") if is_run_here(param.values[0])])
 def test_python_blocks_run_and_show_something(block, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with warnings.catch_warnings():
@@ -52,10 +56,12 @@ def test_examples_are_short():
         assert len(param.values[0].splitlines()) < 30, param.id
 
 
-@pytest.mark.parametrize("page", sorted(ELSEWHERE))
-def test_pages_of_other_environments_are_run_there(page):
-    test = ROOT / "tests" / "adapters" / f"test_{page.removesuffix('.md')}.py"
-    assert f'"{page}"' in test.read_text()
+@pytest.mark.parametrize("library", sorted(ELSEWHERE))
+def test_examples_of_other_environments_are_run_there(library):
+    assert sum(ELSEWHERE[library] in param.values[0] for param in blocks("python")) == 1
+    test = (ROOT / "tests" / "adapters" / f"test_{library}.py").read_text()
+    assert '"interfaces.md"' in test
+    assert f'"{ELSEWHERE[library]}" in' in test
 
 
 def stop(*args, **kwargs):
@@ -197,7 +203,7 @@ def test_the_readme_begins_with_what_a_stranger_needs():
         "results.md",
         "paper.md",
         "environment.md",
-        "README.md#your-library",
+        "interfaces.md",
         "glossary.md",
     ):
         assert f"(docs/{target})" in text

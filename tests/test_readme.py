@@ -45,8 +45,8 @@ def test_extras_are_those_of_the_project():
     assert {*installed.split(","), *more.split(", ")} == set(PROJECT["optional-dependencies"]) - {"docs", "test", "dev"}
 
 
-def test_every_library_of_the_index_is_named_and_has_its_extra():
-    text = (DOCS / "README.md").read_text().partition("## Your library")[2].partition("\n## ")[0]
+def test_every_library_with_an_interface_is_named_and_has_its_extra():
+    text = (DOCS / "interfaces.md").read_text().partition("\n## ")[0]
     rows = re.findall(r"^\| ([\w -]+?) \| .* \| (`\w+`|none) \| \[", text, re.M)
     (named,) = re.findall(r"\[Your library\]\(\S+\): ([^.]*)\.", README)
     assert [name.removeprefix("Ray ") for name, _ in rows] == named.split(", ")
