@@ -158,9 +158,9 @@ class PerceptLayout:
 
     @staticmethod
     def of(scenario: Scenario) -> "PerceptLayout":
-        """The layout that a scenario's sonar suite and channels make."""
-        sonar = scenario.sonar
-        return PerceptLayout(percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels))
+        """The layout that a scenario's sonar suite, channels and task make."""
+        sonar, more = scenario.sonar, scenario.task_class.observed
+        return PerceptLayout(percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels) + more)
 
     @functools.cached_property
     def size(self) -> int:

@@ -151,7 +151,7 @@ class Pairs:
             self._percept = swarm.step(self._policy.act(self._percept))
             u, v, r = np.moveaxis(swarm.state.nu[rows], -1, 0)
             c, s = np.moveaxis(swarm.heading[rows], -1, 0)
-            north, east = swarm.facts.reference[rows, 2, None], swarm.facts.reference[rows, 3, None]
+            north, east = swarm.facts.reference[rows, 0, 2, None], swarm.facts.reference[rows, 0, 3, None]
             self._yaw += (r**2).mean(axis=1)
             self._speed += ((c * u - s * v - north) ** 2 + (s * u + c * v - east) ** 2).mean(axis=1)
             self.min_spacing_m = np.minimum(self.min_spacing_m, swarm.facts.min_spacing[rows])

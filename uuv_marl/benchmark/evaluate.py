@@ -150,7 +150,7 @@ def _batch(
                 series=recorder.series(w),
                 routes=_routes(swarm, samples, w),
                 obstacles=course.obstacles[w, :discs].astype(np.float32),
-                waypoints=course.waypoints[w, : int(course.last[w]) + 1].astype(np.float32),
+                waypoints=course.waypoints[w, 0, : int(course.last[w, 0]) + 1].astype(np.float32),
             )
         active &= ~ended
         actor.active[:] = active

@@ -57,7 +57,7 @@ class Sample(NamedTuple):
     max_spacing_m: Float64
     """Largest distance between two vehicles."""
     centre_error_m: Float64
-    """Distance of the swarm's centre from l(t)."""
+    """Distance of the swarm's centre from l(t), the mean of the groups'."""
     order_parameter: Float64
     """Length of the mean heading vector: 1 aligned, 0 disordered."""
     within_s_l: Float64
@@ -80,14 +80,13 @@ def measure(swarm: Swarm) -> Sample:
     psi = state.eta[:, :, 2]
     order = np.hypot((np.cos(psi) * alive).sum(axis=1), (np.sin(psi) * alive).sum(axis=1)) / living
     anybody = alive.any(axis=1)
-    away = np.hypot(*np.moveaxis(state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
     return Sample(
         time_s=facts.time_s.copy(),
         min_spacing_m=facts.min_spacing.copy(),
         max_spacing_m=facts.max_spacing.copy(),
-        centre_error_m=np.hypot(*(facts.centre - facts.reference[:, :2]).T),
+        centre_error_m=np.hypot(*(facts.centre - swarm.mean_reference[:, :2]).T),
         order_parameter=np.where(anybody, order, np.nan),
-        within_s_l=(anybody & (np.where(alive, away, 0.0).max(axis=1) <= constraints.s_l_m)).astype(np.float64),
+        within_s_l=(anybody & (np.where(alive, facts.away, 0.0).max(axis=1) <= constraints.s_l_m)).astype(np.float64),
         within_s_o=(anybody & (facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m)).astype(np.float64),
         within_s_u=(anybody & (facts.min_spacing >= constraints.s_u_m)).astype(np.float64),
         effort=(facts.effort * alive).sum(axis=1) / living,

@@ -54,7 +54,7 @@ class SuccessRecorder:
         grace = GRACE_S * swarm.scenario.scale.units.time
         now = active & ~self._judged & (facts.time_s >= swarm.duration_s + grace - 1e-9)
         there = now[:, None] & swarm.state.alive
-        self._offset[there] = (swarm.state.eta[:, :, :2] - facts.reference[:, None, :2])[there]
+        self._offset[there] = (swarm.state.eta[:, :, :2] - swarm.own_reference[:, :, :2])[there]
         self._judged |= now
 
     def metrics(self, world: int) -> Success:

@@ -9,17 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from uuv_marl.envs.observation import observer
-from uuv_marl.envs.reward import RewardFunction, named, own_reward, payer, reward_weights
+from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.task import Payment, Task, paid
 from uuv_marl.types import Bool, Float32, Float64
 
 ScenarioLike = UserPath | Scenario | Mapping[str, object]
-Reward = Literal["individual", "team"] | RewardFunction
+Reward = Literal["dense", "sparse", "team"] | RewardFunction
 
 
 class StepResult(NamedTuple):
@@ -42,11 +43,13 @@ class StepResult(NamedTuple):
     """Shape (world,): the time limit ends the episode."""
     weighted: Float64 | None
     """The reward's terms, shape (term, world, vehicle); None for a user's own reward."""
+    named: tuple[str, ...]
+    """Their names."""
 
     @property
     def terms(self) -> Mapping[str, Float64]:
         """The reward's terms by name; empty for a user's own reward."""
-        return {} if self.weighted is None else named(self.weighted)
+        return {} if self.weighted is None else dict(zip(self.named, self.weighted, strict=False))
 
     @property
     def over(self) -> Bool:
@@ -60,8 +63,9 @@ class BatchedEnv:
     Args:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
-        reward: ``individual`` (the sum of a vehicle's terms), ``team`` (every vehicle gets the mean over all vehicles;
-            a lost vehicle also pays its own loss), or a function from the swarm to an array (world, vehicle).
+        reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress, where the
+            task has it), ``team`` (every vehicle gets the mean of ``dense`` over all vehicles; a lost vehicle also pays
+            its own loss), or a function from the swarm to an array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
     """
 
@@ -69,14 +73,18 @@ class BatchedEnv:
         self,
         scenario: Scenario,
         num_worlds: int = 1,
-        reward: Reward = "individual",
+        reward: Reward = "dense",
         max_cycles: int | None = None,
     ) -> None:
-        if not callable(reward) and reward not in ("individual", "team"):
-            raise ValueError(f"reward must be 'individual', 'team' or a function of the swarm, got {reward!r}")
         self.swarm = Swarm(scenario, num_worlds)
+        self.task: Task = self.swarm.task
+        names = (*self.task.rewards, "team")
+        if not callable(reward) and reward not in names:
+            raise ValueError(
+                f"reward must be {', '.join(map(repr, names))} or a function of the swarm, got {reward!r}; these are "
+                f"the rewards of task {scenario.task.name!r}"
+            )
         self.state_layout = state_layout(scenario)
-        self._weights = reward_weights(scenario)
         self._waiting = set(range(num_worlds))
         """Worlds that were never reset."""
         self.over = np.zeros(num_worlds, np.bool_)
@@ -130,17 +138,10 @@ class BatchedEnv:
         self.need_reset("step")
         swarm = self.swarm
         before, running = swarm.state.alive.copy(), ~self.over
-        observation, observe = observer(swarm.percept)
-        reward, terms, pay = payer(swarm, self._weights, running)
-
-        def tell(begin: int, end: int) -> None:
-            observe(begin, end)
-            pay(begin, end)
-
-        swarm.step(action, running, tell)
+        observation, payment = self._simulated(action, running)
         np.add(self.collisions, swarm.facts.collisions, out=self.collisions, where=running)
         alive = swarm.state.alive
-        reward, world_reward, weighted = self._rewards(before & running[:, None], reward, terms)
+        reward, world_reward, weighted = self._rewards(before & running[:, None], payment)
         world_terminated, world_truncated = swarm.endings()
         if self._max_cycles is not None:
             last_tick = self._max_cycles * swarm.scenario.timing.holds_per_decision
@@ -156,25 +157,48 @@ class BatchedEnv:
             world_terminated=world_terminated,
             world_truncated=world_truncated,
             weighted=weighted,
+            named=tuple(self.task.terms),
         )
+
+    def _simulated(self, action: ArrayLike, running: Bool) -> tuple[Float32, Payment]:
+        """One decision of the worlds that are ``running``; all observations, and what those worlds pay."""
+        swarm, task = self.swarm, self.task
+        name = "sparse" if self._reward == "sparse" else task.rewards[0]
+        observation, observe = observer(swarm.percept)
+        payment = task.payment(name, running)
+        if payment is not None and not task.observed:
+            threaded = payment
+
+            def tell(begin: int, end: int) -> None:
+                observe(begin, end)
+                threaded.pay(begin, end)
+
+            swarm.step(action, running, tell)
+            return observation, payment
+        swarm.step(action, running)
+        observe(0, swarm.num_worlds)
+        if payment is None:
+            payment = paid(task, running)
+        else:
+            payment.pay(0, swarm.num_worlds)
+        return observation, payment
 
     def state(self) -> Float32:
         """The global state of every world, shape (world, entry), see ``uuv_marl.envs.state.state_table``."""
         self.need_reset("state()")
         return global_state(self.swarm, self.state_layout)
 
-    def _rewards(self, before: Bool, reward: Float64, terms: Float64) -> tuple[Float64, Float64, Float64 | None]:
-        """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step.
-
-        ``reward`` and ``terms`` are those of the scenario, as ``compute_reward`` gives them.
-        """
+    def _rewards(self, before: Bool, payment: Payment) -> tuple[Float64, Float64, Float64 | None]:
+        """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step."""
         if callable(self._reward):
             own = own_reward(self._reward, self.swarm, before)
             return own, own.mean(axis=1), None
+        reward, terms = payment.reward, payment.terms
         mean = reward.sum(axis=1) / self.swarm.num_vehicles  # twice as fast as reward.mean(axis=1), and its bits
         if self._reward == "team":
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
-            reward = np.where(before, mean[:, None] + named(terms)["loss"], 0.0)
+            loss = terms[tuple(self.task.terms).index("loss")] if "loss" in self.task.terms else 0.0
+            reward = np.where(before, mean[:, None] + loss, 0.0)
         return reward, mean, terms
 
 
@@ -183,6 +207,7 @@ class Changes(TypedDict, total=False):
 
     num_vehicles: int | None
     decision_period: float | None
+    task: str | Mapping[str, object] | None
     overrides: Mapping[str, object] | None
 
 
@@ -199,7 +224,8 @@ def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
         changes: ``num_vehicles`` replaces the scenario's number of vehicles, ``decision_period`` the time between
-            decisions [s], and ``overrides`` any field, as in ``{"sonar.echo_reports": "surface"}``.
+            decisions [s], ``task`` what is to be done (``mine:Rendezvous``), and ``overrides`` any field, as in
+            ``{"sonar.echo_reports": "surface"}``.
 
     Raises:
         TypeError: there is no such argument.
@@ -208,8 +234,9 @@ def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
         near = difflib.get_close_matches(name, EnvOptions.__annotations__, n=1)
         hint = f"did you mean {near[0]}? " if near else ""
         raise TypeError(f"this environment has no argument {name}; {hint}fields of the scenario go into overrides")
-    period = changes.get("decision_period")
-    more = {} if period is None else {"timing.decision_period_s": period}
+    period, task = changes.get("decision_period"), changes.get("task")
+    more: dict[str, object] = {} if period is None else {"timing.decision_period_s": period}
+    more |= {} if task is None else {"task": task}
     return load_scenario(
         scenario, num_vehicles=changes.get("num_vehicles"), overrides={**(changes.get("overrides") or {}), **more}
     )
@@ -220,7 +247,7 @@ def make_batched_env(
     num_worlds: int = 1,
     *,
     max_cycles: int | None = None,
-    reward: Reward = "individual",
+    reward: Reward = "dense",
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes.
@@ -229,8 +256,8 @@ def make_batched_env(
         scenario: a name, a TOML file or a ``Scenario``.
         num_worlds: worlds stepped together.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
-        reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
-        changes: ``num_vehicles``, ``decision_period`` [s] and ``overrides`` of the scenario, see ``changed``.
+        reward: ``dense``, ``sparse``, ``team``, or a function from the swarm to an array (world, vehicle).
+        changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
     """
     return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles)
 

@@ -176,7 +176,7 @@ def parallel_env(
     render_mode: str | None = None,
     *,
     render_options: RenderOptions | None = None,
-    reward: Reward = "individual",
+    reward: Reward = "dense",
     info_terms: bool = False,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
@@ -190,7 +190,7 @@ def parallel_env(
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: how to draw: a dictionary with any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or
             ``map``) and ``sonar_of`` (index of the vehicle whose sonar is shown).
-        reward: ``individual``, ``team``, or a function from the swarm to an array (world, vehicle).
+        reward: ``dense``, ``sparse``, ``team``, or a function from the swarm to an array (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.

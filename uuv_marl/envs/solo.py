@@ -52,7 +52,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         render_options: RenderOptions | None = None,
         info_terms: bool = False,
         max_cycles: int | None = None,
-        reward: Reward = "individual",
+        reward: Reward = "dense",
         **changes: Unpack[Changes],
     ) -> None:
         suited = _suited(others, changed(scenario), changed(scenario, **changes))

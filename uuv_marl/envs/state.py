@@ -37,7 +37,8 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
     """The state of every world, scaled by its layout, shape (world, entry), float32; lost vehicles are zero."""
     state, course, facts = swarm.state, swarm.course, swarm.facts
     worlds, m = np.arange(swarm.num_worlds), swarm.scenario.max_obstacles
-    alive, origin = state.alive[:, :, None].astype(np.float64), facts.reference[:, None, :2]
+    alive, reference = state.alive[:, :, None].astype(np.float64), swarm.mean_reference
+    origin = reference[:, None, :2]
     obstacles = course.obstacles[:, :m]
     present = (np.arange(m) < course.num_obstacles[:, None])[:, :, None]
     fields = (
@@ -46,8 +47,8 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
         swarm.heading * alive,
         swarm.velocity * alive,
         state.nu[:, :, 2:] * alive,
-        facts.reference[:, 2:],
-        course.waypoints[worlds, course.last] - origin[:, 0],
+        reference[:, 2:],
+        course.waypoints[worlds, 0, course.last[:, 0]] - origin[:, 0],
         facts.time_s / swarm.time_limit_s,
         present,
         (obstacles[:, :, :2] - origin) * present,

@@ -80,7 +80,7 @@ class _Tape:
         seen = list(self._inspect)
         percept = swarm.percept
         self._add("time_s", facts.time_s[0])
-        self._add("reference", facts.reference[0, :2])
+        self._add("reference", facts.reference[0, 0, :2])
         self._add("drift", swarm.flow_field().drift)
         self._eddies = swarm.flow_field().eddies
         self._add("position", eta[:, :2])

@@ -5,13 +5,14 @@ The numbers and their sources are in the TOML files beside; nothing here has a d
 
 import logging
 import math
-from functools import cache
-from typing import Annotated
+from functools import cache, cached_property
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from uuv_marl.scenario import fields, hardware, sea, sections
 from uuv_marl.scenario.scale import Scale
+from uuv_marl.scenario.task import Task, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
 MAX_READINGS = 64
@@ -59,6 +60,18 @@ class Scenario(fields.Section):
     mismatch: sea.Mismatch
     faults: Annotated[tuple[sea.Fault, ...], Field(max_length=64)]
     reward: sections.Reward
+    task: Annotated[Task, BeforeValidator(named_task)]
+    """What the swarm is to do: its name, or ``module:Class``, alone or in a table with the task's own numbers."""
+
+    @cached_property
+    def task_class(self) -> Any:
+        """The class of the task, a ``uuv_marl.tasks.Task``."""
+        return task_class(self.task.name)
+
+    @cached_property
+    def task_numbers(self) -> Any:
+        """The task's own numbers, an instance of its class's ``Numbers``."""
+        return task_numbers(self.task)
 
     @property
     def max_obstacles(self) -> int:
@@ -82,6 +95,7 @@ class Scenario(fields.Section):
         return self.current.num_eddies(side, side)
 
     def _check(self) -> None:
+        task_numbers(self.task)
         _check_start(self)
         _check_course(self)
         _check_losses(self)

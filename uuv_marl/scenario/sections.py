@@ -244,7 +244,7 @@ class Disturbance(Section):
 
 
 class Reward(Section):
-    """Weights of the terms in ``envs/reward.py``."""
+    """Weights of the terms of ``follow`` (``tasks/follow.py``)."""
 
     tracking: NonNegative
     obstacle: NonNegative
@@ -252,3 +252,7 @@ class Reward(Section):
     effort: NonNegative
     collision: NonNegative
     arrival: NonNegative
+    progress_m: Positive
+    """Way towards the reference that pays 1, in the dense reward."""
+    progress_far_m: Positive
+    """Distance from the reference from which on nearing it pays nothing, in the dense reward."""

@@ -21,16 +21,20 @@ class State(NamedTuple):
     ]
     tick: Annotated[Int64, "world", "Control holds since the reset."]
     dwell: Annotated[Int64, "world radius", "Control holds for which the swarm has rested within each arrival radius."]
+    touched: Annotated[Bool, "world vehicle", "Whether the vehicle has touched anything since the reset."]
 
 
 @described
 class Course(NamedTuple):
     """What a reset draws."""
 
-    waypoints: Annotated[Float64, "world point 2", "Corners of the trajectory [m], padded."]
-    times: Annotated[Float64, "world point", "When l(t) passes them [s].", Bounds(0)]
-    last: Annotated[Int64, "world", "Index of the last corner.", Bounds(1, "point")]
+    waypoints: Annotated[Float64, "world group point 2", "Corners of each group's trajectory [m], padded."]
+    times: Annotated[Float64, "world group point", "When its l(t) passes them [s].", Bounds(0)]
+    last: Annotated[Int64, "world group", "Index of the last corner.", Bounds(1, "point")]
+    group: Annotated[Int64, "world vehicle", "Group of the vehicle, whose l(t) is its reference.", Bounds(0, "group")]
+    informed: Annotated[Bool, "world vehicle", "Whether the vehicle perceives its reference; else it perceives zeros."]
     obstacles: Annotated[Float64, "world obstacle 3", "Centre north, east and radius [m], padded."]
+    drift: Annotated[Float64, "world obstacle 2", "Velocity of the obstacle, north and east [m/s]; 0 in the paper."]
     num_obstacles: Annotated[Int64, "world", "Obstacles that there are.", Bounds(0, "obstacle", 1)]
     losses: Annotated[Int64, "world loss", "Vehicle lost at each scheduled loss.", Bounds(0, "vehicle")]
 
@@ -49,7 +53,9 @@ class Facts(NamedTuple):
     """What is true of the latest step. Smallest values and counts are over all its control holds. Lengths in m."""
 
     time_s: Annotated[Float64, "world", "Time since the reset."]
-    reference: Annotated[Float64, "world 4", "Position (north, east) and velocity of l(t)."]
+    reference: Annotated[Float64, "world group 4", "Position (north, east) and velocity of each group's l(t)."]
+    away: Annotated[Float64, "world vehicle", "Distance to its own reference; the last one for the lost."]
+    was_away: Annotated[Float64, "world vehicle", "The same at the end of the step before."]
     centre: Annotated[Float64, "world 2", "Mean position of the living."]
     spacing: Annotated[Float64, "world vehicle", "Smallest distance to another vehicle; infinite for the lost."]
     min_spacing: Annotated[Float64, "world", "The smallest of them."]

@@ -65,10 +65,12 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
     see.velocity[w, i, 0] = saturate(nu[w, i, 0], MAX_SPEED)
     see.velocity[w, i, 1] = saturate(nu[w, i, 1], MAX_SPEED)
     see.yaw_rate[w, i, 0] = saturate(nu[w, i, 2], MAX_SPEED)
-    v_x, v_y = reference[w, 2], reference[w, 3]
-    see.reference[w, i, 0], see.reference[w, i, 1] = toward(reference[w, 0] - x, reference[w, 1] - y, c, s)
-    see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
-    see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+    if course.informed[w, i]:
+        l_t = reference[w, course.group[w, i]]
+        v_x, v_y = l_t[2], l_t[3]
+        see.reference[w, i, 0], see.reference[w, i, 1] = toward(l_t[0] - x, l_t[1] - y, c, s)
+        see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
+        see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     for k in range(see.heard.shape[2]):
         j = listener.heard[k]
         see.heard[w, i, k] = 1.0 if j >= 0 else 0.0

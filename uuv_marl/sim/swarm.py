@@ -12,18 +12,16 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
 from uuv_marl.sim.disturbance import draw_losses
+from uuv_marl.sim.draw import Draw
 from uuv_marl.sim.engine import Engine
-from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.sea.actuation import hit
 from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
 from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_tables
 from uuv_marl.sim.spacing import NOWHERE
-from uuv_marl.sim.start import start_state
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
-from uuv_marl.sim.trajectory import arrival_times
 from uuv_marl.types import Bool, Float64, Int32
 
 _log = logging.getLogger("uuv_marl")
@@ -50,13 +48,17 @@ class Swarm:
         self._duration_s = np.zeros(num_worlds)
         self.keys = np.zeros(num_worlds, np.uint64)
         """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
-        self._sizes = _sizes(scenario, num_worlds, self.layout.size)
+        kind = scenario.task_class
+        self._sizes = _sizes(scenario, num_worlds, self.layout.size) | kind.sizes(scenario)
         self.state, self.course = allocate(State, self._sizes), allocate(Course, self._sizes)
         self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)
         self._world = World(self.state, self.course, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
         self._sea = make_sea(scenario, self.keys, self._sizes)
         self._engine = Engine(scenario, self._world, self._sea)
+        self.task: Any = kind(self)
+        """What the swarm is to do, a ``uuv_marl.tasks.Task``. The water asks it what to draw, and lets it observe."""
+        self._task_memory: dict[str, NDArray[Any]] = {} if kind.Memory is None else self.task.memory._asdict()
 
     @property
     def percept(self) -> Percept:
@@ -72,6 +74,16 @@ class Swarm:
     def heading(self) -> Float64:
         """Cosine and sine of every vehicle's heading psi, shape (world, vehicle, 2)."""
         return self._senses.heading
+
+    @property
+    def own_reference(self) -> Float64:
+        """Place and velocity of every vehicle's l(t), north and east [m, m/s], shape (world, vehicle, 4)."""
+        return np.take_along_axis(self.facts.reference, self.course.group[:, :, None], axis=1)
+
+    @property
+    def mean_reference(self) -> Float64:
+        """The mean of the groups' l(t): place and velocity, shape (world, 4)."""
+        return self.facts.reference.mean(axis=1)
 
     @property
     def flow(self) -> Float64:
@@ -126,11 +138,10 @@ class Swarm:
         """How episodes ended, shape (world,) each; both False for episodes that go on.
 
         Returns:
-            Terminated: the swarm arrived (if ``arrival.ends_episode``), or all vehicles are lost.
+            Terminated: the task is done (the swarm arrived, say), or all vehicles are lost.
             Truncated: the time limit cut the episode off, or the world diverged.
         """
-        done = self.arrived & self.scenario.arrival.ends_episode
-        terminated = done | ~self.state.alive.any(axis=1)
+        terminated = self.task.done() | ~self.state.alive.any(axis=1)
         late = self.facts.time_s >= self.time_limit_s - 1e-9
         return terminated, (late | (self.facts.diverged >= 0)) & ~terminated
 
@@ -161,29 +172,32 @@ class Swarm:
         for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
             stream = self._rngs[w] if own is None else np.random.default_rng(own)
             self._reset_world(w, stream or np.random.default_rng())
+        self._tell(np.isin(np.arange(self.num_worlds), list(chosen)))
         return self.percept
 
     def _reset_world(self, w: int, rng: np.random.Generator) -> None:
         self._rngs[w], self.keys[w] = rng, episode_key(rng)
-        field = draw_field(self.scenario, rng)
-        state, course = self.state, self.course
-        points, m = len(field.waypoints), len(field.obstacles)
-        course.waypoints[w, :points], course.waypoints[w, points:] = field.waypoints, field.waypoints[-1]
-        times = arrival_times(field.waypoints, self.scenario.trajectory.speed_mps)
-        course.times[w, :points], course.times[w, points:] = times, times[-1]
-        course.last[w] = points - 1
-        self._duration_s[w] = times[-1]
-        course.obstacles[w, :m], course.obstacles[w, m:] = field.obstacles, 0.0
-        course.num_obstacles[w] = m
-        state.eta[w], state.nu[w] = start_state(self.scenario, field.waypoints, rng)
+        drawn: Draw = self.task.draw(rng)
+        state, course, m = self.state, self.course, len(drawn.obstacles)
+        for g, (waypoints, times) in enumerate(zip(drawn.waypoints, drawn.times, strict=True)):
+            points = len(waypoints)
+            course.waypoints[w, g, :points], course.waypoints[w, g, points:] = waypoints, waypoints[-1]
+            course.times[w, g, :points], course.times[w, g, points:] = times, times[-1]
+            course.last[w, g] = points - 1
+        course.group[w], course.informed[w] = drawn.group, drawn.informed
+        self._duration_s[w] = drawn.duration_s
+        course.obstacles[w, :m], course.obstacles[w, m:] = drawn.obstacles, 0.0
+        course.num_obstacles[w], course.drift[w] = m, 0.0
+        state.eta[w], state.nu[w] = drawn.eta, drawn.nu
         state.before[w] = state.eta[w, :, :2]
-        state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, field.obstacles
+        state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, drawn.obstacles
         course.losses[w] = draw_losses(self.scenario, rng)
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
         if self._sea is not None:
-            draw_sea(w, self.scenario, course, times[-1], self._sea)
+            draw_sea(w, self.scenario, course, drawn.duration_s, self._sea)
         self._engine.observe(w)
+        self.task.begin(w)
 
     def observe(self) -> Percept:
         """Compute facts and percepts anew, as after a reset, once ``state`` or ``course`` was changed by hand.
@@ -194,6 +208,7 @@ class Swarm:
         self._check_indices(self._arrays())
         for w in range(self.num_worlds):
             self._engine.observe(w)
+        self._tell(self._ready)
         return self.percept
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
@@ -229,6 +244,7 @@ class Swarm:
             "duration_s": self._duration_s,
             "keys": self.keys,
             **{k: array for table in (*self._world, *sea_tables(self._sea)) for k, array in table._asdict().items()},
+            **{f"task.{name}": array for name, array in self._task_memory.items()},
         }
 
     def step(
@@ -253,11 +269,24 @@ class Swarm:
             )
         if not (self._ready if active is None else self._ready | ~active).all():
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
-        if self._engine.step(np.ascontiguousarray(action), active, then):
+        running = self._ready if active is None else active
+        self.task.move(running)
+        diverged = self._engine.step(np.ascontiguousarray(action), active, then)
+        self.task.update(running)
+        self._tell(running)
+        if diverged:
             for w in np.flatnonzero((self.facts.diverged >= 0) & ~self._warned):
                 _log.warning(self.divergence(int(w)))
                 self._warned[w] = True
         return self.percept
+
+    def _tell(self, worlds: Bool) -> None:
+        """Write what the task lets the living of these worlds observe, shape (world,), into their percepts."""
+        if not self.task.observed:
+            return
+        told, percept, there = self.task.observe(worlds), self.percept, worlds[:, None] & self.state.alive
+        for field in self.task.observed:
+            percept[field.name][there] = np.clip(told[field.name][there], field.kind.low, field.kind.high)
 
 
 def _sizes(scenario: Scenario, worlds: int, entries: int) -> dict[str, int]:
@@ -266,6 +295,7 @@ def _sizes(scenario: Scenario, worlds: int, entries: int) -> dict[str, int]:
     return {
         "world": worlds,
         "vehicle": scenario.swarm.num_vehicles,
+        "group": 1,
         "point": field.legs[1] + 1 if field else len(scenario.trajectory.waypoints_m or ()),
         "obstacle": max(scenario.max_obstacles, 1),
         "loss": len(scenario.disturbance.loss_times_s),

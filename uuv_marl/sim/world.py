@@ -6,7 +6,7 @@ depends on its neighbours in the batch.
 
 import math
 
-from uuv_marl.sim.arrays import Facts, World
+from uuv_marl.sim.arrays import Course, Facts, World
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.hearing import hear, hear_nobody
@@ -78,6 +78,15 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 
 @compiled_inner
+def move_obstacles(w: int, course: Course, hold_s: float) -> None:
+    """Obstacles go on, those that move, for one control hold."""
+    for k in range(course.num_obstacles[w]):
+        if course.drift[w, k, 0] != 0.0 or course.drift[w, k, 1] != 0.0:
+            course.obstacles[w, k, 0] += course.drift[w, k, 0] * hold_s
+            course.obstacles[w, k, 1] += course.drift[w, k, 1] * hold_s
+
+
+@compiled_inner
 def sort_into_cells(w: int, world: World, model: Model, workspace: Workspace) -> Grid:
     """Sort the living into cells; where these lie."""
     return sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
@@ -91,43 +100,64 @@ def measure(w: int, world: World, model: Model, workspace: Workspace, grid: Grid
     began += measure_obstacles(w, hull, world, workspace.cells, grid)
     for i in range(facts.spacing.shape[1]):
         facts.min_spacing[w] = min(facts.min_spacing[w], facts.spacing[w, i])
+        world.state.touched[w, i] = world.state.touched[w, i] or facts.contacts[w, i] > 0
     facts.max_spacing[w] = extent(workspace.cells, grid)
     facts.collisions[w] += began
     return began
 
 
 @compiled_inner
-def check_arrival(w: int, world: World, rules: Rules) -> None:
-    """Where the reference and the swarm's centre are, and whether the swarm has arrived."""
+def check_group(w: int, g: int, world: World, rules: Rules) -> tuple[float, float, int, float, float, bool]:
+    """Where a group's reference is, and how far its vehicles and their centre are from where they are to arrive.
+
+    Returns:
+        Sums of the living's positions [m], how many live, the largest distance of one of them from the end, and that of
+        their centre [m], and whether l(t), or in passage the centre, has come to the end.
+    """
     state, course, facts = world.state, world.course, world.facts
-    last = course.last[w]
-    t = state.tick[w] * rules.hold_s
-    l_x, l_y, l_vx, l_vy = reference(t, course.waypoints[w], course.times[w], last, rules.passes)
-    facts.time_s[w] = t
-    facts.reference[w, 0], facts.reference[w, 1], facts.reference[w, 2], facts.reference[w, 3] = l_x, l_y, l_vx, l_vy
+    t, last, l_t = facts.time_s[w], course.last[w, g], facts.reference[w, g]
+    l_t[0], l_t[1], l_t[2], l_t[3] = reference(t, course.waypoints[w, g], course.times[w, g], last, rules.passes)
     x, y, num = 0.0, 0.0, 0
     for i in range(state.eta.shape[1]):
+        if course.group[w, i] != g or not (state.alive[w, i] or facts.lost[w, i]):
+            continue
+        dx, dy = state.eta[w, i, 0] - l_t[0], state.eta[w, i, 1] - l_t[1]
+        facts.away[w, i] = math.sqrt(dx * dx + dy * dy)
         if state.alive[w, i]:
             x, y, num = x + state.eta[w, i, 0], y + state.eta[w, i, 1], num + 1
     if num == 0:
-        facts.centre[w] = math.nan
-        return
-    facts.centre[w, 0], facts.centre[w, 1] = x / num, y / num
-    at_x, at_y, there = l_x, l_y, t >= course.times[w, last]
+        return 0.0, 0.0, 0, 0.0, 0.0, True
+    at_x, at_y, there = l_t[0], l_t[1], t >= course.times[w, g, last]
     if rules.passes:
-        at_x, at_y, beyond = passed(x / num, y / num, course.waypoints[w], last)
+        at_x, at_y, beyond = passed(x / num, y / num, course.waypoints[w, g], last)
         there = there and beyond
     far = 0.0
     for i in range(state.eta.shape[1]):
-        if state.alive[w, i]:
+        if state.alive[w, i] and course.group[w, i] == g:
             far = max(far, math.hypot(state.eta[w, i, 0] - at_x, state.eta[w, i, 1] - at_y))
-    error = math.hypot(x / num - at_x, y / num - at_y)
+    return x, y, num, far, math.hypot(x / num - at_x, y / num - at_y), there
+
+
+@compiled_inner
+def check_arrival(w: int, world: World, rules: Rules) -> None:
+    """Where references and the swarm's centre are, and whether the swarm, all its groups, has arrived."""
+    state, facts = world.state, world.facts
+    facts.time_s[w] = state.tick[w] * rules.hold_s
+    x, y, living, far, error, there = 0.0, 0.0, 0, 0.0, 0.0, True
+    for g in range(facts.reference.shape[1]):
+        g_x, g_y, num, g_far, g_error, g_there = check_group(w, g, world, rules)
+        x, y, living = x + g_x, y + g_y, living + num
+        far, error, there = max(far, g_far), max(error, g_error), there and g_there
+    if living == 0:
+        facts.centre[w] = math.nan
+        return
+    facts.centre[w, 0], facts.centre[w, 1] = x / living, y / living
     for k in range(rules.arrival_radii.shape[0]):
         if not (there and far <= rules.spread and error <= rules.arrival_radii[k]):
             state.dwell[w, k] = 0
             continue
         if state.dwell[w, k] == rules.dwell_ticks and math.isnan(facts.arrival_s[w, k]):
-            facts.arrival_s[w, k] = t - rules.dwell_ticks * rules.hold_s
+            facts.arrival_s[w, k] = facts.time_s[w] - rules.dwell_ticks * rules.hold_s
         state.dwell[w, k] += 1
 
 
@@ -168,6 +198,8 @@ def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Gri
 @compiled_inner
 def clear_facts(w: int, facts: Facts) -> None:
     """Forget the step before."""
+    for i in range(facts.away.shape[1]):
+        facts.was_away[w, i] = facts.away[w, i]
     facts.spacing[w] = math.inf
     facts.clearance[w] = math.inf
     facts.obstacle_clearance[w] = math.inf
@@ -184,12 +216,15 @@ def observe_world(w: int, world: World, model: Model, own: Workspace, sea: Sea |
     """Facts and percepts of a world that has just been reset. Facts, senses and ``state.dwell`` are written."""
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
+    world.state.touched[w] = False
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
     load(w, world.state, own.now)
     grid = sort_into_cells(w, world, model, own)
     measure(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
+    for i in range(world.facts.away.shape[1]):
+        world.facts.was_away[w, i] = world.facts.away[w, i]
     perceive(w, world, model, own, grid, True)
     if sea is not None:
         begin(w, world, sea)
@@ -206,6 +241,7 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
     control_hold(w, first, world, model, workspace.now, sea)
     world.state.tick[w] += 1
     apply_losses(w, world, model.rules, sea)
+    move_obstacles(w, world.course, model.rules.hold_s)
     grid = sort_into_cells(w, world, model, workspace)
     began = measure(w, world, model, workspace, grid)
     if model.rules.contact_ends and began > 0:

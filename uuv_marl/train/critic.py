@@ -17,12 +17,12 @@ def privileged_observation(swarm: Swarm, out: Float32) -> None:
     """
     state, facts = swarm.state, swarm.facts
     c, s = np.moveaxis(swarm.heading, -1, 0)
-    to_reference = facts.reference[:, None, :2] - state.eta[:, :, :2]
+    to_reference = swarm.own_reference[:, :, :2] - state.eta[:, :, :2]
     away = np.hypot(*np.moveaxis(to_reference, -1, 0))
     u, v = np.moveaxis(swarm.velocity, -1, 0)
     velocity = np.stack([c * u - s * v, s * u + c * v], axis=-1)
-    drift = velocity.mean(axis=1) - facts.reference[:, 2:]
-    error = facts.centre - facts.reference[:, :2]
+    drift = velocity.mean(axis=1) - swarm.mean_reference[:, 2:]
+    error = facts.centre - swarm.mean_reference[:, :2]
     size = np.hypot(*error.T)[:, None]
     left = swarm.duration_s - facts.time_s
     columns = [

@@ -47,7 +47,7 @@ class Weights(NamedTuple):
 def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
     """The reward of the latest decision, shape (world, vehicle)."""
     facts, share = swarm.facts, swarm.scenario.timing.decision_period_s / 0.5
-    away = np.hypot(*np.moveaxis(swarm.state.eta[:, :, :2] - facts.reference[:, None, :2], -1, 0))
+    away = facts.away
     near = np.clip(1.0 - facts.clearance / by.obstacle_m, 0.0, 1.5)
     close = np.clip(1.0 - facts.spacing / by.spacing_m, 0.0, 1.0)
     rate = (
@@ -66,7 +66,7 @@ def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
 def _shared(swarm: Swarm, by: Weights) -> Float64:
     """What all vehicles of a world pay for where their centre is, shape (world,)."""
     facts = swarm.facts
-    error = np.hypot(*(facts.centre - facts.reference[:, :2]).T)
+    error = np.hypot(*(facts.centre - swarm.mean_reference[:, :2]).T)
     left = np.maximum(swarm.duration_s - facts.time_s, 0.0)
     far, astray = np.minimum(error, 60.0), 1.0 - 2.0 / 3.0 * np.exp(-error / 4.0)
     return by.team * np.exp(-left / by.team_s) * far + by.late * (left == 0.0) * astray
@@ -79,6 +79,6 @@ def lead(swarm: Swarm) -> Float64:
     shared centre error each would get 1/n of that, which its own noise hides. The whole difference also pays for being
     far from the centre, whatever the direction, and so spreads the swarm; this one sums to zero. Fades within 2 m.
     """
-    error = swarm.facts.centre - swarm.facts.reference[:, :2]
+    error = swarm.facts.centre - swarm.mean_reference[:, :2]
     way = -error / np.sqrt(np.sum(error * error, axis=-1, keepdims=True) + 4.0)
     return np.sum((swarm.state.eta[:, :, :2] - swarm.facts.centre[:, None]) * way[:, None], axis=-1)

@@ -100,10 +100,10 @@ class Memory:
         arrival_s = float(facts.arrival_s[w, 0])
         return Scene(
             scenario=swarm.scenario,
-            waypoints=course.waypoints[w, : course.last[w] + 1].copy(),
+            waypoints=course.waypoints[w, 0, : course.last[w, 0] + 1].copy(),
             obstacles=course.obstacles[w, : course.num_obstacles[w]].copy(),
             time_s=float(facts.time_s[w]),
-            reference=facts.reference[w, :2].copy(),
+            reference=facts.reference[w, 0, :2].copy(),
             position=position,
             heading=state.eta[w, :, 2].copy(),
             alive=alive,
@@ -116,7 +116,7 @@ class Memory:
             collisions=int(batch.collisions[w]),
             min_spacing_m=float(facts.min_spacing[w]),
             clearance_m=float(facts.obstacle_clearance[w].min()),
-            centre_error_m=float(np.hypot(*(facts.centre[w] - facts.reference[w, :2]))),
+            centre_error_m=float(np.hypot(*(facts.centre[w] - swarm.mean_reference[w, :2]))),
             sonar=None if sonar_of is None or not alive[sonar_of] else _sonar(batch, world, sonar_of),
             water=swarm.flow_field(w) if swarm.scenario.current.flows else None,
         )

@@ -91,11 +91,13 @@ def navigate(w: int, world: World, navigation: Navigation, track: Track, see: Fi
         if not world.state.alive[w, i]:
             continue
         c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], track)
-        dx = reference[w, 0] - (eta[w, i, 0] + track.drift[w, i, 0])
-        dy = reference[w, 1] - (eta[w, i, 1] + track.drift[w, i, 1])
-        v_x, v_y = reference[w, 2], reference[w, 3]
-        see.reference[w, i, 0], see.reference[w, i, 1] = toward(dx, dy, c, s)
-        see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
-        see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+        if world.course.informed[w, i]:
+            l_t = reference[w, world.course.group[w, i]]
+            dx = l_t[0] - (eta[w, i, 0] + track.drift[w, i, 0])
+            dy = l_t[1] - (eta[w, i, 1] + track.drift[w, i, 1])
+            v_x, v_y = l_t[2], l_t[3]
+            see.reference[w, i, 0], see.reference[w, i, 1] = toward(dx, dy, c, s)
+            see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
+            see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
         if see.compass.shape[2] > 0:
             see.compass[w, i, 0], see.compass[w, i, 1] = saturate(c, 1.0), saturate(s, 1.0)

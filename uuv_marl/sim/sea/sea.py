@@ -98,7 +98,8 @@ def draw_sea(w: int, scenario: Scenario, course: Course, duration_s: float, sea:
         sea: is written.
     """
     key = np.uint64(sea.keys[w])
-    draw_flow(w, key, course.waypoints[w, : course.last[w] + 1], scenario, sea.water, sea.flow)
+    corners = [points[: last + 1] for points, last in zip(course.waypoints[w], course.last[w], strict=True)]
+    draw_flow(w, key, np.concatenate(corners), scenario, sea.water, sea.flow)
     draw_hulls(w, key, duration_s, scenario, sea.hull)
     draw_ears(w, key, sea.noise, sea.ears)
     draw_track(w, key, sea.navigation, sea.track)

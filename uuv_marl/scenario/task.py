@@ -1,0 +1,66 @@
+"""Which task a scenario asks for, and the task's own numbers; ``uuv_marl.tasks`` holds the tasks."""
+
+import difflib
+from typing import Any, cast
+
+from pydantic import ConfigDict, ValidationError
+
+from uuv_marl.modules import named_object
+from uuv_marl.scenario.fields import Section
+
+
+class Task(Section):
+    """The task: its name, and numbers of its own, which its class checks."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: str
+    """One of ``uuv_marl.tasks.TASKS``, or ``module:Class`` for a user's own."""
+
+
+def named_task(given: Any) -> Any:
+    """A table with a task's name, where the name alone was given."""
+    return {"name": given} if isinstance(given, str) else given
+
+
+def task_class(name: str) -> Any:
+    """The class of a task, by its name.
+
+    Raises:
+        ValueError: there is none; the message gives the most similar name.
+    """
+    tasks = cast(dict[str, Any], named_object("uuv_marl.tasks:TASKS"))
+    if name in tasks:
+        return tasks[name]
+    if ":" not in name:
+        near = difflib.get_close_matches(name, list(tasks), n=1, cutoff=0.4)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise ValueError(f"task {name!r} is unknown; {hint}There are {', '.join(tasks)}, and module:Class for your own")
+    try:
+        made = named_object(name)
+    except ImportError as error:
+        raise ValueError(f"task {name!r} {error}; give module:Class of a module that Python finds") from None
+    base: Any = named_object("uuv_marl.tasks:Task")
+    if not (isinstance(made, type) and issubclass(made, base)):
+        raise ValueError(f"task {name!r} must be a subclass of uuv_marl.tasks.Task, got {made!r}")
+    return made
+
+
+def task_numbers(task: Task) -> Any:
+    """The task's own numbers, checked by its class.
+
+    Raises:
+        ValueError: a number is unknown or out of its range; the message names it, its value and the remedy.
+    """
+    numbers = task_class(task.name).Numbers
+    try:
+        return numbers.model_validate(task.model_extra or {})
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(map(str, ("task", *first["loc"])))
+        if first["type"] == "extra_forbidden":
+            there = ", ".join(numbers.model_fields) or "none of its own"
+            raise ValueError(f"{field} is unknown; the numbers of task {task.name!r} are {there}") from None
+        if "ctx" in first and first["type"] == "value_error":
+            raise ValueError(str(first["ctx"]["error"])) from None
+        raise ValueError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None

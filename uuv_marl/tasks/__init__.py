@@ -1,0 +1,11 @@
+"""Tasks: what a swarm is to do, one file each. ``Task`` is the base of your own."""
+
+from uuv_marl.tasks.follow import Follow
+from uuv_marl.tasks.task import Mark, Task
+
+TASKS: dict[str, type[Task]] = {
+    "follow": Follow,
+}
+"""Every task that ships with the package."""
+
+__all__ = ["TASKS", "Follow", "Mark", "Task"]

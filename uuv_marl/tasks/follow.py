@@ -1,0 +1,157 @@
+"""``follow``: the paper's task. The swarm follows l(t) around obstacles and comes to rest at its end.
+
+Its two rewards, ``dense`` and ``sparse``, are named terms, weighted by the scenario, and their sum. Laws that hold by
+construction: an earlier arrival of the same way never pays less, since costs per second are at most zero, progress sums
+to what is left at the start, and an arrival pays once. Who moves and comes back gains nothing. A vehicle never gains
+from its own loss, unless it would have collided again and again: a lost vehicle is charged the worst that those terms
+could have cost it in the rest of the episode, an arrival, and a collision. No term depends on the number of vehicles.
+One weakness remains: if a straggler keeps the swarm from arriving, the others gain from its loss.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arrays import Facts, State
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.model import rules
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.task import Payment, Task
+from uuv_marl.types import Bool, Float64
+
+TRACKING, OBSTACLE, SPACING, EFFORT, COLLISION, LOSS, ARRIVAL, PROGRESS = range(8)
+"""Place of each term in arrays of all; ``sparse`` has no progress."""
+
+
+class Follow(Task):
+    """Follow l(t) and arrive together: ``arrival`` and ``time_limit`` of the scenario say when that is done."""
+
+    rewards: ClassVar[tuple[str, ...]] = ("dense", "sparse")
+    terms: ClassVar[Mapping[str, str]] = {
+        "tracking": "-w · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's distance to l(t)",
+        "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
+        "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
+        "effort": "-w · dt · a²; a²: mean squared length of the action, 1 at full force",
+        "collision": "-w for every collision that begins",
+        "loss": "once, for a lost vehicle: -(w_collision + w_arrival + (w_tracking + w_obstacle + w_spacing + "
+        "w_effort) · T), T: time left until the limit; in dense also what is left of progress, -(D - min(d, D))/c",
+        "arrival": "+w for every vehicle when the swarm arrives",
+        "progress": "dense alone: Phi now - Phi before, with Phi = -min(d, D)/c, and 0 once the swarm has arrived; "
+        "d: the vehicle's distance to l(t), D: progress_far_m, c: progress_m",
+    }
+
+    def __init__(self, swarm: Swarm) -> None:
+        super().__init__(swarm)
+        self._weights = reward_weights(swarm.scenario)
+
+    def payment(self, name: str, running: Bool) -> Payment:
+        """Pay while worlds are stepped: the weighted terms of ``dense``, or those of ``sparse``."""
+        swarm = self.swarm
+        terms = np.zeros((len(self.terms) - (name == "sparse"), swarm.num_worlds, swarm.num_vehicles))
+        reward, limit_s = np.zeros(terms.shape[1:]), swarm.time_limit_s
+
+        def pay(begin: int, end: int) -> None:
+            _fill_some(begin, end, running, limit_s, swarm.state, swarm.facts, self._weights, terms, reward)
+
+        return Payment(reward, terms, pay)
+
+    def reward(self, running: Bool) -> Mapping[str, Float64]:
+        """The weighted terms of the latest step; zero for vehicles lost before."""
+        payment = self.payment("dense", running)
+        payment.pay(0, self.swarm.num_worlds)
+        return dict(zip(self.terms, payment.terms, strict=True))
+
+    def done(self) -> Bool:
+        """Worlds whose swarm has arrived, unless ``arrival.ends_episode`` is false."""
+        return self.swarm.arrived & self.swarm.scenario.arrival.ends_episode
+
+    def there(self) -> Bool:
+        """All vehicles of a swarm that has arrived: the paper's success is the swarm's."""
+        return np.broadcast_to(self.swarm.arrived[:, None], self.swarm.state.alive.shape)
+
+
+class RewardWeights(NamedTuple):
+    """The scenario's weights and lengths, as numbers for the compiled functions."""
+
+    period_s: float
+    tracking: float
+    obstacle: float
+    spacing: float
+    effort: float
+    collision: float
+    arrival: float
+    progress_m: float
+    progress_far_m: float
+    s_l_m: float
+    s_o_m: float
+    s_u_m: float
+    settled_s: float
+    """The step that arrives ends less than this after ``Facts.arrival_s``, and every later one after it."""
+
+
+def reward_weights(scenario: Scenario) -> RewardWeights:
+    """The scenario's weights and lengths."""
+    weight, limit, timing = scenario.reward, scenario.constraints, scenario.timing
+    dwell = rules(scenario).dwell_ticks
+    return RewardWeights(
+        timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
+        weight.collision, weight.arrival, weight.progress_m, weight.progress_far_m,
+        limit.s_l_m, limit.s_o_m, limit.s_u_m,
+        settled_s=(dwell + timing.holds_per_decision - 0.5) * timing.control_hold_s,
+    )  # fmt: skip
+
+
+@compiled
+def shortfall(share: float) -> float:
+    """A cost between 0 and 1 [1]."""
+    return min(max(share, 0.0), 1.0)
+
+
+@compiled
+def _fill(
+    w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
+) -> None:
+    """Fill the weighted ``terms`` of one world, shape (term, world, vehicle), and their sum; both are zero before."""
+    left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
+    worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
+    arrived = not math.isnan(facts.arrival_s[w, 0])
+    arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is
+    far, dense = weights.progress_far_m, terms.shape[0] > PROGRESS
+    for i in range(state.alive.shape[1]):
+        alive, lost = state.alive[w, i], facts.lost[w, i]
+        if not (alive or lost):
+            continue
+        away = facts.away[w, i]
+        terms[TRACKING, w, i] = -weights.tracking * weights.period_s * shortfall(away / weights.s_l_m - 1.0)
+        terms[OBSTACLE, w, i] = (
+            -weights.obstacle * weights.period_s * shortfall(1.0 - facts.clearance[w, i] / weights.s_o_m)
+        )
+        terms[SPACING, w, i] = (
+            -weights.spacing * weights.period_s * shortfall(1.0 - facts.spacing[w, i] / weights.s_u_m)
+        )
+        terms[EFFORT, w, i] = -weights.effort * weights.period_s * facts.effort[w, i]
+        terms[COLLISION, w, i] = -weights.collision * facts.contacts[w, i]
+        if lost:
+            left = (far - min(away, far)) / weights.progress_m if dense else 0.0
+            terms[LOSS, w, i] = -(weights.collision + weights.arrival + worst_rate * left_s + left)
+        if alive and arrives:
+            terms[ARRIVAL, w, i] = weights.arrival
+        if dense and (arrives or not arrived):
+            left = 0.0 if arrives else min(away, far)
+            terms[PROGRESS, w, i] = (min(facts.was_away[w, i], far) - left) / weights.progress_m
+        for k in range(terms.shape[0]):
+            reward[w, i] += terms[k, w, i]
+
+
+@compiled
+def _fill_some(
+    begin: int, end: int, running: Bool, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights,
+    terms: Float64, reward: Float64,
+) -> None:  # fmt: skip
+    """``_fill`` for those worlds of a range that are ``running``, shape (world,)."""
+    for w in range(begin, end):
+        if running[w]:
+            _fill(w, time_limit_s, state, facts, weights, terms, reward)

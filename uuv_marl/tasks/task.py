@@ -1,0 +1,162 @@
+"""``Task``: what a swarm is to do, in hooks that take and give arrays over worlds and vehicles."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from uuv_marl.errors import RewardError
+from uuv_marl.percept import Table
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.fields import Section
+from uuv_marl.sim.draw import Draw, usual_draw
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.tables import allocate
+from uuv_marl.types import Bool, Float64
+
+
+class Mark(NamedTuple):
+    """A circle to draw: place north and east [m], radius [m], and a word."""
+
+    place_m: tuple[float, float]
+    radius_m: float
+    label: str = ""
+
+
+class Payment(NamedTuple):
+    """What pays a step while it is simulated, world by world. The arrays are zero before."""
+
+    reward: Float64
+    """Sum of the terms, shape (world, vehicle)."""
+    terms: Float64
+    """The weighted terms in the order of ``Task.terms``, shape (term, world, vehicle)."""
+    pay: Callable[[int, int], None]
+    """Fills both for a range of worlds, from its first to its end."""
+
+
+def paid(task: "Task", running: Bool) -> Payment:
+    """What a task's ``reward`` gives for the latest step, for worlds that are ``running``.
+
+    Raises:
+        RewardError: terms are missing or unknown, of another shape, or not finite.
+    """
+    given, swarm = task.reward(running), task.swarm
+    name = type(task).__name__
+    if {*given} != {*task.terms}:
+        raise RewardError(f"reward of {name} must give the terms {', '.join(task.terms)}, got {', '.join(given)}")
+    shape = (swarm.num_worlds, swarm.num_vehicles)
+    there = running[:, None] & (swarm.state.alive | swarm.facts.lost)
+    terms = np.zeros((len(task.terms), *shape))
+    for k, term in enumerate(task.terms):
+        own = np.asarray(given[term], np.float64)
+        if own.shape != shape:
+            raise RewardError(f"reward of {name} must give {term} as an array {shape}, got {own.shape}")
+        if not np.isfinite(own[there]).all():
+            raise RewardError(f"reward of {name} must give finite numbers, got others in {term}")
+        terms[k][there] = own[there]
+    return Payment(terms.sum(axis=0), terms, lambda _begin, _end: None)
+
+
+class Task:
+    """What a swarm is to do: who goes where, what is paid, when it is done and well done, and what is measured.
+
+    A subclass overrides hooks. They take ``running``, the worlds that they are about, shape (world,), and give arrays
+    over all worlds and vehicles; what they give for other worlds is not used. ``self.swarm`` is the simulation, in its
+    present state, and ``self.numbers`` the task's own numbers.
+
+    Without an override the swarm starts, and its reference moves, as the scenario says; nothing is paid; the episode
+    runs to its time limit.
+
+    Args:
+        swarm: of any number of worlds, before its first reset.
+    """
+
+    class Numbers(Section):
+        """The task's own numbers, which stand in the scenario's table ``task``; ranges as in ``scenario/fields.py``."""
+
+    Memory: ClassVar[type[Any] | None] = None
+    """Table of what the task remembers (``uuv_marl.sim.tables``): a NamedTuple of arrays over world and vehicle. Zero
+    is nothing: so a world begins. It is part of the swarm's snapshots."""
+    observed: ClassVar[Table] = ()
+    """Rows that the task adds to every percept and observation, see ``uuv_marl.percept.PerceptField``."""
+    rewards: ClassVar[tuple[str, ...]] = ("dense",)
+    """Names of the rewards that the task knows; the first is the default."""
+    terms: ClassVar[Mapping[str, str]] = {}
+    """The terms of the first reward with their formulas, in order."""
+    columns: ClassVar[Mapping[str, str]] = {}
+    """The task's own metrics that tables show, with what they are and their unit."""
+    guide: ClassVar[str] = "bio_inspired"
+    """Policy whose mean return is above that of ``idle`` and ``random``."""
+
+    def __init__(self, swarm: Swarm) -> None:
+        self.swarm = swarm
+        self.numbers: Any = swarm.scenario.task_numbers
+        sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles}
+        self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
+        """What is remembered, the arrays of ``Memory``."""
+
+    @classmethod
+    def sizes(cls, scenario: Scenario) -> Mapping[str, int]:  # noqa: ARG003 - for those who override it
+        """Lengths of axes that differ from the usual: ``group``, ``point`` (corners of a trajectory), ``obstacle``."""
+        return {}
+
+    # What an episode starts from, and what moves.
+
+    def draw(self, rng: np.random.Generator) -> Draw:
+        """What one world starts from, drawn from its own generator; VMAS: ``make_world``, ``reset_world_at``."""
+        return usual_draw(self.swarm.scenario, rng)
+
+    def begin(self, world: int) -> None:
+        """A world was reset: forget what was remembered of it, and look at how it stands."""
+        for array in self.memory:
+            array[world] = 0
+
+    def move(self, running: Bool) -> None:
+        """Before a step: steer what the policies don't, for instance ``swarm.course.drift``; VMAS: ``pre_step``."""
+
+    def update(self, running: Bool) -> None:
+        """After a step: remember what later hooks need; VMAS: ``post_step``."""
+
+    # What is told and paid.
+
+    def observe(self, running: Bool) -> Mapping[str, Float64]:  # noqa: ARG002
+        """The rows of ``observed`` by name, shape (world, vehicle, ...), physical units; VMAS: ``observation``."""
+        return {}
+
+    def reward(self, running: Bool) -> Mapping[str, Float64]:  # noqa: ARG002
+        """What the latest step pays, weighted ``terms`` by name, shape (world, vehicle) each; VMAS: ``reward``."""
+        return {}
+
+    def payment(self, name: str, running: Bool) -> Payment | None:  # noqa: ARG002
+        """Compiled pay for a reward by its name; None where ``reward`` is all there is."""
+        return None
+
+    # When it is done, and well done.
+
+    def done(self) -> Bool:
+        """Worlds whose episode ends before the time limit, shape (world,); VMAS: ``done``."""
+        return np.zeros(self.swarm.num_worlds, np.bool_)
+
+    def there(self) -> Bool:
+        """Vehicles that are where they should be now, shape (world, vehicle)."""
+        return np.ones_like(self.swarm.state.alive)
+
+    def succeeded(self) -> Bool:
+        """Vehicles that would have done their task if the episode ended now: there, alive, and untouched all along."""
+        state = self.swarm.state
+        return self.there() & state.alive & ~state.touched
+
+    # What is measured and drawn.
+
+    def metrics(self, world: int) -> dict[str, float | None]:
+        """Measures of an episode that ends now, numbers by name; VMAS: ``info``.
+
+        A subclass adds its own to these: ``untouched_share``, the share of vehicles that succeeded, and ``whole``, 1 if
+        all did.
+        """
+        share = float(self.succeeded()[world].mean())
+        return {"untouched_share": share, "whole": float(share == 1.0)}
+
+    def marks(self, world: int) -> list[Mark]:  # noqa: ARG002
+        """What to draw of the task beside trajectories, obstacles and vehicles; VMAS: ``extra_render``."""
+        return []
