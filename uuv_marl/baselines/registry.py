@@ -96,6 +96,9 @@ class EnvPolicy:
 
 GUARDED = "guarded:"
 """Prefix of a policy's name that puts it inside the safety filter."""
+OWN = "own:"
+"""Prefix of a policy's name, before all others, that runs it with a decision at every control hold and the inner loop
+that it declares, as it was tuned, where the scenario fixes others for all (``timing.fixed``)."""
 
 
 class Named(NamedTuple):
@@ -107,18 +110,19 @@ class Named(NamedTuple):
 
 
 def parse(name: str) -> Named:
-    """A policy from its name: ``[guarded:]NAME[,key=value ...]``.
+    """A policy from its name: ``[own:][guarded:]NAME[,key=value ...]``.
 
     Args:
         name: NAME is one of ``POLICIES``, the path of a checkpoint, or ``module:Class``; each key is one of the
-            policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter.
+            policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter; ``own:`` changes the
+            scenario alone (``granted``).
 
     Raises:
         PolicyError: no policy has that name; the message gives the most similar name.
     """
-    name = name.removeprefix(GUARDED)
-    if name.startswith(GUARDED):
-        raise PolicyError(f"policy {GUARDED + name!r} names the filter twice; write {name!r}")
+    name = name.removeprefix(OWN).removeprefix(GUARDED)
+    if name.startswith((GUARDED, OWN)):
+        raise PolicyError(f"policy {name!r} has a prefix too many; write it as {OWN}{GUARDED}NAME, each at most once")
     plain, *pairs = [name] if user_path(name).exists() else name.split(",")
     wrong = next((pair for pair in pairs if not all(pair.partition("="))), None)
     if wrong is not None:
@@ -157,7 +161,7 @@ def _kind(name: str) -> Kind:
 
 def is_trained(name: str) -> bool:
     """Whether a name is that of a trained policy: one that ships, or the path of a checkpoint, which may be gone."""
-    plain = name.removeprefix(GUARDED).partition(",")[0]
+    plain = name.removeprefix(OWN).removeprefix(GUARDED).partition(",")[0]
     return isinstance(POLICIES[plain], Trained) if plain in POLICIES else not re.fullmatch(r"[\w.]+:\w+", plain)
 
 
@@ -170,18 +174,22 @@ def channels_in(scenario: Scenario, declared: Sequence[str]) -> list[str]:
 def granted(name: str, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels and the inner loop (``inner_loop_nms``) that a policy declares.
 
+    Where the scenario fixes the inner loop for all (``timing.fixed``), only the channels, unless the name begins with
+    ``own:``, which also gives the policy a decision at every control hold.
     If the scenario has ``modem``, a policy that declares ``link`` gets ``modem`` instead. There are two exceptions: a
     policy that declares both, and a trained policy, which knows only the channels of its training.
     """
     policy = policy_class(name)
-    trained = isinstance(policy, Trained)
-    return load_scenario(
-        scenario,
-        overrides={
-            "sonar.channels": list(policy.channels) if trained else channels_in(scenario, policy.channels),
-            "actuators.yaw_damping_nms": inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario),
-        },
-    )
+    trained, timing = isinstance(policy, Trained), scenario.timing
+    changes: dict[str, object] = {
+        "sonar.channels": list(policy.channels) if trained else channels_in(scenario, policy.channels)
+    }
+    if not timing.fixed or name.startswith(OWN):
+        loop = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
+        changes["actuators.yaw_damping_nms"] = loop
+    if timing.fixed and name.startswith(OWN):
+        changes |= {"timing.fixed": False, "timing.decision_period_s": timing.control_hold_s}
+    return load_scenario(scenario, overrides=changes)
 
 
 @overload
@@ -244,6 +252,7 @@ def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters
         num_worlds: first axis of the percepts.
         parameters: by name; texts stand for what they say. ``barrier`` is the filter's where there is one.
     """
+    name = name.removeprefix(OWN)
     if not name.startswith(GUARDED):
         return _alone(name, kind, scenario, num_worlds, parameters)
     barrier = parameters.pop("barrier", GUARD)

@@ -1,12 +1,13 @@
 """The metrics, one definition each. Distances are taken from the start to the episode's end."""
 
-from typing import NamedTuple
+from typing import NamedTuple, NotRequired
 
 import numpy as np
 from typing_extensions import TypedDict
 
 from uuv_marl.benchmark.success import Success, SuccessRecorder
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks import Follow
 from uuv_marl.types import Bool, Float32, Float64
 
 
@@ -46,6 +47,9 @@ class Measures(TypedDict):
 
 class Metrics(Measures, Success):
     """The metrics of one run; docs/results-format.md defines every key."""
+
+    task: NotRequired[dict[str, float | None]]
+    """The task's own measures (``uuv_marl.tasks.Task.metrics``); absent in ``follow``, whose own are the others."""
 
 
 class Sample(NamedTuple):
@@ -102,14 +106,15 @@ class MetricsRecorder:
         self._samples: list[Sample] = []
         self._clearances: list[Float64] = []
         self._collisions = np.zeros(swarm.num_worlds, np.int64)
-        self._success = SuccessRecorder(swarm)
+        self._success = SuccessRecorder(swarm) if isinstance(swarm.task, Follow) else None
 
     def update(self, active: Bool) -> None:
         """Measure the swarm after a reset or step of the ``active`` worlds."""
         self._samples.append(measure(self._swarm))
         self._clearances.append(self._swarm.facts.obstacle_clearance.copy())
         self._collisions += np.where(active, self._swarm.facts.collisions, 0)
-        self._success.update(active)
+        if self._success:
+            self._success.update(active)
 
     def series(self, world: int) -> dict[str, Float32]:
         """A world's samples over time: every field of ``Sample``, and ``obstacle_distance_m`` (time, obstacle)."""
@@ -124,8 +129,10 @@ class MetricsRecorder:
         table = self._table(world)
         clearance = min(float(clearance[world].min()) for clearance in self._clearances)
         all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
+        own: dict[str, float | None] = self._swarm.task.metrics(world)
+        judged = self._success.metrics(world) if self._success else Success()
         arrived, within_1_m, within_5_m, within_10_m = (_number(time) for time in facts.arrival_s[world])
-        return {
+        made: Metrics = {
             "task_time_s": arrived,
             "time_within_1_m_s": within_1_m,
             "time_within_5_m_s": within_5_m,
@@ -150,8 +157,11 @@ class MetricsRecorder:
             "clamps": clamps,
             "saturation_share": float(table["saturation"][1:].mean()),
             "vehicles_lost": int((~self._swarm.state.alive[world]).sum()),
-            **self._success.metrics(world),
+            **judged,
         }
+        if own:
+            made["task"] = own
+        return made
 
     def _table(self, world: int) -> dict[str, Float64]:
         """A world's samples over time, shape (time,) each."""

@@ -5,13 +5,28 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from rich.table import Table as RichTable
+
 from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import Results, Row
-from uuv_marl.benchmark.tables import CAPTION, HEADERS, Cells, counted, markdown_table, rows_of
+from uuv_marl.benchmark.tables import (
+    CAPTION,
+    HEADERS,
+    TASK_CAPTION,
+    Cells,
+    counted,
+    markdown_table,
+    rich_table,
+    rows_of,
+    task_headers,
+    task_rows,
+    task_table,
+)
 from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
+from uuv_marl.tasks import Follow
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "ppo", "trimmed_scout")
 """The paper's Table 2, the safest hand-made law, and the learned policies of 0.1.0 and of today; all others by name."""
@@ -92,7 +107,9 @@ class Table(NamedTuple):
     """A scenario's table."""
 
     title: str
-    rows: list[Cells]
+    rows: Sequence[Cells] | Sequence[tuple[str, ...]]
+    headers: tuple[str, ...] = HEADERS
+    """Those of ``follow``, whose rows are ``Cells``, or of another task."""
 
 
 def write_report(
@@ -109,9 +126,24 @@ def write_report(
     """
     held = [name for name in sorted(results.policies) if any(results.select(s.name, name, seeds) for s in scenarios)]
     policies = [name for name in dict.fromkeys([*DEFAULT_POLICIES, *held]) if name in held]
-    tables = [Table(title(s, seeds), rows_of(results, s.name, policies, seeds)) for s in scenarios]
+    tables = [_table(results, scenario, policies, seeds) for scenario in scenarios]
     path = results.folder / "table.md"
-    texts = [f"## {table.title}\n\n{markdown_table(HEADERS, table.rows)}" for table in tables]
-    write_text(path, "\n".join([*texts, CAPTION + "\n"]))
+    texts = [f"## {table.title}\n\n{markdown_table(table.headers, table.rows)}" for table in tables]
+    captions = dict.fromkeys(CAPTION if table.headers == HEADERS else TASK_CAPTION for table in tables)
+    write_text(path, "\n".join([*texts, *(f"{caption}\n" for caption in captions)]))
     with writing(results.folder / "figures"):
         return tables, [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]
+
+
+def terminal_table(table: Table, width: int) -> RichTable:
+    """A table for a terminal of a given width in columns."""
+    if table.headers == HEADERS:
+        return rich_table(table.title, [Cells(*row) for row in table.rows], width)
+    return task_table(table.title, table.headers, table.rows)
+
+
+def _table(results: Results, scenario: Scenario, policies: Sequence[str], seeds: Sequence[int]) -> Table:
+    name, heading = scenario.name, title(scenario, seeds)
+    if issubclass(scenario.task_class, Follow):
+        return Table(heading, rows_of(results, name, policies, seeds))
+    return Table(heading, task_rows(results, name, policies, seeds), task_headers(scenario.task_class))

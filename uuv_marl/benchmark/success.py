@@ -41,16 +41,14 @@ class SuccessRecorder:
     def __init__(self, swarm: Swarm) -> None:
         shape = swarm.num_worlds, swarm.num_vehicles
         self._swarm, self._spread = swarm, rules(swarm.scenario).spread
-        self._touched, self._failed = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+        self._failed = np.zeros(shape, np.bool_)
         self._judged = np.zeros(swarm.num_worlds, np.bool_)
         self._offset = np.full((*shape, 2), np.inf)
 
     def update(self, active: Bool) -> None:
         """Look at the swarm after a reset or step of the ``active`` worlds."""
         swarm, facts = self._swarm, self._swarm.facts
-        touches = facts.contacts > 0
-        self._touched |= active[:, None] & touches
-        self._failed |= active[:, None] & facts.lost & ~touches
+        self._failed |= active[:, None] & facts.lost & (facts.contacts == 0)
         grace = GRACE_S * swarm.scenario.scale.units.time
         now = active & ~self._judged & (facts.time_s >= swarm.duration_s + grace - 1e-9)
         there = now[:, None] & swarm.state.alive
@@ -65,7 +63,7 @@ class SuccessRecorder:
             return Success(
                 success_share=None, safe_share=None, done_share=None, swarm_success=None, vehicles_faulty=faulty
             )
-        safe, offset = ~self._touched[world, healthy], self._offset[world, healthy]
+        safe, offset = ~self._swarm.state.touched[world, healthy], self._offset[world, healthy]
         done = np.hypot(*offset.T) <= self._spread
         centred = bool(np.hypot(*offset.mean(axis=0)) <= CENTRE_M * self._swarm.scenario.scale.length)
         return Success(

@@ -1,6 +1,6 @@
 """The benchmark's table: interquartile means over seeds with bootstrap intervals, worst seeds, the paper's figures."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from uuv_marl.baselines.registry import channels_in, is_trained
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import Knowledge, Results, Row
 from uuv_marl.scenario import differences
+from uuv_marl.tasks import Task
 from uuv_marl.types import Float64
 
 _CONFIDENCE = 0.95
@@ -123,6 +124,47 @@ def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Seq
             told = known["channels"] if is_trained(policy) else channels_in(loaded, known["channels"])
             rows.append(_cells(policy, {**known, "channels": told, "yaw_damping_nms": damping}, runs, paper))
     return rows
+
+
+def task_headers(task: type[Task]) -> tuple[str, ...]:
+    """Columns of the table of a task other than ``follow``."""
+    return (
+        "policy", "beyond the percept", "whole swarms", "untouched and there", *task.columns, "obstacle distance [m]",
+        "worst", "spacing [m]", "worst", "collisions",
+    )  # fmt: skip
+
+
+TASK_CAPTION = (
+    "Interquartile mean over seeds [95 % bootstrap interval]; worst seed. Whole swarms: episodes in which every "
+    "vehicle succeeded; a vehicle succeeds that is where the task wants it when the episode ends, and has touched "
+    "nothing. Untouched and there: mean share of such vehicles. Distances as in the tables of follow."
+)
+
+
+def task_rows(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, ...]]:
+    """The cells of ``task_headers``, a row for each policy that has runs, with arguments as for ``rows_of``."""
+    columns: Mapping[str, str] = results.scenarios[scenario].task_class.columns
+    rows: list[tuple[str, ...]] = []
+    for cells in rows_of(results, scenario, policies, seeds):
+        own = [run.metrics.get("task", {}) for run in results.select(scenario, cells.policy, seeds)]
+        shares = [value for run in own if (value := run.get("untouched_share")) is not None]
+        told = [shown([value for run in own if (value := run.get(name)) is not None], ".3g") for name in columns]
+        rows.append((
+            cells.policy, cells.knows, f"{sum(run.get('whole') == 1.0 for run in own)}/{len(own)}",
+            f"{np.mean(shares):.1%}" if shares else _NOTHING, *told, cells.distance, cells.nearest, cells.spacing,
+            cells.closest, cells.collisions,
+        ))  # fmt: skip
+    return rows
+
+
+def task_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]) -> RichTable:
+    """The table of a task for a terminal."""
+    table = RichTable(title=title, title_justify="left", caption=TASK_CAPTION, caption_justify="left")
+    for header in headers:
+        table.add_column(escape(header), overflow="fold")
+    for row in rows:
+        table.add_row(*(escape(cell.replace(_NOTHING, "-")) for cell in row))
+    return table
 
 
 def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigure | None) -> Cells:

@@ -64,7 +64,6 @@ def benchmark(
         from uuv_marl.baselines import POLICIES, granted, make
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
-        from uuv_marl.benchmark.tables import rich_table
         from uuv_marl.replay.command import command
         from uuv_marl.scenario import ScenarioError, load_scenario
 
@@ -90,7 +89,7 @@ def benchmark(
                 runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
             tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
-            console.print(rich_table(table.title, table.rows, console.width))
+            console.print(runner.terminal_table(table, console.width))
         console.print(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
         for path in pictures:
             console.print(f"  {path}", highlight=False)

@@ -14,15 +14,16 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
         vehicle: index of the vehicle; None for the world as a whole.
 
     Returns:
-        ``is_success`` (the swarm arrived, and this vehicle, or any of them, was there to the end; the name under which
-        libraries look for it), ``ending`` (``arrival``, ``time_limit``: also after an arrival where
+        ``is_success`` (in ``follow`` the swarm arrived, and this vehicle, or any of them, was there to the end; in
+        other tasks this vehicle, or all of them, are there untouched; the name under which libraries look for it),
+        ``ending`` (``arrival``, or ``done`` in other tasks, ``time_limit``: also after an arrival where
         ``arrival.ends_episode`` is false, ``lost``: this vehicle or all of them, or ``diverged``: the integration step
         is too long; ``running`` until then),
-        ``arrived`` (the swarm did), ``time_s`` since the reset, and ``collisions``, the contact episodes of the whole
-        swarm until now.
+        ``arrived`` (the swarm did, or the task is done), ``time_s`` since the reset, and ``collisions``, the contact
+        episodes of the whole swarm until now.
     """
-    swarm = batch.swarm
-    arrived = bool(swarm.arrived[world])
+    swarm, task = batch.swarm, batch.task
+    done, arrived = bool(task.done()[world]), task.arrived(world)
     alive = swarm.state.alive[world]
     if not (alive.any() if vehicle is None else alive[vehicle]):
         reason = "lost"
@@ -31,9 +32,9 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
     elif not batch.over[world]:
         reason = "running"
     else:
-        reason = "arrival" if arrived and swarm.scenario.arrival.ends_episode else "time_limit"
+        reason = task.ending if done else "time_limit"
     return {
-        "is_success": arrived and reason not in ("lost", "diverged"),
+        "is_success": task.success(world, vehicle) and reason not in ("lost", "diverged"),
         "ending": reason,
         "arrived": arrived,
         "time_s": float(swarm.facts.time_s[world]),

@@ -161,6 +161,9 @@ class Timing(Section):
     """Runge-Kutta step, of which the control hold is a multiple."""
     decision_period_s: Clock
     """Time between two decisions, a multiple of the control hold; meanwhile the force is held in the world frame."""
+    fixed: bool
+    """Whether the decision period and the inner loop (``actuators.yaw_damping_nms``) are the scenario's, for every
+    policy alike; if not, a policy is granted the inner loop that it declares."""
 
     @property
     def holds_per_decision(self) -> int:

@@ -30,6 +30,7 @@ class Follow(Task):
     """Follow l(t) and arrive together: ``arrival`` and ``time_limit`` of the scenario say when that is done."""
 
     rewards: ClassVar[tuple[str, ...]] = ("dense", "sparse")
+    ending: ClassVar[str] = "arrival"
     terms: ClassVar[Mapping[str, str]] = {
         "tracking": "-w · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's distance to l(t)",
         "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
@@ -71,6 +72,18 @@ class Follow(Task):
     def there(self) -> Bool:
         """All vehicles of a swarm that has arrived: the paper's success is the swarm's."""
         return np.broadcast_to(self.swarm.arrived[:, None], self.swarm.state.alive.shape)
+
+    def arrived(self, world: int) -> bool:
+        """Whether the swarm has arrived."""
+        return bool(self.swarm.arrived[world])
+
+    def metrics(self, world: int) -> dict[str, float | None]:  # noqa: ARG002
+        """None beyond those of every run (``uuv_marl.benchmark.metrics``), which were made for this task."""
+        return {}
+
+    def success(self, world: int, vehicle: int | None = None) -> bool:  # noqa: ARG002 - the whole swarm's
+        """Whether the swarm has arrived, whatever it has touched: the paper's success."""
+        return self.arrived(world)
 
 
 class RewardWeights(NamedTuple):

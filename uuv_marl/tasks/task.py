@@ -85,6 +85,8 @@ class Task:
     """The terms of the first reward with their formulas, in order."""
     columns: ClassVar[Mapping[str, str]] = {}
     """The task's own metrics that tables show, with what they are and their unit."""
+    ending: ClassVar[str] = "done"
+    """Name of the ending of an episode that is ``done``."""
     guide: ClassVar[str] = "bio_inspired"
     """Policy whose mean return is above that of ``idle`` and ``random``."""
 
@@ -145,6 +147,15 @@ class Task:
         """Vehicles that would have done their task if the episode ended now: there, alive, and untouched all along."""
         state = self.swarm.state
         return self.there() & state.alive & ~state.touched
+
+    def arrived(self, world: int) -> bool:
+        """Whether the task of a world is done, whether that ends the episode or not."""
+        return bool(self.done()[world])
+
+    def success(self, world: int, vehicle: int | None = None) -> bool:
+        """Whether an episode that ends now is a success for a vehicle, or with None for all of them."""
+        succeeded = self.succeeded()[world]
+        return bool(succeeded.all() if vehicle is None else succeeded[vehicle])
 
     # What is measured and drawn.
 
