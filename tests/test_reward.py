@@ -6,7 +6,7 @@ import pytest
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
-from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.reward import TERMS, reward_terms
 from uuv_marl.sim.swarm import Swarm
 
