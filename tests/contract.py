@@ -240,7 +240,7 @@ def sb3(case):
     """Stable-Baselines3's VecEnv: rows are vehicles."""
     from uuv_marl.envs.sb3 import SwarmVecEnv
 
-    env = SwarmVecEnv(WORLDS, **case.kwargs)
+    env = SwarmVecEnv(num_worlds=WORLDS, **case.kwargs)
     actions = case.actions()
     run = empty(len(actions), env.observation_space.shape[0], np.float32)
     split = (WORLDS, VEHICLES, -1)
