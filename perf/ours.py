@@ -85,7 +85,7 @@ def ppo(agents: int, worlds: int) -> Case:
     """PPO of Stable-Baselines3 through ``SwarmVecEnv``, sampling and learning."""
     from ppo import training
 
-    return training(SwarmVecEnv(worlds, num_vehicles=agents))
+    return training(SwarmVecEnv(num_worlds=worlds, num_vehicles=agents))
 
 
 def adapter(name: str, agents: int, worlds: int) -> Case:
@@ -107,7 +107,9 @@ def adapter(name: str, agents: int, worlds: int) -> Case:
         env.reset(0)
         env = env.swarm if name == "swarm_idle" else env
     else:
-        env = (SwarmVecEnv if name == "sb3_idle" else uuv_marl.vector_env)(worlds, **how)
+        env = (SwarmVecEnv if name == "sb3_idle" else uuv_marl.vector_env)(
+            **{"num_worlds" if name == "sb3_idle" else "num_envs": worlds}, **how
+        )
         env.reset()
         action = action.reshape(env.action_space.shape if name == "vector_env_idle" else (-1, 2))
     return repeated(lambda _: env.step(action), agents * worlds)

@@ -55,7 +55,7 @@ def plain(agents: int, worlds: int) -> Case:
 
     from uuv_marl.envs.sb3 import SwarmVecEnv
 
-    return sb3_ppo(VecMonitor(SwarmVecEnv(worlds, scenario(agents))), SEED)
+    return sb3_ppo(VecMonitor(SwarmVecEnv(scenario(agents), worlds)), SEED)
 
 
 def supersuit(agents: int, worlds: int) -> Case:

@@ -45,6 +45,9 @@ SINKING = {"faults": [{"kind": "member", "share": 0.4, "onset_s": 2.0}]}
 BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
 
 
+OWN_TASK = "examples.extending.task:Rendezvous"
+
+
 class Case(NamedTuple):
     """An environment and actions for WORLDS worlds, with at least one ending in each."""
 
@@ -101,7 +104,7 @@ class Run(NamedTuple):
 
 def own_reward(swarm):
     """A user's: minus the distance to l(t) in units of 10 m."""
-    away = swarm.state.eta[:, :, :2] - swarm.facts.reference[:, None, :2]
+    away = swarm.state.eta[:, :, :2] - swarm.own_reference[:, :, :2]
     return -np.hypot(away[..., 0], away[..., 1]) / 10.0
 
 
@@ -130,6 +133,10 @@ def cases():
         Case("own_period", "random_field", BRIEF, 0.1),
         Case("team_reward", "lossy", TIMES_OUT, options={"reward": "team"}),
         Case("own_reward", "random_field", ARRIVES, options={"reward": own_reward}),
+        Case("closeness", "random_field", BRIEF, options={"observe": "closeness"}),
+        Case("reach", "starter", TIMES_OUT, options={"task": "reach"}),
+        Case("own_task", "starter", TIMES_OUT, options={"task": OWN_TASK}),
+        Case("own_task-arrives", "starter", {}, steps=5, options={"task": {"name": OWN_TASK, "near_m": 5000.0}}),
         Case("max_cycles", "single_obstacle", TIMES_OUT, options={"max_cycles": 9}),
     ]
 
@@ -240,7 +247,7 @@ def sb3(case):
     """Stable-Baselines3's VecEnv: rows are vehicles."""
     from uuv_marl.envs.sb3 import SwarmVecEnv
 
-    env = SwarmVecEnv(WORLDS, **case.kwargs)
+    env = SwarmVecEnv(num_worlds=WORLDS, **case.kwargs)
     actions = case.actions()
     run = empty(len(actions), env.observation_space.shape[0], np.float32)
     split = (WORLDS, VEHICLES, -1)

@@ -1,158 +1,168 @@
-"""The reward is sound: it ranks policies rightly, and neither dying nor dawdling pays."""
+"""The rewards are sound: they rank policies rightly, and neither dying, nor dawdling, nor going round in circles pays."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.envs.reward import TERMS, reward_terms
-from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks import TASKS
+
+GUIDED = [("starter", "dense", 100), ("starter", "sparse", 30), ("single_obstacle", "dense", 2)]
+REACH = {"task": "reach"}
 
 
-def mean_return(name, scenario):
-    batch = BatchedEnv(scenario, 3)
-    policy = make(name, scenario, 3)
+def mean_returns(name, scenario, reward, worlds):
+    batch = BatchedEnv(scenario, worlds, reward)
+    policy = make(name, scenario, worlds)
     batch.reset(0)
     policy.reset(0)
-    total, active = np.zeros(3), np.ones(3, bool)
-    while active.any():
-        result = batch.step(policy.act(batch.swarm.percept))
-        total += np.where(active, result.reward.mean(axis=1), 0.0)
-        active &= ~batch.swarm.ended
+    total = np.zeros(worlds)
+    while not batch.over.all():
+        policy.active[:] = ~batch.over
+        total += batch.step(policy.act(batch.swarm.percept)).world_reward
     return total
 
 
-def test_the_controller_beats_the_floors_everywhere(scenario_name):
-    scenario = load_scenario(scenario_name)
-    best = mean_return("bio_inspired", scenario)
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize(("scenario", "reward", "seeds"), GUIDED)
+def test_the_guide_of_a_task_beats_the_floors(task, scenario, reward, seeds):
+    if reward not in TASKS[task].rewards:
+        pytest.skip(f"{task} has no such reward")
+    loaded = load_scenario(scenario, overrides={"task": task})
+    best = mean_returns(TASKS[task].guide, loaded, reward, seeds).mean()
     for floor in ("random", "idle"):
-        assert (best > mean_return(floor, scenario)).all(), floor
+        assert best > mean_returns(floor, loaded, reward, seeds).mean(), floor
 
 
-def test_step_terms_are_never_positive_and_arrival_pays_once(place):
-    scenario = load_scenario("single_obstacle", num_vehicles=4)
-    batch = BatchedEnv(scenario, 8)
-    batch.reset(0)
-    rng = np.random.default_rng(0)
-    for _ in range(100):
-        batch.step(rng.uniform(-1, 1, (8, 4, 2)).astype(np.float32))
-        for name, term in reward_terms(batch.swarm).items():
-            assert (term <= 0).all(), name
+class Puppets:
+    """A swarm that is put where the test wants it, at the end of l(t); the reward looks at nothing else."""
+
+    def __init__(self, reward="dense", n=4, **overrides):
+        scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"arrival.dwell_s": 0.3, **overrides})
+        self.batch, self.n = BatchedEnv(scenario, reward=reward), n
+        self.batch.reset(0)
+        self.swarm, self.end = self.batch.swarm, self.batch.swarm.course.waypoints[0, 0, self.batch.swarm.course.last[0, 0]]
+        self.paid = np.zeros(n)
+
+    def put(self, offset, tick=2000):
+        """Everybody 10 m apart around the end of l(t), moved by ``offset`` [m]; nothing is paid."""
+        apart = 10.0 * (np.arange(self.n) - (self.n - 1) / 2)
+        self.swarm.state.eta[0, :, :2] = self.end + np.asarray(offset) + np.stack([apart, np.zeros(self.n)], axis=1)
+        self.swarm.state.before[0] = self.swarm.state.eta[0, :, :2]
+        self.swarm.state.nu[0] = 0.0
+        self.swarm.state.tick[0] = tick
+
+    def step(self):
+        result = self.batch.step(np.zeros((1, self.n, 2), np.float32))
+        self.paid += result.reward[0]
+        return result
 
 
-def returns(scenario, arrival_tick=None, die_at=None, bump_at=None, ticks=60):
-    """Return of a scripted swarm that rests at its end; it arrives, loses vehicle 0 or bumps it when told."""
-    batch = BatchedEnv(scenario)
-    batch.reset(0)
-    swarm, total = batch.swarm, np.zeros(swarm_size := scenario.swarm.num_vehicles)
-    for k in range(ticks):
-        near = arrival_tick is not None and k >= arrival_tick
-        swarm.state.tick[0] = 2000 + k
-        swarm.state.eta[0, :, :2] = 600.0 + 10.0 * np.arange(swarm_size)[:, None] - (0 if near else 300.0)
-        swarm.state.eta[0, :, :2] -= swarm.state.eta[0, :, :2].mean(axis=0) - (600.0 if near else 300.0)
-        swarm.state.nu[0] = 0.0
-        if k == bump_at:  # vehicle 0 runs into vehicle 1
-            swarm.state.eta[0, 0] = (*(swarm.state.eta[0, 1, :2] + (2.1, 0.0)), np.pi)
-            swarm.state.nu[0, 0, 0] = 3.0
-        if k == die_at:
-            swarm.state.alive[0, 0] = False
-        task_alive = swarm.state.alive[0].copy()
-        result = batch.step(np.zeros((1, swarm_size, 2), np.float32))
-        total += result.reward[0]
-        if die_at == k:
-            swarm.facts.lost[0, 0] = True
-            total[0] += sum(term[0, 0] for term in reward_terms(swarm).values())
-        assert task_alive.sum() >= swarm_size - 1
-        if result.terminated[0, -1]:
+@settings(max_examples=20, deadline=None)
+@given(way=st.lists(st.tuples(st.floats(-900, 900), st.floats(-900, 900)), min_size=1, max_size=6))
+@pytest.mark.parametrize("task", TASKS)
+def test_who_moves_and_comes_back_gains_nothing(task, way):
+    """Progress is a potential's change: around a closed way it sums to zero, and all else costs."""
+    swarm = Puppets(task=task)
+    swarm.put((300.0, 0.0))
+    swarm.step()
+    swarm.paid[:] = 0.0
+    for place in [*way, (300.0, 0.0)]:
+        if task == "reach" and np.hypot(*place) < 100.0:
+            continue  # an arrival pays, once
+        swarm.put(place)
+        swarm.step()
+    assert (swarm.paid <= 1e-9).all()
+
+
+def arrival(at, reward, bump_at=None, steps=60):
+    """What is paid on a way that comes to the end at one step, and with ``bump_at`` meets a neighbour before."""
+    swarm = Puppets(reward)
+    for k in range(steps):
+        swarm.put((0.0, 0.0) if at is not None and k >= at else (300.0, 0.0), 2000 + k)
+        if k == bump_at:
+            state = swarm.swarm.state
+            state.eta[0, 0] = (*(state.eta[0, 1, :2] + (2.1, 0.0)), np.pi)
+            state.nu[0, 0, 0] = 3.0
+        if swarm.step().world_terminated[0]:
             break
-    return total
+    return swarm.paid
 
 
-SCRIPTED = load_scenario("single_obstacle", num_vehicles=4, overrides={"arrival.dwell_s": 0.3})
+@pytest.mark.parametrize("reward", ["dense", "sparse"])
+def test_an_earlier_arrival_of_the_same_way_never_lowers_the_return(reward):
+    totals = [arrival(k, reward).mean() for k in (5, 20, 40, None)]
+    assert totals == sorted(totals, reverse=True)
+    assert totals[2] > totals[3]
 
 
-def test_an_earlier_arrival_never_lowers_the_return():
-    totals = [returns(SCRIPTED, arrival_tick=k).mean() for k in (5, 20, 40)]
-    assert totals[0] >= totals[1] >= totals[2]
-    assert totals[2] > returns(SCRIPTED).mean()
-
-
-def test_a_death_always_lowers_the_return_of_the_dead_and_of_the_team():
-    whole = returns(SCRIPTED, arrival_tick=40)
-    dead = returns(SCRIPTED, arrival_tick=40, die_at=20)
-    assert dead[0] < whole[0]
-    assert dead.mean() < whole.mean()
-    never = returns(SCRIPTED)
-    assert returns(SCRIPTED, die_at=20)[0] < never[0]
-    assert returns(SCRIPTED, die_at=20).mean() < never.mean()
-
-
-def test_a_collision_always_lowers_the_return():
-    whole, bumped = returns(SCRIPTED, arrival_tick=40), returns(SCRIPTED, arrival_tick=40, bump_at=20)
-    assert bumped[0] <= whole[0] - SCRIPTED.reward.collision
+@pytest.mark.parametrize("reward", ["dense", "sparse"])
+def test_a_contact_lowers_the_return_of_both(reward):
+    whole, bumped = arrival(40, reward), arrival(40, reward, bump_at=20)
+    assert (bumped[:2] <= whole[:2] - 9.0).all()
     assert bumped.mean() < whole.mean()
 
 
-def test_a_lost_vehicle_is_charged_more_than_staying_could_cost():
-    """Idle vehicles are left behind by l(t) for minutes: dying at once must cost more than that."""
-    lossy = load_scenario("single_obstacle", num_vehicles=6, overrides={"disturbance.loss_times_s": [1.0]})
-    calm = load_scenario(lossy, overrides={"disturbance.loss_times_s": []})
-    idle = np.zeros((1, 6, 2), np.float32)
-    total = {}
-    for scenario in (lossy, calm):
-        batch = BatchedEnv(scenario)
-        batch.reset(0)
-        total[scenario] = np.zeros(6)
-        while not batch.swarm.ended[0]:
-            total[scenario] += batch.step(idle).reward[0]
-        victim = batch.swarm.course.losses[0]
-        if len(victim):
-            dead = int(victim[0])
-    assert total[lossy][dead] < total[calm][dead]
-    assert total[lossy].mean() < total[calm].mean()
-
-
-@pytest.mark.parametrize("reward", ["individual", "team"])
-def test_dying_never_pays_the_one_who_dies(reward):
-    base = load_scenario("single_obstacle", num_vehicles=12, overrides={"time_limit.factor": 0.5})
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("reward", ["dense", "sparse", "team"])
+def test_dying_never_pays_the_one_who_dies(reward, task):
+    """Idle vehicles are left behind for minutes: dying at once must cost more than that."""
+    if reward not in (*TASKS[task].rewards, "team"):
+        pytest.skip(f"{task} has no such reward")
+    changes = {"time_limit.factor": 0.5, "task": task}
+    base = load_scenario("single_obstacle", num_vehicles=6, overrides=changes)
     totals, lost = [], []
-    for losses in ([], [30.0]):
+    for losses in ([], [1.0]):
         batch = BatchedEnv(load_scenario(base, overrides={"disturbance.loss_times_s": losses}), reward=reward)
         batch.reset(3)
         lost += batch.swarm.course.losses[0].tolist()
-        total = np.zeros(12)
-        while not batch.swarm.ended[0]:
-            result = batch.step(np.zeros((1, 12, 2), np.float32))
-            total += result.reward[0] * (result.terminated[0] | batch.swarm.state.alive[0])
+        total = np.zeros(6)
+        while not batch.over[0]:
+            total += batch.step(np.zeros((1, 6, 2), np.float32)).reward[0]
         totals.append(total)
     whole, dead = totals
     assert dead[lost] < whole[lost]
-    if reward == "team":
-        assert (dead <= whole).all()
+    assert dead.mean() < whole.mean()
 
 
-def test_the_mean_does_not_depend_on_the_number_of_vehicles():
+@pytest.mark.parametrize("task", TASKS)
+def test_the_mean_does_not_depend_on_the_number_of_vehicles(task):
     """Vehicles that all see the same have the same reward, however many they are."""
     means = []
     for n in (3, 30):
-        env = uuv_marl.parallel_env("tracking", num_vehicles=n, overrides={"constraints.s_u_m": 1000.0})
-        env.reset(seed=0)
-        swarm = env.swarm
-        swarm.state.eta[0, :, :2] = swarm.facts.reference[0, :2] - 150.0
-        swarm.state.eta[0, :, 0] += np.arange(n) * 3.0 / n
-        swarm.state.before[0] = swarm.state.eta[0, :, :2]
-        swarm.observe()
-        terms = reward_terms(swarm)
-        swarm.facts.spacing[:] = 4.0
-        terms = reward_terms(swarm)
-        means.append(sum(term.mean() for term in terms.values()))
-    assert means[0] == pytest.approx(means[1], rel=0.02)
-    assert means[0] < 0
+        swarm = Puppets(n=n, task=task, **{"constraints.s_u_m": 1000.0})
+        swarm.put((300.0, 0.0))
+        swarm.step()
+        swarm.paid[:] = 0.0
+        swarm.swarm.state.eta[0, :, :2] = swarm.end + (200.0, 0.0)
+        swarm.swarm.state.before[0] = swarm.swarm.state.eta[0, :, :2]
+        swarm.swarm.facts.was_away[0] = swarm.swarm.facts.away[0] = 300.0
+        swarm.step()
+        means.append(swarm.paid.mean())
+    assert means[0] == pytest.approx(means[1], rel=1e-6)
 
 
-def test_the_documented_terms_are_those_paid():
-    swarm = Swarm(load_scenario("tracking", num_vehicles=2))
-    swarm.reset(0)
-    assert list(reward_terms(swarm)) == list(TERMS)
+@pytest.mark.parametrize("task", TASKS)
+def test_terms_are_those_documented_and_sum_to_the_reward(task):
+    env = uuv_marl.parallel_env("starter", task=task, info_terms=True)
+    env.reset(seed=0)
+    for _ in range(20):
+        _, rewards, *_, infos = env.step({agent: np.ones(2, np.float32) for agent in env.agents})
+        for agent, info in infos.items():
+            assert list(info["reward_terms"]) == list(TASKS[task].terms)
+            assert sum(info["reward_terms"].values()) == pytest.approx(rewards[agent], abs=1e-12)
+
+
+def test_sparse_is_dense_without_progress():
+    """Where nobody is lost and nobody arrives, the other terms are the same, bit for bit."""
+    runs = [BatchedEnv(load_scenario("starter"), 2, reward) for reward in ("dense", "sparse")]
+    for batch in runs:
+        batch.reset(0)
+    for _ in range(20):
+        dense, sparse = (batch.step(np.full((2, 5, 2), 0.3)).terms for batch in runs)
+        assert list(sparse) == [name for name in dense if name != "progress"]
+        assert all((dense[name] == sparse[name]).all() for name in sparse)

@@ -35,7 +35,7 @@ def one_thread():
 
 
 def swarm(num_worlds=2, scenario="random_field", overrides=SHORT, **kwargs):
-    return SwarmVecEnv(num_worlds, scenario, num_vehicles=4, decision_period=0.5, overrides=overrides, **kwargs)
+    return SwarmVecEnv(scenario, num_worlds, num_vehicles=4, decision_period=0.5, overrides=overrides, **kwargs)
 
 
 def weights(model):
@@ -122,10 +122,10 @@ def test_unseeded_resets_go_on_and_seeding_returns_every_row():
 
 def test_scenarios_that_lose_vehicles_are_refused_with_the_remedy():
     with pytest.raises(ScenarioError, match=r"in scenario 'lossy'; use .* or override disturbance.loss_times_s=\[\]"):
-        SwarmVecEnv(1, "lossy")
+        SwarmVecEnv("lossy", 1)
     with pytest.raises(ScenarioError, match="contact.ends_vehicle=false"):
-        SwarmVecEnv(1, overrides={"contact.ends_vehicle": True})
-    SwarmVecEnv(1, "lossy", overrides={"disturbance.loss_times_s": []})
+        SwarmVecEnv(overrides={"contact.ends_vehicle": True})
+    SwarmVecEnv("lossy", 1, overrides={"disturbance.loss_times_s": []})
 
 
 def test_attributes_of_rows():

@@ -9,7 +9,6 @@ from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.envs.reward import reward_terms
 from uuv_marl.sim.swarm import Swarm
 
 SPREAD_M = 80.0
@@ -30,9 +29,10 @@ class Story:
         swarm, facts, state = self.swarm, self.swarm.facts, self.swarm.state
         facts.time_s[0] = swarm.duration_s[0] + since_s
         state.tick[0] = round(facts.time_s[0] * 10)
-        facts.reference[0, :2] = 600.0
+        facts.reference[0, 0, :2] = 600.0
         state.eta[0, :, :2] = 600.0 + np.asarray(offsets)
         facts.contacts[0], facts.lost[0] = 0, False
+        state.touched[0, list(touching)] = True
         facts.contacts[0, list(touching)], facts.lost[0, list(lost)] = 1, True
         state.alive[0, list(lost)] = False
         self.recorder.update(WORLD)
@@ -169,7 +169,7 @@ def test_arrival_is_paid_once_and_the_last_info_tells_of_it():
     paid, ended = [], []
     while not ended or not ended[-1]:
         result = batch.step(np.zeros((1, 5, 2), np.float32))
-        paid.append(float(reward_terms(batch.swarm)["arrival"][0, 0]))
+        paid.append(float(result.terms["arrival"][0, 0]))
         ended.append(bool(result.world_truncated[0]))
         assert not result.terminated.any()
     assert np.count_nonzero(paid) == 1

@@ -22,7 +22,7 @@ TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
 def make_env(scenario: str, num_worlds: int) -> VecNormalize:
     """Worlds in which every vehicle is a row, with the reward that MAPPO here is trained with."""
     changes = overrides_for(scenario, {})  # a decision every 0.5 s, and a loop that damps the yaw
-    env = SwarmVecEnv(num_worlds, scenario, reward=Weights(), overrides=changes)
+    env = SwarmVecEnv(scenario, num_worlds, reward=Weights(), overrides=changes)
     # Features of nearness instead of positions, and a short-range barrier: what checkpoints are made for.
     return VecNormalize(ActorVecEnv(env), norm_obs=False, gamma=0.98)
 

@@ -223,6 +223,8 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
             f"{type(env).__name__} has no agents by name; make the policy with make(name, env.scenario, num_worlds) "
             "and call policy.act(env.swarm.percept)"
         )
+    if not getattr(env, "observes_positions", True):
+        raise PolicyError(f"policy {name!r} reads positions; make the environment with observe='positions'")
     return EnvPolicy(_in_units(name, kind, env.scenario, 1, {**written, **parameters}), env.possible_agents)
 
 

@@ -78,12 +78,12 @@ def benchmark(
         from uuv_marl.scenario import ScenarioError, load_scenario
 
         changes, files = changes_of(overrides or []), scenario or ["single_obstacle"]
+        find_modules([*files, *(policy or []), *(overrides or [])])
         scenarios = [load_scenario(name, overrides=changes) for name in files]
         names = [loaded.name for loaded in scenarios]
         if len(set(names)) < len(names):
             raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
         policies = list(dict.fromkeys(policy or runner.DEFAULT_POLICIES))
-        find_modules(policies)
         for name, loaded in itertools.product(policies, scenarios):
             make(name, granted(name, loaded))  # refused now, not after hours of others' runs
         evaluator, cluster = evaluator_at(ray, policies)

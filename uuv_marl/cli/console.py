@@ -139,7 +139,11 @@ def changes_of(overrides: Sequence[str]) -> dict[str, object]:
     return changes
 
 
-def find_modules(policies: Sequence[str]) -> None:
-    """Let ``module:Class`` be looked for in the current folder too."""
-    if any(":" in name for name in policies):
+def find_modules(names: Sequence[str]) -> None:
+    """Let ``module:Class`` be looked for in the current folder too, where a name or a file may ask for one.
+
+    Args:
+        names: of policies, scenarios and tasks, or whole overrides.
+    """
+    if any(":" in name or name.endswith(".toml") for name in names):
         sys.path.append("")  # last, so that no file of this folder takes the place of an installed module

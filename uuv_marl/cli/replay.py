@@ -150,9 +150,9 @@ def _simulated(
     from uuv_marl.replay.record import checked, record
     from uuv_marl.scenario import load_scenario
 
+    find_modules([name, *policies, *overrides])
     scenario = load_scenario(name, overrides=changes_of(overrides))
     checked(inspect, scenario)
-    find_modules(policies)
     for policy in policies:
         make(policy, granted(policy, scenario))
     recordings: list[Recording] = []

@@ -80,6 +80,7 @@ def train_command(
         from uuv_marl.train.folder import TrainingFolder
         from uuv_marl.train.training import Training, changed_fields, read_recipe
 
+        find_modules([scenario or "", recipe, *(overrides or [])])
         if resume:
             _alone(context)
             folder = TrainingFolder(output, None)
@@ -89,7 +90,6 @@ def train_command(
             changes = {name: value for name, value in named.items() if value is not None}
             training = Training(**changed_fields(read_recipe(recipe), {**changes_of(overrides or []), **changes}))
             until = training.steps
-        find_modules([training.reward or ""])
         texts = {
             "reward": "reward {reward:.3f}",
             "score": "validation: score {score:z.3f} (best {best:z.3f}), arrived {arrived:.0%}, "

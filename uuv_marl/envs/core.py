@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.envs.observation import observer
+from uuv_marl.envs.observation import Observe, observation_layout, observer
 from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
@@ -67,6 +67,7 @@ class BatchedEnv:
             task has it), ``team`` (every vehicle gets the mean of ``dense`` over all vehicles; a lost vehicle also pays
             its own loss), or a function from the swarm to an array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
+        observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
     """
 
     def __init__(
@@ -75,8 +76,11 @@ class BatchedEnv:
         num_worlds: int = 1,
         reward: Reward = "dense",
         max_cycles: int | None = None,
+        observe: Observe = "positions",
     ) -> None:
         self.swarm = Swarm(scenario, num_worlds)
+        self.layout = observation_layout(scenario, observe)
+        """The table of an observation."""
         self.task: Task = self.swarm.task
         names = (*self.task.rewards, "team")
         if not callable(reward) and reward not in names:
@@ -123,7 +127,9 @@ class BatchedEnv:
         self.swarm.reset(seed, chosen)
         self._waiting -= set(chosen)
         self.over[chosen], self.collisions[chosen] = False, 0
-        return self.swarm.percept.to_observation()  # no threads, so that a forked process can reset
+        observation, observe = observer(self.swarm.percept, self.layout)
+        observe(0, self.swarm.num_worlds)  # no threads, so that a forked process can reset
+        return observation
 
     def need_reset(self, what: str) -> None:
         """Raise RuntimeError if a world was never reset."""
@@ -164,7 +170,7 @@ class BatchedEnv:
         """One decision of the worlds that are ``running``; all observations, and what those worlds pay."""
         swarm, task = self.swarm, self.task
         name = "sparse" if self._reward == "sparse" else task.rewards[0]
-        observation, observe = observer(swarm.percept)
+        observation, observe = observer(swarm.percept, self.layout)
         payment = task.payment(name, running)
         if payment is not None and not task.observed:
             threaded = payment
@@ -216,6 +222,7 @@ class EnvOptions(Changes, total=False):
 
     max_cycles: int | None
     reward: Reward
+    observe: Observe
 
 
 def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
@@ -248,6 +255,7 @@ def make_batched_env(
     *,
     max_cycles: int | None = None,
     reward: Reward = "dense",
+    observe: Observe = "positions",
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes.
@@ -257,9 +265,10 @@ def make_batched_env(
         num_worlds: worlds stepped together.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         reward: ``dense``, ``sparse``, ``team``, or a function from the swarm to an array (world, vehicle).
+        observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
     """
-    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles)
+    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, observe)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

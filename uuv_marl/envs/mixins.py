@@ -53,6 +53,11 @@ class EnvMixin:
         return self._batch.swarm.scenario
 
     @property
+    def observes_positions(self) -> bool:
+        """Whether policies can read the observations: ``observe="positions"``."""
+        return self._batch.layout == self.swarm.layout
+
+    @property
     def swarm(self) -> Swarm:
         """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
         return self._batch.swarm

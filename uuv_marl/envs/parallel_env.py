@@ -15,6 +15,7 @@ from uuv_marl.envs.core import BatchedEnv, Reward, ScenarioLike, StepResult, mak
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
+from uuv_marl.envs.observation import Observe
 from uuv_marl.sim.arguments import action_array, world_seeds
 from uuv_marl.types import Float32, Int64
 
@@ -58,7 +59,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         self._rows: slice | Int64 = slice(None)
-        layout = batch.swarm.layout
+        layout = batch.layout
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
         self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
         self.state_space = Box(batch.state_layout.low, batch.state_layout.high)
@@ -178,6 +179,8 @@ def parallel_env(
     render_options: RenderOptions | None = None,
     reward: Reward = "dense",
     info_terms: bool = False,
+    observe: Observe = "positions",
+    task: str | Mapping[str, object] | None = None,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> SwarmParallelEnv:
@@ -190,15 +193,20 @@ def parallel_env(
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: how to draw: a dictionary with any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or
             ``map``) and ``sonar_of`` (index of the vehicle whose sonar is shown).
-        reward: ``dense``, ``sparse``, ``team``, or a function from the swarm to an array (world, vehicle).
+        reward: ``dense`` (progress, costs and arrival), ``sparse`` (without progress; only in ``follow``), ``team``
+            (the mean of ``dense`` over all vehicles), or a function from the swarm to an array (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
+        observe: ``positions``, or ``closeness``: the same percept, the larger the nearer a thing is, which networks
+            learn from sooner; docs/environment.md has both tables.
+        task: what is to be done, in place of the scenario's own: a name of ``uuv_marl.tasks.TASKS``, or
+            ``module:Class`` for your own; or a table with it as ``name`` and the task's numbers.
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
     """
     batch = make_batched_env(
-        scenario, max_cycles=max_cycles, reward=reward, num_vehicles=num_vehicles, decision_period=decision_period,
-        overrides=overrides,
+        scenario, max_cycles=max_cycles, reward=reward, observe=observe, num_vehicles=num_vehicles,
+        decision_period=decision_period, task=task, overrides=overrides,
     )  # fmt: skip
     return SwarmParallelEnv(batch, render_mode, info_terms, render_options)
 

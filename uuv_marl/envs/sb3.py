@@ -22,6 +22,9 @@ with extra("sb3", "SwarmVecEnv"):
 
 Indices = None | int | Iterable[int]
 
+WORLDS = 8
+"""Worlds by default: with SB3's default PPO, all of whose steps are 2,048, ``starter`` is learned in 25 updates."""
+
 
 class SwarmVecEnv(EnvMixin, VecEnv):
     """``num_worlds`` x vehicles rows; row ``world * vehicles + i`` is vehicle i of a world.
@@ -33,11 +36,12 @@ class SwarmVecEnv(EnvMixin, VecEnv):
     in which a vehicle can be lost is an error: SB3 has no row that ends and waits.
 
     Args:
-        num_worlds: worlds stepped together.
         scenario: a name, a TOML file or a ``Scenario``.
+        num_worlds: worlds stepped together.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
         render_options: as for ``uuv_marl.parallel_env``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
+            ``overrides``, as
             for ``uuv_marl.parallel_env``.
     """
 
@@ -45,17 +49,18 @@ class SwarmVecEnv(EnvMixin, VecEnv):
 
     def __init__(
         self,
-        num_worlds: int = 1,
         scenario: ScenarioLike = "single_obstacle",
+        num_worlds: int = WORLDS,
         *,
         render_mode: str | None = None,
         render_options: RenderOptions | None = None,
         **options: Unpack[EnvOptions],
     ) -> None:
-        self._wrap(make_batched_env(scenario, num_worlds, **options), render_mode, render_options)
+        batch = make_batched_env(scenario, whole_number("num_worlds", num_worlds, 1), **options)
+        self._wrap(batch, render_mode, render_options)
         refuse_losses(self.scenario, "SwarmVecEnv")
         self._shape = (num_worlds, self.swarm.num_vehicles)
-        layout = self.swarm.layout
+        layout = batch.layout
         super().__init__(
             num_worlds * self.swarm.num_vehicles, Box(layout.low, layout.high), Box(-1.0, 1.0, (2,), np.float32)
         )

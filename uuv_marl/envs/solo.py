@@ -12,6 +12,7 @@ from uuv_marl.envs.core import Changes, Reward, ScenarioLike, StepResult, change
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
+from uuv_marl.envs.observation import Observe
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
 from uuv_marl.types import Float32
@@ -34,8 +35,8 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
             otherwise.
         info_terms: whether the info holds the reward's terms.
-        scenario, max_cycles, reward: as for ``uuv_marl.parallel_env``.
-        changes: ``num_vehicles``, ``decision_period`` and ``overrides``, likewise.
+        scenario, max_cycles, reward, observe: as for ``uuv_marl.parallel_env``.
+        changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, likewise.
 
     Raises:
         ScenarioError: the overrides ask for channels or a yaw damping that the policy does not declare.
@@ -53,14 +54,15 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         info_terms: bool = False,
         max_cycles: int | None = None,
         reward: Reward = "dense",
+        observe: Observe = "positions",
         **changes: Unpack[Changes],
     ) -> None:
         suited = _suited(others, changed(scenario), changed(scenario, **changes))
-        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward)
+        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
         self._info_terms = info_terms
-        layout = self.swarm.layout
+        layout = batch.layout
         self.observation_space = Box(layout.low, layout.high)
         self.action_space = Box(-1.0, 1.0, (2,))
         self._running = False

@@ -36,7 +36,8 @@ class SwarmEnv(EnvMixin, EnvBase):
         scenario: a name, a TOML file or a ``Scenario``.
         seed: of the first reset, in which world w starts from ``seed + w``; as ``set_seed``.
         device: where the tensors go; the simulation stays on the CPU.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
+            ``overrides``, as
             for ``uuv_marl.parallel_env``.
     """
 
@@ -58,6 +59,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         self._make_specs()
 
     def _make_specs(self) -> None:
+        batch = self._batch
         worlds, group = (self.swarm.num_worlds,), (self.swarm.num_worlds, self.swarm.num_vehicles)
 
         def boxed(layout: PerceptLayout, shape: tuple[int, ...]) -> Bounded:
@@ -73,7 +75,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         def nested(entries: Mapping[str, Any], root: Mapping[str, Any] | None = None) -> Composite:
             return Composite({GROUP: Composite(entries, shape=group), **(root or {})}, shape=worlds, device=self.device)
 
-        observation = {"observation": boxed(self.swarm.layout, group), "mask": flags(*group)}
+        observation = {"observation": boxed(batch.layout, group), "mask": flags(*group)}
         self.observation_spec = nested(observation, {"state": boxed(self._batch.state_layout, worlds)})
         self.action_spec = nested({"action": Bounded(-1.0, 1.0, torch.Size((*group, 2)), self.device, torch.float32)})
         self.reward_spec = nested({"reward": Unbounded(torch.Size((*group, 1)), self.device, torch.float32)})

@@ -67,7 +67,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         self.num_envs = batch.swarm.num_worlds
         self._due = np.zeros(self.num_envs, np.bool_)
         """Worlds that the next step resets."""
-        n, layout = batch.swarm.num_vehicles, batch.swarm.layout
+        n, layout = batch.swarm.num_vehicles, batch.layout
         self.single_observation_space = Box(np.tile(layout.low, (n, 1)), np.tile(layout.high, (n, 1)))
         self.single_action_space = Box(-1.0, 1.0, (n, 2))
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -188,7 +188,8 @@ def vector_env(
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
             ``SwarmVectorEnv``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``decision_period`` and ``overrides``, as
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
+            ``overrides``, as
             for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each vehicle; the reward of
             a row is the mean over all vehicles.
     """

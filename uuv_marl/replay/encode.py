@@ -127,6 +127,7 @@ def _arrays(recording: Recording) -> dict[str, Any]:
         "spacing": recording.spacing,
     }
     exact = {**recording.series, "waypoints": recording.waypoints, "obstacles": recording.obstacles}
+    exact["marks"] = recording.marks
     if recording.water is not None:
         smooth["drift"], exact["eddies"] = recording.water.drift, recording.water.eddies.astype(np.float32)
     arrays = {"time_s": _coded(recording.time_s, Coding(tick_s, stride=1))}

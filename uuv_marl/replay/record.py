@@ -113,6 +113,7 @@ class _Tape:
             metrics=run.metrics,
             waypoints=run.waypoints,
             obstacles=run.obstacles,
+            marks=run.marks,
             time_s=tape["time_s"],
             reference=tape["reference"],
             position=_where(alive, tape["position"]),

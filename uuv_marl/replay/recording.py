@@ -61,6 +61,8 @@ class Recording(NamedTuple):
     """Corners of the trajectory, shape (point, 2)."""
     obstacles: Float32
     """Centre north, east and radius, shape (obstacle, 3)."""
+    marks: Float32
+    """What the task draws: centre north, east and radius of circles, at the end, shape (mark, 3)."""
     time_s: Float32
     """Shape (time,)."""
     reference: Float32

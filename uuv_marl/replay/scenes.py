@@ -45,6 +45,7 @@ class Scenes:
             scenario=recording.scenario,
             waypoints=recording.waypoints,
             obstacles=recording.obstacles,
+            marks=recording.marks,
             time_s=now,
             reference=recording.reference[k],
             position=self._position[k],

@@ -154,6 +154,7 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
         metrics=metrics,
         waypoints=trace["waypoints"],
         obstacles=trace["obstacles"],
+        marks=np.zeros((0, 3), np.float32),
         time_s=trace["route_time_s"],
         reference=_reference(trace["waypoints"], scenario, trace["route_time_s"]),
         position=trace["route_position"],

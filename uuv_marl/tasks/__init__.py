@@ -1,11 +1,13 @@
 """Tasks: what a swarm is to do, one file each. ``Task`` is the base of your own."""
 
 from uuv_marl.tasks.follow import Follow
-from uuv_marl.tasks.task import Mark, Task
+from uuv_marl.tasks.reach import Reach
+from uuv_marl.tasks.task import Task
 
 TASKS: dict[str, type[Task]] = {
     "follow": Follow,
+    "reach": Reach,
 }
 """Every task that ships with the package."""
 
-__all__ = ["TASKS", "Follow", "Mark", "Task"]
+__all__ = ["TASKS", "Follow", "Reach", "Task"]

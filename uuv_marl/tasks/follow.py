@@ -19,7 +19,7 @@ from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.task import Payment, Task
+from uuv_marl.tasks.task import Payment, Task, Terms
 from uuv_marl.types import Bool, Float64
 
 TRACKING, OBSTACLE, SPACING, EFFORT, COLLISION, LOSS, ARRIVAL, PROGRESS = range(8)
@@ -59,7 +59,7 @@ class Follow(Task):
 
         return Payment(reward, terms, pay)
 
-    def reward(self, running: Bool) -> Mapping[str, Float64]:
+    def reward(self, running: Bool) -> Terms:
         """The weighted terms of the latest step; zero for vehicles lost before."""
         payment = self.payment("dense", running)
         payment.pay(0, self.swarm.num_worlds)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uuv_marl.errors import RewardError
 from uuv_marl.percept import Table
@@ -14,13 +15,8 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
 from uuv_marl.types import Bool, Float64
 
-
-class Mark(NamedTuple):
-    """A circle to draw: place north and east [m], radius [m], and a word."""
-
-    place_m: tuple[float, float]
-    radius_m: float
-    label: str = ""
+Terms = Mapping[str, NDArray[np.floating[Any]]]
+"""Arrays by name."""
 
 
 class Payment(NamedTuple):
@@ -71,9 +67,8 @@ class Task:
         swarm: of any number of worlds, before its first reset.
     """
 
-    class Numbers(Section):
-        """The task's own numbers, which stand in the scenario's table ``task``; ranges as in ``scenario/fields.py``."""
-
+    Numbers: ClassVar[type[Section]] = Section
+    """The task's own numbers, which stand in the scenario's table ``task``; ranges as in ``scenario/fields.py``."""
     Memory: ClassVar[type[Any] | None] = None
     """Table of what the task remembers (``uuv_marl.sim.tables``): a NamedTuple of arrays over world and vehicle. Zero
     is nothing: so a world begins. It is part of the swarm's snapshots."""
@@ -121,11 +116,11 @@ class Task:
 
     # What is told and paid.
 
-    def observe(self, running: Bool) -> Mapping[str, Float64]:  # noqa: ARG002
+    def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The rows of ``observed`` by name, shape (world, vehicle, ...), physical units; VMAS: ``observation``."""
         return {}
 
-    def reward(self, running: Bool) -> Mapping[str, Float64]:  # noqa: ARG002
+    def reward(self, running: Bool) -> Terms:  # noqa: ARG002
         """What the latest step pays, weighted ``terms`` by name, shape (world, vehicle) each; VMAS: ``reward``."""
         return {}
 
@@ -168,6 +163,6 @@ class Task:
         share = float(self.succeeded()[world].mean())
         return {"untouched_share": share, "whole": float(share == 1.0)}
 
-    def marks(self, world: int) -> list[Mark]:  # noqa: ARG002
-        """What to draw of the task beside trajectories, obstacles and vehicles; VMAS: ``extra_render``."""
-        return []
+    def marks(self, world: int) -> NDArray[np.floating[Any]]:  # noqa: ARG002
+        """Circles to draw of the task: centre north, east and radius [m], shape (mark, 3); VMAS: ``extra_render``."""
+        return np.zeros((0, 3))

@@ -110,6 +110,8 @@ class Painter:
             around = (float(radius) + scene.scenario.constraints.s_o_m) * view.scale
             pygame.draw.circle(self._fine, ink.KEEP_OUT, middle, around, FINE)
             pygame.draw.circle(self._fine, ink.DISC, middle, float(radius) * view.scale)
+        for middle, radius in zip(view.pixels(scene.marks[:, :2]).tolist(), scene.marks[:, 2], strict=True):
+            pygame.draw.circle(self._fine, ink.AMBER, middle, float(radius) * view.scale, FINE)
 
     def _goal(self, at: Float, size: float) -> None:
         angles = np.arange(10) * math.pi / 5.0

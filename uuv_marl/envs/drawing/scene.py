@@ -35,6 +35,8 @@ class Scene(NamedTuple):
     """Corners of the trajectory, shape (point, 2)."""
     obstacles: Float
     """Centre north, east and radius, shape (obstacle, 3)."""
+    marks: Float
+    """Circles that the task draws: centre north, east and radius, shape (mark, 3)."""
     time_s: float
     reference: Float
     """Position of l(t), shape (2,)."""
@@ -102,6 +104,7 @@ class SceneHistory:
             scenario=swarm.scenario,
             waypoints=course.waypoints[w, 0, : course.last[w, 0] + 1].copy(),
             obstacles=course.obstacles[w, : course.num_obstacles[w]].copy(),
+            marks=batch.task.marks(w),
             time_s=float(facts.time_s[w]),
             reference=facts.reference[w, 0, :2].copy(),
             position=position,

@@ -59,6 +59,13 @@ export function drawCourse(context, episode, view, palette, weight) {
   context.strokeStyle = palette.keepout;
   context.stroke();
   context.setLineDash([]);
+  context.beginPath();
+  const marks = episode.values("marks");
+  for (let k = 0; k < marks.length; k += 3) {
+    circle(context, view.x(marks[k + 1]), view.y(marks[k]), marks[k + 2] * view.scale);
+  }
+  context.strokeStyle = palette.goal;
+  context.stroke();
 
   context.beginPath();
   circle(context, view.x(corners[1]), view.y(corners[0]), 5 * weight);

@@ -1,0 +1,60 @@
+"""A task of your own: gather by sonar. In this folder: ``uuv-marl benchmark --set task=task:Rendezvous``."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+import uuv_marl
+from uuv_marl.percept import FLAG, PerceptField
+from uuv_marl.scenario.fields import Positive, Section
+from uuv_marl.sim.draw import Draw
+from uuv_marl.tasks import Task
+
+Floats, Bool = NDArray[np.floating[Any]], NDArray[np.bool_]
+
+
+class Rendezvous(Task):
+    """Come within ``near_m`` of the swarm's centre, all of you, without touching. No vehicle perceives a reference."""
+
+    class Numbers(Section):
+        near_m: Positive = 20.0
+
+    observed: ClassVar[tuple[PerceptField, ...]] = (PerceptField("near", (1,), FLAG, "1 within near_m of the centre"),)
+    terms: ClassVar[Mapping[str, str]] = {"away": "-0.01/m for each decision", "collision": "-10 for each"}
+    columns: ClassVar[Mapping[str, str]] = {"spread_m": "mean distance from the centre at the end [m]"}
+
+    def draw(self, rng: np.random.Generator) -> Draw:
+        drawn = super().draw(rng)
+        drawn.eta[:, :2] *= 3.0  # farther apart
+        return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)), duration_s=60.0)
+
+    def _away(self) -> Floats:
+        return np.hypot(*np.moveaxis(self.swarm.state.eta[:, :, :2] - self.swarm.facts.centre[:, None], -1, 0))
+
+    def there(self) -> Bool:
+        return self._away() <= self.numbers.near_m
+
+    def done(self) -> Bool:
+        return np.all(self.there() | ~self.swarm.state.alive, axis=1)
+
+    def observe(self, running: Bool) -> Mapping[str, Floats]:
+        return {"near": self.there()[:, :, None].astype(np.float64)}
+
+    def reward(self, running: Bool) -> Mapping[str, Floats]:
+        return {"away": -0.01 * self._away(), "collision": -10.0 * self.swarm.facts.contacts}
+
+    def metrics(self, world: int) -> dict[str, float | None]:
+        return {**super().metrics(world), "spread_m": float(self._away()[world].mean())}
+
+    def marks(self, world: int) -> Floats:
+        return np.array([[*self.swarm.facts.centre[world], self.numbers.near_m]])
+
+
+if __name__ == "__main__":
+    env = uuv_marl.parallel_env("starter", task=f"{__name__}:Rendezvous")
+    observations, infos = env.reset(seed=0)
+    while env.agents:
+        observations, *_, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+    print("gathered" if infos["uuv_0"]["is_success"] else "not gathered")

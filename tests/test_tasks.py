@@ -1,0 +1,192 @@
+"""The room for tasks: what the water does for them, what is refused, and a user's task through the tools."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import uuv_marl
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted
+from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.cli import app
+from uuv_marl.envs.core import BatchedEnv
+from uuv_marl.errors import RewardError, ScenarioError
+from uuv_marl.sim.draw import usual_draw
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks import Task
+
+EXAMPLE = "examples.extending.task:Rendezvous"
+
+
+class TwoWays(Task):
+    """Two groups, the second led by the mirror image of l(t); a vehicle of each knows nothing; an obstacle drifts."""
+
+    @classmethod
+    def sizes(cls, scenario):
+        return {"group": 2}
+
+    def draw(self, rng):
+        drawn = usual_draw(self.swarm.scenario, rng)
+        n = len(drawn.eta)
+        return drawn._replace(
+            waypoints=(drawn.waypoints[0], drawn.waypoints[0] * [1.0, -1.0]),
+            times=2 * drawn.times,
+            group=(np.arange(n) % 2).astype(np.int64),
+            informed=np.arange(n) > 1,
+        )
+
+    def move(self, running):
+        self.swarm.course.drift[running, 0] = (0.0, 2.0)
+
+
+class Broken(Task):
+    """Pays what it does not declare."""
+
+    terms = {"one": "1"}  # noqa: RUF012
+
+    def reward(self, running):
+        return {"two": np.zeros((1, 5))}
+
+
+TWO = {"task": f"{__name__}:TwoWays"}
+
+
+def test_each_vehicle_perceives_its_own_groups_reference_or_nothing():
+    swarm = Swarm(load_scenario("multi_obstacle", num_vehicles=6, overrides=TWO), 2)
+    percept = swarm.reset(0)
+    for _ in range(30):
+        percept = swarm.step(np.zeros((2, 6, 2)))
+    offset = swarm.own_reference[:, :, :2] - swarm.state.eta[:, :, :2]
+    np.testing.assert_array_equal(swarm.facts.reference[:, 0, 1], -swarm.facts.reference[:, 1, 1])
+    np.testing.assert_allclose(np.hypot(*np.moveaxis(offset, -1, 0)), swarm.facts.away, rtol=1e-12)
+    seen = np.hypot(*np.moveaxis(percept["reference"], -1, 0))
+    np.testing.assert_allclose(seen[:, 2:], swarm.facts.away[:, 2:], rtol=1e-5)
+    assert (percept["reference"][:, :2] == 0).all()
+    assert (percept["reference_velocity"][:, :2] == 0).all()
+    assert (percept["reference_velocity"][:, 2:] != 0).any(axis=-1).all()
+
+
+def test_a_vehicle_that_knows_nothing_perceives_nothing_of_the_course_at_sea_either():
+    sea = {"navigation.drift_share": 0.1, "navigation.compass_bias_deg": 5.0}
+    swarm = Swarm(load_scenario("multi_obstacle", num_vehicles=6, overrides=TWO | sea))
+    swarm.reset(0)
+    percept = swarm.step(np.zeros((1, 6, 2)))
+    assert (percept["reference"][:, :2] == 0).all()
+    assert (percept["reference"][:, 2:] != 0).any()
+
+
+def test_an_obstacle_that_drifts_is_where_it_should_be_and_hits_who_lies_in_its_way():
+    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=4, overrides=TWO))
+    swarm.reset(0)
+    before = swarm.course.obstacles.copy()
+    radius = before[0, 0, 2]
+    swarm.state.eta[0, 0, :2] = before[0, 0, :2] + (0.0, radius + 3.0)  # 2 m from contact, in its way
+    swarm.state.nu[0, 0] = 0.0
+    swarm.observe()
+    contacts = []
+    for _ in range(20):
+        swarm.step(np.zeros((1, 4, 2)))
+        contacts.append(int(swarm.facts.contacts[0, 0]))
+    np.testing.assert_allclose(swarm.course.obstacles[0, 0, :2], before[0, 0, :2] + (0.0, 4.0), atol=1e-9)
+    assert sum(contacts) == 1
+    assert swarm.state.touched[0].tolist() == [True, False, False, False]
+    assert contacts.index(1) in (9, 10)  # after about 1 s
+
+
+def test_an_arrival_of_groups_is_that_of_all():
+    changes = TWO | {"arrival.radius_m": 1e5, "arrival.spread_m": 1e5, "arrival.dwell_s": 0.1}
+    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=4, overrides=changes))
+    swarm.reset(0)
+    swarm.course.times[0, 1] *= 0.001
+    swarm.step(np.zeros((1, 4, 2)))
+    swarm.step(np.zeros((1, 4, 2)))
+    assert not swarm.arrived[0]  # one group's l(t) still moves
+    swarm.course.times[0, 0] *= 0.001
+    swarm.step(np.zeros((1, 4, 2)))
+    swarm.step(np.zeros((1, 4, 2)))
+    assert swarm.arrived[0]
+
+
+def test_a_snapshot_of_groups_goes_on_bit_for_bit_and_refuses_a_group_that_is_not_there():
+    swarm = Swarm(load_scenario("multi_obstacle", num_vehicles=6, overrides=TWO))
+    swarm.reset(3)
+    snapshot = swarm.snapshot()
+    after = [swarm.step(np.full((1, 6, 2), 0.4)).flat.copy() for _ in range(5)]
+    swarm.restore(snapshot)
+    assert all((swarm.step(np.full((1, 6, 2), 0.4)).flat == flat).all() for flat in after)
+    snapshot["group"][0, 0] = 7
+    with pytest.raises(ValueError, match="group must lie within 0 and 1"):
+        swarm.restore(snapshot)
+
+
+def test_at_a_goal_at_rest_who_touched_something_has_failed():
+    batch = BatchedEnv(load_scenario("starter", overrides={"task": {"name": "reach", "near_m": 30.0}}))
+    batch.reset(0)
+    swarm, goal = batch.swarm, batch.swarm.course.waypoints[0, 0, -1]
+    assert (swarm.facts.reference[0, 0] == [*goal, 0.0, 0.0]).all()
+    swarm.state.eta[0, :, :2] = goal + 8.0 * np.stack([np.arange(5), np.zeros(5)], axis=1)
+    swarm.state.nu[0] = 0.0
+    swarm.observe()
+    swarm.state.touched[0, 2] = True
+    result = batch.step(np.zeros((1, 5, 2)))
+    assert result.world_terminated[0]
+    assert result.terms["arrival"][0].tolist() == [20.0, 20.0, 20.0, 20.0, 0.0]  # the last is 32 m away
+    assert batch.task.metrics(0) == {"untouched_share": 0.6, "whole": 0.0}
+
+
+@pytest.mark.parametrize(("task", "message"), [
+    ("folow", "task 'folow' is unknown; did you mean 'follow'"),
+    ("nowhere:Task", "task 'nowhere:Task' can't be imported: No module named 'nowhere'"),
+    ("json:dumps", "task 'json:dumps' must be a subclass of uuv_marl.tasks.Task"),
+    ({"name": "reach", "near_m": -3.0}, "task.near_m must lie within 0.001 to 1,000,000, got -3.0"),
+    ({"name": "reach", "far_m": 3.0}, "task.far_m is unknown; the numbers of task 'reach' are near_m"),
+    ({"near_m": 3.0}, "task.name is missing"),
+    (7, "task must be"),
+])  # fmt: skip
+def test_a_task_that_can_not_be_is_refused_by_field_value_and_remedy(task, message):
+    with pytest.raises(ScenarioError, match=message.replace("(", r"\(")):
+        load_scenario("starter", overrides={"task": task})
+
+
+def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
+    with pytest.raises(ValueError, match="reward must be 'dense', 'team' or a function of the swarm, got 'sparse'"):
+        uuv_marl.parallel_env("starter", task="reach", reward="sparse")
+    env = uuv_marl.parallel_env("starter", task=f"{__name__}:Broken")
+    env.reset(seed=0)
+    with pytest.raises(RewardError, match="reward of Broken must give the terms one, got two"):
+        env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+
+
+def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
+    scenario = load_scenario("starter")
+    for name in ("bio_inspired", "bio_inspired_plus", "scout", "idle", "mappo"):
+        mine = granted(name, scenario)
+        assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
+    own = granted("own:bio_inspired", scenario)
+    assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
+    (run,) = [event for event in evaluate(own, "own:bio_inspired", [0]) if isinstance(event, Run)]
+    assert run.metrics["task_time_s"] is not None
+
+
+@pytest.fixture
+def in_example_folder(monkeypatch):
+    monkeypatch.chdir(Path(__file__).resolve().parent.parent / "examples" / "extending")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield
+    sys.modules.pop("task", None)
+
+
+def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path, in_example_folder):
+    how = ["--scenario", "starter", "--set", "task=task:Rendezvous", "--policy", "random"]
+    done = CliRunner().invoke(app, ["benchmark", *how, "--seeds", "2", "--output", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    runs = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]
+    assert all(set(run["metrics"]["task"]) == {"untouched_share", "whole", "spread_m"} for run in runs)
+    assert "| spread_m |" in (tmp_path / "out" / "table.md").read_text()
+    done = CliRunner().invoke(app, ["replay", *how, "--output", str(tmp_path / "replay.html")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "replay.html").stat().st_size > 10_000

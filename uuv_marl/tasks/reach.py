@@ -1,0 +1,84 @@
+"""``reach``: every vehicle goes to a goal at rest, the end of its trajectory, and touches nothing on the way."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from uuv_marl.scenario.fields import Positive, Section
+from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.types import Bool
+
+
+class ReachNumbers(Section):
+    """Numbers of ``reach``."""
+
+    near_m: Positive = 60.0
+    """A vehicle is there within this distance of its goal. Assumed: about the radius of 54 vehicles at rest."""
+
+
+class Reached(NamedTuple):
+    """What ``reach`` remembers."""
+
+    paid: Annotated[Bool, "world vehicle", "Whether the vehicle has been there before."]
+
+
+class Reach(Task):
+    """Be within ``near_m`` of a goal at rest; the episode ends when all living vehicles are.
+
+    The weights are those of ``follow``. Laws: progress sums to what the way has shortened by; no step pays more than
+    that, but for the arrival, which pays once; nothing depends on the number of vehicles.
+    """
+
+    Numbers = ReachNumbers
+    Memory: ClassVar[type[Any] | None] = Reached
+    terms: ClassVar[Mapping[str, str]] = {
+        "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
+        "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
+        "effort": "-w · dt · a²; a²: mean squared length of the action, 1 at full force",
+        "collision": "-w for every collision that begins",
+        "loss": "once, for a lost vehicle: -(w_collision + w_arrival + (D - min(d, D))/c + "
+        "(w_obstacle + w_spacing + w_effort) · T), T: time left until the limit",
+        "arrival": "+w once, when the vehicle is first within near_m of its goal",
+        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the goal, D: progress_far_m, "
+        "c: progress_m",
+    }
+
+    def __init__(self, swarm: Swarm) -> None:
+        super().__init__(swarm)
+        self._weight, self._limits = swarm.scenario.reward, swarm.scenario.constraints
+
+    def draw(self, rng: np.random.Generator) -> Draw:
+        """As the scenario says, but l(t) rests at the end all along."""
+        drawn = super().draw(rng)
+        return drawn._replace(times=tuple(np.zeros_like(times) for times in drawn.times))
+
+    def reward(self, running: Bool) -> Terms:
+        """The weighted terms of the latest step."""
+        facts, weight, limits = self.swarm.facts, self._weight, self._limits
+        dt, far = self.swarm.scenario.timing.decision_period_s, weight.progress_far_m
+        now, before = np.minimum(facts.away, far), np.minimum(facts.was_away, far)
+        left_s = np.maximum(self.swarm.time_limit_s - facts.time_s, 0.0)[:, None]
+        worst = weight.collision + weight.arrival + (weight.obstacle + weight.spacing + weight.effort) * left_s
+        arrives = self.there() & self.swarm.state.alive & ~self.memory.paid
+        self.memory.paid[running] |= arrives[running]
+        return {
+            "obstacle": -weight.obstacle * dt * np.clip(1.0 - facts.clearance / limits.s_o_m, 0.0, 1.0),
+            "spacing": -weight.spacing * dt * np.clip(1.0 - facts.spacing / limits.s_u_m, 0.0, 1.0),
+            "effort": -weight.effort * dt * facts.effort,
+            "collision": -weight.collision * facts.contacts,
+            "loss": np.where(facts.lost, -1.0, 0.0) * (worst + (far - now) / weight.progress_m),
+            "arrival": weight.arrival * arrives,
+            "progress": (before - now) / weight.progress_m,
+        }
+
+    def done(self) -> Bool:
+        """Worlds in which all living vehicles are there."""
+        alive = self.swarm.state.alive
+        return np.logical_and((self.there() | ~alive).all(axis=1), alive.any(axis=1))
+
+    def there(self) -> Bool:
+        """Vehicles within ``near_m`` of their goals."""
+        return self.swarm.facts.away <= self.numbers.near_m
