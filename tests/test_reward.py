@@ -86,7 +86,8 @@ def arrival(at, reward, bump_at=None, steps=60):
         swarm.put((0.0, 0.0) if at is not None and k >= at else (300.0, 0.0), 2000 + k)
         if k == bump_at:
             state = swarm.swarm.state
-            state.before[0, 0], state.eta[0, 0, :2] = state.eta[0, 0, :2], state.eta[0, 1, :2] + (1.0, 0.0)
+            state.eta[0, 0] = (*(state.eta[0, 1, :2] + (2.1, 0.0)), np.pi)
+            state.nu[0, 0, 0] = 3.0
         if swarm.step().world_terminated[0]:
             break
     return swarm.paid
