@@ -21,7 +21,7 @@ import numpy as np
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
-from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 

@@ -11,7 +11,7 @@ from uuv_marl.baselines import granted
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
 from uuv_marl.benchmark.results import Results, ResultsError
-from uuv_marl.benchmark.tables import CAPTION, HEADERS, estimate, markdown_table, rows_of
+from uuv_marl.benchmark.tables import CAPTION, HEADERS, estimate, markdown_table, table_rows
 from uuv_marl.cli import app
 
 QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
@@ -213,7 +213,7 @@ def test_the_table_shows_the_paper_and_what_each_policy_knows(tmp_path, monkeypa
     results = Results(tmp_path, [scenario])
     policies = ["bio_inspired", "sdc", "idle"]
     runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
-    rows = rows_of(results, scenario.name, policies, [0, 1])
+    rows = table_rows(results, scenario.name, policies, [0, 1])
     text = markdown_table(HEADERS, rows)
     assert [len(row) for row in rows] == [len(HEADERS)] * 3
     assert "205 s, 10.48-12.63 m" in text

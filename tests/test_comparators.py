@@ -49,7 +49,7 @@ def test_the_obstacles_force_is_the_gradient_of_ge_and_cuis_potential(x, y, goal
         return 0.5 * APF.obstacle * wall**2 * ((goal_x - x) ** 2 + (goal_y - y) ** 2)
 
     distance = math.hypot(x, y)
-    f_x, f_y, bound = apf.obstacle_force(-x / distance, -y / distance, distance - 10.0, goal_x - x, goal_y - y, APF)
+    f_x, f_y, bound = apf.apf_obstacle_force(-x / distance, -y / distance, distance - 10.0, goal_x - x, goal_y - y, APF)
     np.testing.assert_allclose((f_x, f_y), -gradient(potential, x, y), rtol=1e-4, atol=1e-3)
     assert bound == 0
 
@@ -63,7 +63,9 @@ def test_the_neighbours_force_is_the_gradient_of_khatibs_potential(x, y):
         return 0.5 * APF.neighbour * max(1.0 / math.hypot(x, y) - 1.0 / APF.neighbour_range, 0.0) ** 2
 
     # The vehicle is at (x, y), the neighbour at the origin.
-    np.testing.assert_allclose(apf.neighbour_force(-x, -y, APF)[:2], -gradient(potential, x, y), rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(
+        apf.apf_neighbour_force(-x, -y, APF)[:2], -gradient(potential, x, y), rtol=1e-4, atol=1e-3
+    )
 
 
 def test_the_field_is_zero_at_the_goal_though_an_obstacle_is_near():
@@ -100,15 +102,19 @@ def test_the_lattices_force_is_the_gradient_of_its_potential(distance, a, b, uni
 
     step = 1e-3 * unit
     found = gained(distance - step, distance + step) / 2e-3
-    assert olfati_saber.neighbour_force(distance, gains) == pytest.approx(found, rel=1e-3, abs=0.05)
+    assert olfati_saber.neighbour_attraction(distance, gains) == pytest.approx(found, rel=1e-3, abs=0.05)
 
 
 @given(st.floats(10.0, 2000.0), st.floats(10.0, 2000.0), st.floats(8.0, 20.0))
 def test_neighbours_repel_within_the_spacing_and_attract_beyond(a, b, spacing):
     gains = FLOCK._replace(attraction=a, repulsion=b, spacing=spacing)
-    assert olfati_saber.neighbour_force(spacing, gains) == pytest.approx(0.0, abs=1e-6 * (a + b))
-    assert olfati_saber.neighbour_force(0.9 * spacing, gains) < 0 < olfati_saber.neighbour_force(1.1 * spacing, gains)
-    assert olfati_saber.neighbour_force(1.5 * spacing, gains) == 0.0
+    assert olfati_saber.neighbour_attraction(spacing, gains) == pytest.approx(0.0, abs=1e-6 * (a + b))
+    assert (
+        olfati_saber.neighbour_attraction(0.9 * spacing, gains)
+        < 0
+        < olfati_saber.neighbour_attraction(1.1 * spacing, gains)
+    )
+    assert olfati_saber.neighbour_attraction(1.5 * spacing, gains) == 0.0
     assert -b < olfati_saber.phi_alpha(0.0, gains) < 0.0
 
 
@@ -135,7 +141,7 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
 
 def test_obstacles_repel_up_to_their_range():
     ranges = np.array([1.0, 5.0, 20.0, 36.0, 39.0, 40.0, 60.0])
-    forces = [olfati_saber.obstacle_force(reach, FLOCK) for reach in ranges]
+    forces = [olfati_saber.obstacle_repulsion(reach, FLOCK) for reach in ranges]
     assert all(force > 0.0 for force in forces[:5])
     assert forces[5:] == [0.0, 0.0]
     assert max(forces) < 2.0 * FLOCK.obstacle / math.sqrt(olfati_saber.EPSILON)

@@ -148,7 +148,7 @@ def test_every_function_of_compiled_code_is_part_of_its_key():
             found = [function.__globals__[name] for name in used & function.__globals__.keys()]
             homes = {getattr(each, "__module__", None) or getattr(each, "__name__", "") for each in found}
             ours = {home for home in homes if home.startswith("uuv_marl")}
-            assert ours <= sources.reached(module.__name__), function.__qualname__
+            assert ours <= sources.reached_modules(module.__name__), function.__qualname__
     assert functions > 150
 
 
@@ -194,7 +194,7 @@ def test_the_key_follows_imports_through_files(tmp_path, monkeypatch, file, befo
         for module in [m for m in sys.modules if m.startswith("keyed")]:
             del sys.modules[module]
         importlib.invalidate_caches()
-        for each in (sources.source_key, sources.reached, sources._tree, sources._hash):
+        for each in (sources.source_key, sources.reached_modules, sources._tree, sources._hash):
             each.cache_clear()
         return sources.source_key(importlib.import_module("keyed.kernel").__name__)
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
@@ -34,7 +34,7 @@ def saved(folder, scenario, scale, **changes):
         Layer(*(scale * rng.standard_normal(shape, np.float32) for shape in ((a, b), b)))
         for a, b in itertools.pairwise((size, 32, 32, 2))
     ]
-    save_checkpoint(folder / WEIGHTS_FILE, Card(percept=rows_of(layout), **changes), layers)
+    save_checkpoint(folder / WEIGHTS_FILE, Card(percept=card_rows(layout), **changes), layers)
     return str(folder)
 
 

@@ -21,8 +21,8 @@ from uuv_marl.baselines.learned.checkpoint import (
     WEIGHTS_FILE,
     Card,
     Layer,
+    card_rows,
     load_checkpoint,
-    rows_of,
     save_checkpoint,
     vehicle_of,
 )
@@ -48,7 +48,7 @@ def actor(scale=0.3, seed=0, hidden=16, features=11 + 4 * 28):
 
 
 def card(**changes):
-    return Card(**{"percept": rows_of(PerceptLayout.of(load_scenario("tracking"))), **changes})
+    return Card(**{"percept": card_rows(PerceptLayout.of(load_scenario("tracking"))), **changes})
 
 
 @pytest.fixture

@@ -35,10 +35,10 @@ from uuv_marl.train.env import TRAINING_SEEDS, TrainingEnv, Transition
 from uuv_marl.train.exploration import exploration
 from uuv_marl.train.folder import Record, TrainingFolder
 from uuv_marl.train.mappo import Learner, Mappo, annealed, gae
-from uuv_marl.train.reward import Weights, lead, shaped_reward
+from uuv_marl.train.reward import Weights, lead_over_swarm, shaped_reward
 from uuv_marl.train.run import Trainer, resume, train
 from uuv_marl.train.training import Hyperparameters, Training
-from uuv_marl.train.validation import VALIDATION_SEEDS, cost, validation_result
+from uuv_marl.train.validation import VALIDATION_SEEDS, validation_cost, validation_result
 
 OPEN_WATER = {
     "timing.decision_period_s": 0.5,
@@ -298,12 +298,12 @@ def test_moving_the_centre_is_paid_in_full():
     swarm = Swarm(load_scenario("tracking", num_vehicles=50))
     swarm.reset(0)
     swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0)
-    before = lead(swarm)[0]
+    before = lead_over_swarm(swarm)[0]
     swarm.state.eta[0, 7, :2] += (0.6, 0.8)
     swarm.observe()
     swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0) - np.array([0.6, 0.8]) / 50
-    assert (lead(swarm)[0] - before)[7] == pytest.approx(1.0, abs=0.05)
-    assert lead(swarm)[0].mean() == pytest.approx(0.0, abs=1e-9), "nobody is paid for a spread swarm"
+    assert (lead_over_swarm(swarm)[0] - before)[7] == pytest.approx(1.0, abs=0.05)
+    assert lead_over_swarm(swarm)[0].mean() == pytest.approx(0.0, abs=1e-9), "nobody is paid for a spread swarm"
 
 
 def test_the_critics_view_does_not_depend_on_the_order_of_vehicles():
@@ -522,9 +522,11 @@ def episode(**changes):
 
 
 def test_costs_by_hand():
-    assert cost(episode()) == 0.5
-    assert cost(episode(task_time_s=None)) == 2.0
-    assert cost(episode(collisions=7, min_obstacle_distance_m=6.5, min_spacing_m=3.25)) == 0.5 + 2.0 + 0.5 + 0.5
+    assert validation_cost(episode()) == 0.5
+    assert validation_cost(episode(task_time_s=None)) == 2.0
+    assert (
+        validation_cost(episode(collisions=7, min_obstacle_distance_m=6.5, min_spacing_m=3.25)) == 0.5 + 2.0 + 0.5 + 0.5
+    )
     result = validation_result([episode(), episode(task_time_s=None, min_obstacle_distance_m=20.0, collisions=2)])
     assert result == (-2.25, 0.5, 2, 30.0, 6.5, 20.0)
 

@@ -12,14 +12,14 @@ import pytest
 import uuv_marl
 from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark import style
-from uuv_marl.envs.batched_env import make_batched_env
+from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim, nice
 from uuv_marl.envs.drawing.current import ARROW, paint_current
 from uuv_marl.envs.drawing.frame import Frame, Panel, _numbers, pixels
-from uuv_marl.envs.drawing.legend import _flow, rows
+from uuv_marl.envs.drawing.legend import _flow, legend_rows
 from uuv_marl.envs.drawing.painter import Painter
-from uuv_marl.envs.drawing.scene import TRAIL_S, Memory
+from uuv_marl.envs.drawing.scene import TRAIL_S, SceneHistory
 from uuv_marl.envs.solo import SoloEnv
 from uuv_marl.envs.vector_env import vector_env
 
@@ -32,7 +32,7 @@ def played(scenario="starter", policy="bio_inspired", seconds=10.0, sonar_of=Non
     actor = make(policy, batch.swarm.scenario)
     batch.reset(seed)
     actor.reset(seed)
-    memory = Memory(batch)
+    memory = SceneHistory(batch)
     memory.note(batch)
     while batch.swarm.facts.time_s[0] < seconds - 1e-6:
         batch.step(actor.act(batch.swarm.percept))
@@ -80,7 +80,7 @@ def test_still_water_is_drawn_as_before_and_a_sea_is_named_in_the_legend():
     (*_, (row, x, cut, _)) = _flow(200, long, 12)
     assert cut.endswith("…")
     assert x + ink.text(cut, 12).get_width() <= 200
-    assert row == rows(200, long, 12) - 1
+    assert row == legend_rows(200, long, 12) - 1
     painter, camera = Painter(SIZE), aim("follow", [moved], SIZE)
     with_arrows = pixels(painter.paint(moved, camera))
     assert (with_arrows != pixels(painter.paint(moved._replace(water=None), camera))).any()
@@ -151,7 +151,7 @@ def test_steps_of_a_scale_are_nice():
 
 def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
     batch = make_batched_env("starter", 2)
-    memory = Memory(batch)
+    memory = SceneHistory(batch)
     batch.reset(0)
     memory.note(batch)
     start = batch.swarm.state.eta[:, :, :2].copy()
@@ -182,7 +182,7 @@ def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
 @pytest.mark.parametrize("period", [0.1, 0.7, 1.5])
 def test_trails_last_as_long_at_every_decision_period(period):
     batch = make_batched_env("starter", decision_period=period, overrides={"timing.control_hold_s": 0.1})
-    memory = Memory(batch)
+    memory = SceneHistory(batch)
     batch.reset(0)
     for _ in range(round(40.0 / period)):
         batch.step(np.zeros((1, 5, 2), np.float32))
@@ -252,8 +252,8 @@ def test_the_legend_explains_what_can_be_seen_and_nothing_else():
     assert "lost" not in course
     assert {"lost", "echo", "hears", "active sonar", "obstacle, s_o = 5 m"} <= lossy
     sonar = played(seconds=1.0, sonar_of=0)[0]
-    assert rows(2000, sonar, 12) == 1
-    assert rows(800, sonar, 12) == 2
+    assert legend_rows(2000, sonar, 12) == 1
+    assert legend_rows(800, sonar, 12) == 2
     assert max(x for row, x, *_ in _flow(400, sonar, 12)) < 400
 
 

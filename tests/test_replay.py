@@ -476,7 +476,7 @@ def row(collisions, task_time_s, spacing, obstacle):
     ],
 )
 def test_the_worst_run_is_by_collisions_arrival_and_distance(rows, worst):
-    runs = [runner.Row("s", "p", seed, metrics) for seed, metrics in enumerate(rows)]
+    runs = [runner.ResultRow("s", "p", seed, metrics) for seed, metrics in enumerate(rows)]
     results = types.SimpleNamespace(select=lambda scenario, policy, seeds: runs)
     assert runner.worst(results, [types.SimpleNamespace(name="s")], ["p"], range(9)).seed == worst
 
@@ -492,7 +492,7 @@ def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(tmp_path,
     done = CliRunner().invoke(app, ["benchmark", *arguments, close, "--output=out"])
     assert done.exit_code == 0, done.output
     (printed,) = re.findall(r"^ *uuv-marl (replay .*)$", done.output, flags=re.M)
-    rows = [runner.Row(**run) for run in json.loads(Path("out/results.json").read_text())["runs"]]
+    rows = [runner.ResultRow(**run) for run in json.loads(Path("out/results.json").read_text())["runs"]]
     again = CliRunner().invoke(app, shlex.split(printed))
     assert again.exit_code == 0, again.output
     ((recordings, _, _),) = written

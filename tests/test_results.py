@@ -20,8 +20,8 @@ from uuv_marl.atomic import locked
 from uuv_marl.benchmark import load, load_trace, runner
 from uuv_marl.benchmark.evaluate import Routes
 from uuv_marl.benchmark.metrics import Metrics, Sample, Shares
-from uuv_marl.benchmark.results import Content, Knowledge, Results, Row, trace_path
-from uuv_marl.benchmark.tables import Cells, markdown_table, rich_table, rows_of
+from uuv_marl.benchmark.results import Content, Knowledge, ResultRow, Results, trace_path
+from uuv_marl.benchmark.tables import TableRow, markdown_table, rich_table, table_rows
 from uuv_marl.cli import app
 from uuv_marl.errors import MissingExtraError, ResultsError
 
@@ -201,7 +201,7 @@ DEFAULT = [*runner.DEFAULT_POLICIES, "my_policies:Ahead"]
 
 
 def cells(policy):
-    return Cells(
+    return TableRow(
         policy, "compass, link, yaw damping 600 N m s", "20/20", "204.3 [203.9, 204.8]", "206.1",
         "13.81 [13.40, 14.02]", "11.20", "9.93 [9.81, 10.02]", "8.90", "11.21 [11.10, 11.31]",
         "s_l 100%, s_o 100%, s_u 100%", "18 in 11 seeds", "205 s, 10.48-12.63 m",
@@ -224,7 +224,7 @@ def test_the_table_can_be_read_at_any_width(width):
 
 def test_few_seeds_have_no_interval(tmp_path):
     results = made(tmp_path, seeds=range(5))
-    few, enough = (rows_of(results, "single_obstacle", ["idle"], range(count))[0] for count in (4, 5))
+    few, enough = (table_rows(results, "single_obstacle", ["idle"], range(count))[0] for count in (4, 5))
     assert "[" not in few.distance + few.spacing + few.mean
     assert "[" in enough.distance
     assert few.arrived == "0/4"
@@ -391,7 +391,7 @@ def test_the_page_of_the_format_has_every_key_and_array(tmp_path):
     results = made(tmp_path)
     assert keys("`results.json`") == set(Content.__annotations__) - {"__pydantic_config__"}
     assert keys("A policy") == set(Knowledge.__annotations__)
-    assert keys("A run") == set(Row._fields)
+    assert keys("A run") == set(ResultRow._fields)
     assert keys("Metrics") == set(Metrics.__annotations__) == set(results.rows[0].metrics)
     assert set(Shares.__annotations__) == set(results.rows[0].metrics["constraint_share"])
     for share in Shares.__annotations__:

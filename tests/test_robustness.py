@@ -219,8 +219,8 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     assert rows["success_share"][2] < 1.0, "a lag of 2 s costs something"
     kept = json.loads((tmp_path / "cells" / "starter.A1.5" / "results.json").read_text())
     assert kept["runs"][0]["metrics"]["success_share"] == pytest.approx(rows["success_share"][2])
-    before = [path.read_bytes() for path in page.write_report(tmp_path)]
-    assert before == [path.read_bytes() for path in page.write_report(tmp_path)]
+    before = [path.read_bytes() for path in page.write_robustness_report(tmp_path)]
+    assert before == [path.read_bytes() for path in page.write_robustness_report(tmp_path)]
 
 
 def test_scenarios_of_one_name_are_refused(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, granted, make
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, rows_of, save_checkpoint
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, save_checkpoint
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.replay import traces
 from uuv_marl.sim.swarm import Swarm
@@ -124,7 +124,7 @@ def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
     assert granted("sff", sea).sonar.channels == ("modem",)
     assert granted("tests.test_sea_modem:Both", sea).sonar.channels == ("link", "modem")
     linked = load_scenario("starter", overrides={"sonar.channels": ["link"]})
-    card = Card(percept=rows_of(PerceptLayout.of(linked)), channels=("link",))
+    card = Card(percept=card_rows(PerceptLayout.of(linked)), channels=("link",))
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, [Layer(np.zeros((123, 2), np.float32), np.zeros(2, np.float32))])
     assert granted(str(tmp_path), sea).sonar.channels == ("link",)
 

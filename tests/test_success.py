@@ -8,7 +8,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
-from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.sim.swarm import Swarm
 
 SPREAD_M = 80.0

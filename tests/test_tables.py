@@ -9,7 +9,7 @@ from uuv_marl import load_scenario
 from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Course, Facts, Senses, State
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.tables import Bounds, allocate, check, rows
+from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
 from uuv_marl.sim.workspace import Cells, Columns, Listener, Workspace, scratch, workspace
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
@@ -34,9 +34,9 @@ def test_every_array_of_a_desk_has_room_of_its_own(desks):
 def test_a_desk_leaves_no_column_unused_and_has_the_declared_types(desks):
     room, own = desks
     for table, arrays in zip((Columns, Cells, Listener), Workspace(*own[0]), strict=True):
-        for (name, row), array in zip(rows(table).items(), arrays, strict=True):
-            assert array.dtype == row.dtype, name
-            assert len(array) >= LENGTHS[row.axes[0]], name
+        for (name, spec), array in zip(array_specs(table).items(), arrays, strict=True):
+            assert array.dtype == spec.dtype, name
+            assert len(array) >= LENGTHS[spec.axes[0]], name
     columns = sum(block.shape[1] for block in room)
     assert columns == sum(len(table._fields) for table in (Columns, Cells, Listener))
 
@@ -58,7 +58,7 @@ def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyon
     check(Course, arrays, SIZES)
     monkeypatch.setattr(
         "uuv_marl.sim.tables.rows",
-        lambda table: {"last": rows(table)["last"]._replace(bounds=Bounds(low, axis, beyond))},
+        lambda table: {"last": array_specs(table)["last"]._replace(bounds=Bounds(low, axis, beyond))},
     )
     arrays["last"][1] = wrong
     with pytest.raises(ValueError, match="last must lie within"):

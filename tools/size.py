@@ -44,10 +44,13 @@ def options(command: Any) -> int:
 def twice(files: Sequence[Path]) -> list[str]:
     """Names of classes and public functions that more than one module defines, with how many do."""
     found = Counter(
-        node.name
+        name
         for path in files
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and not node.name.startswith("_"))
+        for name in {
+            node.name
+            for node in ast.parse(path.read_text(encoding="utf-8")).body
+            if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and not node.name.startswith("_"))
+        }
     )
     return [f"{name} {count}" for name, count in found.most_common() if count > 1]
 

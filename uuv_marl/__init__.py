@@ -52,4 +52,4 @@ def __dir__() -> list[str]:
     return sorted(__all__)
 
 
-registration.register()
+registration.register_environments()

@@ -7,7 +7,7 @@ import typer
 
 from research import FOLDER
 from research.dynamics.identify import identify
-from uuv_marl.cli.console import console, explained, extra, path_option, shown, working
+from uuv_marl.cli.console import console, explained, extra, path_option, progress_line, working
 
 app = typer.Typer(add_completion=False)
 
@@ -25,7 +25,7 @@ def main(
     """
     with explained(FOLDER):
         with extra("tune", "identification"), working(f"The finished trials are in {output}", alone=output) as bar:
-            report = shown(bar, "identify", trials)
+            report = progress_line(bar, "identify", trials)
             path = identify(output, trials, lambda done, best: report(done, f"largest error {best:.1%}"))
         console.print(f"{path}", highlight=False)
 

@@ -9,7 +9,7 @@ from research import FOLDER
 from research.heldout.job import run
 from research.heldout.page import write_page
 from uuv_marl.atomic import locked
-from uuv_marl.cli.console import console, explained, path_option, shown, working
+from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 
 app = typer.Typer(add_completion=False)
 
@@ -34,7 +34,7 @@ def main(
     """
     with explained(FOLDER):
         with working(f"The finished episodes are in {output}") as bar:
-            report = shown(bar, "held out")
+            report = progress_line(bar, "held out")
             rows = run(output, only or [], seeds, lambda what, share: report(share, what[-60:]))
             report(1.0)
         with locked(output, wait_s=60.0):

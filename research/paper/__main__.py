@@ -7,7 +7,7 @@ import typer
 
 from research import FOLDER
 from research.paper.reproduce import reproduce
-from uuv_marl.cli.console import console, explained, path_option, shown, working
+from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 
 app = typer.Typer(add_completion=False)
 
@@ -34,7 +34,7 @@ def main(
     """
     with explained(FOLDER):
         with working(f"The finished runs are in {output}", alone=output) as bar:
-            report = shown(bar, "reproduce")
+            report = progress_line(bar, "reproduce")
             written = reproduce(output, seeds, only or [], lambda what, share: report(share, what[:60]))
             report(1.0)
         for path in written:

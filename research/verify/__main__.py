@@ -13,7 +13,7 @@ from research import FOLDER
 from research.verify import check
 from research.verify.check import Verdict
 from research.verify.rows import Row
-from uuv_marl.cli.console import console, explained, find_modules, path_argument, progress_bar, shown
+from uuv_marl.cli.console import console, explained, find_modules, path_argument, progress_bar, progress_line
 
 app = typer.Typer(add_completion=False)
 
@@ -69,7 +69,7 @@ def main(
         stopped = False
         try:
             with progress_bar() as bar:
-                report = shown(bar, "verify", len(drawn))
+                report = progress_line(bar, "verify", len(drawn))
                 for k, row in enumerate(drawn):
                     note = partial(_note, report, k, row)
                     note(0.0)

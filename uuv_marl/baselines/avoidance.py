@@ -2,7 +2,7 @@
 
 import math
 
-from uuv_marl.baselines.policy import Limits, resistance
+from uuv_marl.baselines.policy import Limits, surge_resistance
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields
 
@@ -58,4 +58,4 @@ def pass_obstacle(
 @compiled
 def own_drag(u: float, limits: Limits) -> float:
     """Surge resistance [N] at a vehicle's own surge velocity [m/s]."""
-    return resistance(abs(u), limits) * u
+    return surge_resistance(abs(u), limits) * u

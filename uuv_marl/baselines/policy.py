@@ -304,7 +304,7 @@ class Policy:
 
 
 @compiled
-def resistance(speed: float, limits: Limits) -> float:
+def surge_resistance(speed: float, limits: Limits) -> float:
     """Surge resistance per velocity [N s/m] at a speed [m/s] of at least 0. Eq. 4."""
     return limits.X_u + limits.X_uu * speed
 

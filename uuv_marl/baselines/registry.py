@@ -59,7 +59,7 @@ POLICIES: dict[str, Kind] = {
 """Every policy that ships with the package."""
 
 
-class SwarmEnv(Protocol):
+class HasSwarm(Protocol):
     """The part of an environment that ``make`` needs. A wrapper has it, if its ``unwrapped`` is our environment."""
 
     @property
@@ -109,7 +109,7 @@ class Named(NamedTuple):
     """Values by parameter, as the user wrote them."""
 
 
-def parse(name: str) -> Named:
+def parse_policy(name: str) -> Named:
     """A policy from its name: ``[own:][guarded:]NAME[,key=value ...]``.
 
     Args:
@@ -132,8 +132,8 @@ def parse(name: str) -> Named:
 
 
 def policy_class(name: str) -> Kind:
-    """The class of a policy by its name, as ``parse`` reads it. Raises PolicyError with the most similar name."""
-    return parse(name).kind
+    """The class of a policy by its name, see ``parse_policy``. Raises PolicyError with the most similar name."""
+    return parse_policy(name).kind
 
 
 def _kind(name: str) -> Kind:
@@ -195,8 +195,8 @@ def granted(name: str, scenario: Scenario) -> Scenario:
 @overload
 def make(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
 @overload
-def make(name: str, target: SwarmEnv, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
-def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **parameters: object) -> Policy | EnvPolicy:
+def make(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
+def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object) -> Policy | EnvPolicy:
     """A policy by name.
 
     Args:
@@ -212,7 +212,7 @@ def make(name: str, target: Scenario | SwarmEnv, num_worlds: int = 1, **paramete
         PolicyError: the name or a parameter is unknown, or the target lacks channels or the inner loop that the policy
             declares (see ``granted``).
     """
-    kind, written = parse(name)
+    kind, written = parse_policy(name)
     if isinstance(target, Scenario):
         return _in_units(name, kind, target, num_worlds, {**written, **parameters})
     env: Any = getattr(target, "unwrapped", None)

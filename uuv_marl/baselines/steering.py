@@ -2,7 +2,7 @@
 
 import math
 
-from uuv_marl.baselines.policy import Limits, resistance, write_action
+from uuv_marl.baselines.policy import Limits, surge_resistance, write_action
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float32
@@ -29,7 +29,7 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
     angle between the bow and the wished velocity alone, by its sine: such a hull slips sideways in every turn, and
     making that good would turn it back. w is the wished velocity [m/s].
     """
-    drag = resistance(math.hypot(w_x, w_y), limits)
+    drag = surge_resistance(math.hypot(w_x, w_y), limits)
     f_x, f_y = drag * w_x + gain * (w_x - u), drag * w_y + gain * (w_y - v)
     if limits.helm > 0.0:
         across = w_y / max(math.hypot(w_x, w_y), 1e-9)

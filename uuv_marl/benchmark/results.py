@@ -41,7 +41,7 @@ _LONGEST_NAME = 200
 """Longest name of a run [bytes]; file systems allow 255."""
 
 
-class Row(NamedTuple):
+class ResultRow(NamedTuple):
     """One run as ``results.json`` keeps it."""
 
     scenario: str
@@ -70,7 +70,7 @@ class Content(TypedDict):
     machine: dict[str, str | int | None]
     scenarios: dict[str, dict[str, Any]]
     policies: dict[str, Knowledge]
-    runs: list[Row]
+    runs: list[ResultRow]
 
 
 _CONTENT = TypeAdapter(Content)
@@ -150,9 +150,9 @@ class Results:
         self._runs = {row[:3]: row.metrics for row in whole}
 
     @property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[ResultRow]:
         """All runs, by scenario, policy and seed."""
-        return [Row(*key, self._runs[key]) for key in sorted(self._runs)]
+        return [ResultRow(*key, self._runs[key]) for key in sorted(self._runs)]
 
     def use(self, policy: str) -> None:
         """Record a policy's knowledge and file before its first run. Raises ResultsError if its file has changed."""
@@ -198,10 +198,10 @@ class Results:
         with replacing(path) as partial:
             np.savez_compressed(partial, **arrays)
 
-    def select(self, scenario: str, policy: str, seeds: Iterable[int]) -> list[Row]:
+    def select(self, scenario: str, policy: str, seeds: Iterable[int]) -> list[ResultRow]:
         """The runs of a policy on a scenario, by seed."""
         keys = ((scenario, policy, seed) for seed in sorted(set(seeds)))
-        return [Row(*key, self._runs[key]) for key in keys if key in self._runs]
+        return [ResultRow(*key, self._runs[key]) for key in keys if key in self._runs]
 
     def trace_path(self, scenario: str, policy: str, seed: int) -> Path:
         """Where a run's time series are."""

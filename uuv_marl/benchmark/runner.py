@@ -11,16 +11,16 @@ from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
-from uuv_marl.benchmark.results import Results, Row
+from uuv_marl.benchmark.results import ResultRow, Results
 from uuv_marl.benchmark.tables import (
     CAPTION,
     HEADERS,
     TASK_CAPTION,
-    Cells,
+    TableRow,
     counted,
     markdown_table,
     rich_table,
-    rows_of,
+    table_rows,
     task_headers,
     task_rows,
     task_table,
@@ -72,7 +72,7 @@ def run_missing(
             report(scenario.name, policy, 1.0)
 
 
-def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]) -> Row:
+def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]) -> ResultRow:
     """The worst run: the one with most collisions, then one that did not arrive, then the smallest distance.
 
     The distance is between two vehicles or to an obstacle's surface, whichever is smaller. Of equal runs the first
@@ -85,7 +85,7 @@ def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[st
         seeds: to look at.
     """
 
-    def badness(row: Row) -> tuple[int, bool, float]:
+    def badness(row: ResultRow) -> tuple[int, bool, float]:
         metrics = row.metrics
         away = [d for d in (metrics["min_spacing_m"], metrics["min_obstacle_distance_m"]) if d is not None]
         return metrics["collisions"], metrics["task_time_s"] is None, -min(away, default=math.inf)
@@ -107,9 +107,9 @@ class Table(NamedTuple):
     """A scenario's table."""
 
     title: str
-    rows: Sequence[Cells] | Sequence[tuple[str, ...]]
+    rows: Sequence[TableRow] | Sequence[tuple[str, ...]]
     headers: tuple[str, ...] = HEADERS
-    """Those of ``follow``, whose rows are ``Cells``, or of another task."""
+    """Those of ``follow``, whose rows are ``TableRow``, or of another task."""
 
 
 def write_report(
@@ -138,12 +138,12 @@ def write_report(
 def terminal_table(table: Table, width: int) -> RichTable:
     """A table for a terminal of a given width in columns."""
     if table.headers == HEADERS:
-        return rich_table(table.title, [Cells(*row) for row in table.rows], width)
+        return rich_table(table.title, [TableRow(*row) for row in table.rows], width)
     return task_table(table.title, table.headers, table.rows)
 
 
 def _table(results: Results, scenario: Scenario, policies: Sequence[str], seeds: Sequence[int]) -> Table:
     name, heading = scenario.name, title(scenario, seeds)
     if issubclass(scenario.task_class, Follow):
-        return Table(heading, rows_of(results, name, policies, seeds))
+        return Table(heading, table_rows(results, name, policies, seeds))
     return Table(heading, task_rows(results, name, policies, seeds), task_headers(scenario.task_class))

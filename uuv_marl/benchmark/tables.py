@@ -11,7 +11,7 @@ from scipy.stats import bootstrap, trim_mean
 from uuv_marl.baselines.policy import Policy, inner_loop_nms
 from uuv_marl.baselines.registry import channels_in, is_trained
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
-from uuv_marl.benchmark.results import Knowledge, Results, Row
+from uuv_marl.benchmark.results import Knowledge, ResultRow, Results
 from uuv_marl.scenario import differences
 from uuv_marl.tasks import Task
 from uuv_marl.types import Float64
@@ -31,7 +31,7 @@ HEADERS = (
 )  # fmt: skip
 
 
-class Cells(NamedTuple):
+class TableRow(NamedTuple):
     """A row of the table, a text for each of ``HEADERS``; estimates as ``mean [low, high]``."""
 
     policy: str
@@ -95,7 +95,7 @@ def _iqm(data: Float64, axis: int = -1) -> Float64:
     return np.asarray(trim_mean(data, 0.25, axis=axis), np.float64)
 
 
-def shown(sample: Sequence[float], spec: str) -> str:
+def estimate_text(sample: Sequence[float], spec: str) -> str:
     """An estimate as text, each number as ``spec`` says: without interval for few values, a dash for none."""
     if not sample:
         return _NOTHING
@@ -103,7 +103,7 @@ def shown(sample: Sequence[float], spec: str) -> str:
     return f"{e:{spec}}" if len(sample) >= FEWEST else f"{e.iqm:{spec}}"
 
 
-def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Cells]:
+def table_rows(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[TableRow]:
     """The table's cells, a row for each policy that has runs.
 
     Args:
@@ -112,7 +112,7 @@ def rows_of(results: Results, scenario: str, policies: Sequence[str], seeds: Seq
         policies: their names, in the order of the rows.
         seeds: whose runs count.
     """
-    rows: list[Cells] = []
+    rows: list[TableRow] = []
     loaded = results.scenarios[scenario]
     as_in_paper = not differences(loaded)
     for policy in policies:
@@ -142,13 +142,15 @@ TASK_CAPTION = (
 
 
 def task_rows(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, ...]]:
-    """The cells of ``task_headers``, a row for each policy that has runs, with arguments as for ``rows_of``."""
+    """The cells of ``task_headers``, a row for each policy that has runs, with arguments as for ``table_rows``."""
     columns: Mapping[str, str] = results.scenarios[scenario].task_class.columns
     rows: list[tuple[str, ...]] = []
-    for cells in rows_of(results, scenario, policies, seeds):
+    for cells in table_rows(results, scenario, policies, seeds):
         own = [run.metrics.get("task", {}) for run in results.select(scenario, cells.policy, seeds)]
         shares = [value for run in own if (value := run.get("untouched_share")) is not None]
-        told = [shown([value for run in own if (value := run.get(name)) is not None], ".3g") for name in columns]
+        told = [
+            estimate_text([value for run in own if (value := run.get(name)) is not None], ".3g") for name in columns
+        ]
         rows.append((
             cells.policy, cells.knows, f"{sum(run.get('whole') == 1.0 for run in own)}/{len(own)}",
             f"{np.mean(shares):.1%}" if shares else _NOTHING, *told, cells.distance, cells.nearest, cells.spacing,
@@ -167,7 +169,7 @@ def task_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]
     return table
 
 
-def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigure | None) -> Cells:
+def _cells(policy: str, known: Knowledge, runs: Sequence[ResultRow], paper: PaperFigure | None) -> TableRow:
     """A policy's row.
 
     Args:
@@ -182,17 +184,17 @@ def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigur
     collided = sum(count > 0 for count in collisions)
     shares = [run.metrics["constraint_share"] for run in runs]
 
-    return Cells(
+    return TableRow(
         policy=policy,
         knows=_knows(known),
         arrived=f"{len(times)}/{len(runs)}",
-        time=shown(times, ".1f"),
+        time=estimate_text(times, ".1f"),
         slowest=f"{max(times):.1f}" if times else _NOTHING,
-        distance=shown(distances, ".2f"),
+        distance=estimate_text(distances, ".2f"),
         nearest=f"{min(distances):.2f}" if distances else _NOTHING,
-        spacing=shown(spacings, ".2f"),
+        spacing=estimate_text(spacings, ".2f"),
         closest=f"{min(spacings):.2f}" if spacings else _NOTHING,
-        mean=shown(_values(runs, "mean_min_spacing_m"), ".2f"),
+        mean=estimate_text(_values(runs, "mean_min_spacing_m"), ".2f"),
         within=", ".join(f"{name} {np.mean([s[name] for s in shares]):.0%}" for name in ("s_l", "s_o", "s_u")),
         collisions=f"{sum(collisions)} in {counted(collided, 'seed')}" if collided else "0",
         paper=_paper_cell(paper),
@@ -202,7 +204,7 @@ def _cells(policy: str, known: Knowledge, runs: Sequence[Row], paper: PaperFigur
 _Measured = Literal["task_time_s", "min_obstacle_distance_m", "min_spacing_m", "mean_min_spacing_m"]
 
 
-def _values(runs: Sequence[Row], name: _Measured) -> list[float]:
+def _values(runs: Sequence[ResultRow], name: _Measured) -> list[float]:
     return [value for run in runs if (value := run.metrics[name]) is not None]
 
 
@@ -228,7 +230,7 @@ def _paper_cell(paper: PaperFigure | None) -> str:
     return ", ".join(filter(None, parts))
 
 
-def rich_table(title: str, rows: Sequence[Cells], width: int) -> RichTable:
+def rich_table(title: str, rows: Sequence[TableRow], width: int) -> RichTable:
     """The table for a terminal of a given width in columns: the same cells, stacked so that they fit.
 
     For a narrow terminal it leaves out intervals, the spacing's time mean and the shares of Eq. 7; table.md has them.

@@ -63,7 +63,7 @@ SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
 """Free parameters of every tuned policy, and how they become its gains."""
 
 
-def cost(run: Run, scenario: Scenario) -> float:
+def tuning_cost(run: Run, scenario: Scenario) -> float:
     """What tuning minimises for one seed [s]: the task time, or more than the time limit if the swarm fails.
 
     A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. On a
@@ -152,7 +152,7 @@ def tune(
     def objective(trial: optuna.Trial) -> float:
         drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.items()}
         runs = [run for run in evaluate(scenario, policy, SEEDS, gains=gains(**drawn)) if isinstance(run, Run)]
-        return sum(cost(run, scenario) for run in runs) / len(runs)
+        return sum(tuning_cost(run, scenario) for run in runs) / len(runs)
 
     def sampler(seed: int) -> optuna.samplers.BaseSampler:
         return optuna.samplers.CmaEsSampler(seed=seed, n_startup_trials=0, warn_independent_sampling=False)

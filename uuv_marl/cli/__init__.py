@@ -16,10 +16,12 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (
-    benchmark.benchmark, robustness.robustness, benchmark.tune, train.train, replay.replay, export.export,
-):  # fmt: skip
-    app.command()(command)
+app.command()(benchmark.benchmark)
+app.command()(robustness.robustness)
+app.command("tune")(benchmark.tune_command)
+app.command("train")(train.train_command)
+app.command()(replay.replay)
+app.command()(export.export)
 app.command("list")(lists.show_list)
 
 

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from uuv_marl.cli.console import Anew, changes_of, console, explained, extra, find_modules, path_option, shown, working
+from uuv_marl.cli.console import (
+    Anew,
+    changes_of,
+    console,
+    explained,
+    extra,
+    find_modules,
+    path_option,
+    progress_line,
+    working,
+)
 
 if TYPE_CHECKING:
     from uuv_marl.benchmark.runner import Evaluate
@@ -80,7 +90,7 @@ def benchmark(
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
-            line = functools.cache(lambda name, policy_name: shown(bar, f"{name}: {policy_name}"))
+            line = functools.cache(lambda name, policy_name: progress_line(bar, f"{name}: {policy_name}"))
             report = lambda name, policy_name, share: line(name, policy_name)(share)  # noqa: E731
 
             for name in policies if anew else ():
@@ -116,7 +126,7 @@ def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, A
     return evaluate_on_cluster, connected(ray, working_dir=Path.cwd() if own else None)
 
 
-def tune(
+def tune_command(
     policy: Annotated[list[str] | None, typer.Option(help="Name. Repeat it for several. Default: all.")] = None,
     trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
     output: Annotated[Path, path_option("Folder for the trials.")] = Path("results/tune"),
@@ -132,15 +142,14 @@ def tune(
     """
     with explained():
         from uuv_marl.baselines import PolicyError
-        from uuv_marl.benchmark.tuning import SPACES
-        from uuv_marl.benchmark.tuning import tune as search
+        from uuv_marl.benchmark.tuning import SPACES, tune
 
         for name in policy or SPACES:
             if name not in SPACES:
                 raise PolicyError(f"policy {name!r} has no free gains to tune; choose one of {', '.join(SPACES)}")
         with extra("tune", "tuning"), working(f"The finished trials are in {output}", alone=output) as bar:
             for name in policy or SPACES:
-                line = shown(bar, name, trials)
+                line = progress_line(bar, name, trials)
                 report = lambda done, best, line=line, name=name: line(done, f"{name}: best {best:.1f} s")  # noqa: E731
-                path = search(name, output, trials, report, vehicle)
+                path = tune(name, output, trials, report, vehicle)
                 bar.console.print(f"{path}", highlight=False)

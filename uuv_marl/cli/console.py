@@ -107,7 +107,7 @@ def progress_bar() -> Progress:
     )  # fmt: skip
 
 
-def shown(bar: Progress, name: str, total: float = 1.0) -> Callable[..., None]:
+def progress_line(bar: Progress, name: str, total: float = 1.0) -> Callable[..., None]:
     """A new line of the bar: to be called with how much of ``total`` is done, and with words in place of the name."""
     task = bar.add_task(name, total=total)
     return lambda done, words=name: bar.update(task, completed=done, description=words)

@@ -10,7 +10,7 @@ from rich.table import Table
 from uuv_marl.cli.console import console, explained
 
 
-class Kind(StrEnum):
+class ListKind(StrEnum):
     """What can be listed."""
 
     SCENARIOS = "scenarios"
@@ -19,7 +19,7 @@ class Kind(StrEnum):
 
 
 def show_list(
-    what: Annotated[Kind | None, typer.Argument(help="What to list. Default: all three.")] = None,
+    what: Annotated[ListKind | None, typer.Argument(help="What to list. Default: all three.")] = None,
     show: Annotated[
         str | None,
         typer.Option(
@@ -38,20 +38,20 @@ def show_list(
         if show is not None:
             _print_toml(_file(what, show))
             return
-        tables = {Kind.SCENARIOS: _scenarios, Kind.VEHICLES: _vehicles, Kind.POLICIES: _policies}
+        tables = {ListKind.SCENARIOS: _scenarios, ListKind.VEHICLES: _vehicles, ListKind.POLICIES: _policies}
         for kind, table in tables.items():
             if what in (kind, None):
                 console.print(table())
 
 
-def _file(what: Kind | None, name: str) -> str:
+def _file(what: ListKind | None, name: str) -> str:
     """The text of a scenario's or a vehicle's file."""
     from uuv_marl.scenario import show, show_vehicle, vehicle_names
 
-    if what is Kind.POLICIES:
+    if what is ListKind.POLICIES:
         raise typer.BadParameter("a policy has no file to show; docs/policies.md describes each", param_hint="--show")
     known = name.partition("+")[0] in vehicle_names()
-    return show_vehicle(name) if what is Kind.VEHICLES or (what is None and known) else show(name)
+    return show_vehicle(name) if what is ListKind.VEHICLES or (what is None and known) else show(name)
 
 
 def _scenarios() -> Table:

@@ -15,7 +15,7 @@ from uuv_marl.cli.console import (
     path_argument,
     path_option,
     progress_bar,
-    shown,
+    progress_line,
 )
 from uuv_marl.replay import FILMS, MOST_EPISODES
 
@@ -89,7 +89,7 @@ def replay(
                 else:
                     recordings = _saved(run, scenario, policies, seed)
                 path = output or _ready(_default(recordings))
-                report = shown(bar, "writing")
+                report = progress_line(bar, "writing")
                 write(recordings, path, report)
                 report(1.0)
         except KeyboardInterrupt:
@@ -157,7 +157,7 @@ def _simulated(
         make(policy, granted(policy, scenario))
     recordings: list[Recording] = []
     for policy in policies:
-        report = shown(bar, f"{scenario.name}: {policy}")
+        report = progress_line(bar, f"{scenario.name}: {policy}")
         recordings.append(record(scenario, policy, seed, inspect, report))
         report(1.0)
     return recordings

@@ -73,7 +73,7 @@ def robustness(
                 bar.update(task, completed=share, description=what[-60:])
 
             episodes = job.run(output, plan, report, evaluator, anew=anew)
-            written = [*page.write_report(output), episodes]
+            written = [*page.write_robustness_report(output), episodes]
             report("robustness", 1.0)
         for path in written:
             console.print(f"  {path}", highlight=False)

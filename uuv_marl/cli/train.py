@@ -9,7 +9,16 @@ from typing import Annotated, Any
 
 import typer
 
-from uuv_marl.cli.console import changes_of, console, explained, extra, find_modules, path_option, progress_bar, shown
+from uuv_marl.cli.console import (
+    changes_of,
+    console,
+    explained,
+    extra,
+    find_modules,
+    path_option,
+    progress_bar,
+    progress_line,
+)
 
 
 def _whole_number(text: str) -> int:
@@ -19,7 +28,7 @@ def _whole_number(text: str) -> int:
     return int(float(text))
 
 
-def train(
+def train_command(
     context: typer.Context,
     recipe: Annotated[
         str,
@@ -69,7 +78,7 @@ def train(
         with extra("train", "training"):
             from uuv_marl.train import run
         from uuv_marl.train.folder import TrainingFolder
-        from uuv_marl.train.training import Training, changed, read_recipe
+        from uuv_marl.train.training import Training, changed_fields, read_recipe
 
         find_modules([scenario or "", recipe, *(overrides or [])])
         if resume:
@@ -79,7 +88,7 @@ def train(
         else:
             named = {"scenario": scenario, "steps": steps, "seed": seed}
             changes = {name: value for name, value in named.items() if value is not None}
-            training = Training(**changed(read_recipe(recipe), {**changes_of(overrides or []), **changes}))
+            training = Training(**changed_fields(read_recipe(recipe), {**changes_of(overrides or []), **changes}))
             until = training.steps
         texts = {
             "reward": "reward {reward:.3f}",
@@ -105,7 +114,7 @@ def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str
     """Show a training in a bar, with a text for each field that was known so far; how it stood at last."""
     last, known = "no iteration was needed, because all --steps are done already", {}
     with progress_bar() as bar:
-        report = shown(bar, "starting", steps)
+        report = progress_line(bar, "starting", steps)
         for record in records:
             known |= {name: value for name, value in record._asdict().items() if value is not None}
             told = [text.format(**known) for name, text in texts.items() if name in known]

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from uuv_marl.envs.batched_env import make_batched_env, refuse_losses
+from uuv_marl.envs.core import make_batched_env, refuse_losses
 from uuv_marl.extras import extra
 
 with extra("benchmarl", "SwarmTask"):

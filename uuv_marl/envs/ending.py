@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.core import BatchedEnv
 
 
 def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.renderer import Renderer
 from uuv_marl.scenario import Scenario, conditions

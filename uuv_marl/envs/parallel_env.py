@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
-from uuv_marl.envs.batched_env import BatchedEnv, Reward, ScenarioLike, StepResult, make_batched_env
+from uuv_marl.envs.core import BatchedEnv, Reward, ScenarioLike, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin

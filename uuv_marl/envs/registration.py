@@ -4,7 +4,7 @@ import gymnasium
 import pettingzoo
 
 
-def register() -> None:
+def register_environments() -> None:
     """Make the environments known to ``gymnasium.make``, ``gymnasium.make_vec`` and ``pettingzoo.make``."""
     gymnasium.register("uuv_marl/Swarm-v0", vector_entry_point="uuv_marl.envs.vector_env:vector_env")
     gymnasium.register("uuv_marl/Solo-v0", entry_point="uuv_marl.envs.solo:SoloEnv")

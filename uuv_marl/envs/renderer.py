@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.drawing.options import RenderOptions, look
-from uuv_marl.envs.drawing.scene import Memory, Scene
+from uuv_marl.envs.drawing.scene import Scene, SceneHistory
 
 
 class Renderer:
@@ -36,7 +36,7 @@ class Renderer:
         self.fps = round(1.0 / batch.swarm.scenario.timing.decision_period_s) or 1
         self._batch = batch
         self._look = look(options, batch.swarm.num_vehicles, sonar_of)
-        self._memory = Memory(batch)
+        self._memory = SceneHistory(batch)
         self._canvas: Any = None
 
     def draw(self, world: int = 0) -> NDArray[np.uint8] | None:

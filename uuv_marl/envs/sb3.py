@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import EnvOptions, ScenarioLike, StepResult, make_batched_env, refuse_losses
+from uuv_marl.envs.core import EnvOptions, ScenarioLike, StepResult, make_batched_env, refuse_losses
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin

@@ -8,7 +8,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import granted, make
-from uuv_marl.envs.batched_env import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
+from uuv_marl.envs.core import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin

@@ -6,7 +6,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import EnvOptions, ScenarioLike, make_batched_env
+from uuv_marl.envs.core import EnvOptions, ScenarioLike, make_batched_env
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout

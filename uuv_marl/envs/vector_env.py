@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.envs.batched_env import BatchedEnv, EnvOptions, ScenarioLike, StepResult, make_batched_env
+from uuv_marl.envs.core import BatchedEnv, EnvOptions, ScenarioLike, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin, SpecMixin

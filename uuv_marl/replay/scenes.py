@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, Sonar
+from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, SonarView
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.recording import Event, Inspection, Recording
 from uuv_marl.sim.sea.current import FlowField
@@ -83,12 +83,12 @@ class Scenes:
         north, east = self._position[min(k, len(self._position) - 1), list(event.vehicles)].mean(axis=0).tolist()
         return [north, east, event.time_s]
 
-    def _sonar(self, k: int) -> Sonar | None:
+    def _sonar(self, k: int) -> SonarView | None:
         i = self._sonar_of
         if i is None or not self._alive[k, i]:
             return None
         inspection: Inspection = self.recording.inspections[i]
-        return Sonar(i, inspection.neighbour[k][inspection.heard[k] >= 0], inspection.echo_range[k])
+        return SonarView(i, inspection.neighbour[k][inspection.heard[k] >= 0], inspection.echo_range[k])
 
 
 def _distance(metres: float) -> float:

@@ -23,7 +23,7 @@ class File(NamedTuple):
     """Those that are chosen, of a vehicle's file."""
 
 
-def parse(path: Path) -> File:
+def read_toml(path: Path) -> File:
     """Read a file. Raises ScenarioError naming it where it can't be read, is too large or is not valid TOML."""
     try:
         if path.stat().st_size > _MAX_BYTES:

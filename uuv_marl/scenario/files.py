@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.paths import UserPath, user_path
-from uuv_marl.scenario.documents import File, items, merged, parse
+from uuv_marl.scenario.documents import File, items, merged, read_toml
 from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
 from uuv_marl.scenario.overrides import assign, plain
@@ -169,7 +169,7 @@ def _find(name: Any, beside: Path | None = None) -> Path:
 
 def _chain(path: Path) -> list[File]:
     """The file and all that it extends, down to the base."""
-    chain = [parse(path)]
+    chain = [read_toml(path)]
     while not chain[-1].path.samefile(_BASE):
         last = chain[-1]
         name = last.data.get("extends")
@@ -178,7 +178,7 @@ def _chain(path: Path) -> list[File]:
         parent = _BASE if name is None else _find(name, last.path.parent)
         if any(parent.samefile(file.path) for file in chain):
             raise ScenarioError(f"{path}: extends must not lead back to {parent}; name another scenario")
-        chain.append(parse(parent))
+        chain.append(read_toml(parent))
     return chain
 
 

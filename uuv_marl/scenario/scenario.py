@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 
 from uuv_marl.scenario import fields, hardware, sea, sections
 from uuv_marl.scenario.scale import Scale
-from uuv_marl.scenario.task import Task, named_task, task_class, task_numbers
+from uuv_marl.scenario.task import TaskSettings, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
 MAX_READINGS = 64
@@ -38,7 +38,7 @@ class Scenario(fields.Section):
     """Raised by any change of its numbers."""
     scale: Scale = Scale()
     """Scale of its vehicle over the paper's, where the file says ``scale = "vehicle"``."""
-    swarm: sections.Swarm
+    swarm: sections.SwarmSize
     start: sections.Start
     trajectory: sections.Trajectory
     obstacles: Annotated[tuple[sections.Obstacle, ...], Field(max_length=1024)] = ()
@@ -60,7 +60,7 @@ class Scenario(fields.Section):
     mismatch: sea.Mismatch
     faults: Annotated[tuple[sea.Fault, ...], Field(max_length=64)]
     reward: sections.Reward
-    task: Annotated[Task, BeforeValidator(named_task)]
+    task: Annotated[TaskSettings, BeforeValidator(named_task)]
     """What the swarm is to do: its name, or ``module:Class``, alone or in a table with the task's own numbers."""
 
     @cached_property

@@ -38,7 +38,7 @@ def growth(num_vehicles: int) -> float:
     return max(1.0, math.sqrt(num_vehicles / NOMINAL_VEHICLES))
 
 
-class Swarm(Section):
+class SwarmSize(Section):
     """The size of the swarm."""
 
     num_vehicles: Annotated[int, within(1, 16_384)]

@@ -9,7 +9,7 @@ from uuv_marl.modules import named_object
 from uuv_marl.scenario.fields import Section
 
 
-class Task(Section):
+class TaskSettings(Section):
     """The task: its name, and numbers of its own, which its class checks."""
 
     model_config = ConfigDict(extra="allow")
@@ -46,7 +46,7 @@ def task_class(name: str) -> Any:
     return made
 
 
-def task_numbers(task: Task) -> Any:
+def task_numbers(task: TaskSettings) -> Any:
     """The task's own numbers, checked by its class.
 
     Raises:

@@ -8,7 +8,7 @@ import tomlkit
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.paths import user_path
-from uuv_marl.scenario.documents import File, items, merged, parse
+from uuv_marl.scenario.documents import File, items, merged, read_toml
 from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.messages import short, shown
 
@@ -38,7 +38,7 @@ def load_vehicle(name: str) -> dict[str, dict[str, Any]]:
 
 def variant_names(vehicle: str) -> list[str]:
     """Variants that a vehicle's file has: other numbers where sources disagree. ``vehicle`` as for ``load_vehicle``."""
-    return sorted(parse(_find_vehicle(_without_variants(vehicle)[0])).data.get("variants", {}))
+    return sorted(read_toml(_find_vehicle(_without_variants(vehicle)[0])).data.get("variants", {}))
 
 
 def show_vehicle(name: str) -> str:
@@ -68,7 +68,7 @@ def show_vehicle(name: str) -> str:
 def vehicle_file(name: str, beside: Path | None = None) -> File:
     """A vehicle's file, which must be complete: numbers of two vehicles are never mixed without a word."""
     plain, chosen = _without_variants(name)
-    file = parse(_find_vehicle(plain, beside))
+    file = read_toml(_find_vehicle(plain, beside))
     for section, fields in _GIVEN.items():
         given = file.data.get(section)
         needed = fields - _OPTIONAL[section].keys()

@@ -7,7 +7,7 @@ import numpy as np
 from uuv_marl.sim.arrays import Course
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
-from uuv_marl.sim.sonar import Suite, cross, diamond
+from uuv_marl.sim.sonar import SonarSuite, cross, diamond
 from uuv_marl.sim.workspace import Cells, Listener, Workspace
 from uuv_marl.types import Float64, Int64
 
@@ -53,7 +53,7 @@ def locate(num: int, points: Points, pose: Pose, bins: int, ear: Listener) -> No
 
 
 @compiled_inline
-def choose_sectors(num: int, layer: int, suite: Suite, ear: Listener) -> None:
+def choose_sectors(num: int, layer: int, suite: SonarSuite, ear: Listener) -> None:
     """The sub-sector of a layer for each of those located. Eq. 12-13.
 
     No branch depends on the positions: a wrongly guessed branch costs more than all the arithmetic here. ``layer`` is a
@@ -91,7 +91,7 @@ def keep_nearest(num: int, vehicles: Int64, ear: Listener) -> None:
 
 
 @compiled_inline
-def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: Suite, ear: Listener) -> None:
+def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: SonarSuite, ear: Listener) -> None:
     """A listener hears those of some vehicles that are nearest in a sub-sector, unless an obstacle is between.
 
     Of the points the first ``num`` count. A nearer one replaces whom the ear has heard so far.
@@ -130,7 +130,7 @@ def hear_nobody(ear: Listener) -> None:
 
 
 @compiled_inline
-def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
+def hear(p: int, w: int, course: Course, suite: SonarSuite, workspace: Workspace, grid: Grid) -> None:
     """Whom one vehicle hears: those around it, then farther out where a sub-sector is empty."""
     cells, ear, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]
     pose = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
@@ -147,12 +147,14 @@ def hear(p: int, w: int, course: Course, suite: Suite, workspace: Workspace, gri
     for k in range(sectors):  # farther and farther, until nobody nearer can be missed
         near = reach
         while near * near <= ear.nearest[k]:
-            listen_within(reached(k, near, 1.5 * near, pose, suite), pose, w, course, suite, workspace, grid)
+            listen_within(sector_box(k, near, 1.5 * near, pose, suite), pose, w, course, suite, workspace, grid)
             near *= 1.5
 
 
 @compiled_inner
-def listen_within(box: Box, pose: Pose, w: int, course: Course, suite: Suite, workspace: Workspace, grid: Grid) -> None:
+def listen_within(
+    box: Box, pose: Pose, w: int, course: Course, suite: SonarSuite, workspace: Workspace, grid: Grid
+) -> None:
     """A listener hears those of a rectangle of the world, as in ``listen``."""
     ear = workspace.listener
     num = gather(box, workspace.cells, grid, ear)
@@ -160,7 +162,7 @@ def listen_within(box: Box, pose: Pose, w: int, course: Course, suite: Suite, wo
 
 
 @compiled_inner
-def reached(k: int, near: float, far: float, pose: Pose, suite: Suite) -> Box:
+def sector_box(k: int, near: float, far: float, pose: Pose, suite: SonarSuite) -> Box:
     """Rectangle around what a sub-sector hears between two distances, ``near`` and ``far`` [m]."""
     x, y, c, s = pose
     l_x, l_y, u_x, u_y = suite.lower[k, 0], suite.lower[k, 1], suite.upper[k, 0], suite.upper[k, 1]

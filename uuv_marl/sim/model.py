@@ -8,7 +8,7 @@ import numpy as np
 from uuv_marl.percept import PerceptLayout, Starts
 from uuv_marl.scenario import Scenario, growth
 from uuv_marl.sim.disturbance import loss_ticks
-from uuv_marl.sim.sonar import Suite, suite
+from uuv_marl.sim.sonar import SonarSuite, suite
 from uuv_marl.sim.vehicle import Plant, plant
 from uuv_marl.types import Float64, Int64
 
@@ -50,7 +50,7 @@ class Model(NamedTuple):
     """All numbers of a scenario."""
 
     plant: Plant
-    suite: Suite
+    suite: SonarSuite
     rules: Rules
     at: Starts
 

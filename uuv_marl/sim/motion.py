@@ -11,7 +11,7 @@ from uuv_marl.types import Float32
 
 
 @compiled_inner
-def load(w: int, state: State, now: Columns) -> None:
+def load_state(w: int, state: State, now: Columns) -> None:
     """The columns of world w from its state."""
     eta, nu = state.eta, state.nu
     for i in range(eta.shape[1]):

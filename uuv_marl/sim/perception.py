@@ -8,7 +8,7 @@ from uuv_marl.sim.arrays import Course, World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.hearing import Pose
 from uuv_marl.sim.model import Model
-from uuv_marl.sim.sonar import Suite, cross
+from uuv_marl.sim.sonar import SonarSuite, cross
 from uuv_marl.sim.views import Fields
 from uuv_marl.sim.workspace import Workspace
 
@@ -91,7 +91,7 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 
 
 @compiled_inner
-def write_echoes(i: int, w: int, pose: Pose, course: Course, suite: Suite, see: Fields) -> None:
+def write_echoes(i: int, w: int, pose: Pose, course: Course, suite: SonarSuite, see: Fields) -> None:
     """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
 
     What was written stays where nothing is heard.

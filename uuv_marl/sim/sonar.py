@@ -20,7 +20,7 @@ _MIN_BINS = 1024
 """Least number of bins: so many that few directions fall into a bin with an edge."""
 
 
-class Suite(NamedTuple):
+class SonarSuite(NamedTuple):
     """The arrays as sub-sectors, whose edges are unit vectors, and the table that finds a direction's sub-sector."""
 
     lower: Float64
@@ -48,7 +48,7 @@ class Suite(NamedTuple):
     """Whether an obstacle on the line of sight silences a vehicle."""
 
 
-def suite(scenario: Scenario) -> Suite:
+def suite(scenario: Scenario) -> SonarSuite:
     """The scenario's sonar suite as numbers for the compiled functions. Eq. 12."""
     lower: list[tuple[float, float]] = []
     upper: list[tuple[float, float]] = []
@@ -65,7 +65,7 @@ def suite(scenario: Scenario) -> Suite:
         upper += edges[1:]
         ranges += [array.range_m] * array.sub_sectors
     codes, edges, sides = _table(lower, upper)
-    return Suite(
+    return SonarSuite(
         lower=np.array(lower),
         upper=np.array(upper),
         squared_range=np.array([*(range_m * range_m for range_m in ranges), -1.0]),
@@ -101,7 +101,7 @@ def diamond(b_x: float, b_y: float) -> float:
 
 
 def _table(lower: list[tuple[float, float]], upper: list[tuple[float, float]]) -> tuple[Int64, Float64, Int64]:
-    """``Suite``'s codes, edges and sides.
+    """``SonarSuite``'s codes, edges and sides.
 
     A layer holds sub-sectors that do not overlap, arrays that do fall into several. A bin is so narrow that it holds
     one edge of its layer at most, with room for rounding.

@@ -23,14 +23,14 @@ def source_key(module: str, settings: str = "") -> str | None:
         module: name of an imported module.
         settings: whatever else the compiled code depends on.
     """
-    hashes = {name: _hash(name) for name in reached(module)}
+    hashes = {name: _hash(name) for name in reached_modules(module)}
     if None in hashes.values():
         return None
     return hashlib.sha256(repr((settings, sorted(hashes.items()))).encode()).hexdigest()[:16]
 
 
 @functools.cache
-def reached(module: str) -> frozenset[str]:
+def reached_modules(module: str) -> frozenset[str]:
     """The module, and those of its own package and of uuv_marl that it imports, directly or through others."""
     packages = {"uuv_marl", module.partition(".")[0]}
     found, waiting = set[str](), {module}

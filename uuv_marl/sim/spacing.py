@@ -22,7 +22,7 @@ def find_nearest(cells: Cells, grid: Grid) -> None:
             lower_all(p + 1, grid.living, cells.x[p], cells.y[p], cells)
     else:
         for p in range(grid.living):
-            cells.nearest[p] = search(p, cells, grid)
+            cells.nearest[p] = nearest_squared(p, cells, grid)
 
 
 @compiled_inline
@@ -38,7 +38,7 @@ def lower_all(first: int, end: int, x: float, y: float, cells: Cells) -> None:
 
 
 @compiled_inner
-def search(p: int, cells: Cells, grid: Grid) -> float:
+def nearest_squared(p: int, cells: Cells, grid: Grid) -> float:
     """Squared distance [m2] of entry p from the nearest other: in the cells around it, then in ever larger blocks."""
     x, y, least, reach = cells.x[p], cells.y[p], math.inf, grid.side
     while True:

@@ -27,7 +27,7 @@ class Bounds(NamedTuple):
         return sizes[self.axis] - 1 + self.beyond if self.axis else float(np.finfo(np.float64).max)
 
 
-class Row(NamedTuple):
+class ArraySpec(NamedTuple):
     """One array of a table."""
 
     dtype: type[np.generic]
@@ -42,27 +42,27 @@ class Row(NamedTuple):
 
 
 @functools.cache
-def rows(table: type[Any]) -> dict[str, Row]:
+def array_specs(table: type[Any]) -> dict[str, ArraySpec]:
     """The arrays of a table by name, in order."""
-    found: dict[str, Row] = {}
+    found: dict[str, ArraySpec] = {}
     for name, hint in get_type_hints(table, include_extras=True).items():
         axes, meaning, *bounds = hint.__metadata__
         dtype = get_args(get_args(hint.__origin__)[1])[0]
-        found[name] = Row(dtype, tuple(axes.split()), meaning, bounds[0] if bounds else None)
+        found[name] = ArraySpec(dtype, tuple(axes.split()), meaning, bounds[0] if bounds else None)
     return found
 
 
 def allocate(table: type[T], sizes: Mapping[str, int]) -> T:
     """The table filled with zeros, its axes of these lengths."""
-    return table(**{name: np.zeros(row.shape(sizes), row.dtype) for name, row in rows(table).items()})
+    return table(**{name: np.zeros(spec.shape(sizes), spec.dtype) for name, spec in array_specs(table).items()})
 
 
 def described(table: C) -> C:
     """Write each array's meaning, type and shape into the docstring of a table."""
     lines = ["Attributes:"]
-    for name, row in rows(table).items():
-        shape = ", ".join(row.axes) + "," * (len(row.axes) == 1)
-        lines.append(f"    {name}: {row.meaning} Shape ({shape}), {row.dtype.__name__}.")
+    for name, spec in array_specs(table).items():
+        shape = ", ".join(spec.axes) + "," * (len(spec.axes) == 1)
+        lines.append(f"    {name}: {spec.meaning} Shape ({shape}), {spec.dtype.__name__}.")
     table.__doc__ = "\n    ".join([f"{(table.__doc__ or '').strip()}\n", *lines])
     table.__new__.__annotations__ = {}  # what help() shows as the signature: names alone
     return table
@@ -70,9 +70,9 @@ def described(table: C) -> C:
 
 def check(table: type[Any], arrays: Mapping[str, NDArray[Any]], sizes: Mapping[str, int]) -> None:
     """Raise ValueError where a number that compiled code uses unchecked is out of its ``Bounds``."""
-    for name, row in rows(table).items():
-        if row.bounds is None:
+    for name, spec in array_specs(table).items():
+        if spec.bounds is None:
             continue
-        low, high = row.bounds.low, row.bounds.high(sizes)
+        low, high = spec.bounds.low, spec.bounds.high(sizes)
         if not ((arrays[name] >= low) & (arrays[name] <= high)).all():
             raise ValueError(f"{name} must lie within {low} and {high}, got {np.unique(arrays[name])[[0, -1]]}")

@@ -15,7 +15,7 @@ from typing import Any, cast
 
 from numba import config
 
-Task = Callable[[], None]
+Job = Callable[[], None]
 
 
 def num_threads() -> int:
@@ -23,18 +23,18 @@ def num_threads() -> int:
     return cast(Any, config).NUMBA_NUM_THREADS
 
 
-def _serve(tasks: SimpleQueue[Task]) -> None:
+def _serve(jobs: SimpleQueue[Job]) -> None:
     while True:
-        tasks.get()()
+        jobs.get()()
 
 
 @functools.cache
-def _helpers() -> SimpleQueue[Task]:
-    """What helping threads, which begin with the first call, take their tasks from."""
-    tasks: SimpleQueue[Task] = SimpleQueue()
+def _helpers() -> SimpleQueue[Job]:
+    """What helping threads, which begin with the first call, take their jobs from."""
+    jobs: SimpleQueue[Job] = SimpleQueue()
     for k in range(1, max(num_threads(), 2)):
-        Thread(target=_serve, args=(tasks,), name=f"uuv_marl {k}", daemon=True).start()
-    return tasks
+        Thread(target=_serve, args=(jobs,), name=f"uuv_marl {k}", daemon=True).start()
+    return jobs
 
 
 if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads

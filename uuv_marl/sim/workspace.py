@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled_inner
-from uuv_marl.sim.tables import rows
+from uuv_marl.sim.tables import array_specs
 from uuv_marl.types import Float64, Int32, Int64
 
 Column = Annotated[Float64, "vehicle", "See uuv_marl.sim.vehicle."]
@@ -101,7 +101,7 @@ def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -
         num_cells: the most cells that a world is sorted into.
     """
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
-    kinds = [(row.axes, row.dtype) for table in (Columns, Cells, Listener) for row in rows(table).values()]
+    kinds = [(spec.axes, spec.dtype) for table in (Columns, Cells, Listener) for spec in array_specs(table).values()]
 
     def room(axis: str, dtype: type[Any]) -> NDArray[Any]:
         return np.zeros((threads, kinds.count(((axis,), dtype)), lengths[axis]), dtype)
@@ -120,7 +120,7 @@ def _columns() -> Iterator[Any]:
     """The tables of a workspace, in place of each array the number of its column among those of its axis and type."""
     taken: Counter[object] = Counter()
     for table in (Columns, Cells, Listener):
-        kinds = [(row.axes, row.dtype) for row in rows(table).values()]
+        kinds = [(spec.axes, spec.dtype) for spec in array_specs(table).values()]
         numbers: list[int] = []
         for kind in kinds:
             numbers.append(taken[kind])

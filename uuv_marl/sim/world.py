@@ -11,10 +11,10 @@ from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.hearing import hear, hear_nobody
 from uuv_marl.sim.model import Model, Rules
-from uuv_marl.sim.motion import apply_actuators, integrate, load, load_action, load_one
+from uuv_marl.sim.motion import apply_actuators, integrate, load_action, load_one, load_state
 from uuv_marl.sim.perception import write_percept
-from uuv_marl.sim.sea.actuation import is_lost
-from uuv_marl.sim.sea.sea import Sea, begin, drift, integrate_at_sea, know, reads, take_readings
+from uuv_marl.sim.sea.actuation import is_lost_to_fault
+from uuv_marl.sim.sea.sea import Sea, begin_sea, drift, integrate_at_sea, know, reads, take_readings
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
@@ -61,7 +61,7 @@ def apply_losses(w: int, world: World, rules: Rules, sea: Sea | None) -> None:
     """Vehicles whose scheduled time has come fall silent and stop. The sea's faults may lose vehicles, too."""
     if sea is not None:
         for i in range(world.state.alive.shape[1]):
-            if is_lost(w, i, world.state.tick[w], sea.actuation, sea.hull):
+            if is_lost_to_fault(w, i, world.state.tick[w], sea.actuation, sea.hull):
                 lose_vehicle(w, i, world)
     for k in range(rules.loss_ticks.shape[0]):
         if rules.loss_ticks[k] == world.state.tick[w]:
@@ -93,7 +93,7 @@ def sort_into_cells(w: int, world: World, model: Model, workspace: Workspace) ->
 
 
 @compiled_inner
-def measure(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> int:
+def measure_distances(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> int:
     """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
     facts, hull = world.facts, model.rules.hull
     began = measure_vehicles(w, hull, world, workspace.cells, grid)
@@ -219,15 +219,15 @@ def observe_world(w: int, world: World, model: Model, own: Workspace, sea: Sea |
     world.state.touched[w] = False
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
-    load(w, world.state, own.now)
+    load_state(w, world.state, own.now)
     grid = sort_into_cells(w, world, model, own)
-    measure(w, world, model, own, grid)
+    measure_distances(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
     for i in range(world.facts.away.shape[1]):
         world.facts.was_away[w, i] = world.facts.away[w, i]
     perceive(w, world, model, own, grid, True)
     if sea is not None:
-        begin(w, world, sea)
+        begin_sea(w, world, sea)
         take_readings(w, world, sea, fields(world.senses.percept, model.at))
         know(w, world, sea, fields(world.senses.percept, model.at), sea_fields(world.senses.percept, model.at))
 
@@ -243,7 +243,7 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
     apply_losses(w, world, model.rules, sea)
     move_obstacles(w, world.course, model.rules.hold_s)
     grid = sort_into_cells(w, world, model, workspace)
-    began = measure(w, world, model, workspace, grid)
+    began = measure_distances(w, world, model, workspace, grid)
     if model.rules.contact_ends and began > 0:
         for i in range(world.state.alive.shape[1]):
             if world.facts.contacts[w, i] > 0:
@@ -263,7 +263,7 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
     num_alive = 0
     for i in range(action.shape[1]):
         num_alive += int(world.state.alive[w, i])
-    load(w, world.state, workspace.now)
+    load_state(w, world.state, workspace.now)
     load_action(w, action, workspace.now, model.plant)
     for hold in range(holds):
         grid = step_hold(w, hold == 0, world, model, workspace, sea)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES
 from uuv_marl.baselines.learned.percept_features import BARRIER, Features, num_features
-from uuv_marl.baselines.learned.trimmed_scout import TrimmedLaw
+from uuv_marl.baselines.learned.trimmed_scout import TrimmedScout
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.training import Training
@@ -67,15 +67,15 @@ class Trims:
         training: says the law's gains, the filter's margins, and what the actor changes.
     """
 
-    size = RECALLED
+    size = NUM_MEMORY_FEATURES
 
     def __init__(self, scenario: Scenario, num_worlds: int, training: Training) -> None:
-        self._policy = TrimmedLaw(scenario, num_worlds, gains=training.law, barrier=training.safety)
+        self._policy = TrimmedScout(scenario, num_worlds, gains=training.law, barrier=training.safety)
 
     @staticmethod
     def num_features(scenario: Scenario) -> int:  # noqa: ARG004 - of what is remembered, whatever the sonar
         """Features of a vehicle."""
-        return RECALLED
+        return NUM_MEMORY_FEATURES
 
     def hear(self, percept: Percept) -> None:
         """Remember what is perceived."""

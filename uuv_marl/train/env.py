@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import refuse_losses
+from uuv_marl.envs.core import refuse_losses
 from uuv_marl.train.acting import ACTING
 from uuv_marl.train.critic import PRIVILEGED_SIZE
 from uuv_marl.train.group import Group, Seeds

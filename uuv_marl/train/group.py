@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import refuse_losses
+from uuv_marl.envs.core import refuse_losses
 from uuv_marl.envs.reward import own_reward
 from uuv_marl.scenario import load_scenario
 from uuv_marl.sim.swarm import Swarm

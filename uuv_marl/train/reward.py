@@ -18,7 +18,7 @@ class Weights(NamedTuple):
     distance_m: float = 35.0
     """A vehicle pays its distance to l(t) over this [m]; 1e9: nothing."""
     centre: float = 0.4
-    """Pay per metre of a vehicle's ``lead``."""
+    """Pay per metre of a vehicle's ``lead_over_swarm``."""
     obstacle: float = 28.0
     obstacle_m: float = 30.0
     """Clearance c below ``obstacle_m`` costs obstacle x (1 - c / obstacle_m)^2."""
@@ -52,7 +52,7 @@ def shaped_reward(swarm: Swarm, by: Weights) -> Float64:
     close = np.clip(1.0 - facts.spacing / by.spacing_m, 0.0, 1.0)
     rate = (
         -np.minimum(away, 300.0) / by.distance_m
-        + (by.centre * np.clip(lead(swarm), -100.0, 100.0) if by.centre else 0.0)
+        + (by.centre * np.clip(lead_over_swarm(swarm), -100.0, 100.0) if by.centre else 0.0)
         - by.obstacle * near * near
         - by.spacing * close * close
         - by.effort * facts.effort
@@ -72,7 +72,7 @@ def _shared(swarm: Swarm, by: Weights) -> Float64:
     return by.team * np.exp(-left / by.team_s) * far + by.late * (left == 0.0) * astray
 
 
-def lead(swarm: Swarm) -> Float64:
+def lead_over_swarm(swarm: Swarm) -> Float64:
     """How far a vehicle is ahead of the swarm's centre, on the way that the centre has to go [m], (world, vehicle).
 
     To first order a difference reward (Wolpert and Tumer 2002): n times what the vehicle does for the centre. From a

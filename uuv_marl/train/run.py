@@ -17,7 +17,7 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, card_rows, save_checkpoint, vehicle_of
 from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.errors import ResultsError, TrainingError
 from uuv_marl.extras import extra
@@ -154,7 +154,7 @@ class Trainer:
         training = self.training
         scenario = training.loaded
         card = Card(
-            percept=rows_of(PerceptLayout.of(scenario)),
+            percept=card_rows(PerceptLayout.of(scenario)),
             yaw_damping_nms=scenario.actuators.yaw_damping_nms,
             channels=scenario.sonar.channels,
             features=training.sees,

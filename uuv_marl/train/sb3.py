@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned.checkpoint import Card, Layer, rows_of, save_checkpoint, vehicle_of
+from uuv_marl.baselines.learned.checkpoint import Card, Layer, card_rows, save_checkpoint, vehicle_of
 from uuv_marl.baselines.learned.percept_features import BARRIER, MOST_BARRIER, Features
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.errors import PolicyError
@@ -90,7 +90,7 @@ def save_sb3(model: PPO, path: UserPath) -> None:
         raise PolicyError(f"a checkpoint's network has tanh layers, got {hidden}; leave activation_fn out")
     scenario = env.scenario
     card = Card(
-        percept=rows_of(PerceptLayout.of(scenario)),
+        percept=card_rows(PerceptLayout.of(scenario)),
         yaw_damping_nms=scenario.actuators.yaw_damping_nms,
         channels=scenario.sonar.channels,
         vehicle=vehicle_of(scenario),

@@ -300,7 +300,7 @@ TABLES: Mapping[str, Sequence[str]] = {
 """Names of all fields, by table."""
 
 
-def changed(told: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
+def changed_fields(told: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
     """Fields of a training with others in their place: its own, or fields of the scenario, which become ``overrides``.
 
     Args:

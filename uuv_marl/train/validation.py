@@ -22,7 +22,7 @@ class ValidationResult(NamedTuple):
     """Over all episodes."""
 
     score: float
-    """Minus the mean cost, see ``cost``."""
+    """Minus the mean cost, see ``validation_cost``."""
     arrived: float
     """Share of episodes."""
     collisions: int
@@ -61,7 +61,7 @@ def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
     """The result of these episodes."""
     times = [late for late in map(lateness, metrics) if late is not None]
     return ValidationResult(
-        score=-sum(map(cost, metrics)) / len(metrics),
+        score=-sum(map(validation_cost, metrics)) / len(metrics),
         arrived=len(times) / len(metrics),
         collisions=sum(m["collisions"] for m in metrics),
         lateness_s=sum(times) / len(times) if times else None,
@@ -70,7 +70,7 @@ def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
     )
 
 
-def cost(metrics: Metrics) -> float:
+def validation_cost(metrics: Metrics) -> float:
     """Cost of an episode [1]: lateness in minutes (2 if it never arrives), 2 with a collision, and short distances."""
     late = lateness(metrics)
     total = 2.0 if late is None else min(late / 60.0, 2.0)

@@ -57,7 +57,9 @@ class Apf(Policy):
 
 
 @compiled
-def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g: ApfGains) -> tuple[float, float, int]:
+def apf_obstacle_force(
+    n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g: ApfGains
+) -> tuple[float, float, int]:
     """Force [N] from an obstacle: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2 rho_goal^2 within rho_0.
 
     Ge and Cui 2000, with n = 2: one part points away from the obstacle, one to the goal. n is a unit vector to the
@@ -76,7 +78,7 @@ def obstacle_force(n_x: float, n_y: float, rho: float, l_x: float, l_y: float, g
 
 
 @compiled
-def neighbour_force(p_x: float, p_y: float, g: ApfGains) -> tuple[float, float, int]:
+def apf_neighbour_force(p_x: float, p_y: float, g: ApfGains) -> tuple[float, float, int]:
     """Force [N] from a neighbour at p [m]: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2. Khatib 1986."""
     rho = math.hypot(p_x, p_y)
     near = max(rho, MIN_DISTANCE_M)
@@ -104,11 +106,11 @@ def _force(w: int, i: int, see: Fields, g: ApfGains, centres: bool) -> tuple[flo
     f_x, f_y, bound = g.attraction * l_x, g.attraction * l_y, 0
     for k in range(see.heard.shape[2]):
         if see.heard[w, i, k] > 0.0:
-            d_x, d_y, c = neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
+            d_x, d_y, c = apf_neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
             f_x, f_y, bound = f_x + d_x, f_y + d_y, bound + c
     for a in range(see.echo.shape[2]):
         if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
             n_x, n_y, reach, _ = obstacle_at(w, i, a, see, centres)
-            d_x, d_y, c = obstacle_force(n_x, n_y, reach, l_x, l_y, g)
+            d_x, d_y, c = apf_obstacle_force(n_x, n_y, reach, l_x, l_y, g)
             f_x, f_y, bound = f_x + d_x, f_y + d_y, bound + c
     return f_x, f_y, bound

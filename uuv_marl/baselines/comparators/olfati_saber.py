@@ -13,7 +13,7 @@ import numpy as np
 
 from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import counts_once
-from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
+from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -125,7 +125,7 @@ def alpha_weight(z: float, g: OlfatiSaberGains) -> float:
 
 
 @compiled
-def neighbour_force(distance: float, g: OlfatiSaberGains) -> float:
+def neighbour_attraction(distance: float, g: OlfatiSaberGains) -> float:
     """Attraction [N] by a neighbour at a distance [m]: the slope of the lattice's potential, per ``unit``."""
     return phi_alpha(sigma_norm(distance / g.unit), g) * slope(distance / g.unit)
 
@@ -137,7 +137,7 @@ def beta_weight(reach: float, g: OlfatiSaberGains) -> float:
 
 
 @compiled
-def obstacle_force(reach: float, g: OlfatiSaberGains) -> float:
+def obstacle_repulsion(reach: float, g: OlfatiSaberGains) -> float:
     """Repulsion [N] by an obstacle at a distance to its surface [m]. Minus phi_beta n_ik of the source."""
     gap = sigma_norm(reach / g.unit) - sigma_norm(g.obstacle_range / g.unit)
     return g.obstacle * beta_weight(reach, g) * (1.0 - sigma_1(gap)) * slope(reach / g.unit)
@@ -153,7 +153,7 @@ def _act(flat: Float32, at: Starts, g: OlfatiSaberGains, limits: Limits, centres
             l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
             pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
             r_x, r_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
-            drag = resistance(math.hypot(r_x, r_y), limits)
+            drag = surge_resistance(math.hypot(r_x, r_y), limits)
             f_x, f_y = pull * l_x + drag * r_x, pull * l_y + drag * r_y
             f_x, f_y = f_x + g.reference_velocity * (r_x - u), f_y + g.reference_velocity * (r_y - v)
             d_x, d_y = _alpha(w, i, see, g)
@@ -170,7 +170,7 @@ def _alpha(w: int, i: int, see: Fields, g: OlfatiSaberGains) -> tuple[float, flo
             continue
         p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         distance = max(math.hypot(p_x, p_y), 1e-6)
-        force = neighbour_force(distance, g) / distance
+        force = neighbour_attraction(distance, g) / distance
         f_x, f_y = f_x + force * p_x, f_y + force * p_y
         if see.link_identity.shape[2] > 0 and see.link_identity[w, i, k] >= 1.0:
             weight = g.alignment * alpha_weight(sigma_norm(distance / g.unit), g)
@@ -190,7 +190,7 @@ def _beta(w: int, i: int, see: Fields, g: OlfatiSaberGains, centres: bool) -> tu
     for a in range(see.echo.shape[2]):
         if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
             n_x, n_y, reach, radius = obstacle_at(w, i, a, see, centres)
-            away, damping = obstacle_force(reach, g), g.obstacle_damping * beta_weight(reach, g)
+            away, damping = obstacle_repulsion(reach, g), g.obstacle_damping * beta_weight(reach, g)
             towards, shadow = u * n_x + v * n_y, radius / max(radius + reach, 1e-6)
             f_x += damping * (shadow * (u - towards * n_x) - u) - away * n_x
             f_y += damping * (shadow * (v - towards * n_y) - v) - away * n_y

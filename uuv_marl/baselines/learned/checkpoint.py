@@ -17,7 +17,7 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
-from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES
 from uuv_marl.baselines.learned.percept_features import BARRIER, num_features
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.baselines.policy import Policy, PolicyError
@@ -89,7 +89,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """What the tensors are: ``mlp``, tanh layers."""
     features: Literal["percept", "memory"] = "percept"
     """What the first layer is given: ``percept``, what ``Features`` make of one percept, and the last gives a force; or
-    ``memory``, what ``recall`` makes of what is remembered, and the last trims ``law``."""
+    ``memory``, what ``fill_memory_features`` makes of what is remembered, and the last trims ``law``."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every field of the percept."""
     decision_period_s: tuple[float, float] = PERIODS_S
@@ -138,7 +138,7 @@ class Checkpoint(NamedTuple):
     """First 16 hexadecimal digits of the whole file's SHA-256."""
 
 
-def rows_of(layout: PerceptLayout) -> tuple[Row, ...]:
+def card_rows(layout: PerceptLayout) -> tuple[Row, ...]:
     """A percept's table as a card keeps it."""
     return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in layout.table)
 
@@ -197,7 +197,7 @@ def _check(card: Card, layers: Sequence[Layer]) -> None:
     if not 0.0 < card.decision_period_s[0] <= card.decision_period_s[1]:
         raise ValueError(f"its card's decision_period_s must be [shortest, longest], got {card.decision_period_s}")
     remembers = card.features == "memory"
-    width = RECALLED if remembers else num_features(sizes["heard"], sizes.get("echo", 0))
+    width = NUM_MEMORY_FEATURES if remembers else num_features(sizes["heard"], sizes.get("echo", 0))
     last = len(card.trims) if remembers else 2
     for k, (weight, bias) in enumerate(layers):
         outputs = weight.shape[-1] if weight.ndim == 2 and k < len(layers) - 1 else last

@@ -22,18 +22,18 @@ from uuv_marl.types import Bool, Float32, Float64
 NEIGHBOURS, SURFACES = 6, 4
 """How many of the nearest neighbours and obstacles an actor sees."""
 _OWN = 27
-RECALLED = _OWN + 6 * NEIGHBOURS + 5 * SURFACES
+NUM_MEMORY_FEATURES = _OWN + 6 * NEIGHBOURS + 5 * SURFACES
 """Features of a vehicle."""
 
 
 @compiled
-def recall(
+def fill_memory_features(
     rows: Bool, num_vehicles: int, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, kept: Surroundings,
     planes: Float64, features: Float32,
 ) -> None:  # fmt: skip
     """Fill the features of vehicles: their motion, l(t), the hand-made law's wish, who and what is near.
 
-    Shape (world, vehicle, ``RECALLED``); zero for vehicles that are not among ``rows``, shape (world, vehicle).
+    Shape (world, vehicle, ``NUM_MEMORY_FEATURES``); zero for vehicles outside ``rows``, shape (world, vehicle).
     """
     for w in range(features.shape[0]):
         for i in range(features.shape[1]):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from uuv_marl.baselines.learned.checkpoint import Card, Checkpoint, Layer, rows_of, vehicle_of
+from uuv_marl.baselines.learned.checkpoint import Card, Checkpoint, Layer, card_rows, vehicle_of
 from uuv_marl.baselines.learned.percept_features import Features
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
@@ -26,7 +26,7 @@ def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
         PolicyError: the percept, the vehicle or the decision period differs.
     """
     scenario, name = policy.scenario, policy.name
-    then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, rows_of(policy.layout)))
+    then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, card_rows(policy.layout)))
     pairs: list[tuple[str, Mapping[str, object], Mapping[str, object], str]] = [
         ("percept", then, now, "use a scenario with the sonar suite of its training")
     ]

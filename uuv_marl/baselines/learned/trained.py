@@ -5,7 +5,7 @@ from pathlib import Path
 
 from uuv_marl.baselines.learned.checkpoint import Checkpoint, load_checkpoint
 from uuv_marl.baselines.learned.network import Learned
-from uuv_marl.baselines.learned.trimmed_scout import LearnedLaw
+from uuv_marl.baselines.learned.trimmed_scout import LearnedScout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario
 
@@ -42,9 +42,9 @@ class Trained:
         """Full torque of the training's vehicle [N m]."""
         return self.checkpoint.card.full_torque_nm
 
-    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedLaw:
+    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedScout:
         """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
-        kind = LearnedLaw if self.checkpoint.card.features == "memory" else Learned
+        kind = LearnedScout if self.checkpoint.card.features == "memory" else Learned
         return kind(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)
 
 

@@ -7,7 +7,7 @@ all where they answer at once. If the network gives zeros, the policy is the law
 import numpy as np
 
 from uuv_marl.baselines.learned.checkpoint import Checkpoint
-from uuv_marl.baselines.learned.memory_features import RECALLED, recall
+from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES, fill_memory_features
 from uuv_marl.baselines.learned.network import forward, need_same
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.scout.gains import ScoutGains
@@ -18,7 +18,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.types import Bool, Float32
 
 
-class TrimmedLaw(Scout):
+class TrimmedScout(Scout):
     """``scout``'s law, which an actor trims.
 
     Args:
@@ -44,12 +44,12 @@ class TrimmedLaw(Scout):
         """Fill the features of the memory that an actor sees.
 
         Args:
-            features: filled, shape (world, vehicle, ``RECALLED``).
+            features: filled, shape (world, vehicle, ``NUM_MEMORY_FEATURES``).
             rows: the vehicles that are looked at, shape (world, vehicle); all of the running worlds unless given.
         """
         if rows is None:
             rows = np.broadcast_to(self.active[:, None], features.shape[:2]).copy()
-        recall(
+        fill_memory_features(
             rows, self.scenario.swarm.num_vehicles, self.model.own.period_s, self.grown(), self.barrier,
             self.limits, self.memory, self.planes, features,
         )  # fmt: skip
@@ -60,7 +60,7 @@ class TrimmedLaw(Scout):
         return self._decided()
 
 
-class LearnedLaw(TrimmedLaw):
+class LearnedScout(TrimmedScout):
     """A checkpoint's actor inside ``scout``'s law, memory and filter. Deterministic.
 
     Args:
@@ -82,7 +82,7 @@ class LearnedLaw(TrimmedLaw):
         super().__init__(scenario, num_worlds, gains=card.law, barrier=card.safety)
         need_same(self, card, any_vehicle)
         worlds_and_vehicles = self._trims.shape[:2]
-        self._features = np.zeros((*worlds_and_vehicles, RECALLED), np.float32)
+        self._features = np.zeros((*worlds_and_vehicles, NUM_MEMORY_FEATURES), np.float32)
         self._heeded = np.zeros(worlds_and_vehicles, np.bool_)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered

@@ -77,7 +77,7 @@ def holds(a: int, x: float, y: float, sectors: ActiveSectors) -> bool:
 
 
 @compiled
-def listen(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
+def update_discs(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
     """Take a vehicle's echoes into its discs, and forget those that should have been heard and were not."""
     unheard = kept.unheard[w, i]
     for d in range(unheard.shape[0]):
@@ -102,7 +102,7 @@ def listen(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundin
 
 @compiled
 def _nearest_unexplained(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
-    """The active sub-sector of the nearest echo that no disc explains, -1 for none. Arguments as for ``listen``."""
+    """The active sub-sector of the nearest echo that no disc explains, -1 for none. Arguments: ``update_discs``."""
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):
         if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and not _explained(w, i, a, see, sectors, kept):
@@ -262,7 +262,7 @@ def _free_row(w: int, i: int, kept: Surroundings) -> int:
 
 @compiled
 def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
-    """Lower the score of discs that should have been heard and were not. Arguments as for ``listen``."""
+    """Lower the score of discs that should have been heard and were not. Arguments: ``update_discs``."""
     for d in range(kept.score.shape[2]):
         score, unheard = kept.score[w, i, d], kept.unheard[w, i, d]
         if score <= 0.0 or unheard == 0.0:
@@ -285,7 +285,7 @@ def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Sur
 def _merge(w: int, i: int, sectors: ActiveSectors, kept: Surroundings) -> None:
     """Forget what overlaps a disc that is heard now and was heard less: half as often, or with its centre inside.
 
-    Surfaces alone don't tell which of two that are heard now is wrong: both stay. Arguments as for ``listen``.
+    Surfaces alone don't tell which of two that are heard now is wrong: both stay. Arguments as for ``update_discs``.
     """
     disc, score = kept.disc[w, i], kept.score[w, i]
     for d in range(score.shape[0]):

@@ -77,7 +77,7 @@ def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
 
 
 @compiled
-def listen(w: int, i: int, see: Fields, period: float, kept_s: float, kept: Surroundings) -> None:
+def update_neighbours(w: int, i: int, see: Fields, period: float, kept_s: float, kept: Surroundings) -> None:
     """Take the neighbours that a vehicle hears into those it knows."""
     known, since, place, velocity = kept.known[w, i], kept.since[w, i], kept.place[w, i], kept.velocity[w, i]
     for k in range(known.shape[0]):

@@ -101,7 +101,7 @@ def to_body(x: float, y: float, pose: Float64) -> tuple[float, float]:
 
 
 @compiled
-def begin(w: int, i: int, see: Fields, kept: Surroundings) -> None:
+def begin_map(w: int, i: int, see: Fields, kept: Surroundings) -> None:
     """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow."""
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed = math.hypot(v_x, v_y)

@@ -14,7 +14,7 @@ from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32
 
 
-class Model(NamedTuple):
+class OwnModel(NamedTuple):
     """What a vehicle knows of itself before it remembers anything."""
 
     own: Reckoning
@@ -23,13 +23,13 @@ class Model(NamedTuple):
     """How it hears obstacles."""
 
     @staticmethod
-    def of(scenario: Scenario) -> "Model":
+    def of(scenario: Scenario) -> "OwnModel":
         """That of a scenario's vehicle."""
-        return Model(Reckoning.of(scenario), ActiveSectors.of(scenario))
+        return OwnModel(Reckoning.of(scenario), ActiveSectors.of(scenario))
 
 
 @compiled
-def is_lost(row: Float32) -> bool:
+def is_lost_percept(row: Float32) -> bool:
     """Whether a percept, shape (entry,), is that of a lost vehicle: all zero."""
     for k in range(row.shape[0]):  # noqa: SIM110 - compiled
         if row[k] != 0.0:
@@ -38,7 +38,7 @@ def is_lost(row: Float32) -> bool:
 
 
 @compiled
-def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept_s: float, kept: Surroundings) -> None:
+def update_memory(flat: Float32, at: Starts, worlds: Bool, model: OwnModel, kept_s: float, kept: Surroundings) -> None:
     """Take what every vehicle perceives into what it remembers. Once for every decision."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -46,16 +46,16 @@ def listen(flat: Float32, at: Starts, worlds: Bool, model: Model, kept_s: float,
             kept.counted[w, i, 0] += kept.filtered[w, i, 0]
             kept.counted[w, i, 1] += kept.filtered[w, i, 1]
             kept.filtered[w, i, 0] = kept.filtered[w, i, 1] = 0.0
-            if is_lost(flat[w, i]):
+            if is_lost_percept(flat[w, i]):
                 kept.begun[w, i] = 0.0
                 continue
             if kept.begun[w, i] == 0.0:
-                pose.begin(w, i, see, kept)
+                pose.begin_map(w, i, see, kept)
             else:
                 pose.move(w, i, see, model.own, kept)
             pose.keep_motion(w, i, see, kept)
-            discs.listen(w, i, see, model.sectors, kept)
-            neighbours.listen(w, i, see, model.own.period_s, kept_s, kept)
+            discs.update_discs(w, i, see, model.sectors, kept)
+            neighbours.update_neighbours(w, i, see, model.own.period_s, kept_s, kept)
             _keep_distances(w, i, kept)
 
 

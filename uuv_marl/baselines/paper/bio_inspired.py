@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from uuv_marl.baselines.policy import Limits, Policy, resistance, tuned, write_action
+from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -161,7 +161,7 @@ def _act(
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
             v_x, v_y = see.reference_velocity[w, i, 0], see.reference_velocity[w, i, 1]
-            drag = g.feed_forward * resistance(math.hypot(v_x, v_y), limits)
+            drag = g.feed_forward * surge_resistance(math.hypot(v_x, v_y), limits)
             f_x = g.zeta_l * see.reference[w, i, 0] + drag * v_x
             f_y = g.zeta_l * see.reference[w, i, 1] + drag * v_y
             for k in range(see.heard.shape[2]):

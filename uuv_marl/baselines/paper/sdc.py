@@ -63,7 +63,7 @@ class SdcGains(NamedTuple):
 
 
 @described
-class Memory(NamedTuple):
+class SdcMemory(NamedTuple):
     """The slots of the lattice, and how long they have been held."""
 
     slots: Annotated[Float64, "world vehicle 2", "Each vehicle's slot, north and east of the lattice's centre [m]."]
@@ -79,7 +79,7 @@ class Sdc(Policy):
     """
 
     wishes_force: ClassVar[bool] = True
-    Memory: ClassVar[type[Any] | None] = Memory
+    Memory: ClassVar[type[Any] | None] = SdcMemory
     channels: ClassVar[tuple[str, ...]] = ("compass", "link")
     yaw_damping_nms: ClassVar[float] = 600.0
     """Without it, in the settings tried by hand, the informed vehicle left the others behind and none arrived."""

@@ -58,7 +58,7 @@ class SffGains(NamedTuple):
 
 
 @described
-class Memory(NamedTuple):
+class SffMemory(NamedTuple):
     """What each vehicle heard, and how that has changed since the decision before, in its body frame."""
 
     identity: Annotated[Float32, "world vehicle sector", "Who is heard, 0 for nobody."]
@@ -73,7 +73,7 @@ class Sff(Policy):
     """Self-organised fission and fusion, with neighbours' velocity over the link, without the reference's velocity."""
 
     wishes_force: ClassVar[bool] = True
-    Memory: ClassVar[type[Any] | None] = Memory
+    Memory: ClassVar[type[Any] | None] = SffMemory
     channels: ClassVar[tuple[str, ...]] = ("link",)
     tuned_as: ClassVar[str] = "sff"
 
@@ -120,7 +120,7 @@ def _recall(identity: float, known: Float32) -> int:
 
 
 @compiled
-def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Memory) -> None:
+def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: SffMemory) -> None:
     """What every vehicle hears, beside what it heard before."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -130,7 +130,7 @@ def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Me
 
 
 @compiled
-def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None:
+def _compare(w: int, i: int, see: Fields, period: float, memory: SffMemory) -> None:
     """What one vehicle hears, beside what it heard; the frame has turned by its yaw rate times the period since.
 
     ``memory`` is brought up to date.
@@ -155,7 +155,7 @@ def _compare(w: int, i: int, see: Fields, period: float, memory: Memory) -> None
 
 
 @compiled
-def _decide(flat: Float32, at: Starts, g: SffGains, limits: Limits, memory: Memory, action: Float32) -> None:
+def _decide(flat: Float32, at: Starts, g: SffGains, limits: Limits, memory: SffMemory, action: Float32) -> None:
     """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -165,7 +165,7 @@ def _decide(flat: Float32, at: Starts, g: SffGains, limits: Limits, memory: Memo
 
 
 @compiled
-def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: Memory) -> tuple[float, float]:
+def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: SffMemory) -> tuple[float, float]:
     """Body-frame force on one vehicle [N], forward and to starboard."""
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from uuv_marl.baselines.memory import Model, Surroundings, listen
+from uuv_marl.baselines.memory import OwnModel, Surroundings, update_memory
 from uuv_marl.baselines.memory.neighbours import KEPT_S
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.safety.barrier import Barrier
@@ -45,7 +45,7 @@ class Filtered(Policy):
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
         super().__init__(scenario, num_worlds)
         self.barrier = turnable(Barrier(*map(float, barrier)), scenario)
-        self.model = Model.of(scenario)
+        self.model = OwnModel.of(scenario)
         """What vehicles know of themselves."""
         self.gain = velocity_gain(scenario)
         """Force per velocity error [N s/m]."""
@@ -72,7 +72,7 @@ class Filtered(Policy):
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Update the memory from the percept."""
-        listen(self.flat(percept), self.layout.offsets, worlds, self.model, self.kept_s, self.memory)
+        update_memory(self.flat(percept), self.layout.offsets, worlds, self.model, self.kept_s, self.memory)
 
     def acted(self, action: Float32, worlds: Bool) -> None:
         """Keep the action: the memory predicts the vehicle's next place from it."""

@@ -19,7 +19,7 @@ _NOTHING = "–"
 _GROUPS = [*(group for group in GROUPS if group != "X"), EVERY, "X"]
 
 
-def write_report(folder: Path) -> list[Path]:
+def write_robustness_report(folder: Path) -> list[Path]:
     """The page and its pictures from the folder's ``EPISODES``; the paths, that of the page first."""
     episodes = read_episodes(folder / EPISODES)
     page = folder / "robustness.md"

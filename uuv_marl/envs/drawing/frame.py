@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import aim
-from uuv_marl.envs.drawing.legend import draw_legend, rows
+from uuv_marl.envs.drawing.legend import draw_legend, legend_rows
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.envs.drawing.scene import Scene
 from uuv_marl.extras import extra
@@ -65,7 +65,7 @@ class Frame:
 
     def _lay_out(self, panels: Sequence[Panel], heading: str) -> None:
         """Cells for the panels, above them room for the heading, below them for the legend where it takes little."""
-        below = round(20 * self._unit) * rows(self.size[0], panels[0].scene, self._text) + 4
+        below = round(20 * self._unit) * legend_rows(self.size[0], panels[0].scene, self._text) + 4
         laid = len(panels), below, len(heading) > 0
         if self._laid == laid:
             return

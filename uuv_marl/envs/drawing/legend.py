@@ -7,7 +7,7 @@ import numpy as np
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import shown_speed
 from uuv_marl.envs.drawing.current import ARROW, arrow
-from uuv_marl.envs.drawing.painter import DART, FINE, cross
+from uuv_marl.envs.drawing.painter import DART, FINE, diagonal_cross
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene
 from uuv_marl.extras import extra
 from uuv_marl.scenario import conditions, disturbances
@@ -44,7 +44,7 @@ def _sonar(scene: Scene) -> list[tuple[str, Sign]]:
     return [*found, ("echo", _echo)] if scene.obstacles.size else found
 
 
-def rows(width: int, scene: Scene, height: int) -> int:
+def legend_rows(width: int, scene: Scene, height: int) -> int:
     """How many rows a scene's legend takes in this width, with letters of this height [px]."""
     return 1 + max(row for row, *_ in _flow(width, scene, height))
 
@@ -54,7 +54,7 @@ def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height
 
     Args:
         surface: to draw on.
-        area: where on it, with room for the legend's ``rows`` [px].
+        area: where on it, with room for its ``legend_rows`` [px].
         scene: what the frame shows, which decides on the signs.
         height: of the letters [px].
     """
@@ -122,12 +122,12 @@ def _target(fine: pygame.Surface, unit: float) -> None:
 
 
 def _hit(fine: pygame.Surface, unit: float) -> None:
-    cross(fine, np.array([12.0, 8.0]) * unit, 3.0 * unit, ink.ORANGE, round(0.8 * unit) * 2)
+    diagonal_cross(fine, np.array([12.0, 8.0]) * unit, 3.0 * unit, ink.ORANGE, round(0.8 * unit) * 2)
     pygame.draw.circle(fine, ink.ORANGE, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(1.5 * unit))
 
 
 def _lost(fine: pygame.Surface, unit: float) -> None:
-    cross(fine, np.array([12.0, 8.0]) * unit, 3.5 * unit, ink.LOST, round(0.8 * unit) * 2)
+    diagonal_cross(fine, np.array([12.0, 8.0]) * unit, 3.5 * unit, ink.LOST, round(0.8 * unit) * 2)
 
 
 def _current(fine: pygame.Surface, unit: float) -> None:

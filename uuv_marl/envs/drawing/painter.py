@@ -137,7 +137,7 @@ class Painter:
         darts = places[:, None] + length * (DART[:, :1] * ahead[:, None] + DART[:, 1:] * aside[:, None])
         colours = np.where(scene.near[:, None], ink.AMBER, ink.BLUE).tolist()
         for i in np.flatnonzero(~scene.alive):
-            cross(self._fine, places[i], 3.5 * unit, ink.LOST, round(1.6 * unit))
+            diagonal_cross(self._fine, places[i], 3.5 * unit, ink.LOST, round(1.6 * unit))
         for i in np.flatnonzero(scene.alive):
             pygame.draw.polygon(self._fine, colours[i], darts[i].tolist())
         if scene.sonar:
@@ -149,7 +149,7 @@ class Painter:
         """A cross wherever vehicles collided, and a ring around it while it is fresh."""
         unit = self._unit
         for place, when in zip(view.pixels(scene.hits[:, :2]), scene.hits[:, 2], strict=True):
-            cross(self._fine, place, 4.0 * unit, ink.ORANGE, round(2.0 * unit))
+            diagonal_cross(self._fine, place, 4.0 * unit, ink.ORANGE, round(2.0 * unit))
             if scene.time_s - when < FRESH_S:
                 pygame.draw.circle(self._fine, ink.ORANGE, place.tolist(), 13.0 * unit, round(2.5 * unit))
 
@@ -185,7 +185,7 @@ class Painter:
         ink.write(self._shown, "N", (right - 19 * unit, low), height, bold=True, halo=True)
 
 
-def cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:
+def diagonal_cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:
     """A diagonal cross.
 
     Args:

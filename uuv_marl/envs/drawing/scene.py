@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.batched_env import BatchedEnv
+from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.sea.current import FlowField
 from uuv_marl.types import Bool
@@ -17,7 +17,7 @@ TRAIL_S = 20.0
 """How long a trail is [s]."""
 
 
-class Sonar(NamedTuple):
+class SonarView(NamedTuple):
     """What one vehicle's sonar tells it."""
 
     vehicle: int
@@ -62,12 +62,12 @@ class Scene(NamedTuple):
     """Smallest distance of a vehicle to an obstacle's surface; infinite without obstacles."""
     centre_error_m: float
     """Distance of the swarm's centre to l(t)."""
-    sonar: Sonar | None
+    sonar: SonarView | None
     water: FlowField | None
     """How it moves; None where the scenario's water is still."""
 
 
-class Memory:
+class SceneHistory:
     """What a scene shows of the past: trails and collisions of every world, as far as the steps were noted."""
 
     def __init__(self, batch: BatchedEnv) -> None:
@@ -125,7 +125,7 @@ class Memory:
         )
 
 
-def _sonar(batch: BatchedEnv, world: int, vehicle: int) -> Sonar:
+def _sonar(batch: BatchedEnv, world: int, vehicle: int) -> SonarView:
     percept, at = batch.swarm.percept, (world, vehicle)
     neighbour = percept["neighbour"][at][percept["heard"][at] > 0]
-    return Sonar(vehicle, neighbour, percept["echo_range"][at].copy())
+    return SonarView(vehicle, neighbour, percept["echo_range"][at].copy())

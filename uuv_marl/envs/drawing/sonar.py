@@ -7,7 +7,7 @@ import numpy as np
 
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera
-from uuv_marl.envs.drawing.scene import Float, Scene, Sonar
+from uuv_marl.envs.drawing.scene import Float, Scene, SonarView
 from uuv_marl.extras import extra
 from uuv_marl.scenario.hardware import SonarArray
 
@@ -15,7 +15,7 @@ with extra("render", "rendering"):
     import pygame
 
 
-def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: Sonar, view: Camera) -> None:
+def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera) -> None:
     """Every array as a fan with the edges of its sub-sectors, the active ones on top.
 
     Args:
@@ -35,7 +35,7 @@ def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: Sonar, view: Came
             pygame.draw.line(surface, ink.EDGE, middle, edge)
 
 
-def paint_heard(surface: pygame.Surface, scene: Scene, sonar: Sonar, view: Camera, line_px: float) -> None:
+def paint_heard(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera, line_px: float) -> None:
     """Lines to the vehicles that are heard, and echoes as arcs across their sub-sectors.
 
     Args:

@@ -212,7 +212,7 @@ def own_plant(w: int, i: int, hull: Hull) -> Plant:
 
 
 @compiled_inner
-def is_lost(w: int, i: int, tick: int, numbers: Actuation, hull: Hull) -> bool:
+def is_lost_to_fault(w: int, i: int, tick: int, numbers: Actuation, hull: Hull) -> bool:
     """Whether a fault has lost a vehicle by the end of a control hold. ``tick`` counts this hold."""
     lost = False
     for f in range(numbers.kind.shape[0]):

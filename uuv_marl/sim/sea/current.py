@@ -29,7 +29,7 @@ _PEAK = 0.638172686
 """Largest speed around a Lamb-Oseen vortex, in circulation / (2 pi core): at 1.12091 core radii. [derived]"""
 
 
-class Water(NamedTuple):
+class WaterModel(NamedTuple):
     """Numbers of a scenario's current."""
 
     speed: float
@@ -84,11 +84,11 @@ def flow_field(w: int, core_m: float, flow: Flow) -> FlowField:
     return FlowField(flow.mean[w] + flow.gust[w], eddies[eddies[:, 2] != 0.0], core_m)
 
 
-def water(scenario: Scenario) -> Water:
+def water(scenario: Scenario) -> WaterModel:
     """The scenario's current as numbers for the compiled functions."""
     current = scenario.current
     direction = current.direction_deg
-    return Water(
+    return WaterModel(
         speed=current.speed_mps,
         direction=math.nan if direction is None else math.radians(direction),
         deviation=current.variation_mps,
@@ -99,7 +99,7 @@ def water(scenario: Scenario) -> Water:
     )
 
 
-def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: Water, flow: Flow) -> None:
+def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: WaterModel, flow: Flow) -> None:
     """The current of world w's new episode.
 
     Args:
@@ -147,7 +147,7 @@ def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float,
 
 
 @compiled
-def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) -> None:
+def advance_gust(w: int, key: np.uint64, tick: int, water: WaterModel, flow: Flow) -> None:
     """The process one control hold later, exactly: its mean and variance depend on no step.
 
     ``tick`` counts this hold.
@@ -159,7 +159,7 @@ def advance_gust(w: int, key: np.uint64, tick: int, water: Water, flow: Flow) ->
 
 
 @compiled_inner
-def read_flow(w: int, state: State, water: Water, flow: Flow) -> None:
+def read_flow(w: int, state: State, water: WaterModel, flow: Flow) -> None:
     """The water's velocity at every vehicle of a world."""
     everywhere = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
     for i in range(state.eta.shape[1]):
@@ -182,7 +182,7 @@ def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]
 
 
 @compiled_inner
-def know_velocities(w: int, world: World, water: Water, flow: Flow, see: Fields, more: SeaFields) -> None:
+def know_velocities(w: int, world: World, water: WaterModel, flow: Flow, see: Fields, more: SeaFields) -> None:
     """Write each vehicle's own velocity, and by the link its neighbours', as the current makes them."""
     state, heading = world.state, world.senses.heading
     for i in range(state.alive.shape[1]):

@@ -27,7 +27,7 @@ from uuv_marl.types import Float64
 _MAX_AGE_S = 4096.0
 
 
-class Modem(NamedTuple):
+class ModemModel(NamedTuple):
     """Numbers of a scenario's messages."""
 
     round_s: float
@@ -46,10 +46,10 @@ class Mail(NamedTuple):
     mail: Annotated[Float64, "world vehicle peer 3", "Latest message that arrived at a vehicle from each other one."]
 
 
-def modem(scenario: Scenario) -> Modem:
+def modem(scenario: Scenario) -> ModemModel:
     """The scenario's messages as numbers for the compiled functions."""
     round_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
-    return Modem(round_s, scenario.timing.control_hold_s, scenario.modem.loss_probability)
+    return ModemModel(round_s, scenario.timing.control_hold_s, scenario.modem.loss_probability)
 
 
 def draw_mail(w: int, mail: Mail) -> None:
@@ -58,13 +58,13 @@ def draw_mail(w: int, mail: Mail) -> None:
 
 
 @compiled
-def rounds(tick: int, slots: float, numbers: Modem) -> int:
+def rounds(tick: int, slots: float, numbers: ModemModel) -> int:
     """Latest round whose moment, so many shares of a round after its start, has come by this control hold; or -1."""
     return max(math.floor(tick * numbers.hold_s / numbers.round_s - slots + 1e-9), -1)
 
 
 @compiled_inner
-def exchange(w: int, key: np.uint64, world: World, numbers: Modem, mail: Mail, flow: Flow, track: Track) -> None:
+def exchange(w: int, key: np.uint64, world: World, numbers: ModemModel, mail: Mail, flow: Flow, track: Track) -> None:
     """Send and receive what is due at the start of an episode, or the end of a control hold, its number counted."""
     state, n, tick = world.state, mail.sent.shape[1], world.state.tick[w]
     for j in range(n):

@@ -22,7 +22,7 @@ from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float64
 
 
-class Navigation(NamedTuple):
+class NavigationModel(NamedTuple):
     """Numbers of a scenario's navigation."""
 
     drift_share: float
@@ -40,13 +40,13 @@ class Track(NamedTuple):
     bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's error, clockwise."]
 
 
-def navigation(scenario: Scenario) -> Navigation:
+def navigation(scenario: Scenario) -> NavigationModel:
     """The scenario's navigation as numbers for the compiled functions."""
     own = scenario.navigation
-    return Navigation(own.drift_share, math.radians(own.compass_bias_deg))
+    return NavigationModel(own.drift_share, math.radians(own.compass_bias_deg))
 
 
-def draw_track(w: int, key: np.uint64, navigation: Navigation, track: Track) -> None:
+def draw_track(w: int, key: np.uint64, navigation: NavigationModel, track: Track) -> None:
     """Directions and errors of world w's new episode, from its key."""
     for i in range(track.drift.shape[1]):
         track.astray[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
@@ -60,7 +60,7 @@ def find_oneself(w: int, track: Track) -> None:
 
 
 @compiled_inner
-def go_astray(w: int, state: State, navigation: Navigation, track: Track) -> None:
+def go_astray(w: int, state: State, navigation: NavigationModel, track: Track) -> None:
     """Known positions after one control hold."""
     if navigation.drift_share == 0.0:
         return
@@ -82,7 +82,7 @@ def by_compass(w: int, i: int, north: float, east: float, track: Track) -> tuple
 
 
 @compiled_inner
-def navigate(w: int, world: World, navigation: Navigation, track: Track, see: Fields) -> None:
+def navigate(w: int, world: World, navigation: NavigationModel, track: Track, see: Fields) -> None:
     """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them."""
     if navigation.drift_share == 0.0 and navigation.compass_bias == 0.0:
         return

@@ -26,7 +26,7 @@ _NEVER = 2**40
 """A reading that no episode reaches."""
 
 
-class Noise(NamedTuple):
+class NoiseModel(NamedTuple):
     """Numbers of what a scenario's sonar gets wrong."""
 
     bearing: float
@@ -69,12 +69,12 @@ class Ears(NamedTuple):
     ]
 
 
-def noise(scenario: Scenario) -> Noise:
+def noise(scenario: Scenario) -> NoiseModel:
     """The scenario's errors as numbers for the compiled functions."""
     given, arrays = scenario.noise, scenario.sonar.arrays
     half_range = {"active": given.active_r50_m, "passive": given.passive_r50_m}
     decibels = {"active": 40.0, "passive": 20.0}  # per factor 10 of range: sound spreads there and back, or one way
-    return Noise(
+    return NoiseModel(
         bearing=math.radians(given.bearing_deg),
         range_m=given.range_m,
         range_share=given.range_share,
@@ -92,14 +92,14 @@ def noise(scenario: Scenario) -> Noise:
     )
 
 
-def draw_ears(w: int, key: np.uint64, noise: Noise, ears: Ears) -> None:
+def draw_ears(w: int, key: np.uint64, noise: NoiseModel, ears: Ears) -> None:
     """Lasting factors of world w's new episode, from its key."""
     for i in range(ears.factor.shape[1]):
         ears.factor[w, i] = exp(noise.factor_log_sd * normal(key, FACTOR, 0, i, 0))
 
 
 @compiled_inner
-def begin_ears(w: int, key: np.uint64, noise: Noise, ears: Ears) -> None:
+def begin_ears(w: int, key: np.uint64, noise: NoiseModel, ears: Ears) -> None:
     """When the arrays of world w, which begin to read, fall silent first."""
     for i in range(ears.silent.shape[1]):
         for a in range(ears.silent.shape[2]):
@@ -117,7 +117,7 @@ def gap(chance: float, probability: float) -> int:
 
 
 @compiled_inner
-def spoil(at: Reading, num: int, key: np.uint64, passive: bool, noise: Noise, ears: Ears, hits: Hits) -> None:
+def spoil(at: Reading, num: int, key: np.uint64, passive: bool, noise: NoiseModel, ears: Ears, hits: Hits) -> None:
     """What an array of every vehicle misses, and puts elsewhere. ``hits`` are true before, and have errors after."""
     if noise.half_range[at.a] > 0.0:
         miss(at, num, key, noise, hits)
@@ -129,7 +129,7 @@ def spoil(at: Reading, num: int, key: np.uint64, passive: bool, noise: Noise, ea
 
 
 @compiled_inner
-def miss(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -> None:
+def miss(at: Reading, num: int, key: np.uint64, noise: NoiseModel, hits: Hits) -> None:
     """What is too faint is missed: signal excess 20 log10(r50 / r), or 40 log10 there and back, plus noise <= 0.
 
     Ranges of those missed become negative.
@@ -144,7 +144,7 @@ def miss(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -> Non
 
 
 @compiled_inner
-def draw_blur(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -> None:
+def draw_blur(at: Reading, num: int, key: np.uint64, noise: NoiseModel, hits: Hits) -> None:
     """Cosine and sine of every bearing's error, and a standard normal number for its range; arguments as for ``miss``.
 
     The loop holds nothing else, so that it runs on vector registers.
@@ -157,7 +157,7 @@ def draw_blur(at: Reading, num: int, key: np.uint64, noise: Noise, hits: Hits) -
 
 
 @compiled_inner
-def blur(at: Reading, num: int, measured: bool, passive: bool, noise: Noise, ears: Ears, hits: Hits) -> None:
+def blur(at: Reading, num: int, measured: bool, passive: bool, noise: NoiseModel, ears: Ears, hits: Hits) -> None:
     """Put hits at a wrong bearing and range; an echo's position moves as far as its range does.
 
     ``measured``: whether the array measures ranges. The hits have draws of ``draw_blur``.
@@ -179,7 +179,7 @@ def blur(at: Reading, num: int, measured: bool, passive: bool, noise: Noise, ear
 
 @compiled_inner
 def interrupt(
-    at: Reading, key: np.uint64, listening: Listening, noise: Noise, ears: Ears, actuation: Actuation, hull: Hull,
+    at: Reading, key: np.uint64, listening: Listening, noise: NoiseModel, ears: Ears, actuation: Actuation, hull: Hull,
     hits: Hits, readings: Readings,
 ) -> None:  # fmt: skip
     """Echoes of nothing; arrays that are silent for a while; dead arrays."""
@@ -197,7 +197,9 @@ def interrupt(
 
 
 @compiled_inner
-def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, hits: Hits, readings: Readings) -> None:
+def imagine(
+    at: Reading, key: np.uint64, listening: Listening, noise: NoiseModel, hits: Hits, readings: Readings
+) -> None:
     """Echoes of nothing, anywhere in a sub-sector within the array's range, unless something nearer is heard there.
 
     An active array takes one for an obstacle's surface, a passive one for a vehicle.
@@ -225,7 +227,7 @@ def imagine(at: Reading, key: np.uint64, listening: Listening, noise: Noise, hit
 
 
 @compiled_inner
-def is_silent(at: Reading, i: int, key: np.uint64, noise: Noise, ears: Ears) -> bool:
+def is_silent(at: Reading, i: int, key: np.uint64, noise: NoiseModel, ears: Ears) -> bool:
     """Whether an array of vehicle i is silent at a reading; a silence is over before the next can begin.
 
     ``ears`` is written where a silence is over.
@@ -237,7 +239,7 @@ def is_silent(at: Reading, i: int, key: np.uint64, noise: Noise, ears: Ears) -> 
 
 
 @compiled_inner
-def tell_ranged(w: int, alive: Bool, listening: Listening, noise: Noise, more: SeaFields) -> None:
+def tell_ranged(w: int, alive: Bool, listening: Listening, noise: NoiseModel, more: SeaFields) -> None:
     """Write into the percepts of world w which sub-sectors measure ranges."""
     if more.ranged.shape[2] == 0:
         return

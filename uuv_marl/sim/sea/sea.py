@@ -15,16 +15,24 @@ from uuv_marl.sim.model import Rules
 from uuv_marl.sim.sea.actuation import PLANT, Actuation, Hull, actuation, draw_hulls, integrate_each, weaken
 from uuv_marl.sim.sea.current import (
     Flow,
-    Water,
+    WaterModel,
     advance_gust,
     draw_flow,
     know_velocities,
     read_flow,
     water,
 )
-from uuv_marl.sim.sea.modem import Mail, Modem, draw_mail, exchange, know_mail, modem
-from uuv_marl.sim.sea.navigation import Navigation, Track, draw_track, find_oneself, go_astray, navigate, navigation
-from uuv_marl.sim.sea.noise import Ears, Noise, begin_ears, draw_ears, interrupt, noise, spoil, tell_ranged
+from uuv_marl.sim.sea.modem import Mail, ModemModel, draw_mail, exchange, know_mail, modem
+from uuv_marl.sim.sea.navigation import (
+    NavigationModel,
+    Track,
+    draw_track,
+    find_oneself,
+    go_astray,
+    navigate,
+    navigation,
+)
+from uuv_marl.sim.sea.noise import Ears, NoiseModel, begin_ears, draw_ears, interrupt, noise, spoil, tell_ranged
 from uuv_marl.sim.sea.readings import Hits, Readings, any_due, begin_line, collect, line_sizes, recall, remember, store
 from uuv_marl.sim.sea.schedule import Listening, Reading, due, listening
 from uuv_marl.sim.tables import allocate
@@ -41,18 +49,18 @@ class Sea(NamedTuple):
 
     keys: UInt64
     """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
-    water: Water
+    water: WaterModel
     flow: Flow
     actuation: Actuation
     hull: Hull
     listening: Listening
     readings: Readings
     hits: Hits
-    noise: Noise
+    noise: NoiseModel
     ears: Ears
-    navigation: Navigation
+    navigation: NavigationModel
     track: Track
-    modem: Modem
+    modem: ModemModel
     mail: Mail
 
 
@@ -129,7 +137,7 @@ def drift(w: int, world: World, sea: Sea) -> None:
 
 
 @compiled_inner
-def begin(w: int, world: World, sea: Sea) -> None:
+def begin_sea(w: int, world: World, sea: Sea) -> None:
     """The sea around vehicles as they stand, after a reset or where their states were written by hand."""
     read_flow(w, world.state, sea.water, sea.flow)
     find_oneself(w, sea.track)

@@ -9,10 +9,10 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
-from uuv_marl.baselines.learned.memory_features import RECALLED
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, load_checkpoint, save_checkpoint
+from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES
 from uuv_marl.baselines.learned.network import forward
-from uuv_marl.baselines.learned.trimmed_scout import TrimmedLaw
+from uuv_marl.baselines.learned.trimmed_scout import TrimmedScout
 from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.scout.gains import ScoutGains
@@ -36,14 +36,14 @@ def actor(scale, seed=0):
     rng = np.random.default_rng(seed)
     return [
         Layer(scale * rng.standard_normal((a, b), np.float32), scale * rng.standard_normal(b, np.float32))
-        for a, b in itertools.pairwise((RECALLED, 16, 1))
+        for a, b in itertools.pairwise((NUM_MEMORY_FEATURES, 16, 1))
     ]
 
 
 @pytest.fixture
 def saved(tmp_path):
     def save(scale, **changes):
-        card = Card(percept=rows_of(PerceptLayout.of(load_scenario("tracking"))), features="memory", **changes)
+        card = Card(percept=card_rows(PerceptLayout.of(load_scenario("tracking"))), features="memory", **changes)
         save_checkpoint(tmp_path / f"{scale}" / WEIGHTS_FILE, card, actor(scale))
         return str(tmp_path / f"{scale}")
 
@@ -82,7 +82,7 @@ def test_trimmed_scout_is_its_law_where_nothing_lags():
 def test_the_network_is_asked_only_where_its_output_counts(overrides, saved):
     scenario = granted("scout", load_scenario("random_field", overrides=overrides))
     swarm, policy, asked = Swarm(scenario), make(saved(0.3), scenario), []
-    percept, features = swarm.reset(10_007), np.zeros((1, 12, RECALLED), np.float32)
+    percept, features = swarm.reset(10_007), np.zeros((1, 12, NUM_MEMORY_FEATURES), np.float32)
     for _ in range(100):
         policy.hear(percept)
         action = policy.decide(percept).copy()
@@ -196,7 +196,7 @@ def test_whatever_the_actor_says_the_filter_has_the_last_word(saved):
 
 def test_a_trim_is_a_bounded_factor_of_a_vehicle_s_own_steering():
     scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
-    swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
+    swarm, policy = Swarm(scenario), TrimmedScout(scenario)
     policy.hear(swarm.reset(0))
     policy.memory.response[..., PRODUCTS] = policy.memory.response[..., SQUARES] = 9.0
     quiet = policy.trim(np.zeros((1, 2, 1), np.float32)).copy()
@@ -218,9 +218,9 @@ def test_trims_by_hand():
 @pytest.mark.parametrize("overrides", [FEW, FEW | ROUGH], ids=["calm", "rough"])
 def test_what_an_actor_sees_is_bounded(overrides):
     scenario = granted("scout", load_scenario("random_field", overrides=overrides))
-    swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
-    percept, features = swarm.reset(10_008), np.full((1, 12, RECALLED), np.nan, np.float32)
-    most = np.zeros(RECALLED)
+    swarm, policy = Swarm(scenario), TrimmedScout(scenario)
+    percept, features = swarm.reset(10_008), np.full((1, 12, NUM_MEMORY_FEATURES), np.nan, np.float32)
+    most = np.zeros(NUM_MEMORY_FEATURES)
     for _ in range(400):
         policy.hear(percept)
         policy.look(features)
@@ -230,7 +230,7 @@ def test_what_an_actor_sees_is_bounded(overrides):
         percept = swarm.step(action)
     assert np.isfinite(most).all()
     assert most.max() < 8.0
-    assert (most > 0.0).sum() > RECALLED - 10, "most features say something"
+    assert (most > 0.0).sum() > NUM_MEMORY_FEATURES - 10, "most features say something"
 
 
 def test_what_an_actor_sees_turns_with_the_world():
@@ -239,14 +239,14 @@ def test_what_an_actor_sees_turns_with_the_world():
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     for moved in (False, True):
         scenario = granted("scout", load_scenario("single_obstacle", overrides={"swarm.num_vehicles": 10}))
-        swarm, policy = Swarm(scenario), TrimmedLaw(scenario)
+        swarm, policy = Swarm(scenario), TrimmedScout(scenario)
         swarm.reset(3)
         if moved:
             swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (50.0, -80.0)
             swarm.state.eta[0, :, 2] += turn
             swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (50.0, -80.0)
             swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (50.0, -80.0)
-        features = np.zeros((1, 10, RECALLED), np.float32)
+        features = np.zeros((1, 10, NUM_MEMORY_FEATURES), np.float32)
         policy.hear(swarm.observe())
         policy.look(features)
         seen.append(features)
@@ -258,7 +258,7 @@ def test_refusals_name_what_is_wrong(saved, tmp_path):
     slow = granted(policy, load_scenario("random_field", overrides={"timing.decision_period_s": 1.0}))
     with pytest.raises(PolicyError, match="decides every 0.1 to 0.5 s"):
         make(policy, slow)
-    wrong = Card(percept=rows_of(PerceptLayout.of(load_scenario("tracking"))))
+    wrong = Card(percept=card_rows(PerceptLayout.of(load_scenario("tracking"))))
     save_checkpoint(tmp_path / "wrong" / WEIGHTS_FILE, wrong, actor(0.1))
     with pytest.raises(PolicyError, match="expected float32"):
         load_checkpoint(tmp_path / "wrong")
@@ -298,7 +298,7 @@ def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(tmp_path, monkeypatch
         features = env.observation[env._rows[0], : env.features]
         used = policy.act(percept)
         asked = policy._heeded.reshape(-1)
-        np.testing.assert_array_equal(policy._features.reshape(-1, RECALLED)[asked], features[asked])
+        np.testing.assert_array_equal(policy._features.reshape(-1, NUM_MEMORY_FEATURES)[asked], features[asked])
         seen += asked.sum()
         rows = np.zeros((env.rows, 1), np.float32)
         rows[env._rows[0]] = policy._trims.reshape(-1, 1)
