@@ -45,7 +45,10 @@ class Puppets:
         scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"arrival.dwell_s": 0.3, **overrides})
         self.batch, self.n = BatchedEnv(scenario, reward=reward), n
         self.batch.reset(0)
-        self.swarm, self.end = self.batch.swarm, self.batch.swarm.course.waypoints[0, 0, self.batch.swarm.course.last[0, 0]]
+        self.swarm, self.end = (
+            self.batch.swarm,
+            self.batch.swarm.course.waypoints[0, 0, self.batch.swarm.course.last[0, 0]],
+        )
         self.paid = np.zeros(n)
 
     def put(self, offset, tick=2000):
