@@ -1,4 +1,4 @@
-"""The rewards are sound: they rank policies rightly, and neither dying, nor dawdling, nor going round in circles pays."""
+"""The rewards are sound: they rank policies rightly, and neither dying, nor dawdling, nor circling pays."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,10 @@ class Puppets:
         scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"arrival.dwell_s": 0.3, **overrides})
         self.batch, self.n = BatchedEnv(scenario, reward=reward), n
         self.batch.reset(0)
-        self.swarm, self.end = self.batch.swarm, self.batch.swarm.course.waypoints[0, 0, self.batch.swarm.course.last[0, 0]]
+        self.swarm, self.end = (
+            self.batch.swarm,
+            self.batch.swarm.course.waypoints[0, 0, self.batch.swarm.course.last[0, 0]],
+        )
         self.paid = np.zeros(n)
 
     def put(self, offset, tick=2000):
@@ -138,7 +141,7 @@ def test_the_mean_does_not_depend_on_the_number_of_vehicles(task):
         swarm.put((300.0, 0.0))
         swarm.step()
         swarm.paid[:] = 0.0
-        swarm.swarm.state.eta[0, :, :2] = swarm.end + (200.0, 0.0)
+        swarm.swarm.state.eta[0, :, :2] = swarm.end + np.array([200.0, 0.0])
         swarm.swarm.state.before[0] = swarm.swarm.state.eta[0, :, :2]
         swarm.swarm.facts.was_away[0] = swarm.swarm.facts.away[0] = 300.0
         swarm.step()

@@ -237,14 +237,13 @@ def test_hulls_that_cant_stop_pass_and_others_rest():
 
 def test_swarms_of_the_papers_vehicle_pass_the_end_together_and_are_paid_for_it():
     from uuv_marl.baselines import granted, make
-    from uuv_marl.envs.reward import reward_terms
 
     scenario = granted("bio_inspired_plus", load_scenario("starter", overrides={"arrival.by": "passage"}))
     swarm, policy = Swarm(scenario), make("bio_inspired_plus", scenario)
     percept, paid = swarm.reset(0), 0.0
     while not swarm.ended[0]:
         percept = swarm.step(policy.act(percept))
-        paid += reward_terms(swarm)["arrival"].sum()
+        paid += swarm.task.reward(np.ones(1, np.bool_))["arrival"].sum()
     assert swarm.arrived[0]
     assert swarm.facts.arrival_s[0, 0] == swarm.facts.time_s[0] >= 30.0
     assert math.dist(swarm.facts.centre[0], (120.0, 0.0)) < 10.0

@@ -128,14 +128,14 @@ def test_at_a_goal_at_rest_who_touched_something_has_failed():
     batch.reset(0)
     swarm, goal = batch.swarm, batch.swarm.course.waypoints[0, 0, -1]
     assert (swarm.facts.reference[0, 0] == [*goal, 0.0, 0.0]).all()
-    swarm.state.eta[0, :, :2] = goal + 8.0 * np.stack([np.arange(5), np.zeros(5)], axis=1)
+    swarm.state.eta[0, :, :2] = goal + 7.0 * np.stack([np.arange(5), np.zeros(5)], axis=1)
     swarm.state.nu[0] = 0.0
     swarm.observe()
     swarm.state.touched[0, 2] = True
     result = batch.step(np.zeros((1, 5, 2)))
     assert result.world_terminated[0]
-    assert result.terms["arrival"][0].tolist() == [20.0, 20.0, 20.0, 20.0, 0.0]  # the last is 32 m away
-    assert batch.task.metrics(0) == {"untouched_share": 0.6, "whole": 0.0}
+    assert result.terms["arrival"][0].tolist() == 5 * [20.0]
+    assert batch.task.metrics(0) == {"untouched_share": 0.8, "whole": 0.0}
 
 
 @pytest.mark.parametrize(("task", "message"), [
