@@ -23,7 +23,7 @@ class Transition(NamedTuple):
 
     reward: Float32
     terminated: Bool
-    """The swarm arrived."""
+    """The task is done: the swarm arrived, say."""
     truncated: Bool
     """The episode was cut off."""
     final_obs: Float32
@@ -35,6 +35,7 @@ class EpisodeStats(NamedTuple):
 
     number: float
     arrived: float
+    """How many were a success: in ``follow`` the swarm arrived, in other tasks all vehicles are there untouched."""
     collisions: float
     returns: float
     """Return of each episode, the mean over vehicles."""

@@ -101,7 +101,8 @@ class Group:
     def totals(self, worlds: Bool) -> Float64:
         """Sums over the episodes of worlds that have ended, shape (world,), as ``EpisodeStats`` names them."""
         returns, collisions, decisions = self._sums[worlds].sum(axis=0)
-        return np.array([worlds.sum(), (worlds & self.swarm.arrived).sum(), collisions, returns, decisions])
+        done = sum(self.swarm.task.success(int(w)) for w in np.flatnonzero(worlds))
+        return np.array([worlds.sum(), done, collisions, returns, decisions])
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that ``restore`` needs."""

@@ -7,6 +7,7 @@ from functools import cached_property
 from importlib import resources
 from typing import Annotated, Any, Literal, cast
 
+import numpy as np
 import pydantic
 
 from uuv_marl.baselines.learned.checkpoint import PERIODS_S
@@ -21,8 +22,12 @@ from uuv_marl.paths import user_path
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import assign, plain
 from uuv_marl.scenario.scale import Scale
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks import Follow
+from uuv_marl.tasks.task import paid
 from uuv_marl.train.episodes import Conditions, Episodes
 from uuv_marl.train.reward import Weights
+from uuv_marl.types import Float64
 
 _PERIOD, _LOOP, _LOOP_NMS = "timing.decision_period_s", "actuators.yaw_damping_nms", 600.0
 OVERRIDES: Mapping[str, object] = {_PERIOD: 0.5, _LOOP: _LOOP_NMS}
@@ -215,9 +220,12 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     @cached_property
     def paid(self) -> RewardFunction:
-        """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
+        """What vehicles are paid for a decision. Raises RewardError where it can't be imported.
+
+        Without ``reward`` these are the ``weights`` in ``follow``, and in another task what the task itself pays.
+        """
         if self.reward is None:
-            return self.weights
+            return self.weights if issubclass(self.loaded.task_class, Follow) else own_pay
         try:
             function = named_object(self.reward)
         except ImportError as error:
@@ -225,6 +233,11 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
         if not callable(function):
             raise RewardError(f"reward {self.reward!r} must be a function of the swarm, got {function!r}")
         return cast(RewardFunction, function)
+
+
+def own_pay(swarm: Swarm) -> Float64:
+    """What a swarm's task pays for the latest decision by its first reward, shape (world, vehicle)."""
+    return paid(swarm.task, np.ones(swarm.num_worlds, np.bool_)).reward
 
 
 def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]:

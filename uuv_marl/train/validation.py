@@ -62,7 +62,7 @@ def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
     times = [late for late in map(lateness, metrics) if late is not None]
     return ValidationResult(
         score=-sum(map(validation_cost, metrics)) / len(metrics),
-        arrived=len(times) / len(metrics),
+        arrived=sum(map(succeeded, metrics)) / len(metrics),
         collisions=sum(m["collisions"] for m in metrics),
         lateness_s=sum(times) / len(times) if times else None,
         min_spacing_m=_least(m["min_spacing_m"] for m in metrics),
@@ -71,8 +71,14 @@ def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
 
 
 def validation_cost(metrics: Metrics) -> float:
-    """Cost of an episode [1]: lateness in minutes (2 if it never arrives), 2 with a collision, and short distances."""
+    """Cost of an episode [1]: lateness in minutes (2 if it never arrives), 2 with a collision, and short distances.
+
+    In a task other than ``follow`` lateness gives way to twice the share of vehicles that failed.
+    """
     late = lateness(metrics)
+    own = metrics.get("task", {}).get("untouched_share")
+    if own is not None:
+        late = 120.0 * (1.0 - own)
     total = 2.0 if late is None else min(late / 60.0, 2.0)
     total += 2.0 * min(metrics["collisions"], 1)
     distances = metrics["min_obstacle_distance_m"], metrics["min_spacing_m"]
@@ -80,6 +86,11 @@ def validation_cost(metrics: Metrics) -> float:
         if distance is not None:
             total += min(max(1.0 - distance / safe, 0.0), 1.0)
     return total
+
+
+def succeeded(metrics: Metrics) -> bool:
+    """Whether an episode was a success: the swarm arrived, or in a task other than ``follow`` ``whole`` is 1."""
+    return metrics["task"].get("whole") == 1.0 if "task" in metrics else metrics["task_time_s"] is not None
 
 
 def lateness(metrics: Metrics) -> float | None:
