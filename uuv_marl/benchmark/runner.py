@@ -9,6 +9,7 @@ from rich.table import Table as RichTable
 
 from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import granted
+from uuv_marl.baselines.registry import OWN, is_trained
 from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import ResultRow, Results
@@ -30,6 +31,13 @@ from uuv_marl.tasks import Follow
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "ppo", "trimmed_scout")
 """The paper's Table 2, the safest hand-made law, and the learned policies of 0.1.0 and of today; all others by name."""
+
+
+def default_policies(scenarios: Sequence[Scenario]) -> list[str]:
+    """``DEFAULT_POLICIES``; where scenarios fix the clocks for all, the laws among them at their own clocks, too."""
+    fixed = all(scenario.timing.fixed for scenario in scenarios)
+    return [*DEFAULT_POLICIES, *(OWN + name for name in DEFAULT_POLICIES if fixed and not is_trained(name))]
+
 
 Report = Callable[[str, str, float], None]
 """Called with scenario, policy and the share of that pair's work that is done."""

@@ -9,10 +9,10 @@ from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
 from uuv_marl.baselines.policy import Policy, inner_loop_nms
-from uuv_marl.baselines.registry import channels_in, is_trained
+from uuv_marl.baselines.registry import OWN, channels_in, is_trained
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import Knowledge, ResultRow, Results
-from uuv_marl.scenario import differences
+from uuv_marl.scenario import Scenario, differences
 from uuv_marl.tasks import Task
 from uuv_marl.types import Float64
 
@@ -120,9 +120,8 @@ def table_rows(results: Results, scenario: str, policies: Sequence[str], seeds: 
         if runs:
             paper = PAPER.get((scenario, policy)) if as_in_paper else None
             known = results.policies[policy]
-            damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, loaded)
-            told = known["channels"] if is_trained(policy) else channels_in(loaded, known["channels"])
-            rows.append(_cells(policy, {**known, "channels": told, "yaw_damping_nms": damping}, runs, paper))
+            knows = _knows(loaded, policy, known)
+            rows.append(_cells(policy, knows, runs, paper))
     return rows
 
 
@@ -169,12 +168,12 @@ def task_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]
     return table
 
 
-def _cells(policy: str, known: Knowledge, runs: Sequence[ResultRow], paper: PaperFigure | None) -> TableRow:
+def _cells(policy: str, knows: str, runs: Sequence[ResultRow], paper: PaperFigure | None) -> TableRow:
     """A policy's row.
 
     Args:
         policy: its name.
-        known: what it has beyond the percept, on the scenario's vehicle.
+        knows: what it has beyond the percept, on the scenario's vehicle.
         runs: its runs, at least one.
         paper: what the paper says of it, if anything.
     """
@@ -186,7 +185,7 @@ def _cells(policy: str, known: Knowledge, runs: Sequence[ResultRow], paper: Pape
 
     return TableRow(
         policy=policy,
-        knows=_knows(known),
+        knows=knows,
         arrived=f"{len(times)}/{len(runs)}",
         time=estimate_text(times, ".1f"),
         slowest=f"{max(times):.1f}" if times else _NOTHING,
@@ -213,9 +212,16 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def _knows(known: Knowledge) -> str:
-    damping = known["yaw_damping_nms"]
-    return ", ".join([*known["channels"], *([f"yaw damping {damping:g} N m s"] if damping else [])]) or _NOTHING
+def _knows(scenario: Scenario, policy: str, known: Knowledge) -> str:
+    """What a policy has beyond the percept on a scenario, and beyond what all others have there."""
+    told = list(known["channels"] if is_trained(policy) else channels_in(scenario, known["channels"]))
+    own = policy.startswith(OWN)
+    if scenario.timing.fixed and own:
+        told.append(f"a decision every {scenario.timing.control_hold_s:g} s")
+    damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, scenario)
+    if damping and (own or not scenario.timing.fixed):
+        told.append(f"yaw damping {damping:g} N m s")
+    return ", ".join(told) or _NOTHING
 
 
 def _paper_cell(paper: PaperFigure | None) -> str:

@@ -83,7 +83,7 @@ def benchmark(
         names = [loaded.name for loaded in scenarios]
         if len(set(names)) < len(names):
             raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
-        policies = list(dict.fromkeys(policy or runner.DEFAULT_POLICIES))
+        policies = list(dict.fromkeys(policy or runner.default_policies(scenarios)))
         for name, loaded in itertools.product(policies, scenarios):
             make(name, granted(name, loaded))  # refused now, not after hours of others' runs
         evaluator, cluster = evaluator_at(ray, policies)
