@@ -65,13 +65,13 @@ def test_render(scenario_name):
 
 
 def test_the_module_form():
-    from uuv_marl import uuv_swarm_v0
+    from uuv_marl import uuv_swarm_v1
 
-    env = uuv_swarm_v0.parallel_env()
-    assert env.metadata["name"] == "uuv_swarm_v0"
+    env = uuv_swarm_v1.parallel_env()
+    assert env.metadata["name"] == "uuv_swarm_v1"
     assert env.possible_agents == [f"uuv_{i}" for i in range(54)]
-    assert isinstance(env, uuv_swarm_v0.raw_env)
-    assert str(uuv_swarm_v0.env().unwrapped) == "uuv_swarm_v0"
+    assert isinstance(env, uuv_swarm_v1.raw_env)
+    assert str(uuv_swarm_v1.env().unwrapped) == "uuv_swarm_v1"
 
 
 def episode(env, policy=None, seed=3, limit=None, action_seed=0):
@@ -310,7 +310,7 @@ def test_what_is_no_action_is_refused_by_name(action, message):
     with pytest.raises(ValueError, match=f"the action of uuv_1 {message}"):
         env.step({**good, "uuv_1": action})
     assert env.swarm.facts.time_s[0] == 0.0
-    alone = gymnasium.make("uuv_marl/Solo-v0", num_vehicles=3).unwrapped
+    alone = gymnasium.make("uuv_marl/Solo-v1", num_vehicles=3).unwrapped
     alone.reset(seed=0)
     with pytest.raises(ValueError, match=f"the action {message}"):
         alone.step(action)
@@ -394,7 +394,7 @@ ENDINGS = {
 def test_the_last_info_tells_how_it_ended(reason):
     scenario = load_scenario("lossy", num_vehicles=4, overrides={**ENDINGS[reason], "timing.decision_period_s": 0.5})
     env, whole = uuv_marl.parallel_env(scenario), uuv_marl.vector_env(1, scenario)
-    solo = gymnasium.make("uuv_marl/Solo-v0", scenario=scenario, others="bio_inspired").unwrapped
+    solo = gymnasium.make("uuv_marl/Solo-v1", scenario=scenario, others="bio_inspired").unwrapped
     policy = make("bio_inspired", env)
     observations, _ = env.reset(seed=4)
     whole.reset(seed=4)

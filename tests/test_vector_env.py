@@ -253,7 +253,7 @@ def test_wrappers_that_change_observations_work_where_gymnasium_lets_them(mode):
 def test_solo_in_gymnasiums_own_vectoriser_tells_how_it_ended(mode):
     options = {"scenario": "random_field", "num_vehicles": 4, "decision_period": 0.5, "max_cycles": 3}
     envs = gymnasium.make_vec(
-        "uuv_marl/Solo-v0",
+        "uuv_marl/Solo-v1",
         2,
         vectorization_mode="sync",
         vector_kwargs={"autoreset_mode": AutoresetMode(mode)},
@@ -342,14 +342,14 @@ def test_bad_actions_and_order():
 
 
 def test_registries():
-    made = gymnasium.make_vec("uuv_marl/Swarm-v0", num_envs=2, scenario="tracking", num_vehicles=3)
+    made = gymnasium.make_vec("uuv_marl/Swarm-v1", num_envs=2, scenario="tracking", num_vehicles=3)
     assert made.observation_space.shape == (2, 3, 98)
-    assert made.spec.id == "uuv_marl/Swarm-v0"
-    solo = gymnasium.make("uuv_marl/Solo-v0", num_vehicles=3)
+    assert made.spec.id == "uuv_marl/Swarm-v1"
+    solo = gymnasium.make("uuv_marl/Solo-v1", num_vehicles=3)
     assert solo.observation_space.shape == (98,)
-    parallel = pettingzoo.make("parallel", "uuv_marl/uuv_swarm_v0", num_vehicles=3, max_cycles=7)
+    parallel = pettingzoo.make("parallel", "uuv_marl/uuv_swarm_v1", num_vehicles=3, max_cycles=7)
     assert parallel.max_cycles == 7
-    assert pettingzoo.make("aec", "uuv_marl/uuv_swarm_v0", num_vehicles=3).max_num_agents == 3
+    assert pettingzoo.make("aec", "uuv_marl/uuv_swarm_v1", num_vehicles=3).max_num_agents == 3
 
 
 def test_importing_twice_registers_once():
@@ -358,7 +358,7 @@ def test_importing_twice_registers_once():
 
 
 def solo(others="bio_inspired", **kwargs):
-    return gymnasium.make("uuv_marl/Solo-v0", others=others, **{"num_vehicles": 6, **kwargs})
+    return gymnasium.make("uuv_marl/Solo-v1", others=others, **{"num_vehicles": 6, **kwargs})
 
 
 @pytest.mark.parametrize("others", ["bio_inspired", "sdc", "random"])
@@ -535,11 +535,11 @@ def test_numbers_below_float32s_range_are_zero_whatever_numpy_is_told(action):
 
 def test_a_spec_with_a_scenario_goes_through_json():
     scenario = uuv_marl.load_scenario("starter", overrides={"current.speed_mps": 0.5})
-    one = gymnasium.make("uuv_marl/Solo-v0", scenario=scenario, max_episode_steps=5)
+    one = gymnasium.make("uuv_marl/Solo-v1", scenario=scenario, max_episode_steps=5)
     again = gymnasium.make(EnvSpec.from_json(one.spec.to_json()))
     assert again.unwrapped.scenario == one.unwrapped.scenario
     assert again.spec.max_episode_steps == 5
-    many = gymnasium.make_vec("uuv_marl/Swarm-v0", 2, scenario=scenario)
+    many = gymnasium.make_vec("uuv_marl/Swarm-v1", 2, scenario=scenario)
     assert gymnasium.make_vec(EnvSpec.from_json(many.spec.to_json())).scenario == scenario
     with pytest.raises(ScenarioError, match="swarm.num_vehicles must be a whole number, got 'x'"):
         uuv_marl.load_scenario({**scenario.model_dump(), "swarm": {"num_vehicles": "x"}})

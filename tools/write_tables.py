@@ -8,7 +8,7 @@ from pathlib import Path
 import uuv_marl
 from research.dynamics import acceptance, sea_trials
 from research.episodes import read_rows
-from uuv_marl import load_scenario, scenario_names, uuv_swarm_v0
+from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.reward import TERMS
@@ -105,7 +105,7 @@ TABLES = filled() | {
     "stability": rows(acceptance.stability()),
     "scales": rows(sea_trials.scales()),
     "sea_trials": rows(sea_trials.table(TRIALS)),
-    "history": table(("version", "what changed"), list(uuv_swarm_v0.HISTORY.items())),
+    "history": table(("version", "what changed"), list(uuv_swarm_v1.HISTORY.items())),
 }
 """The tables by the names of their marks."""
 

@@ -2,7 +2,7 @@
 
 ``parallel_env()``, ``env()`` and ``vector_env(num_envs)`` make environments, ``load_scenario(name)`` a configuration,
 ``baselines.make(name, env)`` a controller. ``uuv-marl --help`` shows the command line. Importing registers
-``uuv_marl/Swarm-v0`` and ``uuv_marl/Solo-v0`` with Gymnasium, and ``uuv_marl/uuv_swarm_v0`` with PettingZoo.
+``uuv_marl/Swarm-v1`` and ``uuv_marl/Solo-v1`` with Gymnasium, and ``uuv_marl/uuv_swarm_v1`` with PettingZoo.
 """
 
 import importlib
@@ -13,7 +13,7 @@ from uuv_marl.envs import registration
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from uuv_marl import baselines, uuv_swarm_v0
+    from uuv_marl import baselines, uuv_swarm_v1
     from uuv_marl.envs.parallel_env import env, parallel_env
     from uuv_marl.envs.vector_env import vector_env
     from uuv_marl.scenario import load_scenario, scenario_names
@@ -25,7 +25,7 @@ __all__ = [
     "load_scenario",
     "parallel_env",
     "scenario_names",
-    "uuv_swarm_v0",
+    "uuv_swarm_v1",
     "vector_env",
 ]
 
@@ -42,7 +42,7 @@ def __getattr__(name: str) -> Any:
     """Import on first use, so that ``import uuv_marl`` is quick and needs only what is used."""
     if name in _HOMES:
         return getattr(importlib.import_module(_HOMES[name]), name)
-    if name in ("baselines", "uuv_swarm_v0"):
+    if name in ("baselines", "uuv_swarm_v1"):
         return importlib.import_module(f"uuv_marl.{name}")
     raise AttributeError(f"module 'uuv_marl' has no attribute {name!r}")
 

@@ -16,7 +16,7 @@ with extra("distributed", "SwarmMultiAgentEnv"):
     from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
 
 
-ENV_NAME = "uuv_swarm_v0"
+ENV_NAME = "uuv_swarm_v1"
 """The name under which ``register`` makes the environment known."""
 
 

@@ -47,7 +47,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form
-        "name": "uuv_swarm_v0",
+        "name": "uuv_swarm_v1",
         "autoreset_mode": AutoresetMode.SAME_STEP,
         "render_modes": ["rgb_array"],
     }

@@ -1,4 +1,4 @@
-"""PettingZoo's module form of the environment: ``from uuv_marl import uuv_swarm_v0``."""
+"""PettingZoo's module form of the environment: ``from uuv_marl import uuv_swarm_v1``."""
 
 from uuv_marl.envs.parallel_env import SwarmParallelEnv as raw_env
 from uuv_marl.envs.parallel_env import env, parallel_env
