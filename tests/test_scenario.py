@@ -308,7 +308,9 @@ def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
 
 def test_light_commands_import_nothing_heavy():
     code = (
-        "import sys; from typer.testing import CliRunner; from uuv_marl.cli import app\n"
+        "import sys; from typer.testing import CliRunner; from uuv_marl.baselines import POLICIES\n"
+        "assert not any('checkpoint' in vars(policy) for policy in POLICIES.values()), 'weights were read'\n"
+        "from uuv_marl.cli import app\n"
         "for what in ('scenarios', 'policies'): assert CliRunner().invoke(app, ['list', what]).exit_code == 0\n"
         "assert not {'matplotlib', 'scipy.stats'} & set(sys.modules)"
     )
