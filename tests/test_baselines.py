@@ -27,12 +27,6 @@ def test_the_default_gains_are_table_1():
     assert GAINS.feed_forward == 0.0
 
 
-def test_neighbours_at_60_m_neither_attract_nor_repel():
-    f_x, f_y, _ = bio_inspired.neighbour_force(36.0, 48.0, GAINS)
-    assert math.hypot(f_x, f_y) < 1e-9
-    assert bio_inspired.neighbour_force(59.0, 0.0, GAINS)[0] < 0 < bio_inspired.neighbour_force(61.0, 0.0, GAINS)[0]
-
-
 @given(st.floats(-400, 400), st.floats(-400, 400))
 def test_pair_forces_are_central_and_opposite(x, y):
     a = bio_inspired.neighbour_force(x, y, GAINS)
@@ -204,46 +198,6 @@ def test_slots_are_assigned_so_that_ways_are_short():
     np.testing.assert_allclose(policy.memory.slots[0], slots, atol=1e-9)
 
 
-def test_policies_that_remember_forget_on_reset():
-    for name in ("sff", "sdc", "scout", "guarded:mappo", "random"):
-        scenario = granted(name, load_scenario("single_obstacle", num_vehicles=9))
-        swarm, policy = Swarm(scenario), make(name, scenario)
-        runs = []
-        for _ in range(2):
-            percept = swarm.reset(4)
-            policy.reset(4)
-            for _ in range(30):
-                percept = swarm.step(policy.act(percept))
-            runs.append(swarm.state.eta.tobytes())
-        assert runs[0] == runs[1], name
-
-
-@pytest.mark.parametrize(("name", "channel"), [("sff", "link"), ("sdc", "compass and link")])
-def test_a_policy_without_its_channels_names_the_remedy(name, channel):
-    with pytest.raises(PolicyError, match=f"{channel} .sonar.channels.*use uuv_marl.baselines.granted"):
-        make(name, load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="granted"):
-        make(name, parallel_env("tracking"))
-
-
-def test_a_policy_refuses_another_inner_loop():
-    with pytest.raises(PolicyError, match="yaw damping of 600 .*actuators.yaw_damping_nms.*granted"):
-        make("bio_inspired_plus", load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="yaw damping of 0"):
-        make("bio_inspired", granted("bio_inspired_plus", load_scenario("tracking")))
-
-
-def test_unknown_names_and_parameters_suggest():
-    with pytest.raises(PolicyError, match="did you mean 'bio_inspired'"):
-        make("bio_inspred", load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="made for a Scenario"):
-        make("bio_inspired", "tracking")
-    with pytest.raises(PolicyError, match="num_worlds must be at least 1"):
-        make("bio_inspired", load_scenario("tracking"), 0)
-    with pytest.raises(PolicyError, match="no parameter .gain.; did you mean .gains.. It has gains, obstacle_term"):
-        make("bio_inspired", load_scenario("tracking"), gain=3)
-
-
 @pytest.mark.parametrize("name", SPACES)
 def test_tuned_gains_come_from_shipped_trials(name):
     data = json.loads((resources.files("uuv_marl.baselines") / "tuned" / f"{name}.json").read_text())
@@ -333,31 +287,39 @@ def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
         assert make("scout", scenario, preset=name).gains == preset.gains
 
 
+class Nothing(Policy):
+    """Decides nothing."""
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [
+        ("sff", "link .sonar.channels.*use uuv_marl.baselines.granted"),
+        ("sdc", "compass and link .sonar.channels.*use uuv_marl.baselines.granted"),
+        ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*granted"),
+        ("tests.test_baselines:Nothing", r"policy '.*Nothing' must define decide\(percept\)"),
         ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
         ("bio_inspired,zeta_n=x", "the gain zeta_n must be a finite number, got 'x'"),
         ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
         ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
         ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, got 'bold'"),
-        ("idle,gain=1", "has no parameter 'gain'; It has none"),
         ("guarded:bio_insp", "did you mean 'bio_inspired'"),
-        ("bio_insp,zeta_n=1", "did you mean 'bio_inspired'"),
     ],
 )
 def test_a_name_that_means_nothing_is_explained(name, message):
     with pytest.raises(PolicyError, match=message):
         make(name, load_scenario("starter"))
+    with pytest.raises(PolicyError, match=message):
+        make(name, parallel_env("starter"))
 
 
-def test_a_policy_that_decides_nothing_is_refused_when_it_is_made():
-    class Nothing(Policy):
-        pass
-
-    with pytest.raises(PolicyError, match=r"policy 'Nothing' must define decide\(percept\)"):
-        Nothing(load_scenario("starter"))
+def test_what_a_policy_cannot_be_made_for_is_explained():
+    damped = granted("bio_inspired_plus", load_scenario("tracking"))
+    for arguments, message in (((damped,), "yaw damping of 0"), (("tracking",), "made for a Scenario"),
+                               ((load_scenario("tracking"), 0), "num_worlds must be at least 1")):  # fmt: skip
+        with pytest.raises(PolicyError, match=message):
+            make("bio_inspired", *arguments)
 
 
 @pytest.mark.parametrize(

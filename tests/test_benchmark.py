@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.evaluate import Progress, Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, ResultsError
-from uuv_marl.benchmark.tables import CAPTION, HEADERS, estimate, markdown_table, table_rows
+from uuv_marl.benchmark.tables import estimate
 from uuv_marl.cli import app
 
 QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
@@ -24,15 +24,6 @@ def quick(name="single_obstacle"):
 
 def runs_of(scenario, policy, seeds):
     return {run.seed: run for run in evaluate(granted(policy, scenario), policy, seeds) if isinstance(run, Run)}
-
-
-def test_seeds_may_be_numpys(tmp_path):
-    scenario = quick("starter")
-    results = Results(tmp_path, [scenario])
-    for run in evaluate(scenario, "idle", np.arange(2)):
-        if isinstance(run, Run):
-            results.add("starter", "idle", run)
-    assert [row.seed for row in Results(tmp_path, [scenario]).rows] == [0, 1]
 
 
 def test_metrics_are_those_of_the_series(monkeypatch):
@@ -94,13 +85,6 @@ def test_long_routes_are_thinned_in_time_and_keep_start_and_end(monkeypatch):
     assert thin.metrics == whole.metrics
 
 
-def test_never_arriving_and_no_obstacles_are_null():
-    metrics = runs_of(quick("tracking"), "idle", [0])[0].metrics
-    assert metrics["task_time_s"] is None
-    assert metrics["min_obstacle_distance_m"] is None
-    json.dumps(metrics, allow_nan=False)
-
-
 def test_a_swarm_that_is_lost_keeps_no_constraint():
     close = {"contact.ends_vehicle": True, "contact.hull_radius_m": 6.0, "constraints.s_l_m": 5000.0}
     scenario = load_scenario("tracking", overrides={**QUICK, **close, "swarm.num_vehicles": 40})
@@ -108,12 +92,6 @@ def test_a_swarm_that_is_lost_keeps_no_constraint():
         json.dumps(metrics, allow_nan=False)
         if metrics["vehicles_lost"] == 40:
             assert metrics["constraint_share"]["s_l"] < 1.0
-
-
-def test_progress_rises_to_the_end():
-    shares = [e.share for e in evaluate(quick(), "idle", list(range(40))) if isinstance(e, Progress)]
-    assert shares == sorted(shares)
-    assert 0 < shares[0] < shares[-1] <= 1
 
 
 def test_the_estimate_is_the_interquartile_mean_with_its_interval():
@@ -199,30 +177,6 @@ def test_your_own_policy_stands_in_the_table(tmp_path, monkeypatch):
     assert "before its file changed" in " ".join(done.output.split())
 
 
-def test_the_table_says_what_was_changed_and_then_leaves_the_paper_out():
-    assert "CHANGED" not in runner.title(load_scenario("single_obstacle"), [0])
-    changed = load_scenario("single_obstacle", overrides={"obstacles": [], "vehicle.m_kg": 190.0})
-    text = runner.title(changed, [0])
-    assert "vehicle.m_kg=190.0" in text
-    assert "obstacles=[]" in text
-
-
-def test_the_table_shows_the_paper_and_what_each_policy_knows(tmp_path, monkeypatch):
-    scenario = load_scenario("single_obstacle", overrides={"time_limit.factor": 0.02, "time_limit.extra_s": 5.0})
-    monkeypatch.setattr("uuv_marl.benchmark.tables.differences", lambda scenario: [])
-    results = Results(tmp_path, [scenario])
-    policies = ["bio_inspired", "sdc", "idle"]
-    runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
-    rows = table_rows(results, scenario.name, policies, [0, 1])
-    text = markdown_table(HEADERS, rows)
-    assert [len(row) for row in rows] == [len(HEADERS)] * 3
-    assert "205 s, 10.48-12.63 m" in text
-    assert "206 s, 4.2 m" in text
-    assert "compass, link, yaw damping 600 N m s" in text
-    assert "0/2" in text
-    assert "reconstructions" in CAPTION
-
-
 def test_the_command_line_from_end_to_end(tmp_path):
     arguments = ["benchmark", "--scenario=lossy", "--scenario=tracking", "--policy=bio_inspired", "--policy=random"]
     arguments += ["--seeds=3", f"--output={tmp_path}", *SETS, "--set=disturbance.loss_times_s=[1.0, 2.0]"]
@@ -268,21 +222,6 @@ def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path
     assert done.exit_code == 2
     assert message in " ".join(done.output.split())
     assert "Traceback" not in done.output
-
-
-def test_lists_and_help():
-    for arguments in (
-        ["--help"],
-        ["benchmark", "--help"],
-        ["list"],
-        ["list", "policies"],
-        ["--version"],
-        ["tune", "--help"],
-    ):
-        assert CliRunner().invoke(app, arguments).exit_code == 0
-    shown = CliRunner().invoke(app, ["list", "--show", "random_field"]).output
-    assert "Repoulias" in shown
-    assert "[random_field]" in shown
 
 
 @pytest.mark.needs("optuna")

@@ -79,15 +79,6 @@ def test_the_field_is_zero_at_the_goal_though_an_obstacle_is_near():
     assert policy.act(percept)[0, 0, 0] < 0.0
 
 
-def test_the_field_is_bounded_and_what_was_cut_is_counted():
-    scenario, percept = seen("apf", 2)
-    percept["heard"][0, 0, 3] = 1.0  # a neighbour at the very same place
-    percept["echo"][0, 1, 3] = 1.0  # an obstacle's surface
-    policy = make("apf", scenario, gains=APF)
-    assert np.isfinite(policy.act(percept)).all()
-    assert policy.clamps.tolist() == [2]
-
-
 # Olfati-Saber's flocking
 
 
@@ -137,14 +128,6 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
     place = swarm.state.eta[0, :, :2]
     away = np.sort(np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)), axis=1)
     np.testing.assert_allclose(away[:, 1:3], spacing, rtol=0.02)  # at a corner a vehicle has two
-
-
-def test_obstacles_repel_up_to_their_range():
-    ranges = np.array([1.0, 5.0, 20.0, 36.0, 39.0, 40.0, 60.0])
-    forces = [olfati_saber.obstacle_repulsion(reach, FLOCK) for reach in ranges]
-    assert all(force > 0.0 for force in forces[:5])
-    assert forces[5:] == [0.0, 0.0]
-    assert max(forces) < 2.0 * FLOCK.obstacle / math.sqrt(olfati_saber.EPSILON)
 
 
 def beta_velocity(p, v, centre, radius):
@@ -248,14 +231,6 @@ def test_two_that_meet_head_on_swerve_to_the_same_side_and_share(offset):
     np.testing.assert_allclose(actions[0], expected / max(1.0, np.hypot(*expected)), atol=1e-5)
 
 
-def test_the_wish_is_taken_where_nothing_is_near():
-    scenario, percept = seen("orca_informed")
-    percept["velocity"][0, 0] = percept["reference_velocity"][0, 0] = (3.0, 0.0)
-    policy = make("orca_informed", scenario, gains=ORCA)
-    drag = (policy.limits.X_u + 3.0 * policy.limits.X_uu) * 3.0
-    np.testing.assert_allclose(policy.act(percept)[0, 0], (drag / policy.limits.max_force, 0.0), rtol=1e-6)
-
-
 @pytest.mark.parametrize("reports", ["centre", "surface"])
 def test_an_obstacle_ahead_is_not_driven_at(reports):
     """The vehicle takes the whole change: nobody shares it."""
@@ -267,3 +242,12 @@ def test_an_obstacle_ahead_is_not_driven_at(reports):
     percept["echo_position"][0, 0, 3] = (32.0 if reports == "centre" else 12.0, 0.0)
     after = policy.act(percept)[0, 0]
     assert after[0] < before[0]
+
+
+def test_the_field_is_bounded_and_what_was_cut_is_counted():
+    scenario, percept = seen("apf", 2)
+    percept["heard"][0, 0, 3] = 1.0  # a neighbour at the very same place
+    percept["echo"][0, 1, 3] = 1.0  # an obstacle's surface
+    policy = make("apf", scenario, gains=APF)
+    assert np.isfinite(policy.act(percept)).all()
+    assert policy.clamps.tolist() == [2]

@@ -161,18 +161,6 @@ def test_state_changed_by_hand_is_checked():
         swarm.observe()
 
 
-@pytest.mark.parametrize("seed", [1.5, "1", True, [0, 1.5], [0, "1"], (1 + 2j, 0), object()])
-def test_a_seed_is_a_whole_number(seed):
-    swarm = Swarm(load_scenario("tracking", num_vehicles=2), 2)
-    for reset in (swarm.reset, make("random", swarm.scenario, 2).reset):
-        with pytest.raises(TypeError, match="seed must be a whole number from 0"):
-            reset(seed)
-        with pytest.raises(ValueError, match="seed must be a whole number from 0"):
-            reset([-1, 2])
-        with pytest.raises(ValueError, match="one seed for each of 2 worlds"):
-            reset([1, 2, 3])
-
-
 @pytest.fixture
 def runaway(monkeypatch):
     """A vehicle that Runge-Kutta can't follow, as if the scenario's check had missed it: no damping but a pump."""
@@ -328,7 +316,7 @@ QUICK = (
     "benchmark", "--scenario=starter", "--set=time_limit.factor=0.02", "--set=swarm.num_vehicles=2", "--policy=idle",
     "--seeds=1",
 )  # fmt: skip
-LEGACY = ("ascii", "latin-1", "iso8859-15", "cp437", "cp850", "cp1251", "cp932", "cp936", "cp949")
+LEGACY = ("ascii", "latin-1", "cp437", "cp932")
 
 
 @pytest.fixture
@@ -353,19 +341,13 @@ def printed(monkeypatch):
 def test_lists_help_and_errors_can_be_printed_in_any_encoding(encoding, printed):
     for name in COMMANDS:
         assert printed([*name.split(), "--help"], encoding)[0] == 0, name
-    for arguments, word in (("list policies", "scout"), ("list scenarios", "starter"), ("list --show=lossy", "loss")):
+    for arguments, word in (("list policies", "scout"), ("list scenarios", "starter"), ("list vehicles", "remus100")):
         status, text, _ = printed(arguments.split(), encoding)
         assert status == 0
         assert word in text
     status, _, error = printed(["benchmark", "--policy=μ–→"], encoding)
     assert status == 2
     assert "is unknown" in error
-
-
-def test_vehicles_can_be_printed_in_plain_ascii(printed):
-    status, text, _ = printed(["list", "vehicles"], "ascii")
-    assert status == 0
-    assert "remus100" in text
 
 
 @pytest.mark.parametrize("encoding", LEGACY)
@@ -386,8 +368,7 @@ def test_a_table_fits_a_notebook(tmp_path):
 
 def test_commands_work_without_docstrings(tmp_path):
     """``python -OO`` drops them, and every assert."""
-    lines = [["list"], ["list", "--show=lauv"]]
-    lines += [[*name.split(), "--help"] for name in COMMANDS]
+    lines = [["list"], ["list", "--show=lauv"], ["train", "--help"]]
     code = f"""import sys
 from uuv_marl.cli import main
 for arguments in {lines!r}:

@@ -10,7 +10,7 @@ import pytest
 from onnx.reference import ReferenceEvaluator
 from typer.testing import CliRunner
 
-from uuv_marl import load_scenario, parallel_env
+from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
@@ -79,19 +79,6 @@ def test_the_model_acts_as_the_policy_in_the_water(name, scale, tmp_path):
     expect_the_same(model, policy, flat)
 
 
-def test_it_takes_what_the_environment_gives(tmp_path):
-    scenario = load_scenario("tracking", num_vehicles=7)
-    best = saved(tmp_path, scenario, 0.3)
-    env = parallel_env(granted(best, scenario))
-    model, policy = exported(best, scenario, tmp_path), make(best, env)
-    observations, _ = env.reset(seed=3)
-    for _ in range(5):
-        wanted = policy(observations)
-        (actions,) = model.run(None, {"observation": np.stack(list(observations.values()))})
-        np.testing.assert_allclose(actions, list(wanted.values()), rtol=0, atol=1e-5)
-        observations, *_ = env.step(dict(zip(observations, actions, strict=True)))
-
-
 @pytest.mark.parametrize("arrays", [None, [BOW, RING], [RING]])
 @pytest.mark.parametrize("barrier", [BARRIER, BioInspiredGains(zeta_n=0.8, delta_n=2.0, zeta_o=0.3, delta_o=5.0)])
 def test_hostile_percepts(arrays, barrier, scale, tmp_path):
@@ -116,21 +103,6 @@ def test_hostile_percepts(arrays, barrier, scale, tmp_path):
     if scale == 0.0:
         assert not action[:20].any(), "nothing heard, no barrier"
         assert action[20:].any(axis=1).mean() > 0.4
-
-
-def test_forces_that_nearly_cancel(tmp_path):
-    """Neighbours ahead and astern at nearly one distance: what is left of large forces is the policy's too."""
-    scenario = load_scenario("tracking")
-    best = saved(tmp_path, scenario, 0.0)
-    scenario = granted(best, scenario)
-    model, policy, rng = exported(best, scenario, tmp_path), make(best, scenario), np.random.default_rng(5)
-    percept = Percept(np.zeros((200, policy.layout.size), np.float32), policy.layout)
-    distance = rng.uniform(1.5, 50.0, (200, 1))
-    percept["heard"][:, :2] = 1.0
-    percept["neighbour"][:, 0] = distance * (0.6, 0.8)
-    percept["neighbour"][:, 1] = distance * (1.0 + rng.choice([0.0, 1e-7, 1e-4, 1e-2], (200, 1))) * (-0.6, -0.8)
-    action = expect_the_same(model, policy, percept.flat)
-    assert 0.0 < np.median(np.hypot(*action.T)) < 1.0
 
 
 def test_the_file_says_what_it_is(tmp_path):

@@ -1,8 +1,5 @@
 """Films and stills of recordings: what they show, how they are written, and what is refused."""
 
-import sys
-from pathlib import Path
-
 import av
 import numpy as np
 import pytest
@@ -11,8 +8,8 @@ from PIL import Image
 from uuv_marl import load_scenario
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.scene import TRAIL_S
-from uuv_marl.errors import MissingExtraError, ReplayError, ResultsError
-from uuv_marl.replay.film import check_format, write_film
+from uuv_marl.errors import ReplayError, ResultsError
+from uuv_marl.replay.film import write_film
 from uuv_marl.replay.record import record
 from uuv_marl.replay.recording import Event
 from uuv_marl.replay.scenes import Scenes
@@ -97,16 +94,6 @@ def test_a_gif_is_small_and_lasts_as_long_as_it_says(starter, tmp_path):
     assert {ink.BLUE, ink.DISC, ink.GREEN} <= colours
 
 
-def test_the_clock_is_the_same_for_all_and_the_last_picture_is_the_end(starter, tmp_path, monkeypatch):
-    times = []
-    at = Scenes.at
-    monkeypatch.setattr(Scenes, "at", lambda self, time: times.append(time) or at(self, time))
-    write_film(starter, tmp_path / "a.gif", speed=20.0)
-    assert times[::2] == times[1::2]
-    assert np.allclose(np.diff(times[::2]), 20.0 / 8)
-    assert max(float(recording.time_s[-1]) for recording in starter) <= times[-1]
-
-
 def test_an_mp4_plays(starter, tmp_path):
     write_film(starter[:1], tmp_path / "a.mp4", speed=10.0, size=(640, 480), sonar_of=1, camera="map")
     with av.open(str(tmp_path / "a.mp4")) as film:
@@ -151,13 +138,6 @@ def test_what_can_not_be_filmed_is_refused_before_anything_is_written(starter, t
     assert not list(tmp_path.iterdir())
 
 
-def test_a_missing_encoder_is_named_with_its_extra_before_the_episode_runs(monkeypatch):
-    monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(MissingExtraError, match=r"an .mp4 needs av, .* pip install 'uuv_marl\[render\]'"):
-        check_format(Path("a.mp4"))
-    assert check_format(Path("A.GIF")) == ".gif"
-
-
 def test_a_film_is_written_whole_or_not_at_all(starter, tmp_path):
     old = tmp_path / "a.gif"
     old.write_bytes(b"old")
@@ -174,20 +154,3 @@ def test_a_film_is_written_whole_or_not_at_all(starter, tmp_path):
     for suffix in (".gif", ".mp4", ".png"):
         with pytest.raises(ResultsError, match="can't be written"):
             write_film(starter, old / f"b{suffix}")
-
-
-def test_a_trace_without_spacing_and_events_can_be_filmed(lossy, tmp_path):
-    bare = lossy._replace(force=None, spacing=None, events=[], series={**lossy.series})
-    bare.series.pop("collisions")
-    write_film([bare], tmp_path / "a.png")
-    assert (tmp_path / "a.png").stat().st_size > 10_000
-
-
-@pytest.mark.docs
-def test_the_film_of_the_first_screen_is_small_and_fits():
-    path = Path(__file__).parent.parent / "docs" / "figures" / "side_by_side.gif"
-    assert path.stat().st_size < 1_000_000
-    with Image.open(path) as film:
-        assert film.width <= 830
-        assert film.n_frames > 60
-    assert f"--output docs/figures/{path.name}" in (path.parent.parent.parent / "README.md").read_text()

@@ -1,7 +1,5 @@
 """Identification: its space, its errors, its search, and the result that ships."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from research.columns import read_columns
 from research.dynamics import identify, unknowns
 from research.dynamics.unknowns import DEFAULTS, OBJECTIVES, UNKNOWNS, Numbers
 from uuv_marl import load_scenario
-from uuv_marl.benchmark.paper import PAPER
 
 HIT = Numbers(10.03, 12.29, 11.0, 205.0, 0.0)
 
@@ -44,13 +41,6 @@ def test_every_unknown_has_an_effect_and_holds_its_default(name):
         choice.load()
 
 
-def test_the_start_stays_200_m_wide_and_always_fits():
-    for spacing in (10.0, 16.0):
-        for gap in (16.0, 60.0):
-            start = unknowns.case({**DEFAULTS, "start_spacing": spacing, "start_gap": gap}, "tracking").load().start
-            assert 2 * start.width_m + start.gap_m == pytest.approx(200.0)
-
-
 def test_errors_are_relative_and_none_inside_the_papers_range():
     assert unknowns.errors(HIT) == (0.0, 0.0, 0.0)
     assert unknowns.errors(HIT._replace(min_obstacle_distance_m=10.48))[1] == 0.0
@@ -68,34 +58,6 @@ def test_failing_runs_are_dominated_by_any_that_succeed():
     assert (losses[0] < losses[1]).all()
     assert (losses[1] < losses[2]).all()
     assert unknowns.front(losses) == [0]
-
-
-def test_a_setting_that_the_scenario_refuses_is_a_failure_and_no_exception():
-    numbers = unknowns.measure({**DEFAULTS, "yaw_resistance": 400.0})
-    assert numbers.failed == 1.0
-    assert math.isnan(numbers.task_time_s)
-
-
-def test_a_swarm_that_fails_with_the_obstacle_skips_the_longer_scenario(monkeypatch):
-    seen = []
-
-    def runs(case):
-        seen.append(case.scenario)
-        return real(case)
-
-    real = unknowns.runs
-    monkeypatch.setattr(unknowns, "runs", runs)
-    numbers = unknowns.measure({**DEFAULTS, "obstacle_term": "per_obstacle"}, unknowns.SEEDS[:1])
-    assert seen == ["single_obstacle"]
-    assert numbers.failed == 1.0
-    assert numbers.min_obstacle_distance_m < 1.0
-    assert math.isnan(numbers.min_spacing_m)
-
-
-def test_the_front_and_the_chosen_point_by_hand():
-    losses = np.array([[0.1, 0.4], [0.2, 0.2], [0.4, 0.1], [0.3, 0.3], [0.2, 0.2], [0.2, 0.4]])
-    assert unknowns.front(losses) == [0, 1, 2, 4]
-    assert unknowns.best(losses) == 1
 
 
 class Killed(BaseException):
@@ -167,17 +129,3 @@ def test_the_shipped_point_is_loaded_and_runs_as_recorded(shipped):
     numbers = unknowns.measure(shipped["chosen"]["values"])
     for name, value in shipped["chosen"]["numbers"].items():
         assert getattr(numbers, name) == pytest.approx(value, rel=0.02)
-
-
-def test_the_picture_shows_the_papers_numbers_beside_the_trials():
-    figure = identify.draw({"identification-trials": identify.trials()})
-    for ax, across, up in (
-        (figure.axes[0], PAPER["tracking", "bio_inspired"].mean_min_spacing_m, 11.0),
-        (figure.axes[1], PAPER["tracking", "bio_inspired"].min_spacing_m, 205.0),
-    ):
-        left, right = ax.get_xlim()
-        low, high = ax.get_ylim()
-        assert left < across < right
-        assert low < up < high
-        assert ax.get_xlabel().endswith("]")
-        assert ax.get_ylabel().endswith("]")

@@ -59,15 +59,6 @@ def test_specs_hold(scenario_name):
     check_env_specs(SwarmEnv(2, scenario_name, num_vehicles=8, decision_period=0.5))
 
 
-def test_specs_are_those_of_the_other_apis():
-    env = swarm()
-    spec = env.observation_spec["uuv", "observation"]
-    assert spec.shape == (3, 4, 98)
-    np.testing.assert_array_equal(spec.space.high[0, 0], env.swarm.layout.high)
-    assert env.group_map == {"uuv": ["uuv_0", "uuv_1", "uuv_2", "uuv_3"]}
-    assert env.full_action_spec["uuv", "action"].shape == (3, 4, 2)
-
-
 def test_rollouts_reset_worlds_at_their_end_alone():
     env = swarm(overrides=LOSSES, scenario="lossy", seed=1)
     data = env.rollout(60, break_when_any_done=False)
@@ -118,13 +109,6 @@ def test_the_arrival_is_paid_once_however_often_an_ended_world_is_stepped():
         returns.append(data["next", "uuv", "reward"].sum())
     assert returns[0] > 50.0
     torch.testing.assert_close(returns[0], returns[1])
-
-
-def test_resets_hand_out_flags_of_their_own():
-    data = swarm().reset()
-    data["terminated"].fill_(True)
-    assert not data["truncated"].any()
-    assert not data["uuv", "truncated"].any()
 
 
 @pytest.mark.parametrize(

@@ -11,18 +11,16 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.memory.pose import Reckoning
 from uuv_marl.baselines.paper.bio_inspired import BioInspired
-from uuv_marl.baselines.policy import Limits, Policy, inner_loop_nms, write_action
+from uuv_marl.baselines.policy import Limits, Policy, inner_loop_nms
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
 from uuv_marl.baselines.units import in_own_units
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.scenario import ScenarioError
 from uuv_marl.scenario.dimensions import converted
 from uuv_marl.scenario.scale import Scale
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train.training import in_si_units, overrides_for
+from uuv_marl.train.training import overrides_for
 
 POLICIES = (
     "bio_inspired", "bio_inspired_plus", "scout", "sff", "sdc", "apf", "olfati_saber", "orca_informed",
@@ -82,18 +80,6 @@ def test_a_scenario_in_its_own_units_is_the_papers_with_the_vehicle_as_it_looks_
     assert own.actuators.max_force_n == pytest.approx(plain.actuators.max_force_n)
     assert own.vehicle.m_kg != lauv.vehicle.m_kg
     assert in_own_units(plain) is plain
-
-
-def test_a_scale_of_one_changes_nothing():
-    """Not the percept, not a bit of the actions, also of what a scaled scenario of the paper's vehicle gets."""
-    scenarios = [granted("scout", load_scenario(name, num_vehicles=6)) for name in ("single_obstacle", "sea_trial")]
-    swarms, policies = [Swarm(s) for s in scenarios], [make("scout", s) for s in scenarios]
-    assert policies[1].reader is None
-    percepts = [swarm.reset(0) for swarm in swarms]
-    for _ in range(30):
-        actions = [policy.act(percept) for policy, percept in zip(policies, percepts, strict=True)]
-        np.testing.assert_array_equal(*actions)
-        percepts = [swarm.step(action) for swarm, action in zip(swarms, actions, strict=True)]
 
 
 # --- The inner loop ---
@@ -166,13 +152,6 @@ def test_to_a_wished_velocity_a_rudder_turns_by_the_angle_whatever_the_hull_slip
     assert given[0][1] == pytest.approx(np.clip(asked, -1.0, 1.0) if wished[0] > 0.0 else math.copysign(1.0, angle))
 
 
-def test_with_a_rudder_thrust_takes_nothing_from_the_turn():
-    out = np.zeros(2, np.float32)
-    limits = Limits.of(LAUV)
-    write_action(9.0 * limits.max_force, 9.0 * limits.max_torque / limits.lever_arm, limits, out)
-    assert out.tolist() == [1.0, 1.0]
-
-
 @pytest.mark.parametrize("name", ["lauv", "remus100"])
 @pytest.mark.parametrize("policy", ["bio_inspired", "scout", "guarded:bio_inspired_plus"])
 def test_torpedoes_pass_the_sea_trial_without_a_collision(policy, name):
@@ -209,12 +188,6 @@ def test_bad_combinations_are_refused_with_the_remedy():
         make("scout", rov)
 
 
-def test_a_vehicle_with_a_rudder_knows_how_it_turns():
-    """At rest a rudder does nothing, and shares of nothing would be none."""
-    own = in_own_units(LAUV)
-    assert 0.0 < Reckoning.of(own).yaw < 10.0
-
-
 # --- Training ---
 
 
@@ -230,12 +203,6 @@ def test_a_training_has_the_inner_loop_of_its_vehicle(vehicle, damping):
     assert changes["actuators.yaw_damping_nms"] == pytest.approx(damping)
     assert load_scenario("random_field", overrides=changes).timing.decision_period_s == 0.5
     assert overrides_for("random_field", {"actuators.yaw_damping_nms": 7.0})["actuators.yaw_damping_nms"] == 7.0
-
-
-def test_a_training_refuses_a_vehicles_scale():
-    in_si_units(load_scenario("sea_trial"))
-    with pytest.raises(ScenarioError, match="'sea_trial' into the scale of lauv, .* leave scale out"):
-        in_si_units(LAUV)
 
 
 # --- Gains tuned for a hull ---
@@ -254,8 +221,3 @@ def test_gains_tuned_for_a_hull_come_from_shipped_trials(vehicle):
     scenario = granted(name, load_scenario("sea_trial", overrides={"vehicle": vehicle, "scale": "vehicle"}))
     gains = make(name, scenario).gains._asdict()
     assert {key: gains[key] for key in data["best"]} == data["best"]
-
-
-def test_gains_that_nobody_tuned_are_refused():
-    with pytest.raises(PolicyError, match="'bio_inspired_plus.otter' has no tuned gains; .* of apf, .*lauv"):
-        make("bio_inspired_plus,tuned_for=otter", load_scenario("starter"))

@@ -11,9 +11,9 @@ from research.episodes import read_rows
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
-from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
+from uuv_marl.tasks import Follow
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = tuple(ROOT / page for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md"))
@@ -83,7 +83,9 @@ def filled() -> dict[str, str]:
     env = uuv_marl.parallel_env("single_obstacle")
     scenario, agents = env.scenario, env.possible_agents
     weights = scenario.reward.model_dump()
-    terms = [(f"`{name}`", what, f"{weights[name]:g}" if name in weights else "") for name, what in TERMS.items()]
+    terms = [
+        (f"`{name}`", what, f"{weights[name]:g}" if name in weights else "") for name, what in Follow.terms.items()
+    ]
     text = Path(__file__).with_name("tables.md").read_text(encoding="utf-8")
     values = {
         "env": env, "scenario": scenario, "agents": agents, "last": agents[-1],

@@ -55,8 +55,8 @@ def load_scenario(
             may be those of NumPy, torch or OmegaConf. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and
             lags, and ``{"vehicle": "remus100+munk_on"}`` takes a variant of it; where the scenario fixes the inner
             loop for all (``timing.fixed``), another vehicle has none unless an override gives it.
-            ``{"scale": "vehicle"}`` multiplies lengths, speeds and times by the vehicle's (``uuv_marl.scenario.scale``); what other overrides give is not
-            multiplied.
+            ``{"scale": "vehicle"}`` multiplies lengths, speeds and times by the vehicle's
+            (``uuv_marl.scenario.scale``); what other overrides give is not multiplied.
 
     Raises:
         ScenarioError: names the field, the value and the remedy.
