@@ -29,7 +29,7 @@ class TwoWays(Task):
     def sizes(cls, scenario):
         return {"group": 2}
 
-    def draw(self, rng):
+    def draw(self, world, rng):
         drawn = usual_draw(self.swarm.scenario, rng)
         n = len(drawn.eta)
         return drawn._replace(

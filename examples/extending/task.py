@@ -25,8 +25,8 @@ class Rendezvous(Task):
     terms: ClassVar[Mapping[str, str]] = {"away": "-0.01/m for each decision", "collision": "-10 for each"}
     columns: ClassVar[Mapping[str, str]] = {"spread_m": "mean distance from the centre at the end [m]"}
 
-    def draw(self, rng: np.random.Generator) -> Draw:
-        drawn = super().draw(rng)
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+        drawn = super().draw(world, rng)
         drawn.eta[:, :2] *= 3.0  # farther apart
         return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)), duration_s=60.0)
 

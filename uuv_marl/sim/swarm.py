@@ -177,7 +177,9 @@ class Swarm:
 
     def _reset_world(self, w: int, rng: np.random.Generator) -> None:
         self._rngs[w], self.keys[w] = rng, episode_key(rng)
-        drawn: Draw = self.task.draw(rng)
+        for array in self._task_memory.values():
+            array[w] = 0
+        drawn: Draw = self.task.draw(w, rng)
         state, course, m = self.state, self.course, len(drawn.obstacles)
         for g, (waypoints, times) in enumerate(zip(drawn.waypoints, drawn.times, strict=True)):
             points = len(waypoints)

@@ -88,25 +88,23 @@ class Task:
     def __init__(self, swarm: Swarm) -> None:
         self.swarm = swarm
         self.numbers: Any = swarm.scenario.task_numbers
-        sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles}
+        sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles, **self.sizes(swarm.scenario)}
         self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
         """What is remembered, the arrays of ``Memory``."""
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:  # noqa: ARG003 - for those who override it
-        """Lengths of axes that differ from the usual: ``group``, ``point`` (corners of a trajectory), ``obstacle``."""
+        """Lengths of axes: of ``group``, ``point`` (corners), ``obstacle`` where unusual, and of those of ``Memory``."""
         return {}
 
     # What an episode starts from, and what moves.
 
-    def draw(self, rng: np.random.Generator) -> Draw:
-        """What one world starts from, drawn from its own generator; VMAS: ``make_world``, ``reset_world_at``."""
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:  # noqa: ARG002
+        """What a world starts from, drawn from its own generator; ``memory`` is cleared. VMAS: ``reset_world_at``."""
         return usual_draw(self.swarm.scenario, rng)
 
     def begin(self, world: int) -> None:
-        """A world was reset: forget what was remembered of it, and look at how it stands."""
-        for array in self.memory:
-            array[world] = 0
+        """A world was reset: look at how it stands, and remember what later hooks need."""
 
     def move(self, running: Bool) -> None:
         """Before a step: steer what the policies don't, for instance ``swarm.course.drift``; VMAS: ``pre_step``."""

@@ -1,0 +1,211 @@
+"""``hard_water``: closed water with walls, drawn by seed, through which every swarm can pass, if it finds the way."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator
+
+from uuv_marl.scenario import Scenario, ScenarioError
+from uuv_marl.scenario.fields import Positive
+from uuv_marl.scenario.vehicle_checks import top_speed
+from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.start import start_state
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
+from uuv_marl.tasks.maps.walls import Kind, Range, Water, banks, joined, uniform
+from uuv_marl.tasks.maps.ways import CELL_M, Grid, distances, free_cells, reached
+from uuv_marl.tasks.reach import Reach, ReachNumbers
+from uuv_marl.types import Bool, Float64
+
+MOST_DISCS = 320
+"""Most discs of a map."""
+MOST_TRIES = 1000
+FAR_M = 5000.0
+"""Length of a way where there is none [m]."""
+
+
+def _known(kinds: tuple[str, ...]) -> tuple[str, ...]:
+    unknown = [kind for kind in kinds if kind not in KINDS]
+    if unknown or not kinds:
+        raise ValueError(f"task.kinds must name some of {', '.join(KINDS)}, got {list(kinds)}")
+    return kinds
+
+
+class HardWaterNumbers(ReachNumbers):
+    """Numbers of ``hard_water``; the scenario's file has their sources."""
+
+    kinds: Annotated[tuple[str, ...], AfterValidator(_known)]
+    """Kinds of maps, each drawn as often as the others."""
+    length_m: Range
+    """From the start to the goal."""
+    half_width_m: Range
+    """From the middle to the bank at each side."""
+    behind_m: Positive
+    """Water behind the start."""
+    beyond_m: Positive
+    """Water beyond the goal."""
+    bank_radius_m: Positive
+    """Radius of the discs that make the banks."""
+    first_wall_m: Positive
+    """Least place of a wall, ahead of the start; single discs begin at 60 m."""
+    start_clear_m: Positive
+    """Smallest distance of a wall from the start's box."""
+    goal_clear_m: Positive
+    """Smallest distance of a wall from the goal, between separate discs less."""
+    clearance_m: Positive
+    """What a way through the map keeps from all surfaces, at least."""
+    pocket: Pocket
+    bar: Bar
+    gate: Gate
+    forest: Forest
+    maze: Maze
+    harbour: Harbour
+    piles: Piles
+
+    def grid(self) -> Grid:
+        """Cells that hold the largest water."""
+        rows = int((self.behind_m + self.length_m[1] + self.beyond_m) / CELL_M) + 1
+        return Grid(-self.behind_m, -self.half_width_m[1], rows, int(2.0 * self.half_width_m[1] / CELL_M) + 1)
+
+
+class Map(NamedTuple):
+    """A map in its own frame (``maps/walls.py``)."""
+
+    kind: str
+    length: float
+    """From the start to the goal [m]."""
+    discs: Float64
+    """Walls and banks: x, y and radius [m], shape (disc, 3)."""
+    tries: int
+    """How many were drawn until this one was accepted."""
+
+
+class HardWaterMemory(NamedTuple):
+    """What ``hard_water`` remembers."""
+
+    paid: Annotated[Bool, "world vehicle", "Whether the vehicle has been there before."]
+    there_s: Annotated[Float64, "world vehicle", "When it was there first [s]; 0 before."]
+    best_s: Annotated[Float64, "world vehicle", "Length of its free way at the start over full speed [s]."]
+    turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
+    way: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
+    kind: Annotated[Float64, "world", "Index of the map's kind in ``KINDS``."]
+
+
+class HardWater(Reach):
+    """Come to a goal at rest through closed water whose walls are drawn by seed, and touch nothing.
+
+    The goal's vector tells where it is, not which way leads there: that is for sonar, memory, and luck.
+    """
+
+    Numbers = HardWaterNumbers
+    Memory: ClassVar[type[Any] | None] = HardWaterMemory
+    columns: ClassVar[Mapping[str, str]] = {
+        "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]",
+    }
+    guide: ClassVar[str] = "bio_inspired"
+
+    def __init__(self, swarm: Swarm) -> None:
+        super().__init__(swarm)
+        self._grid: Grid = self.numbers.grid()
+
+    @classmethod
+    def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
+        """Room for the discs of a map, and for its cells."""
+        grid = scenario.task_numbers.grid()
+        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns}
+
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+        """A map that can be passed, turned at random; the start is the scenario's."""
+        scenario, memory, made = self.swarm.scenario, self.memory, self.draw_map(rng)
+        c, s = memory.turn[world] = cos_sin(rng.uniform(-np.pi, np.pi))
+        turn = np.array([[c, s], [-s, c]])
+        discs, goal = made.discs.copy(), np.array([[0.0, 0.0], [made.length, 0.0]]) @ turn
+        discs[:, :2] = made.discs[:, :2] @ turn
+        eta, nu = start_state(scenario, goal, rng)
+        free = free_cells(made.discs, self._grid, scenario.contact.hull_radius_m)
+        row, column = self._grid.cell(np.array(made.length), np.array(0.0))
+        memory.way[world] = np.minimum(distances(free, int(row), int(column)), FAR_M)
+        memory.kind[world] = list(KINDS).index(made.kind)
+        memory.best_s[world] = self._ways(world, eta[:, :2], goal[1]) / top_speed(scenario.vehicle, scenario.actuators)
+        n = len(eta)
+        return Draw(
+            (goal,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
+            duration_s=float(memory.best_s[world].max()),
+        )  # fmt: skip
+
+    def draw_map(self, rng: np.random.Generator) -> Map:
+        """A map in its own frame that can be passed.
+
+        Raises:
+            ScenarioError: a thousand maps in a row can't be; the task's numbers leave no way.
+        """
+        numbers = self.numbers
+        for tries in range(1, MOST_TRIES + 1):
+            kind = numbers.kinds[int(rng.integers(len(numbers.kinds)))]
+            length, half = uniform(rng, numbers.length_m), uniform(rng, numbers.half_width_m)
+            water = Water(length, half, numbers.first_wall_m, length - numbers.goal_clear_m)
+            own: Kind = getattr(numbers, kind)
+            walls = own.walls(rng, water)
+            shore = banks(length, half, numbers.behind_m, numbers.beyond_m, numbers.bank_radius_m)
+            made = Map(kind, length, joined(walls, shore), tries)
+            if len(made.discs) <= MOST_DISCS and self._passable(made, walls, own.blocks()):
+                return made
+        raise ScenarioError(
+            f"task {self.swarm.scenario.task.name!r} drew {MOST_TRIES} maps of {', '.join(numbers.kinds)}, and none "
+            f"can be passed with task.clearance_m = {numbers.clearance_m:g}; widen the gaps, or lower the clearance"
+        )
+
+    def _passable(self, made: Map, walls: Float64, blocks: bool) -> bool:
+        """Whether a way leads from all of the start's box to the goal, and, where it should, not straight ahead."""
+        numbers, scenario = self.numbers, self.swarm.scenario
+        if blocks and not (np.abs(walls[:, 1]) < walls[:, 2] + numbers.clearance_m).any():
+            return False
+        length, width = scenario.start.sides(scenario.swarm.num_vehicles)
+        side = width + scenario.start.gap_m / 2.0 + numbers.start_clear_m
+        free = free_cells(made.discs, self._grid, numbers.clearance_m)
+        row, column = self._grid.cell(np.array(made.length), np.array(0.0))
+        led = reached(free, int(row), int(column))
+        rows, columns = self._grid.cell(
+            np.array([-length - numbers.start_clear_m, numbers.start_clear_m]), np.array([-side, side])
+        )
+        return bool(led[rows[0] : rows[1] + 1, columns[0] : columns[1] + 1].all())
+
+    def _ways(self, world: int, place: Float64, goal: Float64) -> Float64:
+        """Length of the shortest free way from places [m], north and east, shape (..., 2), to the goal."""
+        c, s = self.memory.turn[world]
+        x, y = c * place[..., 0] + s * place[..., 1], c * place[..., 1] - s * place[..., 0]
+        row, column = self._grid.cell(x, y)
+        best = np.full(x.shape, FAR_M)
+        for d_r in (-1, 0, 1):
+            for d_c in (-1, 0, 1):
+                r, k = np.clip(row + d_r, 0, self._grid.rows - 1), np.clip(column + d_c, 0, self._grid.columns - 1)
+                off = np.hypot(x - (self._grid.x + r * CELL_M), y - (self._grid.y + k * CELL_M))
+                best = np.minimum(best, self.memory.way[world][r, k] + off)
+        return np.maximum(best, np.hypot(*np.moveaxis(place - goal, -1, 0)))
+
+    def ways(self) -> Float64:
+        """Length of every vehicle's shortest free way to its goal now [m], shape (world, vehicle)."""
+        state, course = self.swarm.state, self.swarm.course
+        return np.array([
+            self._ways(w, state.eta[w, :, :2], course.waypoints[w, 0, 1]) for w in range(self.swarm.num_worlds)
+        ])  # fmt: skip
+
+    def update(self, running: Bool) -> None:
+        """When vehicles are there first."""
+        facts, memory = self.swarm.facts, self.memory
+        first = running[:, None] & self.there() & self.swarm.state.alive & (memory.there_s == 0.0)
+        memory.there_s[first] = np.broadcast_to(facts.time_s[:, None], first.shape)[first]
+
+    def there(self) -> Bool:
+        """Vehicles within ``near_m`` of the goal, along the free way."""
+        near = self.swarm.facts.away <= self.numbers.near_m
+        return near & (self.ways() <= self.numbers.near_m) if near.any() else near
+
+    def metrics(self, world: int) -> dict[str, float | None]:
+        """Also how long vehicles took, and the map's kind by its place in ``KINDS``."""
+        memory = self.memory
+        took = memory.there_s[world] > 0.0
+        ratio = float((memory.there_s[world] / memory.best_s[world])[took].mean()) if took.any() else None
+        return {**super().metrics(world), "time_ratio": ratio, "kind": float(memory.kind[world])}

@@ -1,0 +1,26 @@
+"""``bar``: a wall from one bank past the middle, open at the other bank; straight or bent."""
+
+import numpy as np
+
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Share, Water, joined, side, uniform, wall
+from uuv_marl.types import Float64
+
+
+class Bar(Kind):
+    """Where the open side is, nobody knows before he comes there."""
+
+    open_m: Range
+    """Width of the open water at its end."""
+    bent: Share
+    """Share of maps in which it is bent."""
+    bend_m: Range
+    """How far its bend is ahead of its foot, or behind."""
+
+    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+        """Two walls that meet somewhere around the middle."""
+        radius, x, bank = uniform(rng, self.radius_m), uniform(rng, (water.near, water.far)), side(rng)
+        end = -bank * (water.half - uniform(rng, self.open_m) - radius)
+        bend = side(rng) * uniform(rng, self.bend_m) if rng.random() < self.bent else 0.0
+        middle = (water.ahead(x + bend), float(rng.uniform(-0.4, 0.4)) * water.half)
+        tip = (water.ahead(x + float(rng.uniform(-25.0, 25.0))), end)
+        return joined(wall((x, bank * (water.half + INTO_BANK_M)), middle, radius), wall(middle, tip, radius))

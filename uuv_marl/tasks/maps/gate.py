@@ -1,0 +1,28 @@
+"""``gate``: a wall from bank to bank with one gap."""
+
+import numpy as np
+
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Share, Water, joined, uniform, wall
+from uuv_marl.types import Float64
+
+
+class Gate(Kind):
+    """A single gap, anywhere within a share of the width."""
+
+    gap_m: Range
+    """Width of the gap."""
+    within: Share
+    """How far from the middle it may lie, as a share of the banks' distance."""
+
+    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+        """Two walls, a little aslant."""
+        radius, gap = uniform(rng, self.radius_m), uniform(rng, self.gap_m)
+        at, x = float(rng.uniform(-1.0, 1.0)) * self.within * water.half, uniform(rng, (water.near, water.far))
+        aslant, bank = float(rng.uniform(-0.25, 0.25)), water.half + INTO_BANK_M
+
+        def on(y: float) -> tuple[float, float]:
+            return water.ahead(x + aslant * y), y
+
+        left, right = at - gap / 2 - radius, at + gap / 2 + radius
+        parts = [(-bank, left)] * (left > -bank) + [(right, bank)] * (right < bank)
+        return joined(*(wall(on(a), on(b), radius) for a, b in parts))

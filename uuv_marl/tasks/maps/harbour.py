@@ -1,0 +1,31 @@
+"""``harbour``: finger piers from both banks with basins between them, and a mole across the middle."""
+
+import numpy as np
+
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Water, joined, side, uniform, wall
+from uuv_marl.types import Float64
+
+
+class Harbour(Kind):
+    """Piers stand square to the banks, every basin between two of them is a dead end."""
+
+    pier_m: Range
+    """Length of a pier from the bank."""
+    basin_m: Range
+    """Width of a basin, from pier to pier."""
+    mole_m: Range
+    """Length of the mole that lies across the way, off both banks."""
+
+    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+        """Piers along both banks, and the mole between two of them."""
+        radius, made = uniform(rng, self.radius_m), list[Float64]()
+        for bank in (1.0, -1.0):
+            x = water.near + rng.uniform(0.0, 20.0)
+            while x < water.far:
+                tip = bank * max(water.half - uniform(rng, self.pier_m), 10.0)
+                made.append(wall((x, bank * (water.half + INTO_BANK_M)), (x, tip), radius))
+                x += uniform(rng, self.basin_m) + 2.0 * radius
+        x, half = uniform(rng, (water.near, water.far)), uniform(rng, self.mole_m) / 2.0
+        middle = side(rng) * float(rng.uniform(0.0, 0.3)) * half
+        made.append(wall((x, middle - half), (x, middle + half), radius))
+        return joined(*made)

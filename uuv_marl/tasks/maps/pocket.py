@@ -1,0 +1,37 @@
+"""``pocket``: a dead end that is open towards the swarm; on one side it is mostly closed to the bank."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Share, Water, joined, side, uniform, wall
+from uuv_marl.types import Float64
+
+
+class Pocket(Kind):
+    """A U or a V."""
+
+    depth_m: Range
+    """From its mouth to its back."""
+    half_width_m: Range
+    """Half the width of its mouth."""
+    closed: Share
+    """Share of maps in which one of its sides is closed to the bank, so that only the other way leads past it."""
+
+    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+        """Three walls, and the one to the bank."""
+        radius, depth = uniform(rng, self.radius_m), uniform(rng, self.depth_m)
+        x = uniform(rng, (min(water.near + depth, water.far), water.far))
+        off = side(rng) * rng.uniform(0.0, 0.25) * water.half
+        mouth = min(uniform(rng, self.half_width_m), water.half - abs(off) - 16.0)
+        back = mouth * rng.uniform(0.2, 1.0)
+        front = water.ahead(x - depth)
+        corners = [(front, off - mouth), (x, off - back), (x, off + back), (front, off + mouth)]
+        made = [wall(a, b, radius) for a, b in pairwise(corners)]
+        if rng.random() < self.closed:
+            which = side(rng)
+            made.append(wall(
+                corners[3] if which > 0 else corners[0],
+                (uniform(rng, (front, x)), which * (water.half + INTO_BANK_M)), radius,
+            ))  # fmt: skip
+        return joined(*made)

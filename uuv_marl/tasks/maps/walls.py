@@ -1,0 +1,103 @@
+"""What maps are made of: walls as rows of discs, and the frame that they are drawn in.
+
+The frame: the swarm starts around the origin and its goal lies ``length`` ahead, both in the middle between two banks,
+``half`` to each side; x ahead, y to starboard [m]. A map is turned as a whole when it is done.
+"""
+
+from itertools import pairwise
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator
+
+from uuv_marl.scenario.fields import NonNegative, Section, within
+from uuv_marl.types import Float64
+
+STEP = 1.6
+"""Distance of two discs of a wall, in radii; the gap between them is a fifth of a radius deep. Assumed: as piloted."""
+INTO_BANK_M = 4.0
+"""How far a wall goes on into a bank [m], so that nothing passes between them."""
+
+
+def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError(f"a range must be [low, high] with low <= high, got {list(pair)}")
+    return pair
+
+
+Range = Annotated[tuple[NonNegative, NonNegative], AfterValidator(_ordered)]
+"""Lowest and highest value; each map draws its own between them."""
+
+Share = Annotated[float, within(0, 1)]
+
+
+class Water(NamedTuple):
+    """Closed water before its walls are drawn."""
+
+    length: float
+    """Way from the start to the goal [m]."""
+    half: float
+    """Distance of each bank from the middle [m]."""
+    near: float
+    """Least place ahead of the start at which a wall may stand [m]."""
+    far: float
+    """The largest [m]; beyond it is the goal's free water."""
+
+    def ahead(self, x: float) -> float:
+        """The nearest place at which a wall may stand [m]."""
+        return min(max(x, self.near), self.far)
+
+
+class Kind(Section):
+    """Numbers of one kind of map."""
+
+    radius_m: Range
+    """Radius of the discs that its walls are made of."""
+
+    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+        """Discs, x, y and radius [m], shape (disc, 3). The same generator gives the same walls."""
+        raise NotImplementedError
+
+    def blocks(self) -> bool:
+        """Whether a map counts only if the straight way to the goal is blocked."""
+        return True
+
+
+def uniform(rng: np.random.Generator, bounds: tuple[float, float]) -> float:
+    """A number between two bounds."""
+    return float(rng.uniform(*bounds))
+
+
+def side(rng: np.random.Generator) -> float:
+    """1 or -1."""
+    return 1.0 if rng.random() < 0.5 else -1.0
+
+
+def wall(start: tuple[float, float], end: tuple[float, float], radius: float) -> Float64:
+    """A row of discs from one point to another, both their centres, shape (disc, 3)."""
+    a, b = np.array(start), np.array(end)
+    way = b - a
+    num = max(1, int(np.ceil(np.sqrt(way @ way) / (STEP * radius))))
+    places = a + way * (np.arange(num + 1)[:, None] / num)
+    return np.concatenate([places, np.full((num + 1, 1), radius)], axis=1)
+
+
+def joined(*walls: Any) -> Float64:
+    """Walls as one array."""
+    return np.concatenate([np.zeros((0, 3)), *walls])
+
+
+def banks(length: float, half: float, behind: float, beyond: float, radius: float) -> Float64:
+    """Large discs around the water, whose surfaces are its banks, shape (disc, 3).
+
+    Args:
+        length: from the start to the goal [m].
+        half: distance of the banks at the sides [m].
+        behind: how far behind the start the water ends [m].
+        beyond: how far beyond the goal it ends [m].
+        radius: of the discs [m].
+    """
+    x = (-behind - radius, length + beyond + radius)
+    y = (-half - radius, half + radius)
+    corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]), (x[0], y[0])]
+    return joined(*(wall(a, b, radius) for a, b in pairwise(corners)))
