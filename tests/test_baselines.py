@@ -127,22 +127,6 @@ def test_who_a_vehicle_is_does_not_matter(name):
     np.testing.assert_allclose(actions[0][order], actions[1], atol=1e-6)
 
 
-def test_echoes_of_one_obstacle_count_once_where_asked():
-    lone = load_scenario("single_obstacle", num_vehicles=1)
-    layout = PerceptLayout.of(lone)
-    flat = np.zeros((1, 1, layout.size), np.float32)
-    percept = Percept(flat, layout)
-    percept["echo"][0, 0] = [0, 1, 1, 1, 0, 1, 0]
-    percept["echo_range"][0, 0] = [0, 40, 30, 35, 0, 20, 0]
-    percept["echo_position"][0, 0, 1:4] = (55.0, -5.0)
-    percept["echo_position"][0, 0, 5] = (30.0, 30.0)
-    each = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1))
-    once = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1), obstacle_term="per_obstacle")
-    first, second = ((0.1 * np.exp(80 / np.hypot(*p)) * -np.array(p)) for p in ((55.0, -5.0), (30.0, 30.0)))
-    np.testing.assert_allclose(each.act(percept)[0, 0], (3 * first + second) / 3000, rtol=1e-5)
-    np.testing.assert_allclose(once.act(percept)[0, 0], (first + second) / 3000, rtol=1e-5)
-
-
 @given(st.floats(10.0, 26.0), st.floats(4.0, 20.0))
 def test_clustering_repels_within_its_distance_and_attracts_beyond(distance, width):
     gains = sff.SffGains(1, 1, 100.0, distance, width, 60.0, 0, 0, 0, 1, 0, 1, 0)
@@ -188,28 +172,24 @@ def test_slots_are_a_lattice_around_zero(n):
         np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
 
 
-def test_slots_are_assigned_so_that_ways_are_short():
-    scenario = granted("sdc", load_scenario("tracking", num_vehicles=7))
-    swarm, policy = Swarm(scenario), make("sdc", scenario)
-    swarm.reset(0)
-    slots = sdc.hexagonal_slots(7)[[3, 1, 4, 0, 6, 5, 2]]
-    swarm.state.eta[0, :, :2] = slots * 1.1 + (500.0, 300.0)
-    policy.act(swarm.observe())
-    np.testing.assert_allclose(policy.memory.slots[0], slots, atol=1e-9)
+FOLDER = resources.files("uuv_marl.baselines") / "tuned"
+HULLS = ("bluerov2_heavy", "lauv", "remus100")
 
 
-@pytest.mark.parametrize("name", SPACES)
-def test_tuned_gains_come_from_shipped_trials(name):
-    data = json.loads((resources.files("uuv_marl.baselines") / "tuned" / f"{name}.json").read_text())
-    with (resources.files("uuv_marl.baselines") / "tuned" / f"{name}.csv").open() as file:
-        trials = list(csv.DictReader(file))
-    assert len(trials) == TRIALS
+@pytest.mark.parametrize("file", [*SPACES, *(f"bio_inspired_plus.{hull}" for hull in HULLS)])
+def test_tuned_gains_come_from_shipped_trials(file):
+    data = json.loads((FOLDER / f"{file}.json").read_text())
+    trials = list(csv.DictReader((FOLDER / f"{file}.csv").read_text().splitlines()))
+    name, _, hull = file.partition(".")
+    assert len(trials) == (100 if hull else TRIALS)
+    assert data.get("vehicle", "") == hull or not hull
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
     best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
     assert best == {"cost_s": data["best_cost_s"], **data["best"]}
-    assert list(data["best"]) == list(SPACES[name][0])
-    scenario = granted(name, load_scenario("tracking"))
-    gains = make(name, scenario).gains._asdict()
+    policy = f"{name},tuned_for={hull}" if hull else name
+    changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
+    scenario = granted(policy, load_scenario("sea_trial" if hull else "tracking", overrides=changes))
+    gains = make(policy, scenario).gains._asdict()
     assert {key: gains[key] for key in data["best"]} == data["best"]
 
 

@@ -100,13 +100,6 @@ def test_toml_blocks_are_scenarios(block, tmp_path):
     assert load_scenario(tmp_path / "mine.toml").title
 
 
-@pytest.mark.parametrize("page", [README, CONTRIBUTING], ids=lambda page: page.name)
-def test_make_targets_exist(page):
-    makefile = (ROOT / "Makefile").read_text()
-    for target in re.findall(r"^make ([\w-]+)", page.read_text(), flags=re.M):
-        assert re.search(rf"^(.* )?{target}( .*)?:", makefile, flags=re.M), target
-
-
 def tool():
     spec = importlib.util.spec_from_file_location("write_tables", ROOT / "tools" / "write_tables.py")
     made = importlib.util.module_from_spec(spec)
@@ -142,16 +135,6 @@ def test_links_lead_somewhere(page):
         assert not anchor or anchor in anchors(target), f"{target.name}#{anchor}"
 
 
-def test_every_page_can_be_reached_from_the_index():
-    reached, new = set(), [INDEX]
-    while new:
-        page = new.pop()
-        reached.add(page)
-        new += [target for target, _ in links(page) if target.suffix == ".md" and target not in reached]
-    assert not set(PAGES) - {README} - reached
-    assert (INDEX, "") in links(README)
-
-
 def test_the_table_of_policies_is_right():
     rows = re.findall(r"^\| (`.*?) \| .* \| (.*) \|$", (ROOT / "docs" / "policies.md").read_text(), flags=re.M)
     needs = {name: need for names, need in rows for name in re.findall(r"`(\w+)`", names)}
@@ -159,16 +142,6 @@ def test_the_table_of_policies_is_right():
     for name, policy in POLICIES.items():
         parts = [*policy.channels, *(["yaw damping"] if policy.yaw_damping_nms else [])]
         assert needs[name] == (", ".join(parts) or "nothing"), name
-
-
-def test_the_glossary_names_what_there_is():
-    text = (ROOT / "docs" / "glossary.md").read_text()
-    for path in re.findall(r"`(uuv_marl/[\w/.]+)`", text):
-        assert (ROOT / path).is_file(), path
-    scenario = load_scenario("single_obstacle")
-    for field in re.findall(r"`(\w+\.\w+)`", text):
-        section, _, name = field.partition(".")
-        assert hasattr(getattr(scenario, section), name), field
 
 
 def switches(model, prefix=""):

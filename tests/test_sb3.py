@@ -18,7 +18,6 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.percept import Percept
-from uuv_marl.scenario import ScenarioError
 from uuv_marl.train import run
 from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
 
@@ -93,38 +92,6 @@ def test_time_limits_are_bootstrapped_and_arrivals_are_not(monkeypatch):
         model.learn(40 * env.num_envs)
         single = [shape for shape in asked if tuple(shape) == (1, 98)]
         assert bool(single) == truncated
-
-
-def test_scenarios_that_lose_vehicles_are_refused_with_the_remedy():
-    with pytest.raises(ScenarioError, match=r"in scenario 'lossy'; use .* or override disturbance.loss_times_s=\[\]"):
-        SwarmVecEnv("lossy", 1)
-    with pytest.raises(ScenarioError, match="contact.ends_vehicle=false"):
-        SwarmVecEnv(overrides={"contact.ends_vehicle": True})
-    SwarmVecEnv("lossy", 1, overrides={"disturbance.loss_times_s": []})
-
-
-def test_attributes_of_rows():
-    env = swarm()
-    assert env.get_attr("render_mode") == [None] * 8
-    assert env.get_attr("scenario", [0, 3]) == [env.scenario] * 2
-    assert env.has_attr("swarm")
-    assert not env.has_attr("nonsense")
-    assert env.env_is_wrapped(gymnasium.Wrapper) == [False] * 8
-    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
-        env.set_attr("reward", 1)
-    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
-        env.env_method("reset")
-
-
-@pytest.mark.needs("pygame")
-def test_a_picture_tiles_the_worlds():
-    env = swarm(render_mode="rgb_array")
-    assert env.metadata["render_fps"] == 2
-    with pytest.raises(RuntimeError, match="came before reset"):
-        env.render()
-    env.reset()
-    assert env.render().shape == (1600, 800, 3)
-    env.close()
 
 
 @pytest.mark.parametrize("others", ["bio_inspired", "sdc"])

@@ -115,14 +115,8 @@ def main():
     print(text)
     if given.write:
         before, rest = PAGE.read_text().split(MARK.format("counts"))
-        PAGE.write_text(
-            before
-            + MARK.format("counts")
-            + "\n"
-            + text
-            + MARK.format("/counts")
-            + rest.split(MARK.format("/counts"))[1]
-        )
+        after = rest.split(MARK.format("/counts"))[1]
+        PAGE.write_text(before + MARK.format("counts") + "\n" + text + MARK.format("/counts") + after)
     bad = sum(counter[outcome] for counter in counts.values() for outcome in OUTCOMES[2:])
     sys.exit(bad > 0 or any(sum(row[3:]) for row in crashed))
 
