@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.golden import STARTER
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, granted, make
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
@@ -83,7 +84,7 @@ def test_a_lone_vehicle_lags_by_drag_over_zeta_l(hold, tolerance):
     while swarm.facts.time_s[0] < 400.0:
         percept = swarm.step(policy.act(percept))
     drag = (70.0 + 100.0 * 4.0) * 4.0
-    lag = swarm.facts.reference[0, 0] - swarm.state.eta[0, 0, 0]
+    lag = swarm.facts.reference[0, 0, 0] - swarm.state.eta[0, 0, 0]
     assert lag == pytest.approx(drag / 30.0, abs=tolerance)  # 62.7 m
 
 
@@ -102,7 +103,7 @@ def test_forces_turn_with_the_world(name):
             swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
             swarm.state.eta[0, :, 2] += turn
             swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (x, y)
-            swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (x, y)
+            swarm.course.waypoints[0, 0] = swarm.course.waypoints[0, 0] @ rotation.T + (x, y)
         percept = swarm.observe()
         if name.startswith("sdc"):  # its lattice lies north-east, so only the move is a symmetry
             policy.act(percept)
@@ -205,7 +206,7 @@ def flown(name, scenario, decisions=6, worlds=2):
 
 @pytest.mark.parametrize("name", [*POLICIES, "guarded:mappo"])
 def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
-    swarm, policy, percept = flown(name, "starter")
+    swarm, policy, percept = flown(name, STARTER)
     again, kept, water = pickle.loads(pickle.dumps(policy)), policy.snapshot(), swarm.snapshot()
     first = policy.act(percept)
     assert np.array_equal(again.act(percept), first)
@@ -220,7 +221,7 @@ def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
 
 @pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
 def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
-    swarm, policy, percept = flown(name, "starter")
+    swarm, policy, percept = flown(name, STARTER)
     first = policy.act(percept)
     assert np.array_equal(policy.act(percept), first), "asked twice at one time, it must say the same"
     swarm.step(first)
@@ -234,7 +235,7 @@ def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
 @pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
 def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
     """So that memory does not outlive an autoreset, whichever API did it; the other world keeps its own."""
-    swarm, policy, percept = flown(name, "starter")
+    swarm, policy, percept = flown(name, STARTER)
     before = [array[1].copy() for array in policy.memory]
     percept = swarm.reset([5], worlds=[0])
     action = policy.act(percept)
@@ -249,7 +250,7 @@ def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
 
 
 def test_gains_and_parameters_can_be_written_behind_a_name():
-    scenario = load_scenario("starter")
+    scenario = load_scenario(STARTER)
     policy = make("bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle", scenario)
     assert policy.gains == bio_inspired.BioInspiredGains(zeta_n=0.5)
     assert make("bio_inspired", scenario, zeta_n=0.5).gains == policy.gains
@@ -259,7 +260,7 @@ def test_gains_and_parameters_can_be_written_behind_a_name():
 
 
 def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
-    scenario = granted("scout", load_scenario("starter"))
+    scenario = granted("scout", load_scenario(STARTER))
     assert make("scout", scenario).gains == make(f"scout,preset={DEFAULT_PRESET}", scenario).gains
     for name, preset in PRESETS.items():
         policy = make(f"guarded:scout,preset={name},push=3.5", scenario).inner
@@ -289,9 +290,9 @@ class Nothing(Policy):
 )
 def test_a_name_that_means_nothing_is_explained(name, message):
     with pytest.raises(PolicyError, match=message):
-        make(name, load_scenario("starter"))
+        make(name, load_scenario(STARTER))
     with pytest.raises(PolicyError, match=message):
-        make(name, parallel_env("starter"))
+        make(name, parallel_env(STARTER))
 
 
 def test_what_a_policy_cannot_be_made_for_is_explained():

@@ -119,7 +119,7 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
     swarm.reset(10_000)
     angle = np.arange(6) * math.pi / 3
     ring = 12.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    swarm.state.eta[0, :, :2] = swarm.facts.reference[0, :2] + np.concatenate([np.zeros((1, 2)), ring])
+    swarm.state.eta[0, :, :2] = swarm.facts.reference[0, 0, :2] + np.concatenate([np.zeros((1, 2)), ring])
     swarm.state.eta[0, :, :2] += np.random.default_rng(0).uniform(-2.0, 2.0, (7, 2))
     percept = swarm.observe()
     while swarm.facts.time_s[0] < 100.0:

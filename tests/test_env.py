@@ -129,7 +129,7 @@ def test_bad_input_names_the_agent_and_the_remedy():
     for told, message in (
         ({"render_mode": "ascii"}, "render_mode must be one of"),
         ({"max_cycles": 0}, "max_cycles must be a whole number from 1"),
-        ({"reward": "sparse"}, "reward must be 'individual', 'team'"),
+        ({"reward": "individual"}, "reward must be 'dense', 'sparse', 'team'"),
     ):
         with pytest.raises(ValueError, match=message):
             uuv_marl.parallel_env(**told)

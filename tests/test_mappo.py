@@ -180,7 +180,8 @@ def test_training_worlds_are_not_those_of_validation():
 
 def test_the_reward_by_hand(place):
     swarm = place("single_obstacle", [[0, 0, 0], [4.0, 0, 0], [0, 300.0, 0]], obstacles=[(0.0, -37.0, 25.0)])
-    swarm.facts.reference[0, :2] = (0.0, 40.0)
+    swarm.facts.reference[0, 0, :2] = (0.0, 40.0)
+    swarm.facts.away[0] = np.hypot(*(swarm.state.eta[0, :, :2] - (0.0, 40.0)).T)
     swarm.facts.contacts[0, 2] = 1
     swarm.facts.effort[0] = 0.5
     only = Weights(distance_m=50.0, centre=0.0, obstacle=5.0, obstacle_m=24.0, spacing=8.0, spacing_m=10.0)
@@ -199,7 +200,7 @@ def test_the_reward_by_hand(place):
 @pytest.mark.parametrize("at_rest", [False, True])
 def test_what_all_pay_for_their_centre_by_hand(place, at_rest):
     swarm = place("single_obstacle", [[0, 0, 0], [30.0, 0, 0], [0, 300.0, 0]], obstacles=[(0.0, -37.0, 25.0)])
-    swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (3.0, -4.0)
+    swarm.facts.reference[0, 0, :2] = swarm.facts.centre[0] + (3.0, -4.0)
     swarm.facts.time_s[0] = swarm.duration_s[0] + (0.1 if at_rest else -0.1)
     alone, all_pay = shaped_reward(swarm, Weights()), shaped_reward(swarm, Weights(team=0.1, late=3.0))
     per_step = swarm.scenario.timing.decision_period_s / 0.5
@@ -211,11 +212,11 @@ def test_moving_the_centre_is_paid_in_full():
     """One of n vehicles moves by 1 m towards where the centre should be: paid about 1 m, and not 1/n of it."""
     swarm = Swarm(load_scenario("tracking", num_vehicles=50))
     swarm.reset(0)
-    swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0)
+    swarm.facts.reference[0, 0, :2] = swarm.facts.centre[0] + (30.0, 40.0)
     before = lead_over_swarm(swarm)[0]
     swarm.state.eta[0, 7, :2] += (0.6, 0.8)
     swarm.observe()
-    swarm.facts.reference[0, :2] = swarm.facts.centre[0] + (30.0, 40.0) - np.array([0.6, 0.8]) / 50
+    swarm.facts.reference[0, 0, :2] = swarm.facts.centre[0] + (30.0, 40.0) - np.array([0.6, 0.8]) / 50
     assert (lead_over_swarm(swarm)[0] - before)[7] == pytest.approx(1.0, abs=0.05)
     assert lead_over_swarm(swarm)[0].mean() == pytest.approx(0.0, abs=1e-9), "nobody is paid for a spread swarm"
 

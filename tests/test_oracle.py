@@ -476,7 +476,7 @@ def check_percept(swarm):
     """Every field of the percepts, as the oracle has it; zero for the lost."""
     percept, heading, nu = swarm.percept, swarm.heading[0], swarm.state.nu[0]
     now, alive, discs = swarm.state.eta[0, :, :2], swarm.state.alive[0], swarm.course.obstacles[0]
-    discs, l_t = discs[: swarm.course.num_obstacles[0]], swarm.facts.reference[0]
+    discs, l_t = discs[: swarm.course.num_obstacles[0]], swarm.facts.reference[0, 0]
     over_ground = np.stack([motion.rotation(psi) @ v[:2] for psi, v in zip(swarm.state.eta[0, :, 2], nu, strict=True)])
     j = swarm.heard[0]
     seen = {

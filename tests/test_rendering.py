@@ -7,6 +7,7 @@ import pygame
 import pytest
 
 import uuv_marl
+from tests.golden import STARTER
 from uuv_marl.baselines import granted, make
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
@@ -20,7 +21,7 @@ from uuv_marl.envs.vector_env import vector_env
 SIZE = (600, 500)
 
 
-def played(scenario="starter", policy="bio_inspired", seconds=10.0, sonar_of=None, seed=0, **changes):
+def played(scenario=STARTER, policy="bio_inspired", seconds=10.0, sonar_of=None, seed=0, **changes):
     """The scene of an episode after some seconds, its worlds and its memory."""
     batch = make_batched_env(granted(policy, uuv_marl.load_scenario(scenario, **changes)))
     actor = make(policy, batch.swarm.scenario)
@@ -90,7 +91,7 @@ def test_cameras_show_what_they_promise(scenario):
 
 
 def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
-    batch = make_batched_env("starter", 2)
+    batch = make_batched_env(STARTER, 2)
     memory = SceneHistory(batch)
     batch.reset(0)
     memory.note(batch)
@@ -128,7 +129,7 @@ def test_the_numbers_are_those_of_the_swarm():
     assert numbers["spacing"] == f"{facts.spacing[0].min():.1f} m"
     assert numbers["clearance"] == f"{facts.clearance[0].min():.1f} m"
     assert numbers["collisions"] == "0"
-    away = np.linalg.norm(batch.swarm.state.eta[0, :, :2].mean(axis=0) - facts.reference[0, :2])
+    away = np.linalg.norm(batch.swarm.state.eta[0, :, :2].mean(axis=0) - facts.reference[0, 0, :2])
     assert numbers["to l(t)"] == (f"{away:.1f} m" if away < 100 else f"{away:.0f} m")
     lossy, _, _ = played("lossy", seconds=50.0)
     assert {short: value for _, short, value, _ in _numbers(lossy)}["vehicles"] == "52 of 54"
@@ -200,7 +201,7 @@ def key(name, **fields):
 @pytest.fixture
 def window():
     pygame.display.quit()
-    env = uuv_marl.parallel_env("starter", render_mode="human", render_options={"size": (640, 480)})
+    env = uuv_marl.parallel_env(STARTER, render_mode="human", render_options={"size": (640, 480)})
     env.reset(seed=0)
     key("K_PLUS")
     yield env

@@ -213,7 +213,7 @@ def test_eddies_turn_by_turns_so_that_their_circulation_sums_to_nothing():
             there = eddies[w][eddies[w, :, 2] != 0.0]
             assert len(there) > 0
             assert there[:, 2].sum() == 0.0
-            points = swarm.course.waypoints[w]
+            points = swarm.course.waypoints[w, 0]
             assert (there[:, :2] >= points.min(0) - 250).all()
             assert (there[:, :2] <= points.max(0) + 250).all()
 

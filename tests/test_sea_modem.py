@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, granted, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, save_checkpoint
@@ -16,7 +17,7 @@ MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles"
 
 def swum(overrides, decisions=100, worlds=1, seed=0, **change):
     """The swarm after the reset and after each decision."""
-    swarm = Swarm(load_scenario("starter", overrides=MODEM | overrides, **change), worlds)
+    swarm = Swarm(load_scenario(STARTER, overrides=MODEM | overrides, **change), worlds)
     swarm.reset(seed)
     yield swarm
     rng = np.random.default_rng(1)
@@ -86,8 +87,8 @@ def test_compasses_turn_what_is_said_and_what_is_read():
 def test_comparators_run_on_messages_as_on_the_link(policy):
     """The same law: where messages are as fresh as the link, it does the same."""
     base = {"modem.period_s": 0.1, "obstacles": []}
-    linked = granted(policy, load_scenario("starter", overrides=base))
-    messaged = granted(policy, load_scenario("starter", overrides={**base, "sonar.channels": ["modem"]}))
+    linked = granted(policy, load_scenario(STARTER, overrides=base))
+    messaged = granted(policy, load_scenario(STARTER, overrides={**base, "sonar.channels": ["modem"]}))
     assert "link" not in messaged.sonar.channels
     assert "modem" in messaged.sonar.channels
     paths = []
@@ -105,10 +106,10 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
 
 def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
     """Not for one that asks for both, nor for an actor that was trained on the link."""
-    sea = load_scenario("starter", overrides={"sonar.channels": ["link", "modem"]})
+    sea = load_scenario(STARTER, overrides={"sonar.channels": ["link", "modem"]})
     assert granted("sff", sea).sonar.channels == ("modem",)
     assert granted("tests.test_sea_modem:Both", sea).sonar.channels == ("link", "modem")
-    linked = load_scenario("starter", overrides={"sonar.channels": ["link"]})
+    linked = load_scenario(STARTER, overrides={"sonar.channels": ["link"]})
     card = Card(percept=card_rows(PerceptLayout.of(linked)), channels=("link",))
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, [Layer(np.zeros((123, 2), np.float32), np.zeros(2, np.float32))])
     assert granted(str(tmp_path), sea).sonar.channels == ("link",)

@@ -69,7 +69,7 @@ def frame(swarm):
     return known | {
         "who": swarm.heard[0].copy(),
         "eta": swarm.state.eta[0].copy(),
-        "l": swarm.facts.reference[0].copy(),
+        "l": swarm.facts.reference[0, 0].copy(),
     }
 
 

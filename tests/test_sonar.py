@@ -66,7 +66,7 @@ def test_percepts_do_not_change_when_the_world_is_rotated_and_moved(seed, turn, 
     swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
     swarm.state.eta[0, :, 2] += turn
     swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (x, y)
-    swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (x, y)
+    swarm.course.waypoints[0, 0] = swarm.course.waypoints[0, 0] @ rotation.T + (x, y)
     np.testing.assert_allclose(swarm.observe().flat, before, rtol=1e-4, atol=1e-3)
 
 

@@ -37,7 +37,7 @@ def placed(scenario, found, worlds=1):
 def relative(swarm):
     """States (x, y, psi, u, v, r) relative to l(t), shape (world, 6 vehicle)."""
     states = np.concatenate([swarm.state.eta, swarm.state.nu], axis=2)
-    states[:, :, :2] -= swarm.facts.reference[:, None, :2]
+    states[:, :, :2] -= swarm.facts.reference[:, 0, None, :2]
     return states.reshape(len(states), -1)
 
 

@@ -17,6 +17,7 @@ from gymnasium.wrappers import vector as wrappers
 from packaging.version import Version
 
 import uuv_marl
+from tests.golden import STARTER
 from uuv_marl import baselines
 from uuv_marl.envs.solo import SoloEnv
 from uuv_marl.scenario import ScenarioError
@@ -242,7 +243,7 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
 )
 def test_solo_drops_no_override(overrides, message):
     with pytest.raises(ScenarioError, match=message):
-        SoloEnv("starter", overrides=overrides)
+        SoloEnv(STARTER, overrides=overrides)
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
     assert both.scenario.sonar.channels == ("compass", "modem")
 
