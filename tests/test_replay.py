@@ -510,7 +510,7 @@ def test_the_command_is_quoted_for_a_shell():
 
 @pytest.mark.docs
 def test_the_page_states_the_resolutions():
-    text = (Path(__file__).resolve().parent.parent / "docs" / "replay.md").read_text()
+    text = (Path(__file__).resolve().parent.parent / "docs" / "benchmark.md").read_text()
     cells = {name: cells for name, *cells in re.findall(r"^\| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", text, flags=re.M)}
     turn = 180 / np.pi
     for name, coding, scale in (

@@ -26,7 +26,7 @@ from uuv_marl.cli import app
 from uuv_marl.errors import MissingExtraError, ResultsError
 
 QUICK = {"time_limit.factor": 0.01, "time_limit.extra_s": 2.0, "swarm.num_vehicles": 5}
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "results-format.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmark.md"
 
 
 def quick(name="single_obstacle"):

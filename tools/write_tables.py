@@ -8,18 +8,23 @@ from pathlib import Path
 import uuv_marl
 from research.dynamics import acceptance, sea_trials
 from research.episodes import read_rows
+from research.heldout import page as heldout
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
-from uuv_marl.envs.reward import TERMS
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
+from uuv_marl.tasks.follow import Follow
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = tuple(ROOT / page for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md"))
+PAGES = tuple(
+    ROOT / page
+    for page in ("README.md", "docs/environment.md", "docs/results.md", "docs/scenarios.md", "docs/vehicles.md")
+)
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
 TRIALS = read_rows(ROOT / "docs" / "sea-trials.csv.gz")
+HELD = heldout.tables(read_rows(ROOT / "docs" / "heldout.csv.gz"))
 
 
 def table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
@@ -83,7 +88,9 @@ def filled() -> dict[str, str]:
     env = uuv_marl.parallel_env("single_obstacle")
     scenario, agents = env.scenario, env.possible_agents
     weights = scenario.reward.model_dump()
-    terms = [(f"`{name}`", what, f"{weights[name]:g}" if name in weights else "") for name, what in TERMS.items()]
+    terms = [
+        (f"`{name}`", what, f"{weights[name]:g}" if name in weights else "") for name, what in Follow.terms.items()
+    ]
     text = Path(__file__).with_name("tables.md").read_text(encoding="utf-8")
     values = {
         "env": env, "scenario": scenario, "agents": agents, "last": agents[-1],
@@ -104,6 +111,8 @@ TABLES = filled() | {
     "figures": rows(acceptance.figures()),
     "stability": rows(acceptance.stability()),
     "scales": rows(sea_trials.scales()),
+    "heldout": HELD[0].rstrip("\n"),
+    "fields": HELD[1].rstrip("\n"),
     "sea_trials": rows(sea_trials.table(TRIALS)),
     "history": table(("version", "what changed"), list(uuv_swarm_v1.HISTORY.items())),
 }

@@ -114,7 +114,7 @@ def test_a_compiled_function_shows_its_signature():
 
 @pytest.mark.parametrize(("word", "found_on"), [
     ("sonar", "docs/environment"), ("remus", "docs/vehicles"), ("bluerov2", "docs/vehicles"),
-    ("glossari", "README"), ("mappo", "docs/mappo"), ("parallel_env", "docs/interfaces"),
+    ("replay", "docs/benchmark"), ("mappo", "docs/training"), ("parallel_env", "docs/interfaces"),
 ])  # fmt: skip
 def test_the_search_finds(word, found_on):
     index = json.loads(re.fullmatch(r"Search\.setIndex\((.*)\)", (SITE / "searchindex.js").read_text())[1])
