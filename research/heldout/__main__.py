@@ -27,7 +27,7 @@ def main(
     """Evaluate every policy on seeds that no training, no tuning and no choice has used.
 
     The sets are 1,000 random fields, the paper's scenarios, lost vehicles, swarms of 10 to 300, echoes of the surface,
-    and other decision periods. The command writes heldout.md, heldout.csv.gz and a picture; docs/results.md has the tables. All sets took about two
+    and other decision periods. The command writes heldout.md, heldout.csv.gz and a picture. All sets took about two
     hours in two processes, each with its own --only. Ctrl-C keeps the finished episodes; the same command continues.
 
     Example: python -m research.heldout --only single_obstacle --seeds 5
