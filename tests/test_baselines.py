@@ -27,12 +27,6 @@ def test_the_default_gains_are_table_1():
     assert GAINS.feed_forward == 0.0
 
 
-def test_neighbours_at_60_m_neither_attract_nor_repel():
-    f_x, f_y, _ = bio_inspired.neighbour_force(36.0, 48.0, GAINS)
-    assert math.hypot(f_x, f_y) < 1e-9
-    assert bio_inspired.neighbour_force(59.0, 0.0, GAINS)[0] < 0 < bio_inspired.neighbour_force(61.0, 0.0, GAINS)[0]
-
-
 @given(st.floats(-400, 400), st.floats(-400, 400))
 def test_pair_forces_are_central_and_opposite(x, y):
     a = bio_inspired.neighbour_force(x, y, GAINS)
@@ -133,22 +127,6 @@ def test_who_a_vehicle_is_does_not_matter(name):
     np.testing.assert_allclose(actions[0][order], actions[1], atol=1e-6)
 
 
-def test_echoes_of_one_obstacle_count_once_where_asked():
-    lone = load_scenario("single_obstacle", num_vehicles=1)
-    layout = PerceptLayout.of(lone)
-    flat = np.zeros((1, 1, layout.size), np.float32)
-    percept = Percept(flat, layout)
-    percept["echo"][0, 0] = [0, 1, 1, 1, 0, 1, 0]
-    percept["echo_range"][0, 0] = [0, 40, 30, 35, 0, 20, 0]
-    percept["echo_position"][0, 0, 1:4] = (55.0, -5.0)
-    percept["echo_position"][0, 0, 5] = (30.0, 30.0)
-    each = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1))
-    once = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1), obstacle_term="per_obstacle")
-    first, second = ((0.1 * np.exp(80 / np.hypot(*p)) * -np.array(p)) for p in ((55.0, -5.0), (30.0, 30.0)))
-    np.testing.assert_allclose(each.act(percept)[0, 0], (3 * first + second) / 3000, rtol=1e-5)
-    np.testing.assert_allclose(once.act(percept)[0, 0], (first + second) / 3000, rtol=1e-5)
-
-
 @given(st.floats(10.0, 26.0), st.floats(4.0, 20.0))
 def test_clustering_repels_within_its_distance_and_attracts_beyond(distance, width):
     gains = sff.SffGains(1, 1, 100.0, distance, width, 60.0, 0, 0, 0, 1, 0, 1, 0)
@@ -194,68 +172,24 @@ def test_slots_are_a_lattice_around_zero(n):
         np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
 
 
-def test_slots_are_assigned_so_that_ways_are_short():
-    scenario = granted("sdc", load_scenario("tracking", num_vehicles=7))
-    swarm, policy = Swarm(scenario), make("sdc", scenario)
-    swarm.reset(0)
-    slots = sdc.hexagonal_slots(7)[[3, 1, 4, 0, 6, 5, 2]]
-    swarm.state.eta[0, :, :2] = slots * 1.1 + (500.0, 300.0)
-    policy.act(swarm.observe())
-    np.testing.assert_allclose(policy.memory.slots[0], slots, atol=1e-9)
+FOLDER = resources.files("uuv_marl.baselines") / "tuned"
+HULLS = ("bluerov2_heavy", "lauv", "remus100")
 
 
-def test_policies_that_remember_forget_on_reset():
-    for name in ("sff", "sdc", "scout", "guarded:mappo", "random"):
-        scenario = granted(name, load_scenario("single_obstacle", num_vehicles=9))
-        swarm, policy = Swarm(scenario), make(name, scenario)
-        runs = []
-        for _ in range(2):
-            percept = swarm.reset(4)
-            policy.reset(4)
-            for _ in range(30):
-                percept = swarm.step(policy.act(percept))
-            runs.append(swarm.state.eta.tobytes())
-        assert runs[0] == runs[1], name
-
-
-@pytest.mark.parametrize(("name", "channel"), [("sff", "link"), ("sdc", "compass and link")])
-def test_a_policy_without_its_channels_names_the_remedy(name, channel):
-    with pytest.raises(PolicyError, match=f"{channel} .sonar.channels.*use uuv_marl.baselines.granted"):
-        make(name, load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="granted"):
-        make(name, parallel_env("tracking"))
-
-
-def test_a_policy_refuses_another_inner_loop():
-    with pytest.raises(PolicyError, match="yaw damping of 600 .*actuators.yaw_damping_nms.*granted"):
-        make("bio_inspired_plus", load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="yaw damping of 0"):
-        make("bio_inspired", granted("bio_inspired_plus", load_scenario("tracking")))
-
-
-def test_unknown_names_and_parameters_suggest():
-    with pytest.raises(PolicyError, match="did you mean 'bio_inspired'"):
-        make("bio_inspred", load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="made for a Scenario"):
-        make("bio_inspired", "tracking")
-    with pytest.raises(PolicyError, match="num_worlds must be at least 1"):
-        make("bio_inspired", load_scenario("tracking"), 0)
-    with pytest.raises(PolicyError, match="no parameter .gain.; did you mean .gains.. It has gains, obstacle_term"):
-        make("bio_inspired", load_scenario("tracking"), gain=3)
-
-
-@pytest.mark.parametrize("name", SPACES)
-def test_tuned_gains_come_from_shipped_trials(name):
-    data = json.loads((resources.files("uuv_marl.baselines") / "tuned" / f"{name}.json").read_text())
-    with (resources.files("uuv_marl.baselines") / "tuned" / f"{name}.csv").open() as file:
-        trials = list(csv.DictReader(file))
-    assert len(trials) == TRIALS
+@pytest.mark.parametrize("file", [*SPACES, *(f"bio_inspired_plus.{hull}" for hull in HULLS)])
+def test_tuned_gains_come_from_shipped_trials(file):
+    data = json.loads((FOLDER / f"{file}.json").read_text())
+    trials = list(csv.DictReader((FOLDER / f"{file}.csv").read_text().splitlines()))
+    name, _, hull = file.partition(".")
+    assert len(trials) == (100 if hull else TRIALS)
+    assert data.get("vehicle", "") == hull or not hull
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
     best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
     assert best == {"cost_s": data["best_cost_s"], **data["best"]}
-    assert list(data["best"]) == list(SPACES[name][0])
-    scenario = granted(name, load_scenario("tracking"))
-    gains = make(name, scenario).gains._asdict()
+    policy = f"{name},tuned_for={hull}" if hull else name
+    changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
+    scenario = granted(policy, load_scenario("sea_trial" if hull else "tracking", overrides=changes))
+    gains = make(policy, scenario).gains._asdict()
     assert {key: gains[key] for key in data["best"]} == data["best"]
 
 
@@ -333,31 +267,39 @@ def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
         assert make("scout", scenario, preset=name).gains == preset.gains
 
 
+class Nothing(Policy):
+    """Decides nothing."""
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [
+        ("sff", "link .sonar.channels.*use uuv_marl.baselines.granted"),
+        ("sdc", "compass and link .sonar.channels.*use uuv_marl.baselines.granted"),
+        ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*granted"),
+        ("tests.test_baselines:Nothing", r"policy '.*Nothing' must define decide\(percept\)"),
         ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
         ("bio_inspired,zeta_n=x", "the gain zeta_n must be a finite number, got 'x'"),
         ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
         ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
         ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, got 'bold'"),
-        ("idle,gain=1", "has no parameter 'gain'; It has none"),
         ("guarded:bio_insp", "did you mean 'bio_inspired'"),
-        ("bio_insp,zeta_n=1", "did you mean 'bio_inspired'"),
     ],
 )
 def test_a_name_that_means_nothing_is_explained(name, message):
     with pytest.raises(PolicyError, match=message):
         make(name, load_scenario("starter"))
+    with pytest.raises(PolicyError, match=message):
+        make(name, parallel_env("starter"))
 
 
-def test_a_policy_that_decides_nothing_is_refused_when_it_is_made():
-    class Nothing(Policy):
-        pass
-
-    with pytest.raises(PolicyError, match=r"policy 'Nothing' must define decide\(percept\)"):
-        Nothing(load_scenario("starter"))
+def test_what_a_policy_cannot_be_made_for_is_explained():
+    damped = granted("bio_inspired_plus", load_scenario("tracking"))
+    for arguments, message in (((damped,), "yaw damping of 0"), (("tracking",), "made for a Scenario"),
+                               ((load_scenario("tracking"), 0), "num_worlds must be at least 1")):  # fmt: skip
+        with pytest.raises(PolicyError, match=message):
+            make("bio_inspired", *arguments)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Whatever enters compiled code is checked first: percepts of others, snapshots, masks; and a runaway is named."""
 
-import copy
 import io
 import logging
 import os
@@ -22,6 +21,7 @@ from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoi
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, load_trace
 from uuv_marl.cli import app, main
+from uuv_marl.cli.console import _width, console
 from uuv_marl.errors import DivergenceError, ResultsError
 from uuv_marl.extras import environment, silenced
 from uuv_marl.paths import user_path
@@ -89,21 +89,6 @@ def test_a_swarm_too_large_to_assign_slots_is_refused_at_once():
         make("sdc", granted("sdc", load_scenario("tracking", num_vehicles=2001)))
 
 
-def test_a_ghost_is_nobody_to_the_lattice():
-    """A neighbour without identity moves a vehicle of sdc by its short repulsion alone."""
-    _, policy, percept = made_for("sdc")
-    policy.act(percept)
-    percept["heard"][...] = 0.0
-    percept["heard"][0, 1, 0], percept["neighbour"][0, 1, 0] = 1.0, (60.0, 0.0)
-    actions = []
-    for identity in (0.0, 77.0):
-        percept["link_identity"][0, 1, 0] = identity
-        fresh = copy.deepcopy(policy)
-        actions.append(fresh.act(percept)[0, 1].tolist())
-    percept["heard"][0, 1, 0] = 0.0
-    assert actions[0] == actions[1] == copy.deepcopy(policy).act(percept)[0, 1].tolist()
-
-
 @pytest.mark.parametrize("active", [[True], np.ones(8), np.ones((8, 1), bool), np.ones(9, bool)])
 def test_a_mask_of_other_worlds_is_refused(active):
     swarm = Swarm(load_scenario("tracking", num_vehicles=2), 8)
@@ -159,18 +144,6 @@ def test_state_changed_by_hand_is_checked():
     swarm.course.num_obstacles[0] = 50
     with pytest.raises(ValueError, match="num_obstacles"):
         swarm.observe()
-
-
-@pytest.mark.parametrize("seed", [1.5, "1", True, [0, 1.5], [0, "1"], (1 + 2j, 0), object()])
-def test_a_seed_is_a_whole_number(seed):
-    swarm = Swarm(load_scenario("tracking", num_vehicles=2), 2)
-    for reset in (swarm.reset, make("random", swarm.scenario, 2).reset):
-        with pytest.raises(TypeError, match="seed must be a whole number from 0"):
-            reset(seed)
-        with pytest.raises(ValueError, match="seed must be a whole number from 0"):
-            reset([-1, 2])
-        with pytest.raises(ValueError, match="one seed for each of 2 worlds"):
-            reset([1, 2, 3])
 
 
 @pytest.fixture
@@ -328,7 +301,7 @@ QUICK = (
     "benchmark", "--scenario=starter", "--set=time_limit.factor=0.02", "--set=swarm.num_vehicles=2", "--policy=idle",
     "--seeds=1",
 )  # fmt: skip
-LEGACY = ("ascii", "latin-1", "iso8859-15", "cp437", "cp850", "cp1251", "cp932", "cp936", "cp949")
+LEGACY = ("ascii", "latin-1", "cp437", "cp932")
 
 
 @pytest.fixture
@@ -353,19 +326,13 @@ def printed(monkeypatch):
 def test_lists_help_and_errors_can_be_printed_in_any_encoding(encoding, printed):
     for name in COMMANDS:
         assert printed([*name.split(), "--help"], encoding)[0] == 0, name
-    for arguments, word in (("list policies", "scout"), ("list scenarios", "starter"), ("list --show=lossy", "loss")):
+    for arguments, word in (("list policies", "scout"), ("list scenarios", "starter"), ("list vehicles", "remus100")):
         status, text, _ = printed(arguments.split(), encoding)
         assert status == 0
         assert word in text
     status, _, error = printed(["benchmark", "--policy=μ–→"], encoding)
     assert status == 2
     assert "is unknown" in error
-
-
-def test_vehicles_can_be_printed_in_plain_ascii(printed):
-    status, text, _ = printed(["list", "vehicles"], "ascii")
-    assert status == 0
-    assert "remus100" in text
 
 
 @pytest.mark.parametrize("encoding", LEGACY)
@@ -377,17 +344,16 @@ def test_a_benchmark_that_has_finished_is_printed_in_any_encoding(encoding, prin
     assert "0/1" in text
 
 
-def test_a_table_fits_a_notebook(tmp_path):
-    run = [sys.executable, "-m", "uuv_marl", *QUICK, f"--output={tmp_path}"]
-    there = {**os.environ, "JPY_PARENT_PID": "1", "PYTHONIOENCODING": "utf-8"}
-    text = subprocess.run(run, capture_output=True, encoding="utf-8", check=True, env=there).stdout
+def test_a_table_fits_a_notebook(printed, tmp_path, monkeypatch):
+    monkeypatch.setenv("JPY_PARENT_PID", "1")
+    monkeypatch.setattr(console, "width", _width())
+    _, text, _ = printed([*QUICK, f"--output={tmp_path}"], "utf-8")
     assert 60 < max(len(line) for line in text.splitlines() if "│" in line) <= 88
 
 
 def test_commands_work_without_docstrings(tmp_path):
     """``python -OO`` drops them, and every assert."""
-    lines = [["list"], ["list", "--show=lauv"]]
-    lines += [[*name.split(), "--help"] for name in COMMANDS]
+    lines = [["list"], ["list", "--show=lauv"], ["train", "--help"]]
     code = f"""import sys
 from uuv_marl.cli import main
 for arguments in {lines!r}:

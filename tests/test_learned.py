@@ -1,22 +1,15 @@
 """Learned policies from checkpoints: what they see, what they refuse, and that every path gives one run."""
 
-import copy
 import itertools
 import json
-import math
-import pickle
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import safetensors.numpy
-from typer.testing import CliRunner
 
-from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl import load_scenario
+from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.learned.checkpoint import (
     WEIGHTS_FILE,
     Card,
@@ -27,11 +20,10 @@ from uuv_marl.baselines.learned.checkpoint import (
     vehicle_of,
 )
 from uuv_marl.baselines.learned.network import forward
-from uuv_marl.baselines.learned.percept_features import BARRIER, Features
+from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.benchmark.results import Results, ResultsError, knowledge
-from uuv_marl.cli import app
+from uuv_marl.benchmark.results import knowledge
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.swarm import Swarm
@@ -88,38 +80,6 @@ def learned_file(folder):
     return Path(folder) / WEIGHTS_FILE
 
 
-def test_actions_turn_with_the_world(best):
-    scenario = granted(best, load_scenario("single_obstacle", num_vehicles=20))
-    turn, actions = 0.7, []
-    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    for moved in (False, True):
-        swarm = Swarm(scenario)
-        swarm.reset(3)
-        swarm.state.eta[0, :, :2] += 150.0
-        if moved:
-            swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (50.0, -80.0)
-            swarm.state.eta[0, :, 2] += turn
-            swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (50.0, -80.0)
-            swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (50.0, -80.0)
-        actions.append(make(best, scenario).act(swarm.observe()))
-    assert np.abs(actions[0]).max() > 0.1
-    np.testing.assert_allclose(actions[0], actions[1], atol=5e-4)
-
-
-def test_features_are_bounded_and_feel_what_is_near(place):
-    scenario = load_scenario("single_obstacle", num_vehicles=3)
-    extract = Features(scenario, BARRIER)
-    swarm = place("single_obstacle", [[0, 0, 0], [6.0, 0, 0], [-300.0, 5.0, 0]], obstacles=[(60.0, 0, 25.0)])
-    features, barrier = np.empty((1, 3, extract.size), np.float32), np.empty((1, 3, 2), np.float32)
-    extract.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
-    assert np.abs(features).max() <= 4.0
-    assert barrier[0, 0, 0] < -0.3, "pushed back by the vehicle ahead"
-    before = features.copy()
-    swarm.state.eta[0, 1, 0] = 7.0
-    extract.look(swarm.observe().flat, features, barrier, np.zeros(1, np.int64))
-    assert np.abs(features - before)[0, 0].max() > 0.02
-
-
 @pytest.mark.parametrize("n", [1, 54])
 def test_a_run_depends_on_its_seed_alone(best, n):
     scenario = granted(best, load_scenario("tracking", num_vehicles=n, overrides=SHORT))
@@ -127,18 +87,6 @@ def test_a_run_depends_on_its_seed_alone(best, n):
     (alone,) = (e for e in evaluate(scenario, best, [5]) if isinstance(e, Run))
     assert together[5].metrics == alone.metrics
     np.testing.assert_array_equal(together[5].routes.position, alone.routes.position)
-
-
-def test_the_environment_gives_the_same_run(best):
-    scenario = granted(best, load_scenario("tracking", num_vehicles=5, overrides=SHORT))
-    env, swarm = parallel_env(scenario), Swarm(scenario)
-    through, direct = make(best, env), make(best, scenario)
-    observations, _ = env.reset(seed=3)
-    percept = swarm.reset(3)
-    for _ in range(20):
-        observations, *_ = env.step(through(observations))
-        percept = swarm.step(direct.act(percept))
-    np.testing.assert_array_equal(env.unwrapped.swarm.state.eta, swarm.state.eta)
 
 
 def test_it_works_for_any_size_and_declares_what_it_needs(best):
@@ -184,38 +132,7 @@ def test_a_rewritten_checkpoint_is_loaded_anew(best):
     assert policy_class(best).yaw_damping_nms == 100.0
 
 
-@pytest.mark.parametrize("name", [*POLICIES, "checkpoint"])
-def test_policies_can_be_pickled_and_copied(name, best):
-    """A copy acts as the policy itself from then on, its memory and its random numbers included."""
-    name = best if name == "checkpoint" else name
-    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=6))
-    swarm, policy = Swarm(scenario, 2), make(name, scenario, 2)
-    percept = swarm.reset(3)
-    policy.reset(3)
-    for _ in range(3):
-        percept = swarm.step(policy.act(percept))
-    for same in (pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy)):
-        mine = copy.deepcopy(policy)
-        np.testing.assert_array_equal(same.act(percept), mine.act(percept))
-        np.testing.assert_array_equal(same.act(percept), mine.act(percept))
-
-
-def test_importing_policies_reads_no_weights():
-    code = "import uuv_marl.baselines as b; print([n for n, p in b.POLICIES.items() if 'checkpoint' in vars(p)])"
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert done.stdout == "[]\n"
-    assert POLICIES["mappo"].checkpoint is POLICIES["mappo"].checkpoint
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("vehicle.m_kg", 600.0),
-        ("vehicle.N_rr", 90.0),
-        ("actuators.max_force_n", 1500.0),
-        ("actuators.lever_arm_m", 2.0),
-    ],
-)
+@pytest.mark.parametrize(("field", "value"), [("vehicle.m_kg", 600.0), ("actuators.lever_arm_m", 2.0)])
 @pytest.mark.parametrize("name", ["mappo", "best"])
 def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     """Also by checkpoints of version 0.1.0, which do not name theirs: the shipped one."""
@@ -227,14 +144,6 @@ def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     with pytest.raises(PolicyError, match=message):
         make(name, other)
     assert make(name, other, any_vehicle=True).act(Swarm(other).reset(0)).shape == (1, 2, 2)
-
-
-def test_a_benchmark_on_another_vehicle_is_refused_before_its_first_run(tmp_path):
-    command = ["benchmark", "--policy=idle", "--policy=mappo", "--set=vehicle.m_kg=600.0", f"--output={tmp_path / 'a'}"]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 2
-    assert "mappo was trained on another vehicle" in done.output
-    assert not (tmp_path / "a").exists()
 
 
 def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
@@ -266,15 +175,10 @@ def changed(k=0, name="weight", value=None, at=None):
     [
         (actor(features=100), r"0.weight is float32 \(100, 16\), expected float32 \(123, 16\)"),
         (changed(at=(0, 0), value=np.nan), "0.weight must hold finite numbers"),
-        (changed(at=(3, 1), value=-np.inf), "0.weight must hold finite numbers"),
         (changed(at=(3, 1), value=1e38), "0.weight must hold finite numbers of at most 1e"),
-        (changed(1, "bias", at=0, value=np.nan), "1.bias must hold finite numbers"),
         (changed(value=np.zeros((123, 16, 2))), r"0.weight is float32 \(123, 16, 2\), expected"),
-        (changed(value=np.zeros(123)), r"0.weight is float32 \(123,\), expected"),
-        (changed(0, "bias", np.zeros((16, 1))), r"0.bias is float32 \(16, 1\), expected float32 \(16,\)"),
         (changed(0, "bias", 0.0), r"0.bias is float32 \(1,\), expected"),
         (changed(1, value=np.zeros((16, 3))), r"1.weight is float32 \(16, 3\), expected float32 \(16, 2\)"),
-        (changed(1, value=np.zeros((17, 2))), r"1.weight is float32 \(17, 2\), expected float32 \(16, 2\)"),
         ([], "0.weight is missing"),
     ],
 )
@@ -289,11 +193,9 @@ def test_weights_that_cannot_run_are_refused(layers, message, tmp_path):
     [
         ("barrier", [1.0]),
         ("barrier", [0.0, 0.8, float("nan"), 0.3, 140.0, 0.0]),
-        ("decision_period_s", [0.1, float("inf")]),
         ("decision_period_s", [0.5, 0.1]),
         ("decision_period_s", [0.0, 0.1]),
         ("yaw_damping_nms", float("nan")),
-        ("vehicle", {"vehicle.m_kg": float("inf")}),
         ("percept", "none"),
         ("format", 2),
         ("wings", 2),
@@ -305,45 +207,3 @@ def test_cards_that_say_nothing_sensible_are_refused(field, value, tmp_path):
     (tmp_path / "bad").write_bytes(safetensors.numpy.save(tensors, {"uuv_marl": said}))
     with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .its card's {field}"):
         make(str(tmp_path / "bad"), load_scenario("tracking"))
-
-
-def test_results_refuse_other_weights_of_the_same_path(best, tmp_path):
-    scenario = granted(best, load_scenario("tracking", num_vehicles=2, overrides=SHORT))
-    results = Results(tmp_path / "out", [scenario])
-    for run in evaluate(scenario, best, [0]):
-        if isinstance(run, Run):
-            results.add(scenario.name, best, run)
-    assert Results(tmp_path / "out", [scenario]).has("tracking", best, 0)
-    assert results.trace("tracking", best, 0)["time_s"].size
-    save_checkpoint(learned_file(best), card(), actor(seed=1))
-    changed = Results(tmp_path / "out", [scenario])
-    with pytest.raises(ResultsError, match="as it was before its file changed; give --anew"):
-        changed.use(best)
-    changed.forget_changed(best)
-    assert not changed.has("tracking", best, 0)
-    changed.use(best)
-
-
-def test_one_table_holds_names_and_checkpoints(best, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "runs").mkdir()
-    shutil.move(best, tmp_path / "runs" / "best")
-    options = [f"--set={key}={json.dumps(value)}" for key, value in SHORT.items()]
-    command = ["benchmark", "--scenario=tracking", "--seeds=1", "--policy=idle", "--policy=runs/best", "--output=out"]
-    done = CliRunner().invoke(app, [*command, *options, "--set=swarm.num_vehicles=4"])
-    assert done.exit_code == 0, done.output
-    table = (tmp_path / "out" / "table.md").read_text()
-    assert "| idle |" in table
-    assert "| runs/best | yaw damping 600 N m s |" in table
-
-
-def test_weights_that_change_during_a_benchmark_are_refused(best, tmp_path):
-    scenario = granted(str(best), load_scenario("tracking", num_vehicles=4, overrides=SHORT))
-    results = Results(tmp_path / "out", [scenario])
-    results.use(str(best))
-    runs = [run for run in evaluate(scenario, str(best), [0, 1]) if isinstance(run, Run)]
-    results.add(scenario.name, str(best), runs[0])
-    save_checkpoint(learned_file(best), card(), actor(seed=1))
-    with pytest.raises(ResultsError, match="before its file changed"):
-        results.add(scenario.name, str(best), runs[1])
-    assert [row.seed for row in results.rows] == [0]

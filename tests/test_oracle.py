@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests import contract
+from tests.conftest import COUPLED, LIFT, RUDDER
 from tests.oracle import motion, sonar
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
@@ -64,12 +65,7 @@ print(json.dumps([bits, actions]))
 
 # --- Motion ---
 
-COUPLED = {"vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0, "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0,
-           "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0}  # fmt: skip
-LIFT = {"vehicle.Y_uv": -60.0, "vehicle.Y_ur": 20.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "vehicle.N_vv": -9.0}
 ASTERN = {"actuators.max_astern_n": 700.0, "vehicle.munk_moment": False}
-RUDDER = {"actuators.kind": "rudder", "actuators.Y_uud": 60.0, "actuators.N_uud": -40.0,
-          "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
 HELD = {"timing.decision_period_s": 0.5}
 FINE = {**HELD, "timing.integration_step_s": 0.02}
 LATE = {"actuators.thrust_lag_s": 0.5, "actuators.yaw_lag_s": 0.3, "actuators.yaw_authority": 0.7,

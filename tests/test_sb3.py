@@ -14,12 +14,10 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
-from tests import contract
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.percept import Percept
-from uuv_marl.scenario import ScenarioError
 from uuv_marl.train import run
 from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
 
@@ -60,19 +58,6 @@ def test_ppo_learns_and_a_seed_fixes_it():
     assert np.isfinite(mean)
 
 
-def test_ppo_learns_in_a_disturbed_sea():
-    learn(VecCheckNan(swarm(overrides=contract.SEA | SHORT), raise_exception=True))
-
-
-def test_ppo_knows_episodes_without_any_wrapper():
-    env = swarm(overrides=QUICK, scenario="single_obstacle")
-    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, n_epochs=1, seed=0, device="cpu")
-    model.learn(64 * env.num_envs)
-    assert model.ep_info_buffer
-    assert {info["l"] for info in model.ep_info_buffer} == {33}
-    assert set(model.ep_success_buffer) == {True}
-
-
 def test_normalising_and_stacking_wrappers():
     learn(VecNormalize(VecCheckNan(swarm(), raise_exception=True)))
     learn(VecFrameStack(swarm(), 2))
@@ -109,67 +94,6 @@ def test_time_limits_are_bootstrapped_and_arrivals_are_not(monkeypatch):
         assert bool(single) == truncated
 
 
-def test_unseeded_resets_go_on_and_seeding_returns_every_row():
-    env = swarm()
-    assert list(env.seed(5)) == [5] * 4 + [6] * 4
-    first, second = env.reset(), env.reset()
-    assert not np.array_equal(first, second)
-    env.seed(5)
-    np.testing.assert_array_equal(env.reset(), first)
-    np.testing.assert_array_equal(env.reset(), second)
-    assert len(env.seed()) == 8
-
-
-def test_scenarios_that_lose_vehicles_are_refused_with_the_remedy():
-    with pytest.raises(ScenarioError, match=r"in scenario 'lossy'; use .* or override disturbance.loss_times_s=\[\]"):
-        SwarmVecEnv("lossy", 1)
-    with pytest.raises(ScenarioError, match="contact.ends_vehicle=false"):
-        SwarmVecEnv(overrides={"contact.ends_vehicle": True})
-    SwarmVecEnv("lossy", 1, overrides={"disturbance.loss_times_s": []})
-
-
-def test_attributes_of_rows():
-    env = swarm()
-    assert env.get_attr("render_mode") == [None] * 8
-    assert env.get_attr("scenario", [0, 3]) == [env.scenario] * 2
-    assert env.has_attr("swarm")
-    assert not env.has_attr("nonsense")
-    assert env.env_is_wrapped(gymnasium.Wrapper) == [False] * 8
-    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
-        env.set_attr("reward", 1)
-    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
-        env.env_method("reset")
-
-
-def test_options_reach_the_rows():
-    env = swarm(reward=lambda s: np.full(s.state.alive.shape, 2.5), max_cycles=3)
-    env.reset()
-    actions = np.zeros((8, 2), np.float32)
-    outcomes = [env.step(actions) for _ in range(3)]
-    assert all((reward == 2.5).all() for _, reward, _, _ in outcomes)
-    assert [done.all() for _, _, done, _ in outcomes] == [False, False, True]
-    assert all(0.0 <= info["episode"]["t"] < 60.0 for info in outcomes[-1][3])
-    assert outcomes[-1][3][0]["episode"]["r"] == 7.5
-    with pytest.raises(ValueError, match=r"actions, a row per vehicle, must have shape \(8, 2\), got \(2, 8\)"):
-        env.step(actions.T)
-    assert outcomes[-1][3][0]["ending"] == "time_limit"
-    with pytest.raises(RuntimeError, match="step_wait came before step_async"):
-        env.step_wait()
-    with pytest.raises(TypeError, match="seed must be a whole number from 0, got 1.5"):
-        env.seed(1.5)
-
-
-@pytest.mark.needs("pygame")
-def test_a_picture_tiles_the_worlds():
-    env = swarm(render_mode="rgb_array")
-    assert env.metadata["render_fps"] == 2
-    with pytest.raises(RuntimeError, match="came before reset"):
-        env.render()
-    env.reset()
-    assert env.render().shape == (1600, 800, 3)
-    env.close()
-
-
 @pytest.mark.parametrize("others", ["bio_inspired", "sdc"])
 def test_solo_passes_sb3s_check(scenario_name, others):
     check_env(gymnasium.make("uuv_marl/Solo-v1", scenario=scenario_name, num_vehicles=8, others=others))
@@ -198,16 +122,6 @@ def test_a_monitor_finds_its_keys_where_a_wrapper_ends_the_episode():
     assert info["episode"]["is_success"] is False
 
 
-def test_sb3_evaluates_rows_without_a_wrapper():
-    env = swarm()
-    model = PPO("MlpPolicy", env, device="cpu")
-    _, lengths = evaluate_policy(model, env, 8, return_episode_rewards=True)  # a warning would be an error
-    assert len(lengths) == 8
-    assert min(lengths) > 1
-    assert env.env_is_wrapped(Monitor) == [True] * 8
-    assert not any(env.env_is_wrapped(gymnasium.wrappers.TimeLimit))
-
-
 def actors(**overrides):
     damped = {"actuators.yaw_damping_nms": 600.0, "time_limit.factor": 0.02, "time_limit.extra_s": 2.0}
     return ActorVecEnv(swarm(overrides=damped | overrides))
@@ -230,17 +144,6 @@ def test_a_checkpoint_acts_as_the_model_does(tmp_path):
         observation = rows.swarm.percept.to_observation()
 
 
-def test_an_actor_sees_its_last_features_at_an_episodes_end():
-    env = actors()
-    env.reset()
-    for _ in range(100):
-        *_, dones, infos = env.step(np.zeros((8, 2), np.float32))
-        if dones.any():
-            break
-    last = np.stack([infos[row]["terminal_observation"] for row in np.flatnonzero(dones)])
-    assert last.shape[1:] == env.observation_space.shape
-
-
 def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
     for env, message in (
         (swarm(), r"train on ActorVecEnv\(SwarmVecEnv"), (VecNormalize(actors()), "train on ActorVecEnv"),
@@ -260,3 +163,13 @@ def test_the_example_trains_a_policy(tmp_path):
     assert PPO.load(tmp_path / "model").num_timesteps > 100
     scenario = granted(str(tmp_path), load_scenario("tracking", num_vehicles=3))
     assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0
+
+
+def test_sb3_evaluates_rows_without_a_wrapper():
+    env = swarm()
+    model = PPO("MlpPolicy", env, device="cpu")
+    _, lengths = evaluate_policy(model, env, 8, return_episode_rewards=True)  # a warning would be an error
+    assert len(lengths) == 8
+    assert min(lengths) > 1
+    assert env.env_is_wrapped(Monitor) == [True] * 8
+    assert not any(env.env_is_wrapped(gymnasium.wrappers.TimeLimit))

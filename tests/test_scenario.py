@@ -3,85 +3,74 @@
 import re
 import subprocess
 import sys
-import tomllib
 from collections import UserDict, deque
 from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.conftest import SCENARIOS as LARGE
-from uuv_marl import load_scenario, scenario_names
-from uuv_marl.baselines import make
-from uuv_marl.scenario import ScenarioError, load_vehicle, parse_override, show, to_toml
+from uuv_marl import load_scenario
+from uuv_marl.scenario import ScenarioError, load_vehicle, parse_override, show, to_toml, vehicle_names
 from uuv_marl.scenario.hardware import Vehicle
-from uuv_marl.scenario.scenario import warn_of_speed
 
 FOLDER = resources.files("uuv_marl.scenario")
 BASE = "single_obstacle"
 SCENARIOS = (*LARGE, "sea_trial", "starter")
+NO_NUMBERS = ("version", "title", "source", "name")
+SOURCES = (
+    r"section|Table|Eq\.|assumed|none in the paper|nobody|as in the paper|MBARI|Nanomodem|"
+    r"Repoulias|da Silva|Havenstrøm|lauv_gazebo|Prestero|Fossen|Allen|Sgarioto|von Benzon|Wu"
+)
 
 
-def test_the_shipped_scenarios():
-    assert set(scenario_names()) == set(SCENARIOS)
-
-
-@pytest.mark.parametrize("name", ["base", "vehicles/literature_185", *SCENARIOS])
+@pytest.mark.parametrize("name", ["base", *(f"vehicles/{name}" for name in vehicle_names()), *SCENARIOS])
 def test_every_number_carries_its_source(name):
     for line in (FOLDER / f"{name}.toml").read_text().splitlines():
         value = line.split("#")[0]
-        if re.search(r"=.*(\d|true|false|\[\])", value) and not value.startswith(
-            ("version", "title", "source", "name")
-        ):
-            comment = line.partition("#")[2]
-            known = r"section|Table|Eq\.|assumed|Repoulias|none in the paper|nobody|as in the paper|MBARI|Nanomodem"
-            assert re.search(known, comment), line
+        if re.search(r"=.*(\d|true|false|\[\])", value) and not value.startswith(NO_NUMBERS):
+            assert re.search(SOURCES, line.partition("#")[2]), line
 
 
-@pytest.mark.parametrize("name", ["tracking", "single_obstacle", "multi_obstacle"])
-def test_the_papers_scenarios_differ_only_in_what_the_paper_says(name):
-    data = tomllib.loads((FOLDER / f"{name}.toml").read_text())
-    assert set(data) <= {"title", "source", "version", "trajectory", "obstacles"}
-    assert set(data["trajectory"]) == {"waypoints_m"}
+FAULTS = [{"kind": "array", "share": 0.1, "array": "bow"}, {"kind": "yaw", "share": 0.2, "onset_s": 3.0}]
+SEA = {"current.speed_mps": 0.5, "current.direction_deg": 30.0, "modem.period_s": 9.0, "faults": FAULTS}
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_toml_out_and_in_again(name, tmp_path):
-    scenario = load_scenario(name, num_vehicles=8)
+@pytest.mark.parametrize(("name", "overrides"), [*((name, {}) for name in SCENARIOS), (BASE, SEA)])
+def test_a_scenario_goes_out_as_toml_and_in_again(name, overrides, tmp_path):
+    scenario = load_scenario(name, num_vehicles=8, overrides=overrides)
     path = tmp_path / f"{name}.toml"
     path.write_text(to_toml(scenario))
-    assert load_scenario(path) == scenario
-    assert load_scenario(str(path)) == scenario
+    assert load_scenario(path) == load_scenario(str(path)) == scenario
+    for each in (name, path):
+        expected = load_scenario(each)
+        path.write_text(show(each))
+        assert load_scenario(path) == expected
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_show_is_complete_and_loads(name, tmp_path):
-    text = show(name)
-    path = tmp_path / f"{name}.toml"
-    path.write_text(text)
-    assert load_scenario(path) == load_scenario(name)
-    assert "Repoulias" in text
+FORMS = {
+    "tables": "[vehicle]\nm_kg = 300.0\n[trajectory]\nspeed_mps = 2.5  # my ship's log\n",
+    "inline": "vehicle = {m_kg = 300.0}\ntrajectory = {speed_mps = 2.5}  # my ship's log\n",
+    "dotted": "vehicle.m_kg = 300.0\ntrajectory.speed_mps = 2.5  # my ship's log\n",
+    "no obstacles": "obstacles = []\n[vehicle]\nm_kg = 300.0\n",
+    "other arrays": "obstacles = [{centre_m = [350.0, 350.0], radius_m = 20.0}]\nvehicle.m_kg = 300.0\n"
+    "[[sonar.arrays]]\n"
+    'name = "all"\nkind = "active"\nmounting_deg = 0.0\naperture_deg = 360.0\nrange_m = 80.0\nsub_sectors = 9\n',
+}
 
 
-def test_a_sea_goes_out_and_in_again(tmp_path):
-    faults = [{"kind": "array", "share": 0.1, "array": "bow"}, {"kind": "yaw", "share": 0.2, "onset_s": 3.0}]
-    sea = {"current.speed_mps": 0.5, "current.direction_deg": 30.0, "modem.period_s": 9.0, "faults": faults}
-    scenario = load_scenario(BASE, overrides=sea)
-    path = tmp_path / f"{BASE}.toml"
-    path.write_text(to_toml(scenario))
-    assert load_scenario(path) == scenario
-    assert load_scenario(scenario, overrides={"faults.1.share": 0.3}).faults[1].share == 0.3
-    path.write_text(show(path))
-    assert load_scenario(path) == scenario
-
-
-def test_durations_are_the_papers_bounds():
-    for name, duration in (("single_obstacle", 159.1), ("tracking", 462.1), ("multi_obstacle", 457.9)):
-        assert load_scenario(name).trajectory.duration_s == pytest.approx(duration, abs=0.05)
+@pytest.mark.parametrize("form", FORMS)
+def test_what_is_shown_loads_and_names_the_file_of_each_number(form, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(f'extends = "single_obstacle"\n{FORMS[form]}')
+    shown, before = show(path), load_scenario(path)
+    assert "m_kg = 300.0  # mine.toml" in shown
+    assert "I_z_kgm2 = 50.0  # Repoulias" in shown
+    path.write_text(shown)
+    assert load_scenario(path) == before
 
 
 def test_overrides_reach_every_level():
@@ -100,6 +89,9 @@ def test_overrides_reach_every_level():
     assert scenario.sonar.arrays[1].sub_sectors == 3
     assert scenario.obstacles[0].radius_m == 30.0
     assert load_scenario(BASE).sonar.arrays[0].range_m == 100.0
+    mine = {"faults": [{"kind": "yaw", "share": 0.5}], "faults.0.share": 0.25}
+    assert load_scenario(BASE, overrides=mine).faults[0].share == 0.25
+    assert mine["faults"] == [{"kind": "yaw", "share": 0.5}], "a caller's overrides stay as they are"
 
 
 @pytest.mark.parametrize(
@@ -124,142 +116,83 @@ RUDDER = {"actuators.kind": "rudder", "actuators.N_uud": -40.0, "actuators.rudde
 BAD = [
     ({"sonar.arrays.bow.range_m": -3}, r"sonar.arrays.bow.range_m must lie within 0.001 to 4,096, got -3"),
     ({"vehicle.m_kg": float("nan")}, "vehicle.m_kg must lie within 0.001 to 1,000,000, got nan"),
-    ({"trajectory.speed_mps": float("inf")}, "trajectory.speed_mps must lie within 0.01 to 100, got inf"),
+    ({"vehicle.m_kg": 10**5000}, "vehicle.m_kg must be a number, got int that is too large to show"),
     ({"swarm.num_vehicles": 2.5}, "swarm.num_vehicles must be a whole number, got 2.5"),
-    ({"swarm.num_vehicles": 0}, "swarm.num_vehicles must lie within 1 to 16,384, got 0"),
     ({"vehicle.m_kgg": 3.0}, "vehicle.m_kgg is unknown; did you mean 'vehicle.m_kg'"),
-    ({"sonar.arrays.stern.range_m": 3.0}, "no entry 'stern'; use one of bow, port, starboard"),
-    ({"sonar.echo_reports": "nothing"}, "sonar.echo_reports must be 'centre' or 'surface', got 'nothing'"),
-    ({"start.spacing_m": 30.0, "start.gap_m": 30.0}, "start.spacing_m = 30 leaves room for .* 27 are needed; lower it"),
-    ({"start.gap_m": 5.0}, "start.gap_m must be at least start.spacing_m = 13"),
-    ({"vehicle.X_u": 0.0, "vehicle.X_uu": 0.0}, "vehicle.X_u and vehicle.X_uu must not both be 0"),
-    ({"vehicle.N_r": 0.0, "vehicle.N_rr": 0.0}, "vehicle.N_r and vehicle.N_rr must not both be 0"),
-    ({"start.spacing_m": 1.5}, "start.spacing_m must be at least two hull radii"),
-    ({"start.speed_min_mps": 5.0}, "start.speed_min_mps must not exceed"),
-    ({"obstacles.0.centre_m": [130.0, 130.0]}, "obstacles.0 at .* lies on the start"),
-    ({"obstacles.0.centre_m": [610.0, 600.0]}, "obstacles.0 at .* lies on the trajectory's end"),
-    ({"obstacles.0.radius_m": 0.0}, "obstacles.0.radius_m must lie within 0.001 to 4,096, got 0"),
-    ({"vehicle.N_r": 500.0, "vehicle.N_rr": 1000.0}, "timing.integration_step_s = 0.1 is too long .* use at most"),
-    ({"vehicle.N_r": 2500.0}, "timing.integration_step_s = 0.1 is too long"),
-    ({"actuators.yaw_damping_nms": 2000.0}, "actuators.yaw_damping_nms = 2000 is unstable .* use less than 1600"),
-    ({"vehicle.x_G_m": 1.0}, "not positive definite"),
-    ({"vehicle.N_vv": -900.0}, "vehicle.N_vv = -900 lets quadratic damping add energy; lower its size, or raise"),
-    ({"vehicle.Y_vv": 0.0, "vehicle.N_vv": 1.0}, "vehicle.N_vv = 1 lets quadratic damping add energy"),
-    ({"vehicle.Y_uv": 5.0}, "vehicle.Y_uv = 5, .* are a lift that adds energy to sway and yaw; keep"),
-    (SUMS, "N_uv = -24 and N_ur = -2 are a lift that adds energy .* give the lift's part alone"),
-    (LIFT, "timing.integration_step_s = 0.1 is too long for this vehicle"),
-    ({"actuators.N_uud": 3.0}, "actuators.N_uud = 3 is a rudder's, and actuators.kind is 'force_torque'; set it to 0"),
-    ({"actuators.kind": "rudder"}, "actuators.N_uud must not be 0 where actuators.kind is 'rudder'"),
-    ({"actuators.kind": "rudder", "actuators.N_uud": 3.0}, "actuators.rudder_max_deg must not be 0 where"),
-    (RUDDER | {"actuators.yaw_damping_nms": 6.0}, "yaw_damping_nms must be 0 where .*'rudder', got 6: a rudder has no"),
-    (
-        RUDDER | {"trajectory.speed_mps": 6.0},
-        r"trajectory.speed_mps = 6 is more than the 5.14 m/s .*max_force_n = 3000",
-    ),
-    (RUDDER | {"actuators.N_uud": 9e5}, "max_force_n = 3000 and rudder_max_deg = 20; use at most"),
-    (RUDDER | {"actuators.Y_uud": 3e4}, "max_force_n = 3000 and rudder_max_deg = 20; "),  # the trial's own finding
-    ({"actuators.max_astern_n": -1.0}, "actuators.max_astern_n must lie within 0 to 1,000,000, got -1"),
-    ({"vehicle.Y_r": 500.0}, "lets linear damping add energy"),
-    ({"vehicle.Y_rr": 1000.0}, "lets quadratic damping add energy"),
-    ({"timing.decision_period_s": 0.15}, "timing.decision_period_s must be a whole multiple"),
-    ({"timing.integration_step_s": 0.2}, "timing.control_hold_s must be a whole multiple"),
-    ({"disturbance.loss_times_s": [3.0, 1.0]}, "disturbance.loss_times_s must not fall"),
-    ({"swarm.num_vehicles": 2, "disturbance.loss_times_s": [1.0, 2.0]}, "at least one must remain"),
-    ({"trajectory.waypoints_m": [[1.0, 1.0], [1.0, 1.0]]}, "must differ from one to the next"),
-    ({"trajectory.waypoints_m": [[1.0, 1.0]]}, "trajectory.waypoints_m must have at least 2 entries"),
-    ({"sonar.arrays.bow.sub_sectors": 1, "sonar.arrays.bow.aperture_deg": 200.0}, "use at least 2"),
-    ({"sonar.channels": ["link", "link"]}, "sonar.channels must name each channel once"),
-    ({"nonsense": 1}, "nonsense is unknown"),
-    ({"num_vehicles": 20}, "num_vehicles is unknown; did you mean 'swarm.num_vehicles'"),
     ({"speed": 3.0}, "speed is unknown; did you mean 'trajectory.speed_mps'"),
-    ({"arrival.radius": 3.0}, "arrival.radius is unknown; did you mean 'arrival.radius_m'"),
+    ({"curent.speed_mps": 1.0}, "curent is unknown; did you mean 'current'"),
     ({5: 1}, "5 is unknown"),
     ({"": 1}, "'' is unknown"),
     ({"vehicle": CYCLE}, "nested too deeply"),
     ({".".join("a" * 3000): 1}, "nested too deeply"),
+    ({"sonar.arrays.stern.range_m": 3.0}, "no entry 'stern'; use one of bow, port, starboard"),
     ({"sonar.arrays.².range_m": 5.0}, "there is no entry '²'"),
     ({"sonar.arrays.0.name": ""}, "sonar.arrays.0.name must not be empty"),
-    ({"vehicle.X_u": 1e308}, "vehicle.X_u must lie within 0 to 1,000,000"),
-    ({"vehicle.Y_r": -1e308}, "vehicle.Y_r must lie within -1,000,000 to 1,000,000"),
-    ({"vehicle.m_kg": 10**5000}, "vehicle.m_kg must be a number, got int that is too large to show"),
-    ({"actuators.max_torque_nm": 1e308}, "actuators.max_torque_nm must lie within 0.001 to 1,000,000"),
-    ({"arrival.dwell_s": 1e9}, "arrival.dwell_s must lie within 0 to 3,600"),
-    ({"trajectory.speed_mps": 1e6}, "trajectory.speed_mps must lie within 0.01 to 100"),
-    ({"trajectory.waypoints_m": [[0.0, 0.0], [1e17, 0.0]]}, "trajectory.waypoints_m.1.0 must lie within"),
+    ({"sonar.echo_reports": "nothing"}, "sonar.echo_reports must be 'centre' or 'surface', got 'nothing'"),
+    ({"latency.travel_time": 1}, "latency.travel_time must be true or false, got 1"),
+    ({"start.spacing_m": 30.0, "start.gap_m": 30.0}, "start.spacing_m = 30 leaves room for .* 27 are needed; lower it"),
+    ({"start.gap_m": 5.0}, "start.gap_m must be at least start.spacing_m = 13"),
+    ({"start.spacing_m": 1.5}, "start.spacing_m must be at least two hull radii"),
+    ({"start.speed_min_mps": 5.0}, "start.speed_min_mps must not exceed"),
+    ({"obstacles.0.centre_m": [130.0, 130.0]}, "obstacles.0 at .* lies on the start"),
+    ({"obstacles.0.centre_m": [610.0, 600.0]}, "obstacles.0 at .* lies on the trajectory's end"),
     ({"obstacles": [{"centre_m": [1e5, 1e5], "radius_m": 1.0}] * 2000}, "obstacles must have at most 1024 entries"),
-    (
-        {"timing.decision_period_s": 1000.0},
-        "timing.decision_period_s must be at most the shortest time limit = 298.649",
-    ),
-    ({"timing.decision_period_s": 10.0, "timing.integration_step_s": 0.0001}, "takes 100,000 steps .*at most 10,000"),
-    ({"disturbance.loss_times_s": [5.0, 1e9]}, "disturbance.loss_times_s.1 must lie within 0 to 1,000,000"),
-    ({"vehicle.X_udot_kg": -1000.0}, "timing.integration_step_s = 0.1 is too long .* use at most 0.05"),
+    ({"vehicle.X_u": 0.0, "vehicle.X_uu": 0.0}, "vehicle.X_u and vehicle.X_uu must not both be 0"),
+    ({"vehicle.N_r": 500.0, "vehicle.N_rr": 1000.0}, "timing.integration_step_s = 0.1 is too long .* use at most"),
+    (LIFT, "timing.integration_step_s = 0.1 is too long for this vehicle"),
     ({"actuators.max_force_n": 86797.0, "vehicle.Y_vv": 44.6}, "max_force_n = 86797 .* use at most"),
     ({"actuators.max_torque_nm": 43621.0, "vehicle.N_rr": 1.55}, "max_torque_nm = 43621; use at most"),
-    ({"swarm.num_vehicles.deep": 1}, "swarm.num_vehicles.deep is unknown"),
+    (RUDDER | {"actuators.N_uud": 9e5}, "max_force_n = 3000 and rudder_max_deg = 20; use at most"),
+    (RUDDER | {"actuators.Y_uud": 3e4}, "max_force_n = 3000 and rudder_max_deg = 20; "),  # the trial's own finding
+    ({"actuators.yaw_damping_nms": 2000.0}, "actuators.yaw_damping_nms = 2000 is unstable .* use less than 1600"),
+    ({"vehicle.x_G_m": 1.0}, "not positive definite"),
+    ({"vehicle.Y_r": 500.0}, "lets linear damping add energy"),
+    ({"vehicle.N_vv": -900.0}, "vehicle.N_vv = -900 lets quadratic damping add energy; lower its size, or raise"),
+    ({"vehicle.Y_uv": 5.0}, "vehicle.Y_uv = 5, .* are a lift that adds energy to sway and yaw; keep"),
+    (SUMS, "N_uv = -24 and N_ur = -2 are a lift that adds energy .* give the lift's part alone"),
+    ({"actuators.N_uud": 3.0}, "actuators.N_uud = 3 is a rudder's, and actuators.kind is 'force_torque'; set it to 0"),
+    ({"actuators.kind": "rudder"}, "actuators.N_uud must not be 0 where actuators.kind is 'rudder'"),
+    ({"actuators.kind": "rudder", "actuators.N_uud": 3.0}, "actuators.rudder_max_deg must not be 0 where"),
+    (RUDDER | {"actuators.yaw_damping_nms": 6.0}, "yaw_damping_nms must be 0 where .*'rudder', got 6: a rudder has no"),
+    (RUDDER | {"trajectory.speed_mps": 6.0}, r"speed_mps = 6 is more than the 5.14 m/s .*max_force_n = 3000"),
+    ({"timing.decision_period_s": 0.15}, "timing.decision_period_s must be a whole multiple"),
+    ({"timing.decision_period_s": 1000.0}, "decision_period_s must be at most the shortest time limit = 298.649"),
+    ({"timing.decision_period_s": 10.0, "timing.integration_step_s": 0.0001}, "takes 100,000 steps .*at most 10,000"),
+    ({"disturbance.loss_times_s": [3.0, 1.0]}, "disturbance.loss_times_s must not fall"),
+    ({"swarm.num_vehicles": 2, "disturbance.loss_times_s": [1.0, 2.0]}, "at least one must remain"),
+    ({"trajectory.waypoints_m": [[1.0, 1.0], [1.0, 1.0]]}, "must differ from one to the next"),
+    ({"trajectory.waypoints_m": [[1.0, 1.0]]}, "trajectory.waypoints_m must have at least 2 entries"),
+    ({"trajectory.waypoints_m": [[0.0, 0.0], [1e17, 0.0]]}, "trajectory.waypoints_m.1.0 must lie within"),
+    ({"sonar.arrays.bow.sub_sectors": 1, "sonar.arrays.bow.aperture_deg": 200.0}, "use at least 2"),
+    ({"sonar.channels": ["link", "link"]}, "sonar.channels must name each channel once"),
+    ({"vehicle": "literature_18"}, r"vehicle 'literature_18' is unknown; did you mean 'literature_185'\?"),
 ]
+SHORT = {"timing.control_hold_s": 0.001, "timing.integration_step_s": 0.001}
+COURSE = {"trajectory.waypoints_m": [[0.0, 0.0], [1e6, 1e6]]}
 ARRAY, MEMBER = ({"kind": kind, "share": 0.1} for kind in ("array", "member"))
 BAD_SEA = [
-    ({"current.speed_mps": float("nan")}, "current.speed_mps must lie within 0 to 100, got nan"),
-    ({"current.speed_mps": "fast"}, "current.speed_mps must be a number, got 'fast'"),
-    ({"current.velocity": "bottom"}, "current.velocity must be 'ground' or 'water', got 'bottom'"),
-    ({"current.variation_time_s": 0.0}, "current.variation_time_s must lie within 0.0001 to 3,600, got 0.0"),
-    ({"current.eddies": 2.5}, "current.eddies must be a whole number, got 2.5"),
-    (
-        {"current.eddies": 64, "current.eddy_speed_mps": 1.0, "trajectory.waypoints_m": [[0.0, 0.0], [1e6, 1e6]]},
-        "current.eddies = 64 makes 256,256,064 eddies around this course; at most 4,096 are possible: lower it",
-    ),
-    ({"current": 3}, "current must be a table of fields, got 3"),
-    ({"current.speed": 1.0}, "current.speed is unknown; did you mean 'current.speed_mps'"),
-    ({"curent.speed_mps": 1.0}, "curent is unknown; did you mean 'current'"),
-    ({"latency.travel_time": 1}, "latency.travel_time must be true or false, got 1"),
-    ({"latency.processing_s": 2.5}, "latency.processing_s must lie within 0 to 2, got 2.5"),
-    (
-        {"latency.processing_s": 2.0, "timing.control_hold_s": 0.01, "timing.integration_step_s": 0.01},
-        "latency.processing_s = 2 is 200 control holds; at most 64 readings are kept: lower it or raise timing.control",
-    ),
+    ({"current.eddies": 64, "current.eddy_speed_mps": 1.0} | COURSE, "makes 256,256,064 eddies .*; at most 4,096"),
+    ({"latency.processing_s": 1.0, **SHORT}, "processing_s = 1 is 1,000 control holds; at most 64 readings are kept"),
+    ({"latency.travel_time": True, "latency.sound_speed_mps": 100.0, **SHORT}, r"sound 5,000 control.*500 m.*1,024"),
     ({"latency.active_period_s": 0.1}, "latency.active_period_s must be at least 0.1333, .* range of 100 m, or 0 "),
     ({"noise.silence_probability": 1.5}, "noise.silence_probability must lie within 0 to 1, got 1.5"),
-    ({"noise.false_echo_probability": -0.1}, "noise.false_echo_probability must lie within 0 to 1, got -0.1"),
-    ({"noise.silence_readings": 0}, "noise.silence_readings must lie within 1 to 10,000, got 0"),
-    ({"navigation.compass_bias_deg": float("inf")}, "navigation.compass_bias_deg must lie within 0 to 180, got inf"),
-    ({"modem.loss_probability": 2}, "modem.loss_probability must lie within 0 to 1, got 2"),
-    ({"modem.period_s": 0.0}, "modem.period_s must lie within 0.001 to 36,000, got 0.0"),
-    ({"mismatch.mass": 0.95}, "mismatch.mass must lie within 0 to 0.9, got 0.95"),
     (
         {"mismatch.mass": 0.5, "mismatch.added_mass": 0.5, "mismatch.drag": 0.5},
         r"mismatch.mass = 0.5, added_mass = 0.5, drag = 0.5 and thrust = 0 may draw .*; lower them, or for this one: "
         r"timing.integration_step_s = 0.1 is too long .*; use at most 0.05, or lower",
     ),
-    ({"actuators.yaw_authority": 1.5}, "actuators.yaw_authority must lie within 0 to 1, got 1.5"),
-    ({"actuators.thrust_lag_s": -1.0}, "actuators.thrust_lag_s must lie within 0 to 3,600, got -1.0"),
     ({"sonar.channels": ["modm"]}, "sonar.channels.0 must be 'compass', .* or 'modem', got 'modm'"),
     ({"faults": "yaw"}, "faults must be a list, got 'yaw'"),
     ({"faults": [3]}, "faults.0 must be a table of fields, got 3"),
     ({"faults": [{"kind": "yaw"}]}, "faults.0.share is missing; set it"),
-    ({"faults": [{"kind": "engine", "share": 0.1}]}, "faults.0.kind must be 'thruster', .* got 'engine'"),
-    ({"faults": [MEMBER | {"share": 1.1}]}, "faults.0.share must lie within 0 to 1, got 1.1"),
     ({"faults": [MEMBER | {"efficency": 0.5}]}, "faults.0.efficency is unknown; did you mean 'faults.0.efficiency'"),
-    (
-        {"faults": [MEMBER | {"efficiency": 0.5}]},
-        "efficiency is only for kinds thruster and yaw, got 0.5 .*leave",
-    ),
+    ({"faults": [MEMBER | {"efficiency": 0.5}]}, "efficiency is only for kinds thruster and yaw, got 0.5 .*leave"),
     ({"faults": [MEMBER | {"duration_s": 5.0}]}, "faults.duration_s is of no use to kind member, got 5.*leave it out"),
-    (
-        {"faults": [MEMBER | {"array": "bow"}]},
-        "faults.array must be given for kind array and for no other kind, got 'bow'",
-    ),
-    ({"faults": [ARRAY]}, "faults.array must be given for kind array and for no other kind, got None"),
+    ({"faults": [MEMBER | {"array": "bow"}]}, "faults.array must be given for kind array and for no other kind"),
     ({"faults": [ARRAY | {"array": "stern"}]}, "faults.0.array must be one of bow, port, starboard, got 'stern'"),
-    (
-        {"faults": [MEMBER | {"share": 1.0}]},
-        "faults and .* may lose 54 of 54 vehicles; .*must remain: lower",
-    ),
+    ({"faults": [MEMBER | {"share": 1.0}]}, "faults and .* may lose 54 of 54 vehicles; .*must remain: lower"),
     ({"faults": [MEMBER] * 65}, "faults must have at most 64 entries"),
-    (
-        {"faults.0.share": 0.2},
-        "faults.0.share is unknown: .* the list is empty: give it as a whole",
-    ),
+    ({"faults.0.share": 0.2}, "faults.0.share is unknown: .* the list is empty: give it as a whole"),
 ]
 
 
@@ -269,19 +202,29 @@ def test_bad_values_name_field_value_and_remedy(overrides, message):
         load_scenario(BASE, overrides=overrides)
 
 
-def test_bad_random_fields_are_named():
-    for overrides in ({"random_field.legs": [3, 1]}, {"random_field.obstacles": [0, 100]}):
-        with pytest.raises(ScenarioError, match=next(iter(overrides))):
-            load_scenario("random_field", overrides=overrides)
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
+        ({"scenario": "single_obstcle"}, "did you mean 'single_obstacle'"),
+        ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of lossy, .* or a path ending in .toml"),
+        ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
+        ({"num_vehicles": True}, "swarm.num_vehicles must be a whole number, got True"),
+        ({"overrides": "x"}, "overrides must be a dictionary of fields and values, got 'x'"),
+        ({"overrides": {"swarm.num_vehicles": iter([1])}}, "swarm.num_vehicles must be"),
+        ({"scenario": "random_field", "overrides": {"random_field.legs": [3, 1]}}, "random_field.legs"),
+        ({"scenario": "random_field", "overrides": {"random_field.obstacles": [0, 100]}}, "random_field.obstacles"),
+    ],
+)
+def test_bad_arguments_are_named(arguments, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(**{"scenario": BASE, **arguments})
 
 
-def test_unknown_names_suggest_the_nearest():
-    with pytest.raises(ScenarioError, match="did you mean 'single_obstacle'"):
-        load_scenario("single_obstcle")
-    with pytest.raises(ScenarioError, match="does not exist"):
-        load_scenario("nowhere.toml")
-    with pytest.raises(ScenarioError, match="must look like field=value"):
-        parse_override("swarm.num_vehicles")
+@pytest.mark.parametrize("text", ["vehicle", "x=" + "[" * 3000, "x=" + "9" * 5000, "swarm.num_vehicles=1\nfoo=2", "=3"])
+def test_what_the_command_line_cannot_mean_is_refused(text):
+    with pytest.raises(ScenarioError, match="--set"):
+        parse_override(text)
 
 
 def test_a_file_extends_one_beside_it(tmp_path):
@@ -289,25 +232,29 @@ def test_a_file_extends_one_beside_it(tmp_path):
     (tmp_path / "b.toml").write_text('extends = "a.toml"\n[arrival]\nradius_m = 3.0\n')
     scenario = load_scenario(tmp_path / "b.toml")
     assert (scenario.name, scenario.swarm.num_vehicles, scenario.arrival.radius_m) == ("b", 12, 3.0)
-    (tmp_path / "a.toml").write_text('extends = "b.toml"\n')
-    with pytest.raises(ScenarioError, match="must not lead back"):
-        load_scenario(tmp_path / "b.toml")
-    (tmp_path / "a.toml").write_text("extends = 3\n")
-    with pytest.raises(ScenarioError, match="extends must be a scenario's name or file, got 3"):
-        load_scenario(tmp_path / "a.toml")
-    (tmp_path / "a.toml").write_bytes(b"\xff")
-    with pytest.raises(ScenarioError, match="not valid TOML"):
-        load_scenario(tmp_path / "a.toml")
+    with pytest.raises(ScenarioError, match="'my b.toml' must have a name of letters.*rename the file"):
+        load_scenario((tmp_path / "b.toml").rename(tmp_path / "my b.toml"))
 
 
-def test_broken_files_are_named(tmp_path):
-    path = tmp_path / "broken.toml"
-    path.write_text("[swarm\n")
-    with pytest.raises(ScenarioError, match=r"broken.toml is not valid TOML: .*line 1"):
-        load_scenario(path)
-    path.write_text('title = "x"\nsource = "x"\nversion = 1\n')
-    with pytest.raises(ScenarioError, match=r"trajectory.waypoints_m is needed"):
-        load_scenario(path)
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('extends = "../here/mine.toml"\n', "must not lead back"),
+        ("extends = 3\n", "extends must be a scenario's name or file, got 3"),
+        ("\udcff", "not valid TOML"),
+        ("[swarm\n", "mine.toml is not valid TOML: .*line 1"),
+        ('title = "x"\nsource = "x"\nversion = 1\n', "trajectory.waypoints_m is needed"),
+        ("x = " + "[" * 3000, "nested too deeply"),
+        ("x = " + "9" * 5000, "not valid TOML"),
+        ("x = 1 #" + " " * 1_000_000, "no scenario: it has more than 1,000,000 bytes"),
+    ],
+    ids=range(8),
+)
+def test_a_file_that_is_no_scenario_is_refused(tmp_path, text, message):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "mine.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(tmp_path / "here" / "mine.toml")
 
 
 @pytest.mark.parametrize(
@@ -322,91 +269,6 @@ def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
         angle = rng.uniform(0, 2 * np.pi)
         state = advance(state, (3000 * np.cos(angle), 3000 * np.sin(angle)), STILL, 0.1, p)
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
-
-
-@pytest.mark.parametrize("linear", ["X_u", "Y_v", "N_r"])
-def test_damping_may_be_quadratic_alone(linear):
-    assert getattr(load_scenario(BASE, overrides={f"vehicle.{linear}": 0.0}).vehicle, linear) == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
-        ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of lossy, .* or a path ending in .toml"),
-        ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
-        ({"num_vehicles": True}, "swarm.num_vehicles must be a whole number, got True"),
-        ({"num_vehicles": 2.5}, "swarm.num_vehicles must be a whole number, got 2.5"),
-        ({"overrides": "x"}, "overrides must be a dictionary of fields and values, got 'x'"),
-    ],
-)
-def test_bad_arguments_are_named(arguments, message):
-    with pytest.raises(ScenarioError, match=message):
-        load_scenario(**{"scenario": BASE, **arguments})
-
-
-@pytest.mark.parametrize("text", ["x=" + "[" * 3000, "x=" + "9" * 5000, "swarm.num_vehicles=1\nfoo=2", "=3"])
-def test_what_the_command_line_cannot_mean_is_refused(text):
-    with pytest.raises(ScenarioError, match="--set"):
-        parse_override(text)
-
-
-def test_a_circle_of_files_is_seen_through_its_paths(tmp_path):
-    for here, there in (("e", "f"), ("f", "e")):
-        (tmp_path / here).mkdir()
-        (tmp_path / here / "x.toml").write_text(f'extends = "../{there}/x.toml"\n')
-    with pytest.raises(ScenarioError, match="must not lead back"):
-        load_scenario(tmp_path / "e" / "x.toml")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x = " + "[" * 3000, "nested too deeply"),
-        ("x = " + "9" * 5000, "not valid TOML"),
-        ("x = 1 #" + " " * 1_000_000, "no scenario: it has more than 1,000,000 bytes"),
-    ],
-)
-def test_files_that_are_too_much_are_refused(tmp_path, text, message):
-    (tmp_path / "much.toml").write_text(text)
-    with pytest.raises(ScenarioError, match=message):
-        load_scenario(tmp_path / "much.toml")
-
-
-FORMS = {
-    "tables": "[vehicle]\nm_kg = 300.0\n[trajectory]\nspeed_mps = 2.5  # my ship's log\n",
-    "inline": "vehicle = {m_kg = 300.0}\ntrajectory = {speed_mps = 2.5}  # my ship's log\n",
-    "dotted": "vehicle.m_kg = 300.0\ntrajectory.speed_mps = 2.5  # my ship's log\n",
-    "no obstacles": "obstacles = []\n[vehicle]\nm_kg = 300.0\n",
-    "other arrays": "obstacles = [{centre_m = [350.0, 350.0], radius_m = 20.0}]\nvehicle.m_kg = 300.0\n"
-    "[[sonar.arrays]]\n"
-    'name = "all"\nkind = "active"\nmounting_deg = 0.0\naperture_deg = 360.0\nrange_m = 80.0\nsub_sectors = 9\n',
-}
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_what_is_shown_loads_and_names_the_users_file(form, tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(f'extends = "single_obstacle"\n{FORMS[form]}')
-    shown = show(path)
-    assert "m_kg = 300.0  # mine.toml" in shown
-    assert "I_z_kgm2 = 50.0  # Repoulias" in shown
-    assert "speed_mps = 2.5  # section" not in shown
-    if form in ("tables", "dotted"):
-        assert "speed_mps = 2.5  # my ship's log" in shown
-    if form == "other arrays":
-        assert "radius_m = 20.0  # mine.toml" in shown or "radius_m = 20.0}" in shown
-        assert "sub_sectors = 9  # mine.toml" in shown
-    before = load_scenario(path)
-    path.write_text(shown)
-    assert load_scenario(path) == before
-
-
-def test_a_speed_that_no_vehicle_holds_is_said_once(caplog):
-    warn_of_speed.cache_clear()
-    for _ in range(2):
-        load_scenario(BASE, overrides={"trajectory.speed_mps": 30.0})
-    assert [record.getMessage()[:26] for record in caplog.records] == ["trajectory.speed_mps = 30 "]
 
 
 VEHICLE = ("m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "N_rdot_kgm2", "X_u", "Y_v", "N_r", "X_uu", "Y_vv", "N_rr")
@@ -436,7 +298,9 @@ def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
 
 def test_light_commands_import_nothing_heavy():
     code = (
-        "import sys; from typer.testing import CliRunner; from uuv_marl.cli import app\n"
+        "import sys; from typer.testing import CliRunner; from uuv_marl.baselines import POLICIES\n"
+        "assert not any('checkpoint' in vars(policy) for policy in POLICIES.values()), 'weights were read'\n"
+        "from uuv_marl.cli import app\n"
         "for what in ('scenarios', 'policies'): assert CliRunner().invoke(app, ['list', what]).exit_code == 0\n"
         "assert not {'matplotlib', 'scipy.stats'} & set(sys.modules)"
     )
@@ -479,11 +343,6 @@ def test_a_vehicle_file_that_is_not_whole_is_refused(tmp_path, before, after, me
         load_scenario("tracking", overrides={"vehicle": str(path)})
 
 
-def test_an_unknown_vehicle_names_the_nearest():
-    with pytest.raises(ScenarioError, match=r"vehicle 'literature_18' is unknown; did you mean 'literature_185'\?"):
-        load_scenario("tracking", overrides={"vehicle": "literature_18"})
-
-
 def test_overrides_count_in_whatever_order_they_are_given():
     """A vehicle before its numbers, a table before its entries."""
     pairs = [
@@ -496,41 +355,12 @@ def test_overrides_count_in_whatever_order_they_are_given():
     assert load_scenario("sea_trial", overrides=pairs[0]).actuators.max_force_n == 40.0
 
 
-def test_overrides_of_a_caller_stay_as_they_are():
-    mine = {"faults": [{"kind": "yaw", "share": 0.5}], "faults.0.share": 0.25}
-    assert load_scenario("tracking", overrides=mine).faults[0].share == 0.25
-    assert mine["faults"] == [{"kind": "yaw", "share": 0.5}]
-
-
-def test_a_file_s_name_is_the_scenario_s(tmp_path):
-    path = tmp_path / "my scenario.toml"
-    path.write_text('extends = "starter"\n')
-    with pytest.raises(ScenarioError, match="'my scenario.toml' must have a name of letters.*rename the file"):
-        load_scenario(path)
-
-
 def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
     """Read back from its TOML, which can't say that a number is unknown."""
     own = load_scenario("starter", overrides={"vehicle.cruise_mps": None, "vehicle.source": None})
     path = tmp_path / "mine.toml"
     path.write_text(to_toml(own))
     assert load_scenario(path).vehicle == own.vehicle
-
-
-@pytest.mark.parametrize("wrong", [iter([1]), type(re)])
-def test_an_override_that_can_t_be_copied_is_named(wrong):
-    with pytest.raises(ScenarioError, match=r"swarm.num_vehicles must be"):
-        load_scenario("starter", overrides={"swarm.num_vehicles": wrong})
-
-
-def test_show_gives_no_default_the_source_of_the_vehicle_below(tmp_path):
-    numbers = load_scenario("starter").vehicle.model_dump(exclude_none=True, exclude={"name", "source", "munk_moment"})
-    (tmp_path / "below.toml").write_text('extends = "sea_trial"\nvehicle = "bluerov2_heavy"\nscale = "vehicle"\n')
-    path = tmp_path / "mine.toml"
-    stated = "".join(f"{name} = {value}\n" for name, value in numbers.items())
-    path.write_text(f'extends = "below.toml"\n[vehicle]\nname = "mine"\n{stated}')
-    assert "munk_moment = true  # " in show(tmp_path / "below.toml")
-    assert "munk_moment = true\n" in show(path)
 
 
 class Listed(Sequence):
@@ -578,13 +408,10 @@ def test_a_value_of_an_override_is_taken_for_what_it_can_do(field, same, given):
         ("swarm.num_vehicles", np.bool_(True), "swarm.num_vehicles must be a whole number, got True"),
         ("trajectory.speed_mps", np.complex64(1), "trajectory.speed_mps must be a number"),
         ("trajectory.speed_mps", Fraction(10**400), "trajectory.speed_mps must be a number"),
-        ("trajectory.speed_mps", "3", "trajectory.speed_mps must be a number, got '3'"),
         ("sonar.channels", {"compass"}, "sonar.channels must be a list, got {'compass'}"),
         ("sonar.channels", "compass", "sonar.channels must be a list, got 'compass'"),
         ("sonar.channels", b"compass", "sonar.channels must be a list"),
-        ("current", {"speed": 0.5}, "current.speed is unknown"),
         ("current", 0.5, "current must be a table of fields, got 0.5"),
-        ("current", {"speed_mps": "x"}, "current.speed_mps must be a number, got 'x'"),
     ],
 )
 def test_a_value_of_another_kind_is_refused_by_its_field(field, given, message):
@@ -610,14 +437,3 @@ def test_a_whole_vehicle_takes_no_optional_number_from_the_vehicle_below():
     below = load_scenario("starter", overrides={"vehicle": {"N_vv": -3.0, "source": "mine"}})
     assert below.vehicle.N_vv == -3.0
     assert load_scenario(below, overrides={"vehicle": whole}).vehicle == Vehicle.model_validate(whole)
-
-
-def test_a_vehicle_may_be_given_by_a_path():
-    path = Path(str(FOLDER)) / "vehicles" / "lauv.toml"
-    assert load_scenario("sea_trial", overrides={"vehicle": path}).vehicle.name == "lauv"
-
-
-def test_gains_are_taken_for_what_they_can_do():
-    scenario = load_scenario("starter")
-    for value in (np.float32(0.5), np.array(0.5), Decimal("0.5"), Fraction(1, 2)):
-        assert make("bio_inspired", scenario, zeta_n=value).gains.zeta_n == 0.5

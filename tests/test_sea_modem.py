@@ -1,7 +1,6 @@
 """Messages: who hears what of whom, when, and what is lost."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, granted, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, save_checkpoint
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.replay import traces
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -25,13 +23,6 @@ def swum(overrides, decisions=100, worlds=1, seed=0, **change):
     for _ in range(decisions):
         swarm.step(rng.uniform(-1, 1, (worlds, swarm.num_vehicles, 2)))
         yield swarm
-
-
-def test_a_round_is_the_formula_s_of_a_named_modem():
-    """N (8 B / 463 bit/s + R / c): a Nanomodem, 54 vehicles, 16 bytes, 500 m of guard are 33 s."""
-    modem = load_scenario("tracking").modem
-    assert modem.round_s(54, 1500.0) == pytest.approx(54 * (8 * 16 / 463 + 500 / 1500)) == pytest.approx(32.9, abs=0.05)
-    assert modem.round_s(10, 1500.0) == pytest.approx(6.1, abs=0.05)
 
 
 def test_a_message_is_the_velocity_when_it_was_sent_and_its_age_follows_the_schedule():
@@ -89,12 +80,6 @@ def test_compasses_turn_what_is_said_and_what_is_read():
     assert turns > 100
 
 
-def test_without_messages_the_channel_stays_empty():
-    for swarm in swum({"modem.loss_probability": 1.0}, 50):
-        assert not swarm.percept["modem_identity"].any()
-        assert not swarm.percept["modem_age"].any()
-
-
 @pytest.mark.parametrize(
     "policy", ["sff", "sff_informed", "sdc", "sdc_informed", "olfati_saber_informed", "orca_informed"]
 )
@@ -133,20 +118,3 @@ class Both(Policy):
     """Compares what it is told with what is true."""
 
     channels = ("link", "modem")
-
-
-@pytest.mark.parametrize(
-    ("policy", "told"),
-    [
-        ("sdc", "modem"), ("guarded:sdc", "modem"), ("mine:Own", "modem"), ("runs/mine/best", "link"),
-        ("guarded:runs/12:30/best", "link"), ("mappo", "link"),
-    ],
-)  # fmt: skip
-def test_results_say_what_a_policy_got_instead_of_the_link(policy, told):
-    """A checkpoint knows only the channels of its training."""
-    scenario = load_scenario("starter", overrides={"sonar.channels": ["modem"]})
-    known = {"channels": ["compass", "link"], "yaw_damping_nms": 600.0, "source": None}
-    content = {"scenarios": {"starter": scenario.model_dump(mode="json")}, "policies": {policy: known}}
-    assert traces._scenario(SimpleNamespace(content=content), "starter", policy).sonar.channels == ("compass", told)
-    if policy == "sdc":
-        assert granted(policy, scenario).sonar.channels == ("compass", told)

@@ -1,15 +1,12 @@
 """Laws of the stability study: the linear part is that of the real swarm, and exponents are exponents."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from research.columns import read_columns, write_columns
-from research.dynamics import formation, rest, softening, stability
+from research.dynamics import formation, rest, stability
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.sim.swarm import Swarm
 
@@ -84,30 +81,6 @@ def test_the_loop_is_the_slope_of_one_step_of_the_real_swarm(seven, hold_s, damp
     np.testing.assert_allclose(slope, stability.loop(scenario, rigid, hold_s), atol=5e-3)
 
 
-def test_a_formation_in_balance_may_be_turned_for_nothing_and_else_settles(seven):
-    rigid = formation.stiffness(seven.places, seven.heard, GAINS)
-    found = stability.rates(stability.eigenvalues(formation.straight_leg(7), rigid, 0.0))
-    assert (found.neutral, found.unstable) == (1, 0)
-
-
-def test_short_holds_approach_continuous_feedback(seven):
-    rigid = formation.stiffness(seven.places, seven.heard, GAINS)
-    scenario = formation.straight_leg(7)
-    grown = [stability.rates(stability.eigenvalues(scenario, rigid, hold_s)).weaving for hold_s in (0.0, 1e-3, 1e-2)]
-    assert grown[1] - grown[0] == pytest.approx(0.1 * (grown[2] - grown[0]), rel=0.05)
-
-
-def test_what_stands_for_a_missing_formation_says_so():
-    found = formation.formations(formation.straight_leg(), GAINS, [0], rounds=400)[0]
-    swarm, _ = placed(formation.straight_leg(), found)
-    swarm.observe()
-    assert (swarm.heard[0] == found.heard).all()
-    missing = formation.forces(found.places, found.heard, GAINS) - [1880.0, 0.0]
-    assert found.residual_n == pytest.approx(math.sqrt((missing**2).sum(axis=1).mean()))
-    assert not found.settled
-    assert found.residual_n < 0.05 * 1880.0
-
-
 @pytest.mark.parametrize("hold_s", [0.02, 0.06])
 def test_a_lone_vehicle_weaves_as_predicted(hold_s):
     """Below the critical hold it straightens, above it swings up, at the rate that the eigenvalues say."""
@@ -138,73 +111,3 @@ def test_exponents_of_systems_that_are_known():
         np.testing.assert_allclose(found, expected, atol=1e-3)
     logistic = rest.largest_exponent(lambda x: 4.0 * x * (1.0 - x), np.array([[0.3], [0.41]]), 1e-7, 4000, 2.0)
     np.testing.assert_allclose(logistic, math.log(2.0) / 2.0, rtol=0.05)
-
-
-def test_the_exponent_of_a_smooth_law_does_not_depend_on_the_displacement():
-    smooth = dataclasses.replace(rest.Variant("", softening=rest.SMOOTH), settle_s=30.0)
-    table = rest.measure(smooth, (0, 1))
-    large, small = table["exponent_per_s"].mean(), table["small_exponent_per_s"].mean()
-    assert large == pytest.approx(small, abs=0.15)
-    assert large > 0.4
-
-
-def test_a_law_with_jumps_parts_copies_faster_when_they_are_farther_apart():
-    table = rest.measure(dataclasses.replace(rest.Variant(""), settle_s=30.0), (0,))
-    assert table["exponent_per_s"] > table["small_exponent_per_s"] + 0.5
-    assert 0.8 < table["yaw_rate_rms_rad_per_s"] < 1.3  # about 1 rad/s: the swarm does not settle
-
-
-def test_a_stiff_pull_alone_keeps_a_vehicle_moving_and_yaw_damping_stops_it():
-    stiff = rest.Variant("", num_vehicles=1, gains=BioInspiredGains(zeta_l=1000.0))
-    damped = dataclasses.replace(stiff, yaw_damping_nms=600.0)
-    assert rest.measure(stiff, (0,))["yaw_rate_rms_rad_per_s"] > 1.0
-    assert rest.measure(damped, (0,))["yaw_rate_rms_rad_per_s"] < 0.05
-
-
-def test_a_measure_depends_on_its_seed_alone():
-    law = rest.Variant("", num_vehicles=6, settle_s=5.0)
-    alone, batch = rest.measure(law, (1,)), rest.measure(law, (0, 1))
-    for name in ("yaw_rate_rms_rad_per_s", "speed_rms_mps", "exponent_per_s", "min_spacing_m"):
-        assert alone[name][0] == batch[name][1]
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-def test_without_softening_the_law_is_the_papers(seed):
-    scenario = load_scenario("single_obstacle")
-    swarm = Swarm(scenario)
-    swarm.reset(seed)
-    swarm.state.eta[0, :, :2] += 150.0  # before and beside the obstacle
-    percept = swarm.observe()
-    assert percept["echo"].any()
-    law = make("bio_inspired", scenario).act(percept)
-    np.testing.assert_allclose(softening.Softened(scenario).act(percept), law, atol=1e-6)
-    for soft in (rest.SMOOTH, softening.Softening(torque_gate_n=3e3), softening.Softening(dead_zone_n=3e3)):
-        softened = rest.Variant("", softening=soft).policy(scenario, 1).act(percept)
-        assert np.abs(softened - law).max() > 1e-3
-
-
-def test_the_fade_is_smooth():
-    distance = np.linspace(10.0, 25.0, 1501)
-    share = softening.fade(distance, 14.0, 20.0)
-    assert (share[distance <= 14.0] == 1.0).all()
-    assert (share[distance >= 20.0] == 0.0).all()
-    assert (np.diff(share) <= 0.0).all()
-    assert np.abs(np.diff(share, 2)).max() < 1e-4
-
-
-def test_pictures_are_drawn_from_the_tables_on_disk(tmp_path, monkeypatch):
-    monkeypatch.setattr(stability, "SEEDS", (0,))
-    monkeypatch.setattr(formation.formations, "__defaults__", (50,))
-    monkeypatch.setattr(stability, "HOLDS_S", (0.0, 0.1))
-    monkeypatch.setattr(stability, "SWEEPS", {name: values[:2] for name, values in stability.SWEEPS.items()})
-    monkeypatch.setattr(rest, "VARIANTS", (rest.Variant("one", num_vehicles=1), rest.Variant("two", num_vehicles=2)))
-    monkeypatch.setattr(rest, "SEEDS", (0, 1))
-    for module in (stability, rest):
-        shares = []
-        for name, columns in module.tables(None, shares.append).items():
-            assert len({len(values) for values in columns.values()}) == 1
-            write_columns(tmp_path / f"{name}.csv", columns)
-        assert shares == sorted(shares)
-        assert shares[-1] == 1.0
-    assert len(stability.draw({n: read_columns(tmp_path / f"{n}.csv") for n in ("eigenvalues", "margins")}).axes) == 6
-    assert len(rest.draw({"rest": read_columns(tmp_path / "rest.csv")}).axes) == 3

@@ -19,7 +19,6 @@ from uuv_marl.sim import engine as engine_module
 from uuv_marl.sim.field import draw_field
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.threads import on_threads
-from uuv_marl.sim.vehicle import STILL, advance, plant
 
 
 def play(scenario, seeds, steps, policy="bio_inspired"):
@@ -125,35 +124,6 @@ def test_after_a_fork_a_batch_goes_on_with_threads_of_its_own():
     assert done.stdout.strip() == "7", done.stderr
 
 
-def test_worlds_are_reset_one_by_one_and_their_streams_go_on():
-    scenario = load_scenario("single_obstacle", num_vehicles=6)
-    swarm = Swarm(scenario, 3)
-    swarm.reset(10)
-    first = swarm.state.eta.copy()
-    swarm.reset(None, worlds=[1])
-    assert np.array_equal(swarm.state.eta[[0, 2]], first[[0, 2]])
-    assert not np.array_equal(swarm.state.eta[1], first[1])
-    second = swarm.state.eta[1].copy()
-    alone = Swarm(scenario)
-    alone.reset(11)
-    alone.reset()
-    assert np.array_equal(alone.state.eta[0], second)
-    swarm.reset([11], worlds=[2])
-    assert np.array_equal(swarm.state.eta[2], first[1])
-
-
-def test_seeds_come_as_numbers_lists_or_arrays():
-    swarm = Swarm(load_scenario("tracking", num_vehicles=3), 2)
-    starts = []
-    for seed in (5, [5, 6], np.array([5, 6]), np.int64(5)):
-        swarm.reset(seed)
-        starts.append(swarm.state.eta.tobytes())
-        make("random", swarm.scenario, 2).reset(seed)
-    assert len(set(starts)) == 1
-    with pytest.raises(ValueError, match="one seed for each of 2 worlds, got 3"):
-        swarm.reset([1, 2, 3])
-
-
 def test_a_loss_at_the_start_happens_in_the_first_step():
     swarm = Swarm(load_scenario("tracking", num_vehicles=3, overrides={"disturbance.loss_times_s": [0.0]}))
     swarm.reset(0)
@@ -198,40 +168,6 @@ def test_placement_ends_where_random_placement_jams():
     swarm.reset(0)
     assert swarm.facts.min_spacing.min() >= 17.0
     assert not np.array_equal(swarm.state.eta[0], swarm.state.eta[1])
-
-
-def test_a_force_held_over_a_decision_keeps_its_direction_in_the_world():
-    scenario = load_scenario("tracking", num_vehicles=1, overrides={"timing.decision_period_s": 0.5})
-    swarm = Swarm(scenario)
-    swarm.reset(0)
-    state, p = (*swarm.state.eta[0, 0], *swarm.state.nu[0, 0]), plant(scenario)
-    action = np.array([[[0.3, 0.6]]], np.float32)
-    swarm.step(action)
-    a, heading = action[0, 0].astype(float), state[2]
-    world = (
-        math.cos(heading) * a[0] - math.sin(heading) * a[1],
-        math.sin(heading) * a[0] + math.cos(heading) * a[1],
-    )
-    for _ in range(5):
-        c, s = math.cos(state[2]), math.sin(state[2])
-        tau = 3000 * (c * world[0] + s * world[1]), 3000 * (c * world[1] - s * world[0])
-        state = advance(state, tau, STILL, 0.1, p)
-    np.testing.assert_allclose(swarm.state.eta[0, 0, :2], state[:2], atol=1e-9)
-    np.testing.assert_allclose(swarm.state.nu[0, 0], state[3:], atol=1e-9)
-
-
-def test_control_hold_and_integration_step_are_two_numbers():
-    coarse = load_scenario("tracking", num_vehicles=3)
-    fine = load_scenario(coarse, overrides={"timing.integration_step_s": 0.01})
-    ends = []
-    for scenario in (coarse, fine):
-        swarm = Swarm(scenario)
-        swarm.reset(0)
-        for _ in range(20):
-            swarm.step(np.full((1, 3, 2), 0.2, np.float32))
-        assert swarm.facts.time_s[0] == pytest.approx(2.0)
-        ends.append(swarm.state.eta[0].copy())
-    assert 0 < np.abs(ends[0] - ends[1]).max() < 1e-3
 
 
 def test_arrival_needs_rest_nearness_spread_and_dwell(place):
@@ -310,17 +246,6 @@ def test_a_contact_counts_once_while_it_lasts(place):
     assert swarm.facts.contacts[0].tolist() == [1, 1]
 
 
-def test_touching_an_obstacle_is_a_collision_of_one_vehicle(place):
-    swarm = place(load_scenario("tracking"), [[0, 0, 0], [-60, 40, 0]], nu=[[4, 0, 0]] * 2, obstacles=[(32, 0, 30.0)])
-    action = np.zeros((1, 2, 2), np.float32)
-    total = np.zeros(2)
-    for _ in range(10):
-        swarm.step(action)
-        total += swarm.facts.contacts[0]
-    assert total.tolist() == [1, 0]
-    assert swarm.facts.obstacle_clearance[0, 0] < 1.0
-
-
 def test_contact_ends_the_vehicles_only_where_the_scenario_says_so(place):
     scenario = load_scenario("tracking", overrides={"contact.ends_vehicle": True})
     swarm = place(scenario, [[0, 0, 0], [4, 0, math.pi], [30, 20, 0]], nu=[[3, 0, 0], [3, 0, 0], [0, 0, 0]])
@@ -328,27 +253,6 @@ def test_contact_ends_the_vehicles_only_where_the_scenario_says_so(place):
         swarm.step(np.zeros((1, 3, 2), np.float32))
     assert swarm.state.alive[0].tolist() == [False, False, True]
     assert not np.isin(swarm.heard[0, 2], [0, 1]).any()
-
-
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (np.zeros((1, 3, 2), complex), "real numbers"),
-        (np.zeros((1, 2, 2), np.float32), r"\(1, 3, 2\)"),
-        (np.full((1, 3, 2), np.nan, np.float32), "finite, got nan for vehicle 0 of world 0"),
-    ],
-)
-def test_bad_actions_are_named(action, message):
-    swarm = Swarm(load_scenario("tracking", num_vehicles=3))
-    swarm.reset(0)
-    with pytest.raises(ValueError, match=message):
-        swarm.step(action)
-
-
-def test_step_before_reset_is_named():
-    swarm = Swarm(load_scenario("tracking", num_vehicles=3))
-    with pytest.raises(RuntimeError, match="before reset"):
-        swarm.step(np.zeros((1, 3, 2), np.float32))
 
 
 @settings(max_examples=40)

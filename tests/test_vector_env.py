@@ -1,10 +1,7 @@
 """Gymnasium's APIs: many worlds, one learner among others, the registries."""
 
-import copy
 import importlib
 import pickle
-import subprocess
-import sys
 import warnings
 from functools import partial
 from importlib.util import find_spec
@@ -35,32 +32,6 @@ def random_actions(env, steps=40):
     return np.random.default_rng(1).uniform(-1, 1, (steps, *env.action_space.shape)).astype(np.float32)
 
 
-def test_spaces_and_metadata():
-    env = short()
-    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
-    assert env.metadata["render_fps"] == 2
-    assert env.single_observation_space.shape == (5, 98)
-    assert env.observation_space.shape == (3, 5, 98)
-    assert env.action_space.shape == (3, 5, 2)
-    observation, infos = env.reset(seed=0)
-    assert env.observation_space.contains(observation)
-    assert infos["agent_mask"].all()
-    for action in random_actions(env):
-        observation, reward, terminated, truncated, infos = env.step(action)
-        assert env.observation_space.contains(observation)
-        assert reward.shape == terminated.shape == truncated.shape == (3,)
-        assert (reward.dtype, terminated.dtype) == (np.float64, np.bool_)
-
-
-def test_a_world_is_the_same_in_any_batch():
-    small, large = short(1), short(7)
-    a, b = small.reset(seed=14)[0], large.reset(seed=10)[0]
-    np.testing.assert_array_equal(a[0], b[4])
-    for action in random_actions(large):
-        a, b = small.step(action[4:5])[0], large.step(action)[0]
-        assert a[0].tobytes() == b[4].tobytes()
-
-
 def test_seeds_per_world_and_masks():
     env = short()
     first = env.reset(seed=[4, None, 5])[0]
@@ -71,18 +42,9 @@ def test_seeds_per_world_and_masks():
     for mask in (np.zeros(3, bool), np.ones(2, bool), np.ones(3, int)):
         with pytest.raises(ValueError, match=r"reset_mask'\] must be a bool array of shape \(3,\)"):
             env.reset(options={"reset_mask": mask})
-    with pytest.raises(ValueError, match="one seed for each of 3 worlds, got 2"):
-        env.reset(seed=[1, 2])
-    for bad in (-5, -1, [1, -2, 3]):
-        with pytest.raises(ValueError, match="seed must be a whole number from 0, got -"):
-            env.reset(seed=bad)
-    with pytest.raises(TypeError, match="seed must be a whole number from 0, got 1.5"):
-        env.reset(seed=[1.5, 2, 3])
     for large in (2**63 - 1, 2**64):
         assert env.reset(seed=large)[0].tobytes() == env.reset(seed=large)[0].tobytes()
     assert env.reset(seed=np.int64(4))[0].tobytes() == env.reset(seed=np.array([4, 5, 6]))[0].tobytes()
-    env.reset(seed=9)
-    assert env.np_random_seed == 9
 
 
 def test_without_autoreset_an_ended_world_waits_unpaid():
@@ -106,38 +68,6 @@ def test_without_autoreset_an_ended_world_waits_unpaid():
     np.testing.assert_array_equal(again[0], observation[0])
     *_, truncated, _ = env.step(random_actions(env, 1)[0])
     np.testing.assert_array_equal(truncated, ~mask)
-
-
-def test_gymnasiums_default_autoreset():
-    """NEXT_STEP: what Gymnasium's own ``SyncVectorEnv`` does, step by step; the run is that of SAME_STEP."""
-    env, same = short(autoreset_mode="NextStep", max_cycles=9), short(max_cycles=9)
-    assert env.autoreset_mode is env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    assert same.autoreset_mode is AutoresetMode.SAME_STEP
-    first, _ = env.reset(seed=3)
-    np.testing.assert_array_equal(same.reset(seed=3)[0], first)
-    rng, ends = np.random.default_rng(2), 0
-    for _ in range(4):
-        over = np.zeros(3, bool)
-        while not over.any():
-            actions = rng.uniform(-1, 1, (3, 5, 2)).astype(np.float32)
-            observation, reward, terminated, truncated, infos = env.step(actions)
-            theirs, paid, *_, known = same.step(actions)
-            np.testing.assert_array_equal(reward, paid)
-            over = terminated | truncated
-        assert over.all()
-        assert not infos["agent_mask"].any()
-        assert infos["ending"].tolist() == known["final_info"]["ending"].tolist() == ["time_limit"] * 3
-        assert infos["_ending"].all()
-        for w in range(3):
-            np.testing.assert_array_equal(observation[w], known["final_obs"][w])
-        observation, reward, terminated, truncated, infos = env.step(actions)
-        np.testing.assert_array_equal(observation, theirs)
-        ended = ("agent_terminated", "agent_truncated", "agent_reward")
-        assert not any(part.any() for part in (reward, terminated, truncated, *(infos[name] for name in ended)))
-        assert "ending" not in infos
-        assert infos["agent_mask"].all()
-        ends += 1
-    assert ends == 4
 
 
 def test_a_reset_by_hand_comes_before_the_next_steps():
@@ -231,114 +161,26 @@ def test_gymnasium_wrappers_work():
     assert seen >= 6
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
-def test_wrappers_that_change_observations_work_where_gymnasium_lets_them(mode):
-    names = ["FlattenObservation", "DtypeObservation", "ReshapeObservation"]
-    names += ["NormalizeObservation"] if mode == "NextStep" else []
-    arguments = {"DtypeObservation": (np.float32,), "ReshapeObservation": ((5 * 98,),)}
-    for name in names:
-        env = getattr(wrappers, name)(short(autoreset_mode=mode, max_cycles=4), *arguments.get(name, ()))
-        env.reset(seed=0)
-        ended = 0
-        for action in random_actions(short(), 12):
-            _, _, terminated, truncated, _ = env.step(action.reshape(env.action_space.shape))
-            over = terminated | truncated
-            ended += int(over.sum())
-            if mode == "Disabled" and over.any():
-                env.reset(options={"reset_mask": over})
-        assert ended >= 6, name
-
-
-@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
-def test_solo_in_gymnasiums_own_vectoriser_tells_how_it_ended(mode):
-    options = {"scenario": "random_field", "num_vehicles": 4, "decision_period": 0.5, "max_cycles": 3}
-    envs = gymnasium.make_vec(
-        "uuv_marl/Solo-v1",
-        2,
-        vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": AutoresetMode(mode)},
-        **options,
-    )
-    envs = wrappers.RecordEpisodeStatistics(envs)
-    envs.reset(seed=0)
-    *_, truncated, infos = [envs.step(np.zeros((2, 2), np.float32)) for _ in range(3)][-1]
-    assert truncated.all()
-    assert infos["episode"]["l"].tolist() == [3, 3]
-    told = infos["final_info"] if mode == "SameStep" else infos
-    assert told["ending"].tolist() == ["time_limit"] * 2
-    assert told["is_success"].tolist() == [False, False]
-
-
-def test_final_info_tells_how_a_world_ended():
-    quick = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
-    env = uuv_marl.vector_env(2, "single_obstacle", num_vehicles=4, decision_period=0.5, overrides=quick)
-    env.reset(seed=0)
-    while True:
-        _, _, terminated, truncated, infos = env.step(np.zeros((2, 4, 2), np.float32))
-        if terminated.any():
-            break
-    assert terminated.all()
-    assert not truncated.any()
-    assert infos["final_info"]["arrived"].all()
-    alone = uuv_marl.parallel_env("single_obstacle", num_vehicles=4, decision_period=0.5, overrides=quick)
-    alone.reset(seed=1)
-    while alone.agents:
-        alone.step({agent: np.zeros(2) for agent in alone.agents})
-    np.testing.assert_array_equal(infos["final_info"]["state"][1], alone.state())
-
-
-def test_the_held_force_keeps_its_direction_in_the_world():
-    """One decision of 0.5 s equals five of 0.1 s in which the same world-frame force is projected anew (Eq. 22)."""
-    long = uuv_marl.vector_env(1, "single_obstacle", num_vehicles=3, decision_period=0.5)
-    fine = uuv_marl.vector_env(1, "single_obstacle", num_vehicles=3)
-    long.reset(seed=0)
-    fine.reset(seed=0)
-    action = np.array([[[0.5, 0.4], [0.1, -0.6], [-0.3, 0.2]]], np.float32)
-    psi_0 = fine.swarm.state.eta[0, :, 2].copy()
-    long.step(action)
-    for _ in range(5):
-        turned = fine.swarm.state.eta[0, :, 2] - psi_0
-        x, y = action[0, :, 0], action[0, :, 1]
-        held = np.stack([x * np.cos(turned) + y * np.sin(turned), y * np.cos(turned) - x * np.sin(turned)], axis=-1)
-        fine.step(held[None].astype(np.float32))
-    np.testing.assert_allclose(long.swarm.state.eta, fine.swarm.state.eta, rtol=0, atol=1e-4)
-    assert np.abs(turned).max() > 0.05, "else the test shows nothing"
-
-
-def test_pictures_of_every_world():
-    env = short(2, render_mode="rgb_array")
-    env.reset(seed=0)
-    first, second = env.render()
-    assert first.shape == (800, 800, 3)
-    assert not np.array_equal(first, second)
-    np.testing.assert_array_equal(pickle.loads(pickle.dumps(env)).render()[1], second)
-    env.close()
-    with pytest.raises(ValueError, match=r"render_mode must be one of \['rgb_array'\] or None, got 'human'"):
-        short(render_mode="human")
-    unseen = short(render_mode="rgb_array")
-    for early in (unseen.render, unseen.state, SoloEnv(render_mode="rgb_array").render):
-        with pytest.raises(RuntimeError, match="came before reset"):
-            early()
-    silent = short()
-    silent.reset()
-    with pytest.raises(RuntimeError, match="needs a render_mode"):
-        silent.render()
-
-
-def test_bad_actions_and_order():
-    env = short()
+def test_what_cannot_be_done_is_named():
+    env = short(render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="call reset"):
         env.step(np.zeros((3, 5, 2)))
+    for early in (env.render, env.state, SoloEnv(render_mode="rgb_array").render):
+        with pytest.raises(RuntimeError, match="came before reset"):
+            early()
     env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"shape \(3, 5, 2\)"):
-        env.step(np.zeros((3, 4, 2)))
+    assert [picture.shape for picture in env.render()] == [(800, 800, 3)] * 3
     bad = np.zeros((3, 5, 2))
     bad[1, 2] = np.nan
-    with pytest.raises(ValueError, match="vehicle 2 of world 1"):
-        env.step(bad)
-    for wrong in ("ab", bad * 1j, np.ma.masked_invalid(bad), [[0.1], [0.2, 0.3]], {}):
-        with pytest.raises(ValueError, match="action must hold real numbers, got"):
+    for wrong, message in (
+        (np.zeros((3, 4, 2)), r"shape \(3, 5, 2\)"), (bad, "vehicle 2 of world 1"), ({}, "must hold real numbers, got")
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=message):
             env.step(wrong)
+    with pytest.raises(ValueError, match=r"render_mode must be one of \['rgb_array'\] or None, got 'human'"):
+        short(render_mode="human")
+    with pytest.raises(baselines.PolicyError, match=r"SwarmVectorEnv has no agents by name; make the policy with make"):
+        baselines.make("bio_inspired", env)
 
 
 def test_registries():
@@ -352,23 +194,17 @@ def test_registries():
     assert pettingzoo.make("aec", "uuv_marl/uuv_swarm_v1", num_vehicles=3).max_num_agents == 3
 
 
-def test_importing_twice_registers_once():
-    code = "import warnings; warnings.simplefilter('error'); import uuv_marl; import uuv_marl.envs.vector_env"
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
 def solo(others="bio_inspired", **kwargs):
     return gymnasium.make("uuv_marl/Solo-v1", others=others, **{"num_vehicles": 6, **kwargs})
 
 
-@pytest.mark.parametrize("others", ["bio_inspired", "sdc", "random"])
-def test_solo_passes_gymnasiums_check(scenario_name, others):
+def test_solo_passes_gymnasiums_check(scenario_name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(solo(others, scenario=scenario_name, num_vehicles=8, render_mode="rgb_array").unwrapped)
+        check_env(solo("sdc", scenario=scenario_name, num_vehicles=8, render_mode="rgb_array").unwrapped)
 
 
-@pytest.mark.parametrize("others", ["bio_inspired", "sff_informed", "sdc", "random"])
+@pytest.mark.parametrize("others", ["bio_inspired", "sdc", "random"])
 def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
     """The learner's action and the policy's for all others give the run of ``parallel_env``, bit for bit."""
     losses = {"disturbance.loss_times_s": [2.0, 3.0]} if scenario_name == "lossy" else {}
@@ -397,58 +233,11 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
         env.unwrapped.step(own)
 
 
-def test_solo_repeats_itself_with_policies_that_draw():
-    runs = []
-    for _ in range(2):
-        env = solo("random", overrides=SHORT)
-        record = [env.reset(seed=3)[0]]
-        for _ in range(2):
-            over = False
-            while not over:
-                observation, reward, terminated, truncated, _ = env.step(np.zeros(2, np.float32))
-                record += [observation, reward]
-                over = terminated or truncated
-            record.append(env.reset()[0])
-        runs.append(b"".join(np.asarray(item).tobytes() for item in record))
-    assert runs[0] == runs[1]
-
-
-def test_solo_takes_the_options_of_the_parallel_environment():
-    options = {"decision_period": 0.5, "overrides": {"timing.control_hold_s": 0.5}, "max_cycles": np.int64(3)}
-    env = solo("idle", reward=lambda swarm: np.full(swarm.state.alive.shape, 2.5), **options)
-    env.reset(seed=0)
-    steps = [env.step(np.zeros(2, np.float32))[1:4] for _ in range(3)]
-    assert steps == [(2.5, False, False), (2.5, False, False), (2.5, False, True)]
-
-
-def test_solo_says_what_is_wrong():
-    env = solo()
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"the action must be finite, got \[nan, 0.0\]"):
-        env.unwrapped.step([np.nan, 0.0])
-    with pytest.raises(baselines.PolicyError, match="did you mean 'bio_inspired'"):
-        solo("bio_inspird")
-    with pytest.raises(ValueError, match="render_mode must be one of"):
-        SoloEnv(render_mode="ascii")
-    copy.deepcopy(env)
-
-
-def test_a_controller_for_many_worlds_is_made_for_the_scenario():
-    with pytest.raises(baselines.PolicyError, match=r"SwarmVectorEnv has no agents by name; make the policy with make"):
-        baselines.make("bio_inspired", short())
-
-
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (
-            {"sonar.channels": ["compass"]},
-            "sonar.channels can't hold compass: with 'bio_inspired' the learner has no",
-        ),
-        (
-            {"actuators.yaw_damping_nms": 600.0},
-            "yaw_damping_nms can't be 600: with 'bio_inspired' all vehicles have 0; leave",
-        ),
+        ({"sonar.channels": ["compass"]}, "sonar.channels can't hold compass: with 'bio_inspired' the learner has no"),
+        ({"actuators.yaw_damping_nms": 600.0}, "can't be 600: with 'bio_inspired' all vehicles have 0; leave"),
     ],
 )
 def test_solo_drops_no_override(overrides, message):
@@ -508,7 +297,7 @@ def snapshot_bytes(env):
     return {name: array.tobytes() for name, array in env.swarm.snapshot().items()}
 
 
-@pytest.mark.parametrize("action", [1e-300, 1e-46, -1e-300])
+@pytest.mark.parametrize("action", [1e-300, -1e-46])
 def test_numbers_below_float32s_range_are_zero_whatever_numpy_is_told(action):
     """Actions of a user, observations on their way to a policy, and rewards."""
 

@@ -7,16 +7,12 @@ import tomllib
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from typer.testing import CliRunner
 
 from research.dynamics import acceptance
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark import handling
-from uuv_marl.cli import app
-from uuv_marl.replay.traces import from_folder
-from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, variant_names, vehicle_names
-from uuv_marl.scenario.vehicle_files import VEHICLES
+from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, vehicle_names
 from uuv_marl.sim.swarm import Swarm
 
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
@@ -35,47 +31,6 @@ def measured():
 @pytest.mark.parametrize("figure", acceptance.FIGURES, ids=lambda figure: figure.vehicle)
 def test_a_vehicle_does_what_its_source_states(figure, measured):
     assert getattr(measured[figure.vehicle], figure.quantity) == pytest.approx(figure.stated, abs=figure.within)
-
-
-OTHER = {
-    "lauv": {"top_mps": 1.97, "coast_m": 4.7, "coast_s": 13.5},
-    "remus100": {"top_mps": 2.59, "turn_radius_m": 11.3, "coast_m": 11.8, "coast_s": 46.0},
-    "remus100+munk_on": {"top_mps": 2.59, "turn_radius_m": 5.84},
-    "bluerov2_heavy": {"top_mps": 0.83, "turn_dps": 253.0, "turn_radius_m": 0.0},
-    "bluerov2_heavy+drag_wu": {"top_mps": 2.34},
-    "literature_185": {"top_mps": 5.14, "turn_dps": 300.0},
-}
-"""What another program, which shares no line with this one, made of the same numbers."""
-
-
-@pytest.mark.parametrize("vehicle", OTHER)
-def test_a_vehicle_does_what_another_program_made_of_its_numbers(vehicle, measured):
-    for quantity, value in OTHER[vehicle].items():
-        assert getattr(measured[vehicle], quantity) == pytest.approx(value, rel=0.01, abs=1e-9), quantity
-
-
-@pytest.mark.parametrize(
-    ("vehicle", "speed", "expected"),
-    [
-        ("lauv", 1.0, [-1.57, -4.16]),
-        ("remus100", 1.5, [-0.72 + 1j, -0.72 - 1j]),
-        ("remus100+munk_on", 1.0, [0.66, -1.52]),
-        ("remus100+munk_on+drag_prestero", 1.0, [0.66, -1.52]),
-        ("bluerov2_heavy", 0.5, [0.56, -0.56]),
-        ("literature_185", 1.0, [0.22, -1.22]),
-    ],
-)
-def test_going_straight_is_as_stable_as_another_program_found(vehicle, speed, expected):
-    np.testing.assert_allclose(acceptance.sway_yaw(handling.alone(vehicle), speed), expected, atol=0.012)
-
-
-def test_the_lauv_turns_from_cruise_as_another_program_found():
-    """Full rudder at the thrust that holds 1.5 m/s ahead."""
-    thrust = (2.4 + 2.4 * 1.5) * 1.5 / 14.0
-    *_, (_, _, _, u, v, r) = handling.swim(handling.alone("lauv"), (thrust, 1.0), 60.0, 1.5)
-    assert math.hypot(u, v) == pytest.approx(1.2, abs=0.05)
-    assert math.degrees(r) == pytest.approx(24.0, abs=0.5)
-    assert math.hypot(u, v) / r == pytest.approx(2.85, abs=0.02)
 
 
 def test_presteros_sums_without_the_munk_moment_turn_as_lift_with_it():
@@ -170,20 +125,6 @@ def test_a_minute_of_a_steady_turn_is_scipys(name, source):
 # --- The files ---
 
 
-SOURCES = r"assumed|Repoulias|section 5|da Silva|Havenstrøm|lauv_gazebo|Prestero|Fossen|Allen|Sgarioto|von Benzon|Wu"
-
-
-@pytest.mark.parametrize("name", vehicle_names())
-def test_every_number_of_a_vehicle_has_its_source(name):
-    text = (VEHICLES / f"{name}.toml").read_text()
-    for line in text.splitlines():
-        if " = " in line.split("#")[0] and not line.startswith(("name =", "source =")):
-            assert re.search(SOURCES, line.partition("#")[2]), line
-    data = tomllib.loads(text)
-    assert data["vehicle"]["name"] == name
-    assert data["vehicle"]["source"]
-
-
 @pytest.mark.parametrize("name", handling.every())
 def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
     changes = SLOW | {"vehicle": name, "trajectory.speed_mps": 0.5}
@@ -203,14 +144,6 @@ def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
         assert {field: loaded[section][field] for field in shown[section]} == shown[section]
 
 
-def test_a_variant_changes_what_it_says_and_is_shown_with_its_source():
-    plain, munk = (load_vehicle(name)["vehicle"] for name in ("remus100", "remus100+munk_on"))
-    assert {name for name in plain if plain[name] != munk[name]} == {"name", "munk_moment"}
-    assert variant_names("remus100") == ["drag_prestero", "drag_sgarioto", "munk_on", "small_rudder", "sums"]
-    assert "munk_moment = true # Prestero: his sums" in show_vehicle("remus100+munk_on")
-    assert "[variants.munk_on.vehicle]" in show_vehicle("remus100")
-
-
 def test_a_file_of_ones_own_has_variants_too(tmp_path):
     own = tmp_path / "my+boat.toml"
     own.write_text(
@@ -227,14 +160,8 @@ def test_a_file_of_ones_own_has_variants_too(tmp_path):
 @pytest.mark.parametrize(
     ("variants", "name", "message"),
     [
-        ("", "heavy", "has no variant 'heavy'; it has none"),
         ("[variants.heavy.vehicle]\nm_kg = 25.0", "havy", "has no variant 'havy'; it has heavy"),
         ("[variants.heavy]\nm_kg = 25.0", "heavy", "variants.heavy must hold tables, such as [variants.heavy.vehicle]"),
-        (
-            "[variants.heavy.sonar]\nm = 25.0",
-            "heavy",
-            "variants.heavy holds 'sonar'; it may hold vehicle and actuators",
-        ),
         ("[variants.heavy.vehicle]\nmass = 25.0", "heavy", "vehicle.mass is unknown"),
     ],
 )
@@ -253,38 +180,4 @@ def test_a_vehicle_that_replaces_another_leaves_nothing_of_it():
     assert back.actuators == never.actuators
 
 
-def test_a_vehicle_that_a_scenario_is_too_fast_for_is_refused_with_the_remedy():
-    with pytest.raises(ScenarioError, match=r"trajectory.speed_mps = 4 is more than the 1.97 m/s .* cruise_mps = 1.5"):
-        load_scenario("single_obstacle", overrides={"vehicle": "lauv"})
-    with pytest.raises(
-        ScenarioError, match=r"integration_step_s = 0.1 is too long .* rudder_max_deg = 15; use at most"
-    ):
-        load_scenario("single_obstacle", overrides={"vehicle": "remus100"})
-
-
 # --- The command ---
-
-
-def test_the_command_lists_the_catalogue_and_shows_one():
-    listed = CliRunner().invoke(app, ["list", "vehicles"], env={"COLUMNS": "200"})
-    assert listed.exit_code == 0, listed.output
-    assert all(name in listed.output for name in handling.every())
-    row = next(line for line in listed.output.splitlines() if "remus100+munk_on" in line)
-    assert "5.8 m" in row
-    assert "2.59" in row
-    assert "variant: munk_moment = true" in row
-    shown = CliRunner().invoke(app, ["list", "--show", "lauv"])
-    assert shown.output == show_vehicle("lauv") + "\n"
-    wrong = CliRunner().invoke(app, ["list", "vehicles", "--show", "remus"])
-    assert wrong.exit_code != 0
-    assert "did you mean 'remus100'" in wrong.output
-
-
-def test_a_benchmark_of_a_torpedo_says_that_it_has_no_inner_loop_and_can_be_replayed(tmp_path):
-    torpedo = ["vehicle=lauv", "trajectory.speed_mps=1.5", "start.speed_max_mps=1.5", "time_limit.factor=0.05"]
-    command = ["benchmark", "--scenario", "starter", "--policy", "bio_inspired_plus", "--seeds", "1", "--output"]
-    run = CliRunner().invoke(app, [*command, str(tmp_path / "run"), *(f"--set={change}" for change in torpedo)])
-    assert run.exit_code == 0, run.output
-    assert "yaw damping" not in (tmp_path / "run" / "table.md").read_text()
-    recording = from_folder(tmp_path / "run", None, None, 0)
-    assert np.isfinite(recording.position[-1]).all()

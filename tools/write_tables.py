@@ -12,15 +12,14 @@ from research.heldout import page as heldout
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
+from uuv_marl.envs.observation import closeness_table
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
-from uuv_marl.tasks.follow import Follow
+from uuv_marl.tasks import TASKS, Follow, Reach
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = tuple(
-    ROOT / page
-    for page in ("README.md", "docs/environment.md", "docs/results.md", "docs/scenarios.md", "docs/vehicles.md")
-)
+NAMES = ("environment", "results", "scenarios", "tasks", "vehicles")
+PAGES = (ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in NAMES))
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
 TRIALS = read_rows(ROOT / "docs" / "sea-trials.csv.gz")
@@ -76,6 +75,15 @@ def scenarios() -> str:
     return table(("name", "what", "vehicles", "obstacles (at most)", "source"), lines)
 
 
+def tasks() -> list[tuple[str, ...]]:
+    """Every task that ships: its name, what it is, its numbers with their values."""
+    return [
+        (f"`{name}`", (made.__doc__ or "").splitlines()[0],
+         ", ".join(f"`{field}` = {value:g}" for field, value in made.Numbers()) or "none")
+        for name, made in TASKS.items()
+    ]  # fmt: skip
+
+
 def channels() -> str:
     """The fields that all channels append to the observation."""
     plain = PerceptLayout.of(load_scenario("single_obstacle"))
@@ -105,6 +113,9 @@ TABLES = filled() | {
     "benchmark": benchmark(),
     "scenarios": scenarios(),
     "observation": fields(PerceptLayout.of(load_scenario("single_obstacle")).table),
+    "closeness": fields(closeness_table(load_scenario("single_obstacle"))),
+    "reach": table(("term", "value"), [(f"`{name}`", what) for name, what in Reach.terms.items()]),
+    "tasks": table(("name", "what", "numbers of its own"), tasks()),
     "channels": channels(),
     "state": fields(state_table(load_scenario("single_obstacle"))),
     "vehicles": rows(acceptance.measures()),

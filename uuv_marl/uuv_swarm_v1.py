@@ -5,5 +5,9 @@ from uuv_marl.envs.parallel_env import env, parallel_env
 
 __all__ = ["HISTORY", "env", "parallel_env", "raw_env"]
 
-HISTORY = {"v0": "first version"}
+HISTORY = {
+    "v0": "first version",
+    "v1": 'the default reward is dense, with progress towards the reference; v0\'s is reward="sparse"; the clocks of '
+    "starter are those of a learner",
+}
 """What changed in physics, observation, action or reward, by version of the environment."""

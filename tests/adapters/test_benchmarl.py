@@ -20,11 +20,7 @@ with warnings.catch_warnings():
 
     from uuv_marl.envs.benchmarl import SwarmTask
 pytestmark = pytest.mark.filterwarnings("ignore")
-SMALL = {
-    "num_vehicles": 4,
-    "decision_period": 0.5,
-    "overrides": {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0},
-}
+SMALL = {"num_vehicles": 4, "decision_period": 0.5, "overrides": {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}}
 
 
 def experiment(folder, task, algorithm=MappoConfig, seed=100_000):

@@ -53,9 +53,10 @@ def load_scenario(
         overrides: ``{"sonar.echo_reports": "surface", "sonar.arrays.bow.range_m": 80.0}``; entries of lists are
             addressed by their name or index. A table changes only the fields that it has, a list is replaced. Values
             may be those of NumPy, torch or OmegaConf. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and
-            lags, and ``{"vehicle": "remus100+munk_on"}`` takes a variant of it. ``{"scale": "vehicle"}`` multiplies
-            lengths, speeds and times by the vehicle's (``uuv_marl.scenario.scale``); what other overrides give is not
-            multiplied.
+            lags, and ``{"vehicle": "remus100+munk_on"}`` takes a variant of it; where the scenario fixes the inner
+            loop for all (``timing.fixed``), another vehicle has none unless an override gives it.
+            ``{"scale": "vehicle"}`` multiplies lengths, speeds and times by the vehicle's
+            (``uuv_marl.scenario.scale``); what other overrides give is not multiplied.
 
     Raises:
         ScenarioError: names the field, the value and the remedy.
@@ -72,6 +73,8 @@ def load_scenario(
         for field, value in own.items():
             if field == "vehicle" and isinstance(value, str):
                 data = merged(data, load_vehicle(value))
+                if data["timing"].get("fixed"):  # the loop that it fixes was the other vehicle's
+                    data["actuators"]["yaw_damping_nms"] = 0.0
             else:
                 data["vehicle"] = (left_out(value) if field == "vehicle" else None) or data["vehicle"]
                 assign(data, field, value)
