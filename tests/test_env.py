@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import uuv_marl
-from uuv_marl import load_scenario, uuv_swarm_v0
+from uuv_marl import load_scenario, uuv_swarm_v1
 from uuv_marl.baselines import granted, make
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import Percept, PerceptLayout, percept_table
@@ -38,7 +38,7 @@ def test_parallel_seed(scenario_name):
 
 
 def test_max_cycles():
-    max_cycles_test(uuv_swarm_v0)
+    max_cycles_test(uuv_swarm_v1)
 
 
 def test_state(scenario_name):

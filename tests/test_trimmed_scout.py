@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-<<<<<<< HEAD:tests/test_trimmed_scout.py
-from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines import granted, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES
-=======
-from uuv_marl.baselines import granted, make
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, load_checkpoint, rows_of, save_checkpoint
-from uuv_marl.baselines.learned.memory_features import RECALLED
->>>>>>> tests:tests/test_learned_law.py
 from uuv_marl.baselines.learned.network import forward
 from uuv_marl.baselines.learned.trimmed_scout import TrimmedScout
 from uuv_marl.baselines.memory.doubt import doubt, trim_weights
@@ -201,40 +195,6 @@ def test_what_an_actor_sees_is_bounded(overrides):
     assert (most > 0.0).sum() > NUM_MEMORY_FEATURES - 10, "most features say something"
 
 
-<<<<<<< HEAD:tests/test_trimmed_scout.py
-def test_what_an_actor_sees_turns_with_the_world():
-    """The same swarm elsewhere and turned: the vehicles' own frames are all that there is."""
-    seen, turn = [], 0.7
-    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    for moved in (False, True):
-        scenario = granted("scout", load_scenario("single_obstacle", overrides={"swarm.num_vehicles": 10}))
-        swarm, policy = Swarm(scenario), TrimmedScout(scenario)
-        swarm.reset(3)
-        if moved:
-            swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (50.0, -80.0)
-            swarm.state.eta[0, :, 2] += turn
-            swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (50.0, -80.0)
-            swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (50.0, -80.0)
-        features = np.zeros((1, 10, NUM_MEMORY_FEATURES), np.float32)
-        policy.hear(swarm.observe())
-        policy.look(features)
-        seen.append(features)
-    np.testing.assert_allclose(seen[0], seen[1], atol=1e-3)
-
-
-def test_refusals_name_what_is_wrong(saved, tmp_path):
-    policy = saved(0.1)
-    slow = granted(policy, load_scenario("random_field", overrides={"timing.decision_period_s": 1.0}))
-    with pytest.raises(PolicyError, match="decides every 0.1 to 0.5 s"):
-        make(policy, slow)
-    wrong = Card(percept=card_rows(PerceptLayout.of(load_scenario("tracking"))))
-    save_checkpoint(tmp_path / "wrong" / WEIGHTS_FILE, wrong, actor(0.1))
-    with pytest.raises(PolicyError, match="expected float32"):
-        load_checkpoint(tmp_path / "wrong")
-
-
-=======
->>>>>>> tests:tests/test_learned_law.py
 @pytest.mark.needs("torch")
 def test_it_is_trained_as_it_is_used_and_a_resume_is_exact(tmp_path, monkeypatch):
     from uuv_marl.train import run as trainings
