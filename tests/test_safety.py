@@ -115,7 +115,7 @@ def test_where_no_velocity_is_safe_it_is_counted():
 
 @pytest.mark.parametrize("name", ["sff", "mappo"])
 def test_policies_that_collide_alone_do_not_inside_the_filter(name):
-    """On a crowded field of the tuning seeds; more are in docs/guarded.md."""
+    """On a crowded field of the tuning seeds; more are in docs/policies.md."""
     collisions = {}
     for policy in (name, f"guarded:{name}"):
         scenario = granted(policy, load_scenario("random_field"))
