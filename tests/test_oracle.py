@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from tests import contract
 from tests.conftest import COUPLED, LIFT, RUDDER
+from tests.golden import STARTER
 from tests.oracle import motion, sonar
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
@@ -449,7 +450,7 @@ def test_the_largest_distance_is_found_whatever_the_shape(shape, n):
 
 EPISODES = {
     "surfaces, all channels": (
-        "starter", {"overrides": {"sonar.channels": ["compass", "link"], "sonar.echo_reports": "surface"}}
+        STARTER, {"overrides": {"sonar.channels": ["compass", "link"], "sonar.echo_reports": "surface"}}
     ),
     "link alone": ("multi_obstacle", {"num_vehicles": 9, "overrides": {"sonar.channels": ["link"]}}),
     "obstacles hide": ("multi_obstacle", {"num_vehicles": 12, "overrides": {"sonar.obstacles_hide_vehicles": True}}),

@@ -68,7 +68,7 @@ def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyon
     arrays["last"][:] = 1
     check(Course, arrays, SIZES)
     monkeypatch.setattr(
-        "uuv_marl.sim.tables.rows",
+        "uuv_marl.sim.tables.array_specs",
         lambda table: {"last": array_specs(table)["last"]._replace(bounds=Bounds(low, axis, beyond))},
     )
     arrays["last"][1] = wrong

@@ -318,7 +318,9 @@ def test_numbers_below_float32s_range_are_zero_whatever_numpy_is_told(action):
         for library, name in (("stable_baselines3", "sb3.SwarmVecEnv"), ("torchrl", "torchrl.SwarmEnv")):
             if find_spec(library):
                 module, _, kind = name.partition(".")
-                env = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), kind)(2, "starter", reward=tiny)
+                env = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), kind)(
+                    num_worlds=2, scenario="starter", reward=tiny
+                )
                 started = env.reset()
                 env.step(np.full((10, 2), action) if library == "stable_baselines3" else env.rand_action(started))
 

@@ -114,8 +114,8 @@ def parse_policy(name: str) -> Named:
 
     Args:
         name: NAME is one of ``POLICIES``, the path of a checkpoint, or ``module:Class``; each key is one of the
-            policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter; ``own_clock:`` changes the
-            scenario alone (``granted``).
+            policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter; ``own_clock:`` changes
+            the scenario alone (``granted``).
 
     Raises:
         PolicyError: no policy has that name; the message gives the most similar name.
