@@ -452,7 +452,7 @@ def test_stopping_writes_nothing(tmp_path, monkeypatch, written):
 
 def test_the_own_policys_error_names_it(tmp_path, monkeypatch, written):
     (tmp_path / "broken.py").write_text(
-        "from uuv_marl.baselines import Policy\n\n\nclass Bad(Policy):\n    def act(self, percept):\n        return 1\n"
+        "from uuv_marl.baselines import Policy\nclass Bad(Policy):\n    def decide(self, percept):\n        return 1\n"
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))

@@ -257,18 +257,18 @@ import numpy as np
 from uuv_marl.baselines import Policy
 
 class Misspelt(Policy):
-    def act(self, percept):
+    def decide(self, percept):
         return self.towards(percept)
 
     def towards(self, percept):
         return percept["refrence"]
 
 class Shaped(Policy):
-    def act(self, percept):
+    def decide(self, percept):
         return np.zeros((1, 2), np.float32)
 
 class Nan(Policy):
-    def act(self, percept):
+    def decide(self, percept):
         return np.full((*percept["velocity"].shape[:2], 2), np.nan, np.float32)
 
 class Unmakeable(Policy):
@@ -276,7 +276,7 @@ class Unmakeable(Policy):
         super().__init__(scenario, num_worlds)
         raise OverflowError("too much")
 
-    def act(self, percept):
+    def decide(self, percept):
         pass
 """
 
@@ -284,7 +284,7 @@ class Unmakeable(Policy):
 @pytest.mark.parametrize(
     ("name", "messages"),
     [
-        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in act", "users_own.py:10, in towards"]),
+        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in decide", "users_own.py:10, in towards"]),
         ("Shaped", ["policy 'users_own:Shaped'", "action", "shape"]),
         ("Nan", ["policy 'users_own:Nan'", "action", "finite"]),
         ("Unmakeable", ["OverflowError: too much", "users_own.py:23, in __init__"]),
