@@ -116,7 +116,7 @@ import numpy as np
 from uuv_marl.baselines import Policy
 
 class Ahead(Policy):
-    def act(self, percept):
+    def decide(self, percept):
         reference = percept["reference"]
         return (reference / np.maximum(np.hypot(*np.moveaxis(reference, -1, 0)), 1e-6)[..., None]).astype(np.float32)
 """

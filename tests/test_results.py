@@ -153,14 +153,14 @@ import numpy as np
 from uuv_marl.baselines import Policy
 
 class Misspelt(Policy):
-    def act(self, percept):
+    def decide(self, percept):
         return self.towards(percept)
 
     def towards(self, percept):
         return percept["refrence"]
 
 class Nan(Policy):
-    def act(self, percept):
+    def decide(self, percept):
         return np.full((*percept["velocity"].shape[:2], 2), np.nan, np.float32)
 """
 

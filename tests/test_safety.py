@@ -16,7 +16,7 @@ class Ahead(Policy):
 
     yaw_damping_nms = 600.0
 
-    def act(self, percept):
+    def decide(self, percept):
         action = np.zeros((*percept.flat.shape[:2], 2), np.float32)
         action[..., 0] = 1.0
         return action
@@ -64,8 +64,8 @@ def test_who_backs_into_what_it_no_longer_hears_is_stopped():
     """The cause of the shipped learned policy's collisions: thrust astern, an obstacle outside the active fan."""
 
     class Astern(Ahead):
-        def act(self, percept):
-            return -super().act(percept)
+        def decide(self, percept):
+            return -super().decide(percept)
 
     swarm, _, percept = placed(AHEAD, [(240.0, 0.0, 0.0)], HERE)
     for acts, meets in ((Astern(swarm.scenario), True), (Guarded(swarm.scenario, inner=Astern(swarm.scenario)), False)):
@@ -95,7 +95,6 @@ def test_where_nothing_is_near_no_action_changes(name):
         action = bare.act(percept)
         np.testing.assert_array_equal(guarded.act(percept), action)
         percept = swarm.step(action)
-        guarded.acted(action, guarded.active)
     assert guarded.changed[0] == 0
 
 

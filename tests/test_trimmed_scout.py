@@ -89,8 +89,7 @@ def test_the_network_is_asked_only_where_its_output_counts(overrides, saved):
         policy.look(features)
         everywhere = forward(policy.checkpoint.layers, features[0])[None]
         np.testing.assert_array_equal(action, policy.trim(everywhere))
-        policy.acted(action, policy.active)
-        percept = swarm.step(action)
+        percept = swarm.step(policy.drive(percept, action))
     assert (np.mean(asked) > 0.9) == (overrides != FEW), "hardly anybody's in calm water, nearly all where they lag"
 
 
@@ -188,8 +187,7 @@ def test_what_an_actor_sees_is_bounded(overrides):
         policy.look(features)
         most = np.maximum(most, np.abs(features[0]).max(axis=0))
         action = policy.trim(np.zeros((1, 12, 1), np.float32))
-        policy.acted(action, policy.active)
-        percept = swarm.step(action)
+        percept = swarm.step(policy.drive(percept, action))
     assert np.isfinite(most).all()
     assert most.max() < 8.0
     assert (most > 0.0).sum() > NUM_MEMORY_FEATURES - 10, "most features say something"

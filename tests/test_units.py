@@ -147,7 +147,7 @@ class Acts(Policy):
 def test_bad_combinations_are_refused_with_the_remedy():
     with pytest.raises(PolicyError, match="computes in the paper's units, .* make it with uuv_marl.baselines.make"):
         BioInspired(LAUV)
-    with pytest.raises(PolicyError, match="tests.test_units:Acts defines act, .* define decide instead of act"):
+    with pytest.raises(PolicyError, match=r"'Acts' must define decide\(percept\), and leave act, .* alone"):
         make("tests.test_units:Acts", LAUV)
     with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
         make("mappo", LAUV)

@@ -235,11 +235,6 @@ def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parame
         return _made(name, kind, scenario, num_worlds, parameters)
     need_granted(name, kind, scenario)
     policy = _made(name, kind, in_own_units(scenario), num_worlds, parameters)
-    if type(policy).act is not Policy.act:
-        raise PolicyError(
-            f"{name} defines act, which can't be converted to the scale of {scenario.vehicle.name} in scenario "
-            f"{scenario.name!r}; define decide instead of act"
-        )
     policy.reader = reader
     return policy
 
