@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
@@ -71,6 +72,28 @@ def test_ppo_knows_episodes_without_any_wrapper():
     assert model.ep_info_buffer
     assert {info["l"] for info in model.ep_info_buffer} == {33}
     assert set(model.ep_success_buffer) == {True}
+
+
+def test_recurrent_ppo_forgets_where_an_episode_begins():
+    """All rows of a world start together, one step after their end, and then act as a policy that remembers nothing."""
+    env = swarm(overrides={**SHORT, "time_limit.extra_s": 4.0})
+    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=40, batch_size=80, n_epochs=1, seed=3, device="cpu")
+    model.learn(40 * env.num_envs)
+    starts = model.rollout_buffer.episode_starts.reshape(2, 4, 40)  # row after row, each in the order of time
+    assert (starts == starts[:, :1]).all()
+    assert starts[..., 0].all()
+    assert 2 <= starts[:, 0, 1:].sum() < 40
+    env.seed(0)
+    observation, state, start = env.reset(), None, np.ones(8, bool)
+    began = 0
+    for _ in range(40):
+        action, state = model.predict(observation, state, start, deterministic=True)
+        fresh, _ = model.predict(observation, deterministic=True)
+        same = (action == fresh).all(axis=1)
+        np.testing.assert_array_equal(same, start)
+        observation, _, start, _ = env.step(action)
+        began += start.sum()
+    assert began >= 16
 
 
 def test_normalising_and_stacking_wrappers():
