@@ -277,9 +277,9 @@ def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
 
 def test_the_example_trains_a_policy(tmp_path):
     file = Path(__file__).resolve().parent.parent / "examples" / "training" / "sb3.py"
-    command = [sys.executable, file, "--scenario=tracking", "--worlds=1", "--steps=100", f"--output={tmp_path}"]
+    command = [sys.executable, file, "--worlds=1", "--steps=100", f"--output={tmp_path}"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
-    assert f"--scenario tracking --policy {tmp_path}" in done.stdout
+    assert f"--scenario starter --policy {tmp_path}" in done.stdout
     assert PPO.load(tmp_path / "model").num_timesteps > 100
-    scenario = granted(str(tmp_path), load_scenario("tracking", num_vehicles=3))
+    scenario = granted(str(tmp_path), load_scenario("starter"))
     assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0
