@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
@@ -56,6 +57,28 @@ def test_ppo_learns_and_a_seed_fixes_it():
     assert first.num_timesteps == 3 * 32 * 8
     mean, _ = evaluate_policy(first, swarm(), n_eval_episodes=8)
     assert np.isfinite(mean)
+
+
+def test_recurrent_ppo_forgets_where_an_episode_begins():
+    """All rows of a world start together, one step after their end, and then act as a policy that remembers nothing."""
+    env = swarm(overrides={**SHORT, "time_limit.extra_s": 4.0})
+    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=40, batch_size=80, n_epochs=1, seed=3, device="cpu")
+    model.learn(40 * env.num_envs)
+    starts = model.rollout_buffer.episode_starts.reshape(2, 4, 40)  # row after row, each in the order of time
+    assert (starts == starts[:, :1]).all()
+    assert starts[..., 0].all()
+    assert 2 <= starts[:, 0, 1:].sum() < 40
+    env.seed(0)
+    observation, state, start = env.reset(), None, np.ones(8, bool)
+    began = 0
+    for _ in range(40):
+        action, state = model.predict(observation, state, start, deterministic=True)
+        fresh, _ = model.predict(observation, deterministic=True)
+        same = (action == fresh).all(axis=1)
+        np.testing.assert_array_equal(same, start)
+        observation, _, start, _ = env.step(action)
+        began += start.sum()
+    assert began >= 16
 
 
 def test_normalising_and_stacking_wrappers():
@@ -157,11 +180,11 @@ def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
 
 def test_the_example_trains_a_policy(tmp_path):
     file = Path(__file__).resolve().parent.parent / "examples" / "training" / "sb3.py"
-    command = [sys.executable, file, "--scenario=tracking", "--worlds=1", "--steps=100", f"--output={tmp_path}"]
+    command = [sys.executable, file, "--worlds=1", "--steps=100", f"--output={tmp_path}"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
-    assert f"--scenario tracking --policy {tmp_path}" in done.stdout
+    assert f"--scenario starter --policy {tmp_path}" in done.stdout
     assert PPO.load(tmp_path / "model").num_timesteps > 100
-    scenario = granted(str(tmp_path), load_scenario("tracking", num_vehicles=3))
+    scenario = granted(str(tmp_path), load_scenario("starter"))
     assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0
 
 

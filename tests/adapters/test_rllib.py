@@ -192,7 +192,7 @@ def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(joined
 
 
 def test_every_runner_starts_from_its_own_world(joined):
-    algorithm = config("random_field", 123_000).build_algo()
+    algorithm = config("training_field", 123_000).build_algo()
     try:
         algorithm.train()
         fields = algorithm.env_runner_group.foreach_env_runner(
@@ -202,7 +202,7 @@ def test_every_runner_starts_from_its_own_world(joined):
         algorithm.stop()
     expected = []
     for seed in (123_001, 123_002):
-        env = uuv_marl.parallel_env("random_field", num_vehicles=5, overrides=example.TASK)
+        env = uuv_marl.parallel_env("training_field", num_vehicles=5)
         env.reset(seed=seed)
         expected.append(env.swarm.course.obstacles)
     assert sorted(field.tobytes() for field in fields) == sorted(field.tobytes() for field in expected)
