@@ -20,7 +20,7 @@ help:
 	@echo "make test-docs                      the site without a warning, its links, search and width; tutorials run"
 	@echo "make docs-links                     the site's links to other sites, which need the internet"
 	@echo "make test-bounds                    the simulation's tests, every index of compiled code checked"
-	@echo "make test-attacks                   hostile inputs, kills and crash points: docs/reliability.md"
+	@echo "make test-attacks                   hostile inputs, kills and crash points: SECURITY.md"
 	@echo "make test-release                   a wheel, installed into an empty environment, and its commands there"
 	@echo "make test-lowest                    tests with the oldest libraries that pyproject.toml allows, without torch"
 	@echo "make test-light PYTHON=python3.13   tests without torch, on another Python"

@@ -74,10 +74,11 @@ def rllib(agents: int, worlds: int) -> Case:
     END.enter_context(connected(None))
     example = runpy.run_path(str(Path(__file__).resolve().parent.parent / "examples" / "training" / "rllib.py"))
     config = example["ppo_config"](SCENARIO, agents, 0, SEED)
+    config.environment(env_config={"scenario": SCENARIO, "num_vehicles": agents, "overrides": OVERRIDES})
     config.env_runners(num_envs_per_env_runner=worlds)
     config.training(
         train_batch_size_per_learner=DECISIONS * agents * worlds, minibatch_size=MINIBATCH, num_epochs=EPOCHS,
-        lr=LEARNING_RATE,
+        lr=LEARNING_RATE, gamma=GAMMA,
     )  # fmt: skip
     logging.getLogger("ray.rllib").setLevel(logging.ERROR)
     algorithm = config.build_algo()

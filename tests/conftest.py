@@ -32,6 +32,13 @@ settings.load_profile("laws")
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
 """Those that tests step through; ``starter`` is one of their kind, only shorter."""
 
+COUPLED = {"vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0, "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0,
+           "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0}  # fmt: skip
+LIFT = {"vehicle.Y_uv": -60.0, "vehicle.Y_ur": 20.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "vehicle.N_vv": -9.0}
+RUDDER = {"actuators.kind": "rudder", "actuators.Y_uud": 60.0, "actuators.N_uud": -40.0,
+          "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
+"""Vehicles that have every term of the equations."""
+
 
 def pytest_report_header():
     return [f"left out, for want of {NEEDS[file]}: {file}" for file in collect_ignore]

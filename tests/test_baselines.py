@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.golden import STARTER
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, granted, make
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
@@ -83,7 +84,7 @@ def test_a_lone_vehicle_lags_by_drag_over_zeta_l(hold, tolerance):
     while swarm.facts.time_s[0] < 400.0:
         percept = swarm.step(policy.act(percept))
     drag = (70.0 + 100.0 * 4.0) * 4.0
-    lag = swarm.facts.reference[0, 0] - swarm.state.eta[0, 0, 0]
+    lag = swarm.facts.reference[0, 0, 0] - swarm.state.eta[0, 0, 0]
     assert lag == pytest.approx(drag / 30.0, abs=tolerance)  # 62.7 m
 
 
@@ -102,7 +103,7 @@ def test_forces_turn_with_the_world(name):
             swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
             swarm.state.eta[0, :, 2] += turn
             swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (x, y)
-            swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (x, y)
+            swarm.course.waypoints[0, 0] = swarm.course.waypoints[0, 0] @ rotation.T + (x, y)
         percept = swarm.observe()
         if name.startswith("sdc"):  # its lattice lies north-east, so only the move is a symmetry
             policy.act(percept)
@@ -125,22 +126,6 @@ def test_who_a_vehicle_is_does_not_matter(name):
         swarm.state.eta[0], swarm.state.nu[0] = swarm.state.eta[0, places], swarm.state.nu[0, places]
         actions.append(policy.act(swarm.observe())[0])
     np.testing.assert_allclose(actions[0][order], actions[1], atol=1e-6)
-
-
-def test_echoes_of_one_obstacle_count_once_where_asked():
-    lone = load_scenario("single_obstacle", num_vehicles=1)
-    layout = PerceptLayout.of(lone)
-    flat = np.zeros((1, 1, layout.size), np.float32)
-    percept = Percept(flat, layout)
-    percept["echo"][0, 0] = [0, 1, 1, 1, 0, 1, 0]
-    percept["echo_range"][0, 0] = [0, 40, 30, 35, 0, 20, 0]
-    percept["echo_position"][0, 0, 1:4] = (55.0, -5.0)
-    percept["echo_position"][0, 0, 5] = (30.0, 30.0)
-    each = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1))
-    once = make("bio_inspired", lone, gains=GAINS._replace(zeta_o=0.1), obstacle_term="per_obstacle")
-    first, second = ((0.1 * np.exp(80 / np.hypot(*p)) * -np.array(p)) for p in ((55.0, -5.0), (30.0, 30.0)))
-    np.testing.assert_allclose(each.act(percept)[0, 0], (3 * first + second) / 3000, rtol=1e-5)
-    np.testing.assert_allclose(once.act(percept)[0, 0], (first + second) / 3000, rtol=1e-5)
 
 
 @given(st.floats(10.0, 26.0), st.floats(4.0, 20.0))
@@ -188,28 +173,24 @@ def test_slots_are_a_lattice_around_zero(n):
         np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
 
 
-def test_slots_are_assigned_so_that_ways_are_short():
-    scenario = granted("sdc", load_scenario("tracking", num_vehicles=7))
-    swarm, policy = Swarm(scenario), make("sdc", scenario)
-    swarm.reset(0)
-    slots = sdc.hexagonal_slots(7)[[3, 1, 4, 0, 6, 5, 2]]
-    swarm.state.eta[0, :, :2] = slots * 1.1 + (500.0, 300.0)
-    policy.act(swarm.observe())
-    np.testing.assert_allclose(policy.memory.slots[0], slots, atol=1e-9)
+FOLDER = resources.files("uuv_marl.baselines") / "tuned"
+HULLS = ("bluerov2_heavy", "lauv", "remus100")
 
 
-@pytest.mark.parametrize("name", SPACES)
-def test_tuned_gains_come_from_shipped_trials(name):
-    data = json.loads((resources.files("uuv_marl.baselines") / "tuned" / f"{name}.json").read_text())
-    with (resources.files("uuv_marl.baselines") / "tuned" / f"{name}.csv").open() as file:
-        trials = list(csv.DictReader(file))
-    assert len(trials) == TRIALS
+@pytest.mark.parametrize("file", [*SPACES, *(f"bio_inspired_plus.{hull}" for hull in HULLS)])
+def test_tuned_gains_come_from_shipped_trials(file):
+    data = json.loads((FOLDER / f"{file}.json").read_text())
+    trials = list(csv.DictReader((FOLDER / f"{file}.csv").read_text().splitlines()))
+    name, _, hull = file.partition(".")
+    assert len(trials) == (100 if hull else TRIALS)
+    assert data.get("vehicle", "") == hull or not hull
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
     best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
     assert best == {"cost_s": data["best_cost_s"], **data["best"]}
-    assert list(data["best"]) == list(SPACES[name][0])
-    scenario = granted(name, load_scenario("tracking"))
-    gains = make(name, scenario).gains._asdict()
+    policy = f"{name},tuned_for={hull}" if hull else name
+    changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
+    scenario = granted(policy, load_scenario("sea_trial" if hull else "tracking", overrides=changes))
+    gains = make(policy, scenario).gains._asdict()
     assert {key: gains[key] for key in data["best"]} == data["best"]
 
 
@@ -225,7 +206,7 @@ def flown(name, scenario, decisions=6, worlds=2):
 
 @pytest.mark.parametrize("name", [*POLICIES, "guarded:mappo"])
 def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
-    swarm, policy, percept = flown(name, "starter")
+    swarm, policy, percept = flown(name, STARTER)
     again, kept, water = pickle.loads(pickle.dumps(policy)), policy.snapshot(), swarm.snapshot()
     first = policy.act(percept)
     assert np.array_equal(again.act(percept), first)
@@ -240,7 +221,7 @@ def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
 
 @pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
 def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
-    swarm, policy, percept = flown(name, "starter")
+    swarm, policy, percept = flown(name, STARTER)
     first = policy.act(percept)
     assert np.array_equal(policy.act(percept), first), "asked twice at one time, it must say the same"
     swarm.step(first)
@@ -254,7 +235,7 @@ def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
 @pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
 def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
     """So that memory does not outlive an autoreset, whichever API did it; the other world keeps its own."""
-    swarm, policy, percept = flown(name, "starter")
+    swarm, policy, percept = flown(name, STARTER)
     before = [array[1].copy() for array in policy.memory]
     percept = swarm.reset([5], worlds=[0])
     action = policy.act(percept)
@@ -269,7 +250,7 @@ def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
 
 
 def test_gains_and_parameters_can_be_written_behind_a_name():
-    scenario = load_scenario("starter")
+    scenario = load_scenario(STARTER)
     policy = make("bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle", scenario)
     assert policy.gains == bio_inspired.BioInspiredGains(zeta_n=0.5)
     assert make("bio_inspired", scenario, zeta_n=0.5).gains == policy.gains
@@ -279,7 +260,7 @@ def test_gains_and_parameters_can_be_written_behind_a_name():
 
 
 def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
-    scenario = granted("scout", load_scenario("starter"))
+    scenario = granted("scout", load_scenario(STARTER))
     assert make("scout", scenario).gains == make(f"scout,preset={DEFAULT_PRESET}", scenario).gains
     for name, preset in PRESETS.items():
         policy = make(f"guarded:scout,preset={name},push=3.5", scenario).inner
@@ -309,9 +290,9 @@ class Nothing(Policy):
 )
 def test_a_name_that_means_nothing_is_explained(name, message):
     with pytest.raises(PolicyError, match=message):
-        make(name, load_scenario("starter"))
+        make(name, load_scenario(STARTER))
     with pytest.raises(PolicyError, match=message):
-        make(name, parallel_env("starter"))
+        make(name, parallel_env(STARTER))
 
 
 def test_what_a_policy_cannot_be_made_for_is_explained():

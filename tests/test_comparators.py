@@ -16,7 +16,6 @@ from uuv_marl.sim.swarm import Swarm
 
 APF = apf.ApfGains(80.0, 40_000.0, 50.0, 500_000.0, 20.0)
 FLOCK = olfati_saber.OlfatiSaberGains(2.0, 14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
-ORCA = orca.OrcaGains(3.0, 5.0, 6.0, 6.0, 0.1)
 METRES = st.floats(-60.0, 60.0)
 
 
@@ -120,7 +119,7 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
     swarm.reset(10_000)
     angle = np.arange(6) * math.pi / 3
     ring = 12.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    swarm.state.eta[0, :, :2] = swarm.facts.reference[0, :2] + np.concatenate([np.zeros((1, 2)), ring])
+    swarm.state.eta[0, :, :2] = swarm.facts.reference[0, 0, :2] + np.concatenate([np.zeros((1, 2)), ring])
     swarm.state.eta[0, :, :2] += np.random.default_rng(0).uniform(-2.0, 2.0, (7, 2))
     percept = swarm.observe()
     while swarm.facts.time_s[0] < 100.0:
@@ -130,60 +129,7 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
     np.testing.assert_allclose(away[:, 1:3], spacing, rtol=0.02)  # at a corner a vehicle has two
 
 
-def beta_velocity(p, v, centre, radius):
-    """How the nearest point of a disc moves as a vehicle does, by differences."""
-
-    def nearest(place):
-        return centre + radius * (place - centre) / np.hypot(*(place - centre))
-
-    return (nearest(p + 1e-5 * v) - nearest(p - 1e-5 * v)) / 2e-5
-
-
-def test_an_obstacle_brakes_relative_to_its_nearest_point():
-    gains = FLOCK._replace(obstacle=0.0, pull=0.0, reference_velocity=0.0)
-    scenario, percept = seen("olfati_saber")
-    velocity, centre, radius = np.array([2.0, 1.0]), np.array([30.0, 10.0]), 20.0
-    alone = make("olfati_saber", scenario, gains=gains)
-    percept["velocity"][0, 0] = velocity
-    free = alone.act(percept)[0, 0].astype(float)
-    percept["echo"][0, 0, 2], percept["echo_range"][0, 0, 2] = 1.0, np.hypot(*centre) - radius
-    percept["echo_position"][0, 0, 2] = centre
-    limits = alone.limits
-    force = (alone.act(percept)[0, 0] - free) * [limits.max_force, limits.max_torque / limits.lever_arm]
-    expected = gains.obstacle_damping * (beta_velocity(np.zeros(2), velocity, centre, radius) - velocity)
-    np.testing.assert_allclose(force, expected, rtol=1e-4, atol=0.02)
-    assert expected @ velocity < 0.0
-
-
-def test_alignment_follows_neighbours_and_needs_their_velocities():
-    scenario, percept = seen("olfati_saber_informed")
-    gains = FLOCK._replace(alignment=100.0)
-    percept["heard"][0, 0, 3], percept["link_identity"][0, 0, 3] = 1.0, 2.0
-    percept["neighbour"][0, 0, 3] = (2.0, 0.0)  # so near that it counts wholly
-    percept["link_velocity"][0, 0, 3] = (0.0, 3.0)
-    limits = make("olfati_saber_informed", scenario, gains=gains).limits
-    actions = [
-        make("olfati_saber_informed", scenario, gains=FLOCK._replace(alignment=weight)).act(percept)[0, 0]
-        for weight in (0.0, 100.0)
-    ]
-    assert (actions[1] - actions[0])[1] * limits.max_torque / limits.lever_arm == pytest.approx(300.0, rel=1e-4)
-    percept["link_identity"][0, 0, 3] = 0.0  # of whom no message has arrived
-    np.testing.assert_array_equal(make("olfati_saber_informed", scenario, gains=gains).act(percept)[0, 0], actions[0])
-
-
 # Reciprocal velocity obstacles
-
-
-def test_the_half_planes_are_those_of_the_source():
-    """By hand: a disc of radius 6 m, 10 m ahead. The cone's leg is (0.8, 0.6); cut off at 5 s it ends 0.8 m/s away."""
-    head_on = orca.escape(10.0, 0.0, 6.0, 2.0, 0.0, 100.0, 0.1)
-    np.testing.assert_allclose(head_on, (-0.72, 0.96, -0.6, 0.8), atol=1e-12)
-    slow = orca.escape(10.0, 0.0, 6.0, 1.0, 0.0, 5.0, 0.1)
-    np.testing.assert_allclose(slow, (-0.2, 0.0, -1.0, 0.0), atol=1e-12)
-    apart = orca.escape(10.0, 0.0, 6.0, -1.0, 0.0, 5.0, 0.1)  # may close in by 0.8 m/s
-    np.testing.assert_allclose(apart, (1.8, 0.0, -1.0, 0.0), atol=1e-12)
-    inside = orca.escape(4.0, 0.0, 6.0, 1.0, 0.0, 5.0, 0.5)  # out within one decision
-    np.testing.assert_allclose(inside, (-5.0, 0.0, -1.0, 0.0), atol=1e-12)
 
 
 def nearest_approach(p_x, p_y, v_x, v_y, horizon):
@@ -210,38 +156,6 @@ def test_the_change_grazes_the_disc_and_is_the_smallest(p_x, p_y, v_x, v_y, radi
         d_x, d_y = 0.99 * size * math.cos(angle), 0.99 * size * math.sin(angle)
         same = nearest_approach(p_x, p_y, v_x + d_x, v_y + d_y, horizon)
         assert (same < radius + 1e-6) if collides else (same > radius - 1e-6)
-
-
-@pytest.mark.parametrize("offset", [0.0, 0.5, -0.5])
-def test_two_that_meet_head_on_swerve_to_the_same_side_and_share(offset):
-    """Each takes half, so that both together just pass; exactly head-on, both to starboard."""
-    scenario, percept = seen("orca_informed", 2)
-    policy = make("orca_informed", scenario, gains=ORCA)
-    percept["velocity"][0, :, 0] = percept["reference_velocity"][0, :, 0] = 2.0
-    percept["heard"][0, :, 3], percept["link_identity"][0, :, 3] = 1.0, (2.0, 1.0)
-    percept["neighbour"][0, :, 3] = (12.0, offset)  # each sees the other on the same side
-    percept["link_velocity"][0, :, 3] = (-2.0, 0.0)
-    actions = policy.act(percept)[0].astype(float)
-    np.testing.assert_array_equal(actions[0], actions[1])
-    assert actions[0, 1] * (-1.0 if offset > 0.0 else 1.0) > 0.0
-    u_x, u_y, *_ = orca.escape(12.0, offset, 6.0, 4.0, 0.0, ORCA.horizon, 0.1)
-    resistance = policy.limits.X_u + policy.limits.X_uu * math.hypot(2.0 + u_x / 2, u_y / 2)
-    force = resistance * np.array([2.0 + u_x / 2, u_y / 2]) + policy._follow * np.array([u_x / 2, u_y / 2])
-    expected = force * [1.0 / policy.limits.max_force, policy.limits.lever_arm / policy.limits.max_torque]
-    np.testing.assert_allclose(actions[0], expected / max(1.0, np.hypot(*expected)), atol=1e-5)
-
-
-@pytest.mark.parametrize("reports", ["centre", "surface"])
-def test_an_obstacle_ahead_is_not_driven_at(reports):
-    """The vehicle takes the whole change: nobody shares it."""
-    scenario, percept = seen("orca_informed", **{"sonar.echo_reports": reports})
-    policy = make("orca_informed", scenario, gains=ORCA)
-    percept["velocity"][0, 0] = percept["reference_velocity"][0, 0] = (4.0, 0.0)
-    before = policy.act(percept)[0, 0].copy()
-    percept["echo"][0, 0, 3], percept["echo_range"][0, 0, 3] = 1.0, 12.0
-    percept["echo_position"][0, 0, 3] = (32.0 if reports == "centre" else 12.0, 0.0)
-    after = policy.act(percept)[0, 0]
-    assert after[0] < before[0]
 
 
 def test_the_field_is_bounded_and_what_was_cut_is_counted():

@@ -151,58 +151,6 @@ def test_every_function_of_compiled_code_is_part_of_its_key():
     assert functions > 150
 
 
-KERNEL = """
-from keyed import other
-from keyed.other import LIMIT
-from . import beside
-
-def step(x):
-    return x + LIMIT + other.dotted(x)
-"""
-OTHER = """
-LIMIT = 2.0
-
-def dotted(x):
-    return 5 * x
-
-def late():
-    from keyed.later import last
-    return last
-"""
-
-
-@pytest.mark.parametrize(
-    ("file", "before", "after", "changes"),
-    [
-        ("other", "LIMIT = 2.0", "LIMIT = 2.5", True),
-        ("other", "return 5 * x", "return 6 * x", True),
-        ("other", "return 5 * x", '"""A docstring."""\n    return 5 * x  # and a comment', False),
-        ("later", "last = 1", "last = 2", True),
-        ("beside", "near = 1", "near = 2", True),
-        ("unused", "far = 1", "far = 2", False),
-    ],
-)
-def test_the_key_follows_imports_through_files(tmp_path, monkeypatch, file, before, after, changes):
-    texts = {"kernel": KERNEL, "other": OTHER, "later": "last = 1", "beside": "near = 1", "unused": "far = 1"}
-
-    def key():
-        folder = tmp_path / "keyed"
-        folder.mkdir(exist_ok=True)
-        for name, text in {"__init__": "", **texts}.items():
-            (folder / f"{name}.py").write_text(text)
-        for module in [m for m in sys.modules if m.startswith("keyed")]:
-            del sys.modules[module]
-        importlib.invalidate_caches()
-        for each in (sources.source_key, sources.reached_modules, sources._tree, sources._hash):
-            each.cache_clear()
-        return sources.source_key(importlib.import_module("keyed.kernel").__name__)
-
-    monkeypatch.syspath_prepend(str(tmp_path))
-    first = key()
-    texts[file] = texts[file].replace(before, after)
-    assert (key() != first) is changes
-
-
 def test_a_cache_that_cannot_be_used_is_explained_and_the_run_goes_on(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")

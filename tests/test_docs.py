@@ -18,7 +18,7 @@ from uuv_marl.scenario import Scenario
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
 README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
-POLICY = [ROOT / name for name in ("SECURITY.md", "CODE_OF_CONDUCT.md", "ROADMAP.md")]
+POLICY = [ROOT / name for name in ("SECURITY.md",)]
 PAGES = [README, CONTRIBUTING, *POLICY, *sorted((ROOT / "docs").rglob("*.md"))]
 ELSEWHERE = {"benchmarl": "from benchmarl.", "rllib": "from ray.rllib."}
 """Imports by which the examples are known that run in tests/adapters, where their libraries are."""
@@ -32,6 +32,15 @@ def blocks(language, pages=PAGES):
     ]
 
 
+LONG = re.compile(r"\.learn\([\d_]+\)")
+"""A training of Stable-Baselines3 as a page prints it: minutes."""
+
+
+def begun(block):
+    """The block, but its trainings end after their first step."""
+    return LONG.sub(".learn(1, callback=lambda *_: False)", block)
+
+
 def is_run_here(block):
     return not any(line in block for line in ELSEWHERE.values())
 
@@ -41,7 +50,7 @@ def test_python_blocks_run_and_show_something(block, capsys, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module="torchrl|tensordict")
-        exec(compile(block, "README.md", "exec"), {"__name__": "example"})
+        exec(compile(begun(block), "README.md", "exec"), {"__name__": "example"})
     assert capsys.readouterr().out or block.startswith("# mine.py")
 
 
@@ -83,6 +92,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     for work in ("paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check"):
         monkeypatch.setattr(f"research.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.run.train", stop_at_once)
+    monkeypatch.syspath_prepend(ROOT / "examples" / "extending")
     monkeypatch.chdir(tmp_path)
     line = line.replace(" docs/", f" {ROOT / 'docs'}/")
     line = re.sub(r"--policy (runs/\S+|mine:\w+)", "--policy mappo", line)  # a reader's own
@@ -98,13 +108,6 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
 def test_toml_blocks_are_scenarios(block, tmp_path):
     (tmp_path / "mine.toml").write_text(block)
     assert load_scenario(tmp_path / "mine.toml").title
-
-
-@pytest.mark.parametrize("page", [README, CONTRIBUTING], ids=lambda page: page.name)
-def test_make_targets_exist(page):
-    makefile = (ROOT / "Makefile").read_text()
-    for target in re.findall(r"^make ([\w-]+)", page.read_text(), flags=re.M):
-        assert re.search(rf"^(.* )?{target}( .*)?:", makefile, flags=re.M), target
 
 
 def tool():
@@ -142,33 +145,14 @@ def test_links_lead_somewhere(page):
         assert not anchor or anchor in anchors(target), f"{target.name}#{anchor}"
 
 
-def test_every_page_can_be_reached_from_the_index():
-    reached, new = set(), [INDEX]
-    while new:
-        page = new.pop()
-        reached.add(page)
-        new += [target for target, _ in links(page) if target.suffix == ".md" and target not in reached]
-    assert not set(PAGES) - {README} - reached
-    assert (INDEX, "") in links(README)
-
-
 def test_the_table_of_policies_is_right():
-    rows = re.findall(r"^\| (`.*?) \| .* \| (.*) \|$", (ROOT / "docs" / "policies.md").read_text(), flags=re.M)
+    text = (ROOT / "docs" / "policies.md").read_text().partition("\n## ")[0]
+    rows = re.findall(r"^\| (`.*?) \| .* \| (.*) \|$", text, flags=re.M)
     needs = {name: need for names, need in rows for name in re.findall(r"`(\w+)`", names)}
     assert set(needs) == set(POLICIES)
     for name, policy in POLICIES.items():
         parts = [*policy.channels, *(["yaw damping"] if policy.yaw_damping_nms else [])]
         assert needs[name] == (", ".join(parts) or "nothing"), name
-
-
-def test_the_glossary_names_what_there_is():
-    text = (ROOT / "docs" / "glossary.md").read_text()
-    for path in re.findall(r"`(uuv_marl/[\w/.]+)`", text):
-        assert (ROOT / path).is_file(), path
-    scenario = load_scenario("single_obstacle")
-    for field in re.findall(r"`(\w+\.\w+)`", text):
-        section, _, name = field.partition(".")
-        assert hasattr(getattr(scenario, section), name), field
 
 
 def switches(model, prefix=""):

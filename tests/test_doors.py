@@ -1,6 +1,5 @@
 """Whatever enters compiled code is checked first: percepts of others, snapshots, masks; and a runaway is named."""
 
-import copy
 import io
 import logging
 import os
@@ -22,6 +21,7 @@ from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoi
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, load_trace
 from uuv_marl.cli import app, main
+from uuv_marl.cli.console import _width, console
 from uuv_marl.errors import DivergenceError, ResultsError
 from uuv_marl.extras import environment, silenced
 from uuv_marl.paths import user_path
@@ -87,21 +87,6 @@ def test_no_number_of_an_observation_is_an_index(name):
 def test_a_swarm_too_large_to_assign_slots_is_refused_at_once():
     with pytest.raises(PolicyError, match="at most 2000 vehicles"):
         make("sdc", granted("sdc", load_scenario("tracking", num_vehicles=2001)))
-
-
-def test_a_ghost_is_nobody_to_the_lattice():
-    """A neighbour without identity moves a vehicle of sdc by its short repulsion alone."""
-    _, policy, percept = made_for("sdc")
-    policy.act(percept)
-    percept["heard"][...] = 0.0
-    percept["heard"][0, 1, 0], percept["neighbour"][0, 1, 0] = 1.0, (60.0, 0.0)
-    actions = []
-    for identity in (0.0, 77.0):
-        percept["link_identity"][0, 1, 0] = identity
-        fresh = copy.deepcopy(policy)
-        actions.append(fresh.act(percept)[0, 1].tolist())
-    percept["heard"][0, 1, 0] = 0.0
-    assert actions[0] == actions[1] == copy.deepcopy(policy).act(percept)[0, 1].tolist()
 
 
 @pytest.mark.parametrize("active", [[True], np.ones(8), np.ones((8, 1), bool), np.ones(9, bool)])
@@ -359,10 +344,10 @@ def test_a_benchmark_that_has_finished_is_printed_in_any_encoding(encoding, prin
     assert "0/1" in text
 
 
-def test_a_table_fits_a_notebook(tmp_path):
-    run = [sys.executable, "-m", "uuv_marl", *QUICK, f"--output={tmp_path}"]
-    there = {**os.environ, "JPY_PARENT_PID": "1", "PYTHONIOENCODING": "utf-8"}
-    text = subprocess.run(run, capture_output=True, encoding="utf-8", check=True, env=there).stdout
+def test_a_table_fits_a_notebook(printed, tmp_path, monkeypatch):
+    monkeypatch.setenv("JPY_PARENT_PID", "1")
+    monkeypatch.setattr(console, "width", _width())
+    _, text, _ = printed([*QUICK, f"--output={tmp_path}"], "utf-8")
     assert 60 < max(len(line) for line in text.splitlines() if "│" in line) <= 88
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import uuv_marl
-from uuv_marl import load_scenario
+from uuv_marl import load_scenario, uuv_swarm_v1
 from uuv_marl.baselines import granted, make
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import Percept, PerceptLayout, percept_table
@@ -18,21 +18,6 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)
     from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, render_test
     from pettingzoo.test.state_test import state_test
-
-
-def module(scenario):
-    """PettingZoo's tests take a module with these two functions."""
-
-    class Module:
-        @staticmethod
-        def parallel_env(**kwargs):
-            return uuv_marl.parallel_env(scenario, **kwargs)
-
-        @staticmethod
-        def env(**kwargs):
-            return uuv_marl.env(scenario=scenario, **kwargs)
-
-    return Module
 
 
 def test_parallel_api(scenario_name):
@@ -52,8 +37,8 @@ def test_parallel_seed(scenario_name):
     parallel_seed_test(lambda: uuv_marl.parallel_env(scenario_name))
 
 
-def test_max_cycles(scenario_name):
-    max_cycles_test(module(scenario_name))
+def test_max_cycles():
+    max_cycles_test(uuv_swarm_v1)
 
 
 def test_state(scenario_name):
@@ -62,16 +47,6 @@ def test_state(scenario_name):
 
 def test_render():
     render_test(lambda **kwargs: uuv_marl.env(scenario="lossy", num_vehicles=8, **kwargs))
-
-
-def test_the_module_form():
-    from uuv_marl import uuv_swarm_v1
-
-    env = uuv_swarm_v1.parallel_env()
-    assert env.metadata["name"] == "uuv_swarm_v1"
-    assert env.possible_agents == [f"uuv_{i}" for i in range(54)]
-    assert isinstance(env, uuv_swarm_v1.raw_env)
-    assert str(uuv_swarm_v1.env().unwrapped) == "uuv_swarm_v1"
 
 
 SHORT = {"time_limit.factor": 0.05, "time_limit.extra_s": 20.0}
@@ -127,56 +102,41 @@ def test_scales_are_powers_of_two_and_sizes_add_up():
 
 
 def test_reward_terms_add_up_and_team_reward_is_their_mean():
-    overrides = {"constraints.s_l_m": 20.0, "constraints.s_u_m": 20.0}
-    alone = uuv_marl.parallel_env(num_vehicles=10, info_terms=True, overrides=overrides)
-    team = uuv_marl.parallel_env(num_vehicles=10, reward="team", overrides=overrides)
-    own = uuv_marl.parallel_env(num_vehicles=10, reward=lambda swarm: -swarm.facts.spacing)
-    for env in (alone, team, own):
-        env.reset(seed=2)
-    actions = {agent: np.full(2, 0.4, np.float32) for agent in alone.agents}
+    close = {"constraints.s_l_m": 20.0, "constraints.s_u_m": 20.0}
+    alone = uuv_marl.parallel_env(num_vehicles=10, info_terms=True, overrides=close)
+    team = uuv_marl.parallel_env(num_vehicles=10, reward="team", overrides=close)
+    alone.reset(seed=2)
+    team.reset(seed=2)
     for _ in range(50):
-        _, rewards, _, _, infos = alone.step(actions)
-        _, shared, _, _, _ = team.step(actions)
-        _, spacing, _, _, _ = own.step(actions)
+        _, rewards, _, _, infos = alone.step(dict.fromkeys(alone.agents, (0.4, 0.4)))
+        _, shared, *_ = team.step(dict.fromkeys(team.agents, (0.4, 0.4)))
     for agent, reward in rewards.items():
         assert sum(infos[agent]["reward_terms"].values()) == pytest.approx(reward)
         assert shared[agent] == pytest.approx(np.mean(list(rewards.values())))
     assert min(rewards.values()) < 0
-    np.testing.assert_allclose(list(spacing.values()), -own.swarm.facts.spacing[0])
 
 
 def test_bad_input_names_the_agent_and_the_remedy():
     env = uuv_marl.parallel_env(num_vehicles=3)
-    good = {agent: np.zeros(2, np.float32) for agent in env.possible_agents}
-    env.reset(seed=0)
-    cases = [
-        ({"uuv_0": good["uuv_0"]}, "the action of uuv_1 is missing"),
-        ({**good, "uuv_9": np.zeros(2)}, "there is no agent 'uuv_9'"),
-    ]
-    for actions, message in cases:
-        with pytest.raises(ValueError, match=message):
-            env.step(actions)
-    with pytest.raises(ValueError, match="render_mode must be one of"):
-        uuv_marl.parallel_env(render_mode="ascii")
-    with pytest.raises(ValueError, match="max_cycles must be a whole number from 1"):
-        uuv_marl.parallel_env(max_cycles=0)
-    with pytest.raises(ValueError, match="reward must be 'individual', 'team'"):
-        uuv_marl.parallel_env(reward="sparse")
-    with pytest.raises(RuntimeError, match="needs a render_mode"):
-        env.render()
-    fresh = uuv_marl.parallel_env(num_vehicles=3, render_mode="rgb_array")
-    for call in (fresh.render, fresh.state):
+    for call in (env.state, uuv_marl.parallel_env(render_mode="rgb_array").render):
         with pytest.raises(RuntimeError, match="came before reset"):
             call()
+    env.reset(seed=0)
+    good = dict.fromkeys(env.agents, np.zeros(2, np.float32))
+    for actions, message in (({"uuv_0": good["uuv_0"]}, "of uuv_1 is missing"), ({**good, "x": 0}, "no agent 'x'")):
+        with pytest.raises(ValueError, match=message):
+            env.step(actions)
+    for told, message in (
+        ({"render_mode": "ascii"}, "render_mode must be one of"),
+        ({"max_cycles": 0}, "max_cycles must be a whole number from 1"),
+        ({"reward": "individual"}, "reward must be 'dense', 'sparse', 'team'"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            uuv_marl.parallel_env(**told)
     lone = uuv_marl.parallel_env(num_vehicles=1, reward=lambda swarm: -swarm.facts.spacing)
     lone.reset(seed=0)
     with pytest.raises(ValueError, match="must give finite numbers"):
         lone.step({"uuv_0": np.zeros(2)})
-    short = uuv_marl.parallel_env(num_vehicles=3, max_cycles=1)
-    short.reset(seed=0)
-    short.step(good)
-    with pytest.raises(RuntimeError, match="the episode is over; call reset"):
-        short.step(good)
 
 
 def test_stepping_nobody_after_the_end_gives_nothing():
@@ -206,10 +166,8 @@ UNUSABLE = [
     ({}, "must hold real numbers, got {}"),
     ({0.1, 0.2}, "must hold real numbers, got {0.1, 0.2}"),
     ("ab", "must hold real numbers, got 'ab'"),
-    (["0.1", "0.2"], r"must hold real numbers, got \['0.1', '0.2'\]"),
     ([[0.1], [0.2, 0.3]], r"must hold real numbers, got \[\[0.1\], \[0.2, 0.3\]\] \(setting an array element"),
     ([10**400, 0], "must hold real numbers, got"),
-    (None, "must hold real numbers, got None"),
     ([0.1, None], "must hold real numbers"),
     (Tensor(), r"must hold real numbers, got .* \(Can't call numpy\(\) on Tensor .* Use tensor.detach"),
     ([0.1 + 1j, 0.2], "must hold real numbers"),
@@ -236,16 +194,6 @@ def test_what_is_no_action_is_refused_by_name(action, message):
         env.step(np.zeros((3, 2)))
     with pytest.raises(ValueError, match="there is no agent 5"):
         env.step({**good, 5: np.zeros(2)})
-
-
-def test_numbers_of_every_kind_are_rounded_alike():
-    runs = set()
-    for kind in (np.float32, np.float64, np.int8, bool, list, tuple):
-        env = uuv_marl.parallel_env(num_vehicles=2)
-        env.reset(seed=0)
-        action = kind((1.0, 0.0)) if kind in (list, tuple) else np.array((1, 0)).astype(kind)
-        runs.add(env.step(dict.fromkeys(env.agents, action))[0]["uuv_1"].tobytes())
-    assert len(runs) == 1
 
 
 @pytest.mark.parametrize("bad", [1.5, "1", True, {}, [1.5], ["a"], 2.0])
@@ -341,17 +289,6 @@ def test_the_last_info_tells_how_it_ended(reason):
         assert collisions > 0, "else the test shows nothing"
 
 
-def test_the_turn_based_api_tells_it_too():
-    env = uuv_marl.env(num_vehicles=2, max_cycles=2)
-    env.reset(seed=0)
-    last = {}
-    for agent in env.agent_iter():
-        _, _, terminated, truncated, info = env.last()
-        last[agent] = info
-        env.step(None if terminated or truncated else np.zeros(2, np.float32))
-    assert [info["ending"] for info in last.values()] == ["time_limit"] * 2
-
-
 class OneWorld(gymnasium.Env):
     """A single-agent face of one world, for Gymnasium's forked workers."""
 
@@ -385,13 +322,3 @@ def test_gymnasium_workers_give_the_same_run():
         runs.append(record)
         envs.close()
     assert runs[0] == runs[1]
-
-
-def test_a_percept_tells_its_fields():
-    percept = Swarm(load_scenario("single_obstacle", num_vehicles=3)).reset(seed=0)
-    assert percept.names[:3] == ("velocity", "yaw_rate", "reference")
-    assert repr(percept).startswith("Percept(flat (1, 3, 98); velocity (1, 3, 2), yaw_rate (1, 3, 1)")
-    with pytest.raises(KeyError, match="percept has no field 'refrence'; did you mean 'reference'"):
-        percept["refrence"]
-    with pytest.raises(KeyError, match="percept has no field 'compass'; It has velocity, "):
-        percept["compass"]

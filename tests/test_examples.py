@@ -24,8 +24,3 @@ def test_an_example_runs(path, says):
 def test_an_example_is_short_and_tested(file):
     assert len(file.read_text().splitlines()) < 60
     assert f'("{file.stem}", ' in Path(__file__).read_text()
-
-
-@pytest.mark.parametrize("name", ["sb3", "rllib"])
-def test_a_trainer_is_short_and_tested_beside_its_adapter(name):
-    assert len((FOLDER / "training" / f"{name}.py").read_text().splitlines()) < 120

@@ -1,8 +1,6 @@
 """Exported policies: the ONNX model acts as the policy does, on percepts from the water and on hostile ones."""
 
 import itertools
-import json
-from pathlib import Path
 
 import numpy as np
 import onnx
@@ -12,13 +10,12 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, load_checkpoint, save_checkpoint
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.cli import app
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.sim.swarm import Swarm
 
 BOW = {"name": "bow", "kind": "active", "mounting_deg": 0.0, "aperture_deg": 90.0, "range_m": 80.0, "sub_sectors": 5}
 RING = {
@@ -60,25 +57,6 @@ def expect_the_same(model, policy, flat):
     return action
 
 
-@pytest.mark.parametrize("name", ["random_field", "single_obstacle"])
-def test_the_model_acts_as_the_policy_in_the_water(name, scale, tmp_path):
-    scenario = load_scenario(name, num_vehicles=20)
-    best = saved(tmp_path, scenario, scale)
-    scenario = granted(best, scenario)
-    model, policy, rng = exported(best, scenario, tmp_path), make(best, scenario), np.random.default_rng(1)
-    swarm = Swarm(scenario)
-    flat = [swarm.reset(2).flat[0].copy()]
-    for obstacle in swarm.course.obstacles[0]:
-        swarm.state.eta[0, :, :2] = obstacle[:2] + rng.normal(0, obstacle[2] + 10.0, (20, 2))
-        flat.append(swarm.observe().flat[0].copy())
-        flat.append(swarm.step(rng.uniform(-0.7, 0.7, (1, 20, 2)).astype(np.float32)).flat[0].copy())
-    flat = np.concatenate(flat)
-    seen = Percept(flat, policy.layout)
-    assert (seen["echo"].sum(axis=1) > 0).any()
-    assert (seen["heard"].sum(axis=1) > 3).any()
-    expect_the_same(model, policy, flat)
-
-
 @pytest.mark.parametrize("arrays", [None, [BOW, RING], [RING]])
 @pytest.mark.parametrize("barrier", [BARRIER, BioInspiredGains(zeta_n=0.8, delta_n=2.0, zeta_o=0.3, delta_o=5.0)])
 def test_hostile_percepts(arrays, barrier, scale, tmp_path):
@@ -103,24 +81,6 @@ def test_hostile_percepts(arrays, barrier, scale, tmp_path):
     if scale == 0.0:
         assert not action[:20].any(), "nothing heard, no barrier"
         assert action[20:].any(axis=1).mean() > 0.4
-
-
-def test_the_file_says_what_it_is(tmp_path):
-    scenario = load_scenario("tracking")
-    best = saved(tmp_path, scenario, 0.1, training={"seed": 3})
-    write_onnx(best, scenario, tmp_path / "new" / "policy.onnx")
-    model = onnx.load(tmp_path / "new" / "policy.onnx")
-    said = {entry.key: entry.value for entry in model.metadata_props}
-    checkpoint = load_checkpoint(Path(best))
-    assert Card.model_validate_json(said["card"]) == checkpoint.card
-    assert json.loads(said["card"])["decision_period_s"] == [0.1, 0.5]
-    assert said["checkpoint"] == checkpoint.digest
-    assert json.loads(said["limits"])["max_force"] == scenario.actuators.max_force_n
-    assert "every 0.1 to 0.5 s" in model.doc_string
-    (observation,), (action,) = model.graph.input, model.graph.output
-    assert (observation.name, action.name) == ("observation", "action")
-    assert "neighbour 42 [64 m]" in observation.doc_string
-    assert "yaw torque" in action.doc_string
 
 
 @pytest.mark.parametrize("policy", ["bio_inspired", "scout", "guarded:mappo", "trimmed_scout"])

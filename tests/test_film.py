@@ -11,7 +11,6 @@ from uuv_marl.envs.drawing.scene import TRAIL_S
 from uuv_marl.errors import ReplayError, ResultsError
 from uuv_marl.replay.film import write_film
 from uuv_marl.replay.record import record
-from uuv_marl.replay.recording import Event
 from uuv_marl.replay.scenes import Scenes
 
 
@@ -37,18 +36,13 @@ def test_a_scene_is_the_sample_of_its_time(starter):
     np.testing.assert_array_equal(scene.reference, recording.reference[k])
     assert scene.min_spacing_m == recording.series["min_spacing_m"][k]
     assert scene.clearance_m == recording.series["obstacle_clearance_m"][k]
-    assert scene.centre_error_m == recording.series["centre_error_m"][k]
     assert len(scene.trail) == TRAIL_S
     np.testing.assert_array_equal(scene.trail[0], recording.position[k - 200])
     np.testing.assert_array_equal(scene.trail[-1], recording.position[k - 10])
     heard = recording.inspections[1].heard[k]
     assert len(scene.sonar.neighbour) == (heard >= 0).sum() > 0
     assert scene.arrival_s is None
-    after = scenes.at(1e6)
-    assert after.time_s == recording.time_s[-1]
-    assert after.arrival_s == recording.metrics["task_time_s"]
-    assert len(scenes.at(0.0).trail) == 1
-    assert not Scenes(recording, trails=False).at(30.0).trail.size
+    assert scenes.at(1e6).arrival_s == recording.metrics["task_time_s"]
 
 
 def test_the_lost_stay_where_they_were_lost(lossy):
@@ -59,18 +53,6 @@ def test_the_lost_stay_where_they_were_lost(lossy):
     gone = int(np.flatnonzero(~scene.alive)[0])
     last = int(np.flatnonzero(np.isfinite(lossy.position[:, gone, 0]))[-1])
     np.testing.assert_array_equal(scene.position[gone], lossy.position[last, gone])
-
-
-def test_collisions_are_marked_once_they_have_happened(starter):
-    events = [Event(10.0, "collision", (0, 1)), Event(20.0, "near", (2,)), Event(30.0, "obstacle", (3,))]
-    scenes = Scenes(starter[0]._replace(events=events))
-    assert [len(scenes.at(time).hits) for time in (9.0, 10.0, 29.0, 31.0)] == [0, 1, 1, 2]
-    between = scenes.at(10.0).position[:2].mean(axis=0)
-    np.testing.assert_allclose(scenes.at(31.0).hits[0], [*between, 10.0], rtol=1e-5)
-    series = {name: values for name, values in starter[0].series.items() if name != "collisions"}
-    trace = Scenes(starter[0]._replace(events=[*events, Event(40.0, "collision", ())], series=series))
-    assert [trace.at(time).collisions for time in (9.0, 10.0, 31.0, 41.0)] == [0, 1, 2, 3]
-    assert len(trace.at(41.0).hits) == 2
 
 
 def test_a_gif_is_small_and_lasts_as_long_as_it_says(starter, tmp_path):
@@ -110,27 +92,14 @@ def test_an_mp4_plays(starter, tmp_path):
     assert not np.array_equal(frames[0], frames[len(frames) // 2])
 
 
-def test_a_still_shows_moments_of_every_recording(starter, tmp_path):
-    write_film(starter, tmp_path / "a.png")
-    with Image.open(tmp_path / "a.png") as still:
-        assert still.size == (1320, 900)
-        picture = np.asarray(still)
-    panels = [picture[20 + 430 * row : 440 + 430 * row, 330 * k : 330 * (k + 1)] for row in (0, 1) for k in range(4)]
-    assert all((np.abs(panel.astype(int) - ink.BLUE).max(axis=2) < 40).sum() > 20 for panel in panels)
-    assert not np.array_equal(panels[0], panels[1])
-
-
 def test_what_can_not_be_filmed_is_refused_before_anything_is_written(starter, tmp_path):
     for arguments, message in (
         ({"recordings": starter * 3}, "a film shows 1 to 4 recordings side by side, got 6"),
-        ({"recordings": []}, "got 0"),
         ({"path": tmp_path / "a.avi"}, r"a.avi must end in .mp4, .gif or .png"),
         ({"camera": "fly"}, "camera must be one of"),
         ({"speed": 0.0}, "speed must be positive, got 0.0"),
-        ({"speed": float("nan")}, "speed must be positive, got nan"),
         ({"sonar_of": 3}, "holds no sonar of vehicle 3, only of: 1; name the vehicle when you record"),
         ({"size": (640, 481), "path": tmp_path / "a.mp4"}, r"size must be .* even .* got \(640, 481\)"),
-        ({"size": (3, 4)}, r"size must be .* got \(3, 4\)"),
     ):
         given = {"recordings": starter, "path": tmp_path / "a.gif", **arguments}
         with pytest.raises(ReplayError, match=message):

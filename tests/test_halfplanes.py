@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from scipy.optimize import minimize
 
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 
@@ -122,31 +121,3 @@ def test_firm_planes_are_kept_where_they_can_be(wish, firm, loose):
         assert excess(velocity[None], firm) <= 1e-8
     if violation == 0.0:
         np.testing.assert_array_equal(velocity, solved(wish, firm + loose)[0])
-
-
-def test_a_firm_plane_decides_where_a_loose_one_gives_way():
-    wall, push = (1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)  # at most -1 m/s, and at least 1 m/s
-    assert solved((0.0, 2.0), [wall, push])[1] == pytest.approx(1.0)
-    np.testing.assert_allclose(solved((0.0, 2.0), [wall, push])[0], (0.0, 2.0), atol=1e-8)
-    velocity, violation = solved((0.0, 2.0), [wall, push], firm=1)
-    np.testing.assert_allclose(velocity, (-1.0, 2.0), atol=1e-8)
-    assert violation == pytest.approx(2.0)
-
-
-def test_without_planes_the_wish_is_cut_to_the_limit():
-    np.testing.assert_array_equal(solved((1.0, -2.0), [])[0], (1.0, -2.0))
-    np.testing.assert_allclose(solved((6.0, -8.0), [])[0], (2.4, -3.2))
-
-
-def test_a_general_optimiser_finds_the_same():
-    """SLSQP, which knows nothing of geometry, on crowds of half-planes."""
-    draw = np.random.default_rng(0)
-    for _ in range(20):
-        angle, b = draw.uniform(0, 2 * np.pi, 20), draw.uniform(0.5, 3.0, 20)
-        planes, wish = np.stack([np.cos(angle), np.sin(angle), b], axis=1), draw.uniform(-4, 4, 2)
-        kept = [
-            {"type": "ineq", "fun": lambda v, planes=planes: planes[:, 2] - planes[:, :2] @ v},
-            {"type": "ineq", "fun": lambda v: LIMIT**2 - v @ v},
-        ]
-        found = minimize(lambda v, wish=wish: ((v - wish) ** 2).sum(), np.zeros(2), constraints=kept, method="SLSQP")
-        np.testing.assert_allclose(solved(wish, planes)[0], found.x, atol=1e-4)

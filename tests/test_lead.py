@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tests.test_memory import room
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.baselines.memory.actuators import answer, identify, lead
@@ -15,12 +16,6 @@ from uuv_marl.sim.swarm import Swarm
 PERIOD_S = 0.1
 LAGS = st.floats(0.05, 2.0)
 SHARES = st.floats(0.1, 1.0)
-
-
-def room():
-    """What one vehicle remembers of nothing."""
-    scenario = granted("scout", load_scenario("tracking", num_vehicles=1))
-    return make("scout", scenario).memory
 
 
 class Component:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import safetensors.numpy
-from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
@@ -21,11 +20,10 @@ from uuv_marl.baselines.learned.checkpoint import (
     vehicle_of,
 )
 from uuv_marl.baselines.learned.network import forward
-from uuv_marl.baselines.learned.percept_features import BARRIER, Features
+from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.benchmark.results import Results, ResultsError, knowledge
-from uuv_marl.cli import app
+from uuv_marl.benchmark.results import knowledge
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.swarm import Swarm
@@ -82,20 +80,6 @@ def learned_file(folder):
     return Path(folder) / WEIGHTS_FILE
 
 
-def test_features_are_bounded_and_feel_what_is_near(place):
-    scenario = load_scenario("single_obstacle", num_vehicles=3)
-    extract = Features(scenario, BARRIER)
-    swarm = place("single_obstacle", [[0, 0, 0], [6.0, 0, 0], [-300.0, 5.0, 0]], obstacles=[(60.0, 0, 25.0)])
-    features, barrier = np.empty((1, 3, extract.size), np.float32), np.empty((1, 3, 2), np.float32)
-    extract.look(swarm.percept.flat, features, barrier, np.zeros(1, np.int64))
-    assert np.abs(features).max() <= 4.0
-    assert barrier[0, 0, 0] < -0.3, "pushed back by the vehicle ahead"
-    before = features.copy()
-    swarm.state.eta[0, 1, 0] = 7.0
-    extract.look(swarm.observe().flat, features, barrier, np.zeros(1, np.int64))
-    assert np.abs(features - before)[0, 0].max() > 0.02
-
-
 @pytest.mark.parametrize("n", [1, 54])
 def test_a_run_depends_on_its_seed_alone(best, n):
     scenario = granted(best, load_scenario("tracking", num_vehicles=n, overrides=SHORT))
@@ -148,13 +132,7 @@ def test_a_rewritten_checkpoint_is_loaded_anew(best):
     assert policy_class(best).yaw_damping_nms == 100.0
 
 
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("vehicle.m_kg", 600.0),
-        ("actuators.lever_arm_m", 2.0),
-    ],
-)
+@pytest.mark.parametrize(("field", "value"), [("vehicle.m_kg", 600.0), ("actuators.lever_arm_m", 2.0)])
 @pytest.mark.parametrize("name", ["mappo", "best"])
 def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     """Also by checkpoints of version 0.1.0, which do not name theirs: the shipped one."""
@@ -166,14 +144,6 @@ def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     with pytest.raises(PolicyError, match=message):
         make(name, other)
     assert make(name, other, any_vehicle=True).act(Swarm(other).reset(0)).shape == (1, 2, 2)
-
-
-def test_a_benchmark_on_another_vehicle_is_refused_before_its_first_run(tmp_path):
-    command = ["benchmark", "--policy=idle", "--policy=mappo", "--set=vehicle.m_kg=600.0", f"--output={tmp_path / 'a'}"]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 2
-    assert "mappo was trained on another vehicle" in done.output
-    assert not (tmp_path / "a").exists()
 
 
 def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
@@ -237,32 +207,3 @@ def test_cards_that_say_nothing_sensible_are_refused(field, value, tmp_path):
     (tmp_path / "bad").write_bytes(safetensors.numpy.save(tensors, {"uuv_marl": said}))
     with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .its card's {field}"):
         make(str(tmp_path / "bad"), load_scenario("tracking"))
-
-
-def test_results_refuse_other_weights_of_the_same_path(best, tmp_path):
-    scenario = granted(best, load_scenario("tracking", num_vehicles=2, overrides=SHORT))
-    results = Results(tmp_path / "out", [scenario])
-    for run in evaluate(scenario, best, [0]):
-        if isinstance(run, Run):
-            results.add(scenario.name, best, run)
-    assert Results(tmp_path / "out", [scenario]).has("tracking", best, 0)
-    assert results.trace("tracking", best, 0)["time_s"].size
-    save_checkpoint(learned_file(best), card(), actor(seed=1))
-    changed = Results(tmp_path / "out", [scenario])
-    with pytest.raises(ResultsError, match="as it was before its file changed; give --anew"):
-        changed.use(best)
-    changed.forget_changed(best)
-    assert not changed.has("tracking", best, 0)
-    changed.use(best)
-
-
-def test_weights_that_change_during_a_benchmark_are_refused(best, tmp_path):
-    scenario = granted(str(best), load_scenario("tracking", num_vehicles=4, overrides=SHORT))
-    results = Results(tmp_path / "out", [scenario])
-    results.use(str(best))
-    runs = [run for run in evaluate(scenario, str(best), [0, 1]) if isinstance(run, Run)]
-    results.add(scenario.name, str(best), runs[0])
-    save_checkpoint(learned_file(best), card(), actor(seed=1))
-    with pytest.raises(ResultsError, match="before its file changed"):
-        results.add(scenario.name, str(best), runs[1])
-    assert [row.seed for row in results.rows] == [0]

@@ -13,6 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests import contract
+from tests.conftest import COUPLED, LIFT, RUDDER
+from tests.golden import STARTER
 from tests.oracle import motion, sonar
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
@@ -64,12 +66,7 @@ print(json.dumps([bits, actions]))
 
 # --- Motion ---
 
-COUPLED = {"vehicle.x_G_m": 0.05, "vehicle.Y_rdot_kgm": -4.0, "vehicle.Y_r": 12.0, "vehicle.N_v": -20.0,
-           "vehicle.Y_rr": 15.0, "vehicle.N_rv": -40.0}  # fmt: skip
-LIFT = {"vehicle.Y_uv": -60.0, "vehicle.Y_ur": 20.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "vehicle.N_vv": -9.0}
 ASTERN = {"actuators.max_astern_n": 700.0, "vehicle.munk_moment": False}
-RUDDER = {"actuators.kind": "rudder", "actuators.Y_uud": 60.0, "actuators.N_uud": -40.0,
-          "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
 HELD = {"timing.decision_period_s": 0.5}
 FINE = {**HELD, "timing.integration_step_s": 0.02}
 LATE = {"actuators.thrust_lag_s": 0.5, "actuators.yaw_lag_s": 0.3, "actuators.yaw_authority": 0.7,
@@ -453,7 +450,7 @@ def test_the_largest_distance_is_found_whatever_the_shape(shape, n):
 
 EPISODES = {
     "surfaces, all channels": (
-        "starter", {"overrides": {"sonar.channels": ["compass", "link"], "sonar.echo_reports": "surface"}}
+        STARTER, {"overrides": {"sonar.channels": ["compass", "link"], "sonar.echo_reports": "surface"}}
     ),
     "link alone": ("multi_obstacle", {"num_vehicles": 9, "overrides": {"sonar.channels": ["link"]}}),
     "obstacles hide": ("multi_obstacle", {"num_vehicles": 12, "overrides": {"sonar.obstacles_hide_vehicles": True}}),
@@ -480,7 +477,7 @@ def check_percept(swarm):
     """Every field of the percepts, as the oracle has it; zero for the lost."""
     percept, heading, nu = swarm.percept, swarm.heading[0], swarm.state.nu[0]
     now, alive, discs = swarm.state.eta[0, :, :2], swarm.state.alive[0], swarm.course.obstacles[0]
-    discs, l_t = discs[: swarm.course.num_obstacles[0]], swarm.facts.reference[0]
+    discs, l_t = discs[: swarm.course.num_obstacles[0]], swarm.facts.reference[0, 0]
     over_ground = np.stack([motion.rotation(psi) @ v[:2] for psi, v in zip(swarm.state.eta[0, :, 2], nu, strict=True)])
     j = swarm.heard[0]
     seen = {

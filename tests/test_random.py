@@ -95,12 +95,3 @@ def test_keys_belong_to_episodes_and_move_no_draw():
     alone.reset()
     assert alone.keys[0] == batch.keys[1], "an unseeded reset goes on with the world's own stream"
     assert random.episode_key(np.random.default_rng(7)) == first[0]
-
-
-def test_a_snapshot_keeps_the_key():
-    swarm = Swarm(load_scenario("random_field", num_vehicles=3), 2)
-    swarm.reset(5)
-    kept, keys = swarm.snapshot(), swarm.keys.copy()
-    swarm.reset(50)
-    swarm.restore(kept)
-    assert swarm.keys.tolist() == keys.tolist()

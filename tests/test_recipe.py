@@ -4,13 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.baselines.learned.checkpoint import load_checkpoint
 from uuv_marl.benchmark.robustness.axes import AXES
-from uuv_marl.cli import app
 from uuv_marl.scenario.conditions import disturbances
 from uuv_marl.train.training import Training, read_recipe, recipes
 
@@ -94,16 +92,6 @@ def test_a_recipe_resumes_bit_for_bit(tmp_path):
         np.testing.assert_array_equal(a.weight, b.weight)
 
 
-def test_a_recipe_can_choose_the_last_policy(tmp_path):
-    from uuv_marl.train.run import train
-
-    training = trained_by(recipe(tmp_path / "r.toml", chosen='"last"', validate_every=1))
-    *_, last = train(tmp_path / "run", training)
-    best, end = (load_checkpoint(tmp_path / "run" / name) for name in ("best", f"checkpoints/{last.iteration:06d}"))
-    assert best.card.training["record"]["iteration"] == last.iteration > 1
-    np.testing.assert_array_equal(best.layers[0].weight, end.layers[0].weight)
-
-
 def test_what_ships_was_trained_as_its_recipe_says():
     training = trained_by("trimmed_scout")
     shipped = POLICIES["trimmed_scout"]
@@ -128,11 +116,3 @@ def test_a_file_that_is_no_recipe_is_named(tmp_path):
     (tmp_path / "bad.toml").write_text("steps = \n", encoding="utf-8")
     with pytest.raises(TrainingError, match=r"bad.toml' is no TOML"):
         read_recipe(str(tmp_path / "bad.toml"))
-
-
-def test_the_command_trains_what_a_recipe_says(tmp_path):
-    command = ["train", recipe(tmp_path / "r.toml"), f"--output={tmp_path / 'run'}", "--steps=1000", "--seed=2"]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 0, done.output
-    card = load_checkpoint(tmp_path / "run" / "best").card
-    assert (card.features, card.training["seed"], card.training["episodes"]["number"]) == ("memory", 2, 12)

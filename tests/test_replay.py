@@ -18,11 +18,10 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.benchmark.results import Results, trace_path
+from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import ReplayError, ResultsError
 from uuv_marl.replay.encode import CODINGS, payload, unwrapped
-from uuv_marl.replay.events import contacts, near_misses
 from uuv_marl.replay.record import record
 from uuv_marl.replay.traces import from_folder, from_trace
 from uuv_marl.sim.swarm import Swarm
@@ -124,38 +123,6 @@ def test_every_contact_is_an_event(changes):
     assert seen == {"collision", "obstacle"} or changes
 
 
-def test_contacts_find_their_partners():
-    """0 hits 1 and 2, which touched before; 3 a rock; 4 and 5 each other; 6 and 7, which touched before, 8 and 9."""
-    now = [[0, 1.5], [0.5, 0], [-0.5, 0], [50, 0], [80, 0], [81, 0], [100, 0], [100.5, 0], [100, 1.5], [100.5, -1.5]]
-    before = np.array(now, np.float32)
-    before[[0, 5, 8, 9]] += [[0, 4], [4, 0], [0, 4], [0, -4]]
-    position = np.array([before, now], np.float32)
-    began = np.array([[0] * 10, [2] + [1] * 9], np.int32)
-    clearance = np.full((2, 10), 9.0, np.float32)
-    clearance[1, 3] = 0.5
-    found = contacts(np.array([0, 0.1], np.float32), began, clearance, position, 1.0)
-    assert sorted(event.vehicles for event in found) == [(0, 1), (0, 2), (3,), (4, 5), (6, 8), (7, 9)]
-    assert {event.kind for event in found if len(event.vehicles) == 1} == {"obstacle"}
-
-
-def test_who_stays_too_near_makes_one_mark():
-    time = np.arange(100, dtype=np.float32) / 10
-    below = np.zeros((100, 3), bool)
-    below[5:90:2, 0] = True  # at the limit for long
-    below[[5, 60], 1] = True
-    found = near_misses("near", time, below)
-    assert [(round(event.time_s, 1), event.vehicles) for event in found] == [(0.5, (0, 1)), (6.0, (1,))]
-
-
-def test_a_crowd_has_few_marks_and_an_arrival_is_one():
-    crowd = record(quick(**{"constraints.s_u_m": 40.0}), "random", 1)
-    assert 1 <= len([event for event in crowd.events if event.kind == "near"]) <= 8
-    recording = record(load_scenario("starter"), "bio_inspired_plus", 0)
-    assert [event for event in recording.events if event.kind == "arrived"] == [
-        (recording.metrics["task_time_s"], "arrived", ())
-    ]
-
-
 NODE = """
 import { readFileSync, writeFileSync } from "node:fs";
 const [decoder, folder] = process.argv.slice(-2);
@@ -228,13 +195,6 @@ def test_a_browser_reads_the_recording(tmp_path):
         assert ("heard" in arrays) == bool(inspected)
 
 
-def test_headings_turn_without_jumps():
-    wrapped = np.array([[3.0, 0.0], [-3.0, 0.1], [3.1, np.nan], [-3.1, np.nan]], np.float32)
-    smooth = unwrapped(wrapped)
-    assert np.abs(np.diff(smooth[:, 0])).max() < 1.0
-    np.testing.assert_allclose(np.cos(smooth), np.cos(wrapped), atol=1e-6)
-
-
 def saved(folder, policies=("idle", "random"), scenario=None):
     scenario = scenario or quick("lossy", **{"disturbance.loss_times_s": [2.0]})
     results = Results(folder, [scenario])
@@ -264,16 +224,6 @@ def test_a_saved_trace_is_shown_as_far_as_it_goes(tmp_path):
     json.dumps(payload([recording]), allow_nan=False)
 
 
-def test_a_trace_needs_neither_its_policy_nor_the_current_folder(tmp_path, monkeypatch):
-    results = saved(tmp_path, ["idle"])
-    path = tmp_path / "results.json"
-    path.write_text(path.read_text().replace('"idle"', '"gone:Policy"'))
-    results.trace_path("lossy", "idle", 0).rename(trace_path(tmp_path, "lossy", "gone:Policy", 0))
-    monkeypatch.chdir(tmp_path)
-    assert from_folder(".", None, None, 0).policy == "gone:Policy"
-    assert from_trace(Path("traces") / trace_path(tmp_path, "lossy", "gone:Policy", 0).name).seed == 0
-
-
 def edited(path, change):
     arrays = dict(np.load(path))
     change(arrays)
@@ -298,25 +248,22 @@ def test_a_trace_that_lacks_something_is_refused(tmp_path, change, message):
 
 
 def test_what_is_no_trace_is_explained(tmp_path):
-    results = saved(tmp_path / "out")
-    path = results.trace_path("lossy", "random", 0)
-    with pytest.raises(ReplayError, match=r"does not exist; give the folder of a benchmark"):
-        from_trace(tmp_path / "nothing.npz")
-    foreign = tmp_path / "traces" / path.name
+    path = saved(tmp_path / "out").trace_path("lossy", "random", 0)
+    foreign, stray = tmp_path / "traces" / path.name, path.with_name("lossy.random.7.npz")
     foreign.parent.mkdir()
-    foreign.write_bytes(path.read_bytes())
-    with pytest.raises(ReplayError, match=r"holds no results.json, .* simulate with --scenario and --policy"):
-        from_trace(foreign)
-    stray = path.with_name("lossy.random.7.npz")
-    stray.write_bytes(path.read_bytes())
-    with pytest.raises(ReplayError, match=r"is no trace of a run in .*results.json"):
-        from_trace(stray)
-    with pytest.raises(ReplayError, match=r"no routes: .* seed 0 .*: uuv-marl replay .*--policy random --seed 1"):
-        from_trace(results.trace_path("lossy", "random", 1))
-    with pytest.raises(ReplayError, match=r"with seed 9, only 0, 1; .*--seed 9"):
-        from_folder(tmp_path / "out", "lossy", "random", 9)
-    with pytest.raises(ReplayError, match=r"holds no 'sff' but idle, random; choose with --policy"):
-        from_folder(tmp_path / "out", "lossy", "sff", 0)
+    for copy in (foreign, stray):
+        copy.write_bytes(path.read_bytes())
+    for trace, message in (
+        (tmp_path / "nothing.npz", "does not exist; give the folder of a benchmark"),
+        (foreign, "holds no results.json, .* simulate with --scenario and --policy"),
+        (stray, "is no trace of a run in .*results.json"),
+        (path.with_name("lossy.random.1.npz"), "no routes: .* seed 0 .*: uuv-marl replay .*--policy random --seed 1"),
+    ):
+        with pytest.raises(ReplayError, match=message):
+            from_trace(trace)
+    for policy, seed, message in (("random", 9, "with seed 9, only 0, 1;"), ("sff", 0, "no 'sff' but idle, random;")):
+        with pytest.raises(ReplayError, match=message):
+            from_folder(tmp_path / "out", "lossy", policy, seed)
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(ResultsError, match="can't be read .*; delete it, and the benchmark's command makes it again"):
         from_trace(path)
@@ -394,13 +341,6 @@ def test_mistakes_are_explained_before_anything_is_simulated(arguments, message,
     assert not written
 
 
-def test_a_saved_run_takes_no_other_numbers(tmp_path, written):
-    trace = saved(tmp_path).trace_path("lossy", "idle", 0)
-    assert "holds saved episodes, which --inspect and --set can't change" in replay(tmp_path, "--inspect=0")[1]
-    assert "is one episode already" in replay(trace, "--policy=idle")[1]
-    assert "no routes" in replay(tmp_path, "--policy=idle", "--seed=1")[1]
-
-
 def test_stopping_writes_nothing(tmp_path, monkeypatch, written):
     def stop(*arguments):
         raise KeyboardInterrupt
@@ -411,26 +351,6 @@ def test_stopping_writes_nothing(tmp_path, monkeypatch, written):
     assert code == 130
     assert text.endswith("Stopped; nothing was written.")
     assert not list(tmp_path.iterdir())
-
-
-def row(collisions, task_time_s, spacing, obstacle):
-    metrics = {"collisions": collisions, "task_time_s": task_time_s}
-    return {**metrics, "min_spacing_m": spacing, "min_obstacle_distance_m": obstacle}
-
-
-@pytest.mark.parametrize(
-    ("rows", "worst"),
-    [
-        ([row(0, 9.0, 5.0, 5.0), row(2, 9.0, 5.0, 5.0), row(1, None, 0.1, 0.1)], 1),
-        ([row(1, 9.0, 0.1, 5.0), row(1, None, 5.0, 5.0), row(0, None, 0.1, 0.1)], 1),
-        ([row(0, 9.0, 5.0, 3.0), row(0, 9.0, 4.0, 9.0), row(0, 9.0, None, None)], 0),
-        ([row(0, 9.0, 5.0, 5.0), row(0, 9.0, 5.0, 5.0)], 0),
-    ],
-)
-def test_the_worst_run_is_by_collisions_arrival_and_distance(rows, worst):
-    runs = [runner.ResultRow("s", "p", seed, metrics) for seed, metrics in enumerate(rows)]
-    results = types.SimpleNamespace(select=lambda scenario, policy, seeds: runs)
-    assert runner.worst(results, [types.SimpleNamespace(name="s")], ["p"], range(9)).seed == worst
 
 
 def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(tmp_path, monkeypatch, written):

@@ -1,6 +1,5 @@
 """The robustness suite: axes as data, one start at every level, scores by hand, resuming, the command."""
 
-import itertools
 import json
 from pathlib import Path
 
@@ -15,9 +14,6 @@ from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS, overrid
 from uuv_marl.benchmark.success import GRACE_S
 from uuv_marl.cli import app
 from uuv_marl.scenario import disturbances
-from uuv_marl.sim.random import episode_key
-from uuv_marl.sim.sea.actuation import victims
-from uuv_marl.sim.swarm import Swarm
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PLACES = [(axis.name, level) for axis in AXES.values() for level in axis.levels]
@@ -54,39 +50,6 @@ def test_every_level_is_a_scenario_of_its_own(scenario):
         assert loaded not in seen, (axis, level)
         assert disturbances(loaded) or AXES[axis].channels, (axis, level)
         seen.append(loaded)
-
-
-@pytest.mark.parametrize("axis", ["F2", "F3", "F4"])
-def test_who_is_hit_at_a_level_is_hit_at_the_next(axis):
-    key = episode_key(np.random.default_rng(5))
-    hit = [
-        set(victims(key, 0, load_scenario("random_field", overrides=overrides(axis, k, "random_field"))))
-        for k in range(1, 6)
-    ]
-    assert all(less < more for less, more in itertools.pairwise(hit))
-
-
-def test_a_seed_has_the_same_start_and_field_at_every_level():
-    def drawn(axis, level):
-        swarm = Swarm(load_scenario("random_field", num_vehicles=7, overrides=overrides(axis, level, "random_field")))
-        swarm.reset(3)
-        return (
-            swarm.state.eta.copy(),
-            swarm.state.nu.copy(),
-            swarm.course.obstacles.copy(),
-            swarm.course.waypoints.copy(),
-        )
-
-    calm = drawn(CALM, 0)
-    for axis, level in PLACES:
-        for ours, theirs in zip(drawn(axis, level), calm, strict=True):
-            np.testing.assert_array_equal(ours, theirs, err_msg=f"{axis} {level}")
-
-
-def test_messages_are_left_out_for_who_has_none():
-    plan = job.SHIPPED._replace(policies=("mappo", "sdc"), axes=("C1", "W1"))
-    found = {(cell.axis, cell.case.policy) for cell in job.cells(plan)}
-    assert found == {(CALM, "mappo"), (CALM, "sdc"), ("W1", "mappo"), ("W1", "sdc"), ("C1", "sdc")}
 
 
 # Scores
@@ -133,14 +96,6 @@ def test_critical_severity_in_the_axis_s_unit(cells, text):
     assert scores.critical_text(axis, found) == text
 
 
-def test_groups_are_means_over_axes_and_all_over_groups():
-    own = table(calm=[1.0] * 6, W1_1=[0.8] * 6, W2_1=[0.4] * 6, S1_1=[1.0] * 6, X_1=[0.0] * 6)
-    assert scores.group_score(own, "W").value == pytest.approx(0.6)
-    assert scores.group_score(own, scores.EVERY).value == pytest.approx(0.8)
-    assert scores.group_score(own, "X").value == 0.0
-    assert scores.group_score(own, "N") is None
-
-
 # Job, page, command
 
 
@@ -181,16 +136,6 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     assert kept["runs"][0]["metrics"]["success_share"] == pytest.approx(rows["success_share"][2])
     before = [path.read_bytes() for path in page.write_robustness_report(tmp_path)]
     assert before == [path.read_bytes() for path in page.write_robustness_report(tmp_path)]
-
-
-def test_success_is_judged_in_a_vehicle_s_scale_too(tmp_path):
-    """There l(t), and the time after which a swarm is judged, take longer."""
-    mine = tmp_path / "mine.toml"
-    mine.write_text('extends = "starter"\nversion = 1\nvehicle = "lauv"\nscale = "vehicle"\n')
-    path = job.run(tmp_path / "out", TINY._replace(axes=("N2",), levels=(1,), scenarios=(str(mine),)), silent)
-    found = job.read_episodes(path)
-    assert found["axis"].tolist() == ["0", "N2"]
-    assert found["success_share"].notna().all()
 
 
 @pytest.mark.docs

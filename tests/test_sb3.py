@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
@@ -18,7 +19,6 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.percept import Percept
-from uuv_marl.scenario import ScenarioError
 from uuv_marl.train import run
 from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
 
@@ -59,6 +59,28 @@ def test_ppo_learns_and_a_seed_fixes_it():
     assert np.isfinite(mean)
 
 
+def test_recurrent_ppo_forgets_where_an_episode_begins():
+    """All rows of a world start together, one step after their end, and then act as a policy that remembers nothing."""
+    env = swarm(overrides={**SHORT, "time_limit.extra_s": 4.0})
+    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=40, batch_size=80, n_epochs=1, seed=3, device="cpu")
+    model.learn(40 * env.num_envs)
+    starts = model.rollout_buffer.episode_starts.reshape(2, 4, 40)  # row after row, each in the order of time
+    assert (starts == starts[:, :1]).all()
+    assert starts[..., 0].all()
+    assert 2 <= starts[:, 0, 1:].sum() < 40
+    env.seed(0)
+    observation, state, start = env.reset(), None, np.ones(8, bool)
+    began = 0
+    for _ in range(40):
+        action, state = model.predict(observation, state, start, deterministic=True)
+        fresh, _ = model.predict(observation, deterministic=True)
+        same = (action == fresh).all(axis=1)
+        np.testing.assert_array_equal(same, start)
+        observation, _, start, _ = env.step(action)
+        began += start.sum()
+    assert began >= 16
+
+
 def test_normalising_and_stacking_wrappers():
     learn(VecNormalize(VecCheckNan(swarm(), raise_exception=True)))
     learn(VecFrameStack(swarm(), 2))
@@ -93,38 +115,6 @@ def test_time_limits_are_bootstrapped_and_arrivals_are_not(monkeypatch):
         model.learn(40 * env.num_envs)
         single = [shape for shape in asked if tuple(shape) == (1, 98)]
         assert bool(single) == truncated
-
-
-def test_scenarios_that_lose_vehicles_are_refused_with_the_remedy():
-    with pytest.raises(ScenarioError, match=r"in scenario 'lossy'; use .* or override disturbance.loss_times_s=\[\]"):
-        SwarmVecEnv("lossy", 1)
-    with pytest.raises(ScenarioError, match="contact.ends_vehicle=false"):
-        SwarmVecEnv(overrides={"contact.ends_vehicle": True})
-    SwarmVecEnv("lossy", 1, overrides={"disturbance.loss_times_s": []})
-
-
-def test_attributes_of_rows():
-    env = swarm()
-    assert env.get_attr("render_mode") == [None] * 8
-    assert env.get_attr("scenario", [0, 3]) == [env.scenario] * 2
-    assert env.has_attr("swarm")
-    assert not env.has_attr("nonsense")
-    assert env.env_is_wrapped(gymnasium.Wrapper) == [False] * 8
-    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
-        env.set_attr("reward", 1)
-    with pytest.raises(NotImplementedError, match="rows are vehicles of shared worlds"):
-        env.env_method("reset")
-
-
-@pytest.mark.needs("pygame")
-def test_a_picture_tiles_the_worlds():
-    env = swarm(render_mode="rgb_array")
-    assert env.metadata["render_fps"] == 2
-    with pytest.raises(RuntimeError, match="came before reset"):
-        env.render()
-    env.reset()
-    assert env.render().shape == (1600, 800, 3)
-    env.close()
 
 
 @pytest.mark.parametrize("others", ["bio_inspired", "sdc"])
@@ -190,11 +180,11 @@ def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
 
 def test_the_example_trains_a_policy(tmp_path):
     file = Path(__file__).resolve().parent.parent / "examples" / "training" / "sb3.py"
-    command = [sys.executable, file, "--scenario=tracking", "--worlds=1", "--steps=100", f"--output={tmp_path}"]
+    command = [sys.executable, file, "--worlds=1", "--steps=100", f"--output={tmp_path}"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
-    assert f"--scenario tracking --policy {tmp_path}" in done.stdout
+    assert f"--scenario starter --policy {tmp_path}" in done.stdout
     assert PPO.load(tmp_path / "model").num_timesteps > 100
-    scenario = granted(str(tmp_path), load_scenario("tracking", num_vehicles=3))
+    scenario = granted(str(tmp_path), load_scenario("starter"))
     assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0
 
 

@@ -213,7 +213,7 @@ def test_eddies_turn_by_turns_so_that_their_circulation_sums_to_nothing():
             there = eddies[w][eddies[w, :, 2] != 0.0]
             assert len(there) > 0
             assert there[:, 2].sum() == 0.0
-            points = swarm.course.waypoints[w]
+            points = swarm.course.waypoints[w, 0]
             assert (there[:, :2] >= points.min(0) - 250).all()
             assert (there[:, :2] <= points.max(0) + 250).all()
 
@@ -280,12 +280,6 @@ def test_a_vehicle_that_differs_swims_as_a_scenario_with_its_numbers():
     assert len({tuple(row) for row in swarm._sea.hull.plants[0]}) == 5
 
 
-def test_every_number_of_a_vehicle_has_a_column():
-    swarm = swim(MISMATCH, 0)
-    swarm._sea.hull.plants[0, 2] = np.arange(len(Plant._fields))
-    assert own_plant.py_func(0, 2, swarm._sea.hull) == Plant(*range(len(Plant._fields)))
-
-
 @given(st.floats(0, 1), st.floats(0, 1), st.integers(0, 2**32))
 def test_a_larger_share_has_the_smaller_one_s_victims(a, b, key):
     few, many = (
@@ -310,3 +304,9 @@ def test_faults_act_from_their_onset_for_their_duration():
             assert thrust[i] == (750.0 if i in victim[0] and hold >= 10 else 1500.0)
             assert (torque[i] == 0.0) == (i in victim[1] and 5 <= hold < 15)
         assert set(np.flatnonzero(~swarm.state.alive[0])) == (victim[2] if hold >= 19 else set())
+
+
+def test_every_number_of_a_vehicle_has_a_column():
+    swarm = swim(MISMATCH, 0)
+    swarm._sea.hull.plants[0, 2] = np.arange(len(Plant._fields))
+    assert own_plant.py_func(0, 2, swarm._sea.hull) == Plant(*range(len(Plant._fields)))

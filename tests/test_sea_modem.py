@@ -1,16 +1,15 @@
 """Messages: who hears what of whom, when, and what is lost."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, granted, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, save_checkpoint
 from uuv_marl.percept import PerceptLayout
-from uuv_marl.replay import traces
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -18,20 +17,13 @@ MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles"
 
 def swum(overrides, decisions=100, worlds=1, seed=0, **change):
     """The swarm after the reset and after each decision."""
-    swarm = Swarm(load_scenario("starter", overrides=MODEM | overrides, **change), worlds)
+    swarm = Swarm(load_scenario(STARTER, overrides=MODEM | overrides, **change), worlds)
     swarm.reset(seed)
     yield swarm
     rng = np.random.default_rng(1)
     for _ in range(decisions):
         swarm.step(rng.uniform(-1, 1, (worlds, swarm.num_vehicles, 2)))
         yield swarm
-
-
-def test_a_round_is_the_formula_s_of_a_named_modem():
-    """N (8 B / 463 bit/s + R / c): a Nanomodem, 54 vehicles, 16 bytes, 500 m of guard are 33 s."""
-    modem = load_scenario("tracking").modem
-    assert modem.round_s(54, 1500.0) == pytest.approx(54 * (8 * 16 / 463 + 500 / 1500)) == pytest.approx(32.9, abs=0.05)
-    assert modem.round_s(10, 1500.0) == pytest.approx(6.1, abs=0.05)
 
 
 def test_a_message_is_the_velocity_when_it_was_sent_and_its_age_follows_the_schedule():
@@ -89,20 +81,14 @@ def test_compasses_turn_what_is_said_and_what_is_read():
     assert turns > 100
 
 
-def test_without_messages_the_channel_stays_empty():
-    for swarm in swum({"modem.loss_probability": 1.0}, 50):
-        assert not swarm.percept["modem_identity"].any()
-        assert not swarm.percept["modem_age"].any()
-
-
 @pytest.mark.parametrize(
     "policy", ["sff", "sff_informed", "sdc", "sdc_informed", "olfati_saber_informed", "orca_informed"]
 )
 def test_comparators_run_on_messages_as_on_the_link(policy):
     """The same law: where messages are as fresh as the link, it does the same."""
     base = {"modem.period_s": 0.1, "obstacles": []}
-    linked = granted(policy, load_scenario("starter", overrides=base))
-    messaged = granted(policy, load_scenario("starter", overrides={**base, "sonar.channels": ["modem"]}))
+    linked = granted(policy, load_scenario(STARTER, overrides=base))
+    messaged = granted(policy, load_scenario(STARTER, overrides={**base, "sonar.channels": ["modem"]}))
     assert "link" not in messaged.sonar.channels
     assert "modem" in messaged.sonar.channels
     paths = []
@@ -120,10 +106,10 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
 
 def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
     """Not for one that asks for both, nor for an actor that was trained on the link."""
-    sea = load_scenario("starter", overrides={"sonar.channels": ["link", "modem"]})
+    sea = load_scenario(STARTER, overrides={"sonar.channels": ["link", "modem"]})
     assert granted("sff", sea).sonar.channels == ("modem",)
     assert granted("tests.test_sea_modem:Both", sea).sonar.channels == ("link", "modem")
-    linked = load_scenario("starter", overrides={"sonar.channels": ["link"]})
+    linked = load_scenario(STARTER, overrides={"sonar.channels": ["link"]})
     card = Card(percept=card_rows(PerceptLayout.of(linked)), channels=("link",))
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, [Layer(np.zeros((123, 2), np.float32), np.zeros(2, np.float32))])
     assert granted(str(tmp_path), sea).sonar.channels == ("link",)
@@ -133,20 +119,3 @@ class Both(Policy):
     """Compares what it is told with what is true."""
 
     channels = ("link", "modem")
-
-
-@pytest.mark.parametrize(
-    ("policy", "told"),
-    [
-        ("sdc", "modem"), ("guarded:sdc", "modem"), ("mine:Own", "modem"), ("runs/mine/best", "link"),
-        ("guarded:runs/12:30/best", "link"), ("mappo", "link"),
-    ],
-)  # fmt: skip
-def test_results_say_what_a_policy_got_instead_of_the_link(policy, told):
-    """A checkpoint knows only the channels of its training."""
-    scenario = load_scenario("starter", overrides={"sonar.channels": ["modem"]})
-    known = {"channels": ["compass", "link"], "yaw_damping_nms": 600.0, "source": None}
-    content = {"scenarios": {"starter": scenario.model_dump(mode="json")}, "policies": {policy: known}}
-    assert traces._scenario(SimpleNamespace(content=content), "starter", policy).sonar.channels == ("compass", told)
-    if policy == "sdc":
-        assert granted(policy, scenario).sonar.channels == ("compass", told)

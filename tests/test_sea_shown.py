@@ -6,22 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import uuv_marl
 from tests.test_replay_page import node
 from uuv_marl import load_scenario
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.benchmark.figures import _where
 from uuv_marl.benchmark.results import Results
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
-from uuv_marl.replay.encode import CODINGS, payload
+from uuv_marl.replay.encode import CODINGS
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
 from uuv_marl.replay.traces import from_trace
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged_observation
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
@@ -68,21 +65,6 @@ def test_the_global_state_holds_the_velocity_over_ground():
     np.testing.assert_array_equal(fields[1]["yaw_rate"], fields[0]["yaw_rate"])
 
 
-def test_a_critic_sees_how_the_centre_moves_over_ground():
-    seen = np.zeros((2, 1, 5, PRIVILEGED_SIZE), np.float32)
-    calm, moved = carried()
-    privileged_observation(calm, seen[0])
-    privileged_observation(moved, seen[1])
-    np.testing.assert_allclose((seen[1] - seen[0])[0, :, 6:8], turned(FLOW, moved) / 4.0, atol=1e-5)
-
-
-def test_in_still_water_the_velocity_is_the_state_s_own():
-    """Not one that is like it: off means the bits of before."""
-    swarm = carried(3)[0]
-    assert np.shares_memory(swarm.velocity, swarm.state.nu)
-    np.testing.assert_array_equal(swarm.velocity, swarm.state.nu[:, :, :2])
-
-
 # --- Replays and headers ---
 
 WATER = CURRENT | {"current.variation_mps": 0.3, "current.eddies": 8, "current.eddy_speed_mps": 1.2}
@@ -124,19 +106,3 @@ def test_the_page_reads_the_same_water(sailed, tmp_path):
         centre = np.array(numbers["poses"]).reshape(-1, 3)[:, :2]
         ours = Scenes(sailed).at(time).water.at(centre)
         np.testing.assert_allclose(numbers["flow"], ours, atol=CODINGS["drift"].resolution + 1e-4)
-
-
-def test_headers_say_what_is_on():
-    calm, moved = load_scenario("starter"), load_scenario("starter", overrides=WATER | {"noise.bearing_deg": 2.0})
-    assert "still water, no noise, no delay" in runner.title(calm, [0])
-    said = "current 0.7 m/s, current varies by 0.3 m/s, eddies of 1.2 m/s, bearing noise 2 deg"
-    assert said in runner.title(moved, [0])
-    assert repr(uuv_marl.parallel_env(calm)) == "SwarmParallelEnv(starter: 5 vehicles, still water, no noise, no delay)"
-    assert repr(uuv_marl.vector_env(3, moved)) == f"SwarmVectorEnv(starter: 3 worlds, 5 vehicles, {said})"
-
-
-def test_replays_and_figures_say_it_too(sailed):
-    (episode,) = payload([sailed])["episodes"]
-    assert episode["conditions"].startswith("current 0.7 m/s")
-    assert _where(sailed.scenario, "seed 0").endswith(f"seed 0\n{episode['conditions']}")
-    assert _where(load_scenario("starter"), "seed 0") == "starter, 5 vehicles (literature_185), seed 0"

@@ -111,20 +111,6 @@ def test_the_page_of_a_package_index_has_no_dead_links(distributions):
     assert any("doi.org" in url for url in metadata.get_all("Project-URL"))
 
 
-@pytest.mark.needs("hatchling")
-def test_with_the_repositorys_address_every_link_and_picture_of_the_page_is_whole():
-    spec = importlib.util.spec_from_file_location("index_page", ROOT / "tools" / "index_page.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    text = (ROOT / "README.md").read_text()
-    whole = module.page(text, "https://example.org/uuv_marl/")
-    for _, target in re.findall(r"(\[[^\]]+)\]\((?!https?:|#)([^)]*)\)", text):
-        kind = "raw" if target.endswith((".gif", ".png")) else "blob"
-        assert f"](https://example.org/uuv_marl/{kind}/HEAD/{target})" in whole
-    assert all(link.startswith(("https:", "#")) for link in re.findall(r"\]\(([^)]*)\)", whole))
-    assert len(whole.splitlines()) == len(text.splitlines())
-
-
 @pytest.mark.needs("build")
 def test_the_wheel_is_the_package_with_its_data_and_nothing_else(distributions):
     _, wheel, _ = distributions

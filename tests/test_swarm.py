@@ -124,23 +124,6 @@ def test_after_a_fork_a_batch_goes_on_with_threads_of_its_own():
     assert done.stdout.strip() == "7", done.stderr
 
 
-def test_worlds_are_reset_one_by_one_and_their_streams_go_on():
-    scenario = load_scenario("single_obstacle", num_vehicles=6)
-    swarm = Swarm(scenario, 3)
-    swarm.reset(10)
-    first = swarm.state.eta.copy()
-    swarm.reset(None, worlds=[1])
-    assert np.array_equal(swarm.state.eta[[0, 2]], first[[0, 2]])
-    assert not np.array_equal(swarm.state.eta[1], first[1])
-    second = swarm.state.eta[1].copy()
-    alone = Swarm(scenario)
-    alone.reset(11)
-    alone.reset()
-    assert np.array_equal(alone.state.eta[0], second)
-    swarm.reset([11], worlds=[2])
-    assert np.array_equal(swarm.state.eta[2], first[1])
-
-
 def test_a_loss_at_the_start_happens_in_the_first_step():
     swarm = Swarm(load_scenario("tracking", num_vehicles=3, overrides={"disturbance.loss_times_s": [0.0]}))
     swarm.reset(0)
@@ -261,17 +244,6 @@ def test_a_contact_counts_once_while_it_lasts(place):
     swarm.step(action)
     assert swarm.facts.collisions[0] == 1
     assert swarm.facts.contacts[0].tolist() == [1, 1]
-
-
-def test_touching_an_obstacle_is_a_collision_of_one_vehicle(place):
-    swarm = place(load_scenario("tracking"), [[0, 0, 0], [-60, 40, 0]], nu=[[4, 0, 0]] * 2, obstacles=[(32, 0, 30.0)])
-    action = np.zeros((1, 2, 2), np.float32)
-    total = np.zeros(2)
-    for _ in range(10):
-        swarm.step(action)
-        total += swarm.facts.contacts[0]
-    assert total.tolist() == [1, 0]
-    assert swarm.facts.obstacle_clearance[0, 0] < 1.0
 
 
 def test_contact_ends_the_vehicles_only_where_the_scenario_says_so(place):

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Course, Facts, Senses, State
@@ -14,7 +15,17 @@ from uuv_marl.sim.workspace import Cells, Columns, Listener, Workspace, scratch,
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
           "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
-SIZES = {"world": 2, "vehicle": 5, "point": 3, "obstacle": 4, "loss": 1, "sector": 21, "radius": 4, "entry": 98}
+SIZES = {
+    "world": 2,
+    "vehicle": 5,
+    "group": 2,
+    "point": 3,
+    "obstacle": 4,
+    "loss": 1,
+    "sector": 21,
+    "radius": 4,
+    "entry": 98,
+}
 LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5}
 
 
@@ -57,7 +68,7 @@ def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyon
     arrays["last"][:] = 1
     check(Course, arrays, SIZES)
     monkeypatch.setattr(
-        "uuv_marl.sim.tables.rows",
+        "uuv_marl.sim.tables.array_specs",
         lambda table: {"last": array_specs(table)["last"]._replace(bounds=Bounds(low, axis, beyond))},
     )
     arrays["last"][1] = wrong
@@ -68,15 +79,15 @@ def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyon
 def test_the_compiled_types_are_the_same_for_all_scenarios():
     """Otherwise each scenario, hull or disturbance compiles the whole simulation anew."""
     changes = [
-        ("starter", {}),
+        (STARTER, {}),
         ("tracking", {"num_vehicles": 1}),
         ("single_obstacle", {"overrides": {"sonar.arrays.bow.sub_sectors": 3, "sonar.echo_reports": "surface"}}),
         ("multi_obstacle", {"num_vehicles": 300}),
         ("lossy", {"overrides": {"sonar.channels": ["compass", "link"]}}),
         ("random_field", {"overrides": {"vehicle.m_kg": 250.0, "contact.ends_vehicle": True}}),
-        ("starter", {"overrides": RUDDER}),
-        ("starter", {"overrides": {**RUDDER, "actuators.yaw_lag_s": 0.2}}),
-        ("starter", {"overrides": {"current.eddies": 8, "current.eddy_speed_mps": 0.5}}),
+        (STARTER, {"overrides": RUDDER}),
+        (STARTER, {"overrides": {**RUDDER, "actuators.yaw_lag_s": 0.2}}),
+        (STARTER, {"overrides": {"current.eddies": 8, "current.eddy_speed_mps": 0.5}}),
         ("random_field", {"overrides": {"sonar.channels": ["age"], "faults": [{"kind": "yaw", "share": 0.5}]}}),
     ]
     for name, change in changes:

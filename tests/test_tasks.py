@@ -166,9 +166,9 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
     for name in ("bio_inspired", "bio_inspired_plus", "scout", "idle", "mappo"):
         mine = granted(name, scenario)
         assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
-    own = granted("own:bio_inspired", scenario)
+    own = granted("own_clock:bio_inspired", scenario)
     assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
-    (run,) = [event for event in evaluate(own, "own:bio_inspired", [0]) if isinstance(event, Run)]
+    (run,) = [event for event in evaluate(own, "own_clock:bio_inspired", [0]) if isinstance(event, Run)]
     assert run.metrics["task_time_s"] is not None
 
 

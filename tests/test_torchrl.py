@@ -2,7 +2,6 @@
 
 import warnings
 
-import numpy as np
 import pytest
 import torch
 from tensordict.nn import TensorDictModule
@@ -57,30 +56,6 @@ def actor():
 
 def test_specs_hold(scenario_name):
     check_env_specs(SwarmEnv(2, scenario_name, num_vehicles=8, decision_period=0.5))
-
-
-def test_rollouts_reset_worlds_at_their_end_alone():
-    env = swarm(overrides=LOSSES, scenario="lossy", seed=1)
-    data = env.rollout(60, break_when_any_done=False)
-    mask, over = data["uuv", "mask"], data["next", "done"].squeeze(-1)
-    assert over.sum() >= 6
-    lost = ~data["next", "uuv", "mask"]
-    assert (lost.any(-1) & ~over).any()
-    assert data["next", "uuv", "terminated"].squeeze(-1)[lost].all()
-    assert mask[:, 1:][over[:, :-1]].all(), "a new episode begins with everybody"
-    assert (mask[:, 1:] == data["next", "uuv", "mask"][:, :-1])[~over[:, :-1]].all()
-    np.testing.assert_array_equal(data["next", "uuv", "observation"][lost], 0.0)
-    np.testing.assert_array_equal(data["next", "uuv", "reward"].squeeze(-1)[~mask], 0.0)
-
-
-def test_seeds():
-    a, b = swarm(seed=4), swarm()
-    first = a.reset()["uuv", "observation"]
-    b.set_seed(4)
-    torch.testing.assert_close(b.reset()["uuv", "observation"], first, rtol=0, atol=0)
-    assert not torch.equal(a.reset()["uuv", "observation"], first)
-    torch.testing.assert_close(b.reset(seed=4)["uuv", "observation"], first, rtol=0, atol=0)
-    torch.testing.assert_close(swarm(1, seed=5).reset()["uuv", "observation"][0], first[1], rtol=0, atol=0)
 
 
 def test_a_seed_waits_for_each_worlds_next_reset():

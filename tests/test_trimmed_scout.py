@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines import granted, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES
 from uuv_marl.baselines.learned.network import forward
@@ -28,7 +28,6 @@ ROUGH = {
 }  # fmt: skip
 
 
-SILENT = {"noise.silence_probability": 0.1, "noise.silence_readings": 10}
 LAG = {"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}
 
 
@@ -90,8 +89,7 @@ def test_the_network_is_asked_only_where_its_output_counts(overrides, saved):
         policy.look(features)
         everywhere = forward(policy.checkpoint.layers, features[0])[None]
         np.testing.assert_array_equal(action, policy.trim(everywhere))
-        policy.acted(action, policy.active)
-        percept = swarm.step(action)
+        percept = swarm.step(policy.drive(percept, action))
     assert (np.mean(asked) > 0.9) == (overrides != FEW), "hardly anybody's in calm water, nearly all where they lag"
 
 
@@ -123,19 +121,6 @@ def test_an_actor_has_its_say_where_vehicles_doubt(overrides, least, most):
     assert least <= np.mean(doubts) <= most
 
 
-def test_old_readings_do_not_make_a_vehicle_steer_softly(saved):
-    """Of its own motion it is sure, where the sonar falls silent for a second at a time."""
-    scenario = granted("scout", load_scenario("random_field", num_vehicles=20, overrides=SILENT))
-    swarm, policy, doubts = Swarm(scenario), make("scout", scenario), []
-    percept = swarm.reset(10_007)
-    for _ in range(300):
-        percept = swarm.step(policy.act(percept))
-        doubts.append([doubt(0, i, policy.memory) for i in range(20)])
-    moves, whole = np.mean(doubts, axis=(0, 1))
-    assert moves < 0.05
-    assert whole > 0.4
-
-
 @pytest.mark.parametrize(("noise_deg", "least", "most"), [(0.0, 0.9, 1.0), (10.0, 0.0, 0.1)], ids=["exact", "noisy"])
 def test_who_makes_up_for_its_lag_steers_softly_only_where_it_hears_well(noise_deg, least, most):
     rough = LAG | {"noise.bearing_deg": noise_deg}
@@ -160,30 +145,6 @@ def test_who_does_not_doubt_has_the_gains_of_the_law():
     law = ScoutGains(pull_in_doubt=-0.3, push_in_doubt=0.7)
     assert wary(law, 0.0) == law
     assert wary(law, 1.0) == law._replace(pull=law.pull * math.exp(-0.3), push=law.push * math.exp(0.7))
-
-
-@pytest.mark.parametrize(("noise_deg", "least", "most"), [(0.0, 0.7, 1.3), (5.0, 0.0, 0.5)], ids=["exact", "noisy"])
-def test_who_doubts_keeps_farther_from_others_where_it_is_told_to(noise_deg, least, most):
-    """How often a neighbour is nearer than 10 m, beside the law without; 0.95 and 0.11 to 0.14 on three seeds."""
-    overrides = {"noise.bearing_deg": noise_deg}
-    near = []
-    for push in (0.0, 1.1):
-        law = f"scout,preset=lead,push_in_doubt={push}"
-        scenario = granted(law, load_scenario("single_obstacle", overrides=overrides))
-        swarm, policy, spacings = Swarm(scenario), make(law, scenario), []
-        percept = swarm.reset(10_007)
-        for k in range(600):
-            percept = swarm.step(policy.act(percept))
-            if k > 200:
-                spacings.append(swarm.facts.spacing.copy())
-        near.append(np.mean(np.array(spacings) < 10.0))
-    assert least <= near[1] / near[0] <= most
-
-
-def test_a_run_depends_on_its_seed_alone(saved):
-    policy = saved(0.3)
-    both = actions(policy, decisions=80, worlds=2)
-    np.testing.assert_array_equal(both[:, 1:], actions(policy, seed=10_008, decisions=80))
 
 
 def test_whatever_the_actor_says_the_filter_has_the_last_word(saved):
@@ -226,42 +187,10 @@ def test_what_an_actor_sees_is_bounded(overrides):
         policy.look(features)
         most = np.maximum(most, np.abs(features[0]).max(axis=0))
         action = policy.trim(np.zeros((1, 12, 1), np.float32))
-        policy.acted(action, policy.active)
-        percept = swarm.step(action)
+        percept = swarm.step(policy.drive(percept, action))
     assert np.isfinite(most).all()
     assert most.max() < 8.0
     assert (most > 0.0).sum() > NUM_MEMORY_FEATURES - 10, "most features say something"
-
-
-def test_what_an_actor_sees_turns_with_the_world():
-    """The same swarm elsewhere and turned: the vehicles' own frames are all that there is."""
-    seen, turn = [], 0.7
-    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    for moved in (False, True):
-        scenario = granted("scout", load_scenario("single_obstacle", overrides={"swarm.num_vehicles": 10}))
-        swarm, policy = Swarm(scenario), TrimmedScout(scenario)
-        swarm.reset(3)
-        if moved:
-            swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (50.0, -80.0)
-            swarm.state.eta[0, :, 2] += turn
-            swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (50.0, -80.0)
-            swarm.course.waypoints[0] = swarm.course.waypoints[0] @ rotation.T + (50.0, -80.0)
-        features = np.zeros((1, 10, NUM_MEMORY_FEATURES), np.float32)
-        policy.hear(swarm.observe())
-        policy.look(features)
-        seen.append(features)
-    np.testing.assert_allclose(seen[0], seen[1], atol=1e-3)
-
-
-def test_refusals_name_what_is_wrong(saved, tmp_path):
-    policy = saved(0.1)
-    slow = granted(policy, load_scenario("random_field", overrides={"timing.decision_period_s": 1.0}))
-    with pytest.raises(PolicyError, match="decides every 0.1 to 0.5 s"):
-        make(policy, slow)
-    wrong = Card(percept=card_rows(PerceptLayout.of(load_scenario("tracking"))))
-    save_checkpoint(tmp_path / "wrong" / WEIGHTS_FILE, wrong, actor(0.1))
-    with pytest.raises(PolicyError, match="expected float32"):
-        load_checkpoint(tmp_path / "wrong")
 
 
 @pytest.mark.needs("torch")

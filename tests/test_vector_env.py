@@ -17,6 +17,7 @@ from gymnasium.wrappers import vector as wrappers
 from packaging.version import Version
 
 import uuv_marl
+from tests.golden import STARTER
 from uuv_marl import baselines
 from uuv_marl.envs.solo import SoloEnv
 from uuv_marl.scenario import ScenarioError
@@ -161,44 +162,6 @@ def test_gymnasium_wrappers_work():
     assert seen >= 6
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
-def test_wrappers_that_change_observations_work_where_gymnasium_lets_them(mode):
-    names = ["FlattenObservation", "DtypeObservation", "ReshapeObservation"]
-    names += ["NormalizeObservation"] if mode == "NextStep" else []
-    arguments = {"DtypeObservation": (np.float32,), "ReshapeObservation": ((5 * 98,),)}
-    for name in names:
-        env = getattr(wrappers, name)(short(autoreset_mode=mode, max_cycles=4), *arguments.get(name, ()))
-        env.reset(seed=0)
-        ended = 0
-        for action in random_actions(short(), 12):
-            _, _, terminated, truncated, _ = env.step(action.reshape(env.action_space.shape))
-            over = terminated | truncated
-            ended += int(over.sum())
-            if mode == "Disabled" and over.any():
-                env.reset(options={"reset_mask": over})
-        assert ended >= 6, name
-
-
-@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
-def test_solo_in_gymnasiums_own_vectoriser_tells_how_it_ended(mode):
-    options = {"scenario": "random_field", "num_vehicles": 4, "decision_period": 0.5, "max_cycles": 3}
-    envs = gymnasium.make_vec(
-        "uuv_marl/Solo-v1",
-        2,
-        vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": AutoresetMode(mode)},
-        **options,
-    )
-    envs = wrappers.RecordEpisodeStatistics(envs)
-    envs.reset(seed=0)
-    *_, truncated, infos = [envs.step(np.zeros((2, 2), np.float32)) for _ in range(3)][-1]
-    assert truncated.all()
-    assert infos["episode"]["l"].tolist() == [3, 3]
-    told = infos["final_info"] if mode == "SameStep" else infos
-    assert told["ending"].tolist() == ["time_limit"] * 2
-    assert told["is_success"].tolist() == [False, False]
-
-
 def test_what_cannot_be_done_is_named():
     env = short(render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="call reset"):
@@ -271,30 +234,6 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
         env.unwrapped.step(own)
 
 
-def test_solo_repeats_itself_with_policies_that_draw():
-    runs = []
-    for _ in range(2):
-        env = solo("random", overrides=SHORT)
-        record = [env.reset(seed=3)[0]]
-        for _ in range(2):
-            over = False
-            while not over:
-                observation, reward, terminated, truncated, _ = env.step(np.zeros(2, np.float32))
-                record += [observation, reward]
-                over = terminated or truncated
-            record.append(env.reset()[0])
-        runs.append(b"".join(np.asarray(item).tobytes() for item in record))
-    assert runs[0] == runs[1]
-
-
-def test_solo_takes_the_options_of_the_parallel_environment():
-    options = {"decision_period": 0.5, "overrides": {"timing.control_hold_s": 0.5}, "max_cycles": np.int64(3)}
-    env = solo("idle", reward=lambda swarm: np.full(swarm.state.alive.shape, 2.5), **options)
-    env.reset(seed=0)
-    steps = [env.step(np.zeros(2, np.float32))[1:4] for _ in range(3)]
-    assert steps == [(2.5, False, False), (2.5, False, False), (2.5, False, True)]
-
-
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
@@ -304,7 +243,7 @@ def test_solo_takes_the_options_of_the_parallel_environment():
 )
 def test_solo_drops_no_override(overrides, message):
     with pytest.raises(ScenarioError, match=message):
-        SoloEnv("starter", overrides=overrides)
+        SoloEnv(STARTER, overrides=overrides)
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
     assert both.scenario.sonar.channels == ("compass", "modem")
 
@@ -379,7 +318,9 @@ def test_numbers_below_float32s_range_are_zero_whatever_numpy_is_told(action):
         for library, name in (("stable_baselines3", "sb3.SwarmVecEnv"), ("torchrl", "torchrl.SwarmEnv")):
             if find_spec(library):
                 module, _, kind = name.partition(".")
-                env = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), kind)(2, "starter", reward=tiny)
+                env = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), kind)(
+                    num_worlds=2, scenario="starter", reward=tiny
+                )
                 started = env.reset()
                 env.step(np.full((10, 2), action) if library == "stable_baselines3" else env.rand_action(started))
 

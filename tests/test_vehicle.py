@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tests.conftest import COUPLED, LIFT, RUDDER
 from tests.oracle.motion import matrices
 from uuv_marl import load_scenario
 from uuv_marl.scenario import ScenarioError, vehicle_checks
@@ -14,21 +15,6 @@ from uuv_marl.sim import vehicle
 from uuv_marl.sim.vehicle import STILL, plant
 
 speed = st.floats(-6.0, 6.0)
-COUPLED = {
-    "vehicle.x_G_m": 0.05,
-    "vehicle.Y_rdot_kgm": -4.0,
-    "vehicle.Y_r": 12.0,
-    "vehicle.N_v": -20.0,
-    "vehicle.Y_rr": 15.0,
-    "vehicle.N_rv": -40.0,
-}
-LIFT = {"vehicle.Y_uv": -60.0, "vehicle.Y_ur": 20.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "vehicle.N_vv": -9.0}
-RUDDER = {
-    "actuators.kind": "rudder",
-    "actuators.Y_uud": 60.0,
-    "actuators.N_uud": -40.0,
-    "actuators.rudder_max_deg": 20.0,
-}
 PLAIN = plant(load_scenario("tracking"))
 FULL = plant(load_scenario("tracking", overrides=COUPLED))
 TORPEDO = plant(load_scenario("tracking", overrides=LIFT | RUDDER))
@@ -81,8 +67,8 @@ def test_with_a_rudder_each_number_of_an_action_has_its_own_limit(x, y):
     assert vehicle.effort(0.8, -0.9, TORPEDO) == pytest.approx(0.81)
 
 
-@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-7, 7), st.sampled_from([0.0, 500.0]))
-def test_a_held_force_is_cut_where_astern_there_is_less(a_x, a_y, turn, astern):
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-7, 7), st.sampled_from([0.0, 500.0, 2000.0]))
+def test_a_held_force_keeps_its_direction_in_the_world_but_is_cut_where_astern_there_is_less(a_x, a_y, turn, astern):
     p = PLAIN._replace(max_force=2000.0, max_astern=astern)
 
     def force(a):
@@ -146,58 +132,6 @@ def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
     moved = np.array([x + c * a[0] - s * a[1], y + s * a[0] + c * a[1], a[2] + turn])
     np.testing.assert_allclose(b[:3], moved, atol=1e-9)
     np.testing.assert_allclose(b[3:], a[3:], atol=1e-9)
-
-
-def test_mirrored_vehicle_moves_as_the_mirror_image():
-    a = vehicle.advance((0.0, 0.0, 0.4, 2.0, 0.6, 0.9), (500.0, 200.0), STILL, 0.1, PLAIN)
-    b = vehicle.advance((0.0, 0.0, -0.4, 2.0, -0.6, -0.9), (500.0, -200.0), STILL, 0.1, PLAIN)
-    np.testing.assert_allclose(b, np.array(a) * [1, -1, -1, 1, -1, -1], atol=1e-12)
-
-
-@given(st.floats(-50, 50), st.floats(-50, 50))
-def test_projection_keeps_direction_and_the_unit_disc(x, y):
-    p_x, p_y = vehicle.project(x, y)
-    assert math.hypot(p_x, p_y) <= 1.0 + 1e-12
-    assert p_x * y == pytest.approx(p_y * x, abs=1e-9)
-    if math.hypot(x, y) <= 1.0:
-        assert (p_x, p_y) == (x, y)
-
-
-@given(st.floats(-1, 1), st.floats(-8, 8))
-def test_yaw_damping_opposes_the_turn_within_the_torque_limit(a_y, r):
-    p = PLAIN._replace(yaw_damping=600.0)
-    torque = vehicle.actuators(0.3, a_y, r, p)[1]
-    assert abs(torque) <= p.max_torque
-    assert torque == pytest.approx(max(-3000.0, min(3000.0, 3000.0 * a_y - 600.0 * r)))
-
-
-@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-7, 7))
-def test_a_held_force_keeps_its_direction_in_the_world(a_x, a_y, turn):
-    p = PLAIN._replace(max_force=2000.0, max_astern=2000.0, max_torque=900.0, lever_arm=0.5)
-    b_x, b_y = vehicle.turned(a_x, a_y, turn, p)
-    before = np.array([a_x * p.max_force, a_y * p.max_torque / p.lever_arm])
-    after = np.array([b_x * p.max_force, b_y * p.max_torque / p.lever_arm])
-    c, s = math.cos(turn), math.sin(turn)
-    np.testing.assert_allclose([c * after[0] - s * after[1], s * after[0] + c * after[1]], before, atol=1e-9)
-
-
-@given(st.floats(-100, 100))
-def test_wrap_gives_the_same_direction_in_one_turn(angle):
-    wrapped = vehicle.wrap(angle)
-    assert -math.pi <= wrapped < math.pi
-    assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-12)
-    assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-12)
-
-
-@given(*[st.floats(-1.5, 1.5)] * 2, st.floats(-3, 3))
-def test_a_uniform_flow_carries_a_vehicle_along_and_changes_nothing_else(north, east, psi):
-    """Galilean invariance: the trajectory in a current is the one in still water plus the current times the time."""
-    still = moved = (0.0, 0.0, psi, 1.0, -0.3, 0.4)
-    for _ in range(40):
-        still = vehicle.advance(still, (900.0, -250.0), STILL, 0.1, FULL)
-        moved = vehicle.advance(moved, (900.0, -250.0), (north, east), 0.1, FULL)
-    assert moved[2:] == still[2:]
-    assert moved[:2] == pytest.approx((still[0] + 4.0 * north, still[1] + 4.0 * east), abs=1e-12)
 
 
 @pytest.mark.parametrize(("damping", "limit_mps"), [(0.0, 0.682), (600.0, 2.459)])

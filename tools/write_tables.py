@@ -8,6 +8,7 @@ from pathlib import Path
 import uuv_marl
 from research.dynamics import acceptance, sea_trials
 from research.episodes import read_rows
+from research.heldout import page as heldout
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
@@ -17,13 +18,12 @@ from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
 from uuv_marl.tasks import TASKS, Follow, Reach
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = tuple(
-    ROOT / page
-    for page in ("README.md", "docs/environment.md", "docs/scenarios.md", "docs/vehicles.md", "docs/tasks.md")
-)
+NAMES = ("environment", "results", "scenarios", "tasks", "vehicles")
+PAGES = (ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in NAMES))
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
 TRIALS = read_rows(ROOT / "docs" / "sea-trials.csv.gz")
+HELD = heldout.tables(read_rows(ROOT / "docs" / "heldout.csv.gz"))
 
 
 def table(head: tuple[str, ...], lines: list[tuple[str, ...]]) -> str:
@@ -122,6 +122,8 @@ TABLES = filled() | {
     "figures": rows(acceptance.figures()),
     "stability": rows(acceptance.stability()),
     "scales": rows(sea_trials.scales()),
+    "heldout": HELD[0].rstrip("\n"),
+    "fields": HELD[1].rstrip("\n"),
     "sea_trials": rows(sea_trials.table(TRIALS)),
     "history": table(("version", "what changed"), list(uuv_swarm_v1.HISTORY.items())),
 }

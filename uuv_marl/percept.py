@@ -219,8 +219,8 @@ class Percept:
     ``velocity`` (..., 2), ``yaw_rate`` (..., 1), ``reference`` (..., 2), ``reference_velocity`` (..., 2),
     ``heard`` (..., sector), ``neighbour`` (..., sector, 2), ``echo`` (..., active), ``echo_range`` (..., active),
     ``echo_position`` (..., active, 2), and where their channels are granted ``compass`` (..., 2), ``link_identity``
-    (..., sector), ``link_velocity`` (..., sector, 2) and those of docs/sea.md. Any of them by ``percept["name"]``;
-    ``percept.names`` lists those there are.
+    (..., sector), ``link_velocity`` (..., sector, 2) and those of docs/scenarios.md. Any of them by
+    ``percept["name"]``; ``percept.names`` lists those there are.
     """
 
     flat: Float32

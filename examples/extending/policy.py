@@ -46,5 +46,5 @@ if __name__ == "__main__":
     while swarm.facts.time_s[0] < 30.0:
         percept = swarm.step(policy.act(percept))
         collisions += swarm.facts.collisions[0]
-    away = np.hypot(*(swarm.facts.centre - swarm.facts.reference[:, :2])[0])
+    away = np.hypot(*(swarm.facts.centre - swarm.facts.reference[:, 0, :2])[0])
     print(f"after 30 s the swarm is {away:.0f} m from the reference point, with {collisions} collisions")

@@ -13,7 +13,7 @@ def close_and_careful(swarm: Swarm) -> NDArray[np.float64]:
 
     ``swarm.state`` and ``swarm.facts`` hold the arrays; ``help(uuv_marl.sim.arrays.Facts)`` explains each.
     """
-    offset = swarm.state.eta[:, :, :2] - swarm.facts.reference[:, None, :2]
+    offset = swarm.state.eta[:, :, :2] - swarm.facts.reference[:, :1, :2]
     distance = np.linalg.norm(offset, axis=-1)
     near = np.minimum(swarm.facts.clearance, swarm.facts.spacing)
     reward = -0.01 * distance - np.clip(1.0 - near / 5.0, 0.0, 1.0) - 10.0 * swarm.facts.contacts

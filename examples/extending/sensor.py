@@ -24,7 +24,7 @@ def turned(percept: Percept, angle: float) -> Percept:
 
 
 class Askew(BioInspiredPlus):
-    """The paper's law in its strongest form, which is told wrong bearings. Any policy can be wrapped so.
+    """The paper's law in its strongest form, which is told wrong bearings. Any policy without memory can be wrapped so.
 
     Args:
         scenario: gives the vehicle's limits.
@@ -36,9 +36,9 @@ class Askew(BioInspiredPlus):
         super().__init__(scenario, num_worlds)
         self._angle = -math.radians(degrees)  # what is ahead of the ship seems to lie to port of the sonar's axis
 
-    def act(self, percept: Percept) -> NDArray[np.float32]:
+    def decide(self, percept: Percept) -> NDArray[np.float32]:
         """Shares of full force and torque, shape (world, vehicle, 2)."""
-        return super().act(turned(percept, self._angle))
+        return super().decide(turned(percept, self._angle))
 
 
 if __name__ == "__main__":

@@ -12,19 +12,15 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.paths import user_path
-from uuv_marl.train.reward import Weights
 from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
-from uuv_marl.train.training import overrides_for
 
 TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
 
 
 def make_env(scenario: str, num_worlds: int) -> VecNormalize:
-    """Worlds in which every vehicle is a row, with the reward that MAPPO here is trained with."""
-    changes = overrides_for(scenario, {})  # a decision every 0.5 s, and a loop that damps the yaw
-    env = SwarmVecEnv(scenario, num_worlds, reward=Weights(), overrides=changes)
+    """Worlds in which every vehicle is a row."""
     # Features of nearness instead of positions, and a short-range barrier: what checkpoints are made for.
-    return VecNormalize(ActorVecEnv(env), norm_obs=False, gamma=0.98)
+    return VecNormalize(ActorVecEnv(SwarmVecEnv(scenario, num_worlds)), norm_obs=False)
 
 
 def train(scenario: str, steps: int, num_worlds: int, seed: int) -> PPO:
@@ -36,7 +32,6 @@ def train(scenario: str, steps: int, num_worlds: int, seed: int) -> PPO:
         n_steps=48,
         batch_size=960,
         n_epochs=4,
-        gamma=0.98,  # a horizon of 25 s
         policy_kwargs={"net_arch": [64, 64], "log_std_init": -1.0},  # noise of 0.37 of the full force at first
         seed=TRAINING_SEEDS + seed,
         device="cpu",
@@ -48,7 +43,7 @@ def train(scenario: str, steps: int, num_worlds: int, seed: int) -> PPO:
 def main() -> None:
     """Train as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenario", default="starter", help="name or TOML file")
+    parser.add_argument("--scenario", default="starter", help="name or TOML file; training_field is the next")
     parser.add_argument("--steps", type=int, default=300_000, help="decisions times vehicles")
     parser.add_argument("--worlds", type=int, default=32)
     parser.add_argument("--seed", type=int, default=0)

@@ -51,7 +51,7 @@ class Softened(BioInspired):
         super().__init__(scenario, num_worlds, gains=gains)
         self.softening = softening
 
-    def act(self, percept: Percept) -> Float32:
+    def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         g, soft, limits = self.gains, self.softening, self.limits
         neighbour, echo = percept["neighbour"].astype(np.float64), percept["echo_position"].astype(np.float64)

@@ -31,14 +31,20 @@ def write_page(folder: Path, rows: Sequence[Row]) -> list[Path]:
         return [page, table, *([draw_fields(drawn, folder / "figures" / "heldout.png")] if drawn else [])]
 
 
-def report(rows: Sequence[Row]) -> str:
-    """The page's text."""
+def tables(rows: Sequence[Row]) -> tuple[str, str]:
+    """How many episodes arrive untouched in each set, and what the episodes on random fields are like."""
     found: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         found.setdefault((row["policy"], row["set"]), []).append(row)
     policies = [name for group in GROUPS.values() for name in group if any(name == policy for policy, _ in found)]
+    return _sets(found, policies), _fields(found, policies)
+
+
+def report(rows: Sequence[Row]) -> str:
+    """The page's text."""
+    sets, fields = tables(rows)
     return Template(read_text("heldout", "story.md")).substitute(
-        first=f"{FIRST:,}", episodes=f"{len(rows):,}", sets=_sets(found, policies), fields=_fields(found, policies)
+        first=f"{FIRST:,}", episodes=f"{len(rows):,}", sets=sets, fields=fields
     )
 
 

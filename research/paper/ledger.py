@@ -198,11 +198,6 @@ def write_ledger(folder: Path, entries: Sequence[Entry], seeds: int) -> list[Pat
     return [data, page]
 
 
-def read_ledger(path: Path) -> list[Entry]:
-    """The rows of a ``ledger.json``."""
-    return [Entry(**row) for row in json.loads(path.read_text(encoding="utf-8"))["entries"]]
-
-
 _KINDS = {
     "number": ("Numbers", "section, quantity, unit, paper, ours, worst, difference, verdict"),
     "claim": ("Sentences", "no., section, the paper says, holds, ours, worst, verdict"),

@@ -20,11 +20,7 @@ with warnings.catch_warnings():
 
     from uuv_marl.envs.benchmarl import SwarmTask
 pytestmark = pytest.mark.filterwarnings("ignore")
-SMALL = {
-    "num_vehicles": 4,
-    "decision_period": 0.5,
-    "overrides": {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0},
-}
+SMALL = {"num_vehicles": 4, "decision_period": 0.5, "overrides": {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}}
 
 
 def experiment(folder, task, algorithm=MappoConfig, seed=100_000):
@@ -105,4 +101,6 @@ def test_the_pages_example_runs(tmp_path, monkeypatch):
     page = Path(__file__).resolve().parents[2] / "docs" / "interfaces.md"
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.S)
     (block,) = [block for block in blocks if "from benchmarl." in block]
+    block, count = re.subn(r"max_n_iters, config.lr = \d+", "max_n_iters, config.lr = 1", block)
+    assert count == 1
     exec(compile(block, page.name, "exec"), {"__name__": "example"})

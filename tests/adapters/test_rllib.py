@@ -26,9 +26,8 @@ with warnings.catch_warnings():
 
 import uuv_marl
 from tests import contract
-from uuv_marl.baselines import make
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.distributed import chunks, connected, evaluate_on_cluster
+from uuv_marl.benchmark.distributed import connected, evaluate_on_cluster
 from uuv_marl.benchmark.results import Results, origin
 from uuv_marl.cli import app
 from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
@@ -119,16 +118,6 @@ def test_a_lost_vehicle_leaves_alone_and_the_time_limit_truncates_the_others():
         assert truncateds == {"__all__": t == len(outcomes) - 1}
 
 
-def test_arrival_terminates_all():
-    overrides = {**contract.ARRIVES, **LOSES}
-    outcomes = play(SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 4, "overrides": overrides}))
-    *_, terminateds, truncateds, _ = outcomes[-1]
-    assert len(terminateds) == 3
-    assert all(terminateds.values())
-    assert truncateds == {"__all__": False}
-    assert not any(outcome[3]["__all__"] for outcome in outcomes[:-1])
-
-
 def test_the_loss_of_everybody_terminates_all():
     env = SwarmMultiAgentEnv({"num_vehicles": 2, "overrides": {"contact.ends_vehicle": True}})
     env.reset(seed=0)
@@ -163,19 +152,6 @@ def test_rllib_accepts_the_environment_and_it_renders():
     assert picture.ndim == 3
     env.close()
     assert SwarmMultiAgentEnv().possible_agents == uuv_marl.parallel_env().possible_agents
-
-
-def test_a_policy_by_name_drives_it():
-    ours, theirs = uuv_marl.parallel_env(num_vehicles=4), SwarmMultiAgentEnv({"num_vehicles": 4})
-    ends = []
-    for env in (ours, theirs):
-        policy = make("bio_inspired", env)
-        observations, _ = env.reset(seed=3)
-        policy.reset(seed=3)
-        for _ in range(20):
-            observations = env.step(policy(observations))[0]
-        ends.append(np.stack(list(observations.values())))
-    assert ends[0].tobytes() == ends[1].tobytes()
 
 
 def config(scenario, seed=100_000):
@@ -216,7 +192,7 @@ def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(joined
 
 
 def test_every_runner_starts_from_its_own_world(joined):
-    algorithm = config("random_field", 123_000).build_algo()
+    algorithm = config("training_field", 123_000).build_algo()
     try:
         algorithm.train()
         fields = algorithm.env_runner_group.foreach_env_runner(
@@ -226,7 +202,7 @@ def test_every_runner_starts_from_its_own_world(joined):
         algorithm.stop()
     expected = []
     for seed in (123_001, 123_002):
-        env = uuv_marl.parallel_env("random_field", num_vehicles=5, overrides=example.TASK)
+        env = uuv_marl.parallel_env("training_field", num_vehicles=5)
         env.reset(seed=seed)
         expected.append(env.swarm.course.obstacles)
     assert sorted(field.tobytes() for field in fields) == sorted(field.tobytes() for field in expected)
@@ -332,14 +308,6 @@ def test_other_code_on_a_node_is_refused(joined, monkeypatch):
             list(evaluate_on_cluster(scenario, "mappo", [0]))
 
 
-def test_chunks_hold_every_seed_once_and_are_enough_for_all_cores():
-    for count, cores in [(1, 2), (20, 2), (100, 3), (10_000, 2), (5, 500)]:
-        parts = chunks(range(count), cores)
-        assert [seed for part in parts for seed in part] == list(range(count))
-        assert len(parts) >= min(count, 4 * cores)
-        assert max(map(len, parts)) <= 32
-
-
 def test_ray_on_one_machine_is_closed_to_others():
     code = (
         "from uuv_marl.benchmark.distributed import connected, ray\n"
@@ -350,18 +318,6 @@ def test_ray_on_one_machine_is_closed_to_others():
     done = subprocess.run([sys.executable, "-c", code], env=clean, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["127.0.0.1", "1", "False"]
     assert done.stderr == ""
-
-
-def test_a_missing_ray_is_explained(tmp_path, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith("uuv_marl.benchmark.distrib")]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "ray", None)
-    done = CliRunner().invoke(app, ["benchmark", "--ray=auto", f"--output={tmp_path / 'out'}"])
-    assert done.exit_code == 2
-    assert "needs ray, which comes with the extra 'distributed': pip install 'uuv_marl[distributed]'" in " ".join(
-        done.output.split()
-    )
-    assert not (tmp_path / "out").exists()
 
 
 def test_the_example_of_the_page_runs(tmp_path):

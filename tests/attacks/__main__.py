@@ -18,10 +18,8 @@ from pathlib import Path
 from tests.attacks import crashes, inputs
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGE = ROOT / "docs" / "reliability.md"
 OUTCOMES = ("accepted", "refused", "unclear", "wrong", "memory", "crash", "hang")
 HANG_S, START_S = 30.0, 300.0
-MARK = "<!-- {} -->"
 
 
 def environment():
@@ -102,7 +100,6 @@ def main():
     parser.add_argument("--share", type=float, default=1.0, help="of the cases, such as 0.1 for a quick look")
     parser.add_argument("--only", nargs="*", default=[], help="kinds of inputs, or crashes")
     parser.add_argument("--case", type=int, help="run this case of --only alone, in this process, with its traceback")
-    parser.add_argument("--write", action="store_true", help=f"put the counts into {PAGE.relative_to(ROOT)}")
     given = parser.parse_args()
     kinds = [kind for kind in inputs.COUNTS if not given.only or kind.__name__ in given.only]
     if given.case is not None:
@@ -111,18 +108,7 @@ def main():
         return
     counts = campaign(kinds, given.seed, given.share)
     crashed = crashes.campaign(given.share) if not given.only or "crashes" in given.only else []
-    text = table(counts, crashed)
-    print(text)
-    if given.write:
-        before, rest = PAGE.read_text().split(MARK.format("counts"))
-        PAGE.write_text(
-            before
-            + MARK.format("counts")
-            + "\n"
-            + text
-            + MARK.format("/counts")
-            + rest.split(MARK.format("/counts"))[1]
-        )
+    print(table(counts, crashed))
     bad = sum(counter[outcome] for counter in counts.values() for outcome in OUTCOMES[2:])
     sys.exit(bad > 0 or any(sum(row[3:]) for row in crashed))
 

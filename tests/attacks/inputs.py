@@ -34,22 +34,8 @@ NUMBERS = (
     2**64, -(2**63), math.inf, -math.inf, math.nan, True, False,
 )  # fmt: skip
 THINGS = (
-    *NUMBERS,
-    None,
-    "",
-    "x",
-    "²",
-    "centre",
-    "active",
-    [],
-    [1],
-    [1, 2],
-    [[1, 2], [3, 4]],
-    {},
-    {"a": 1},
-    "9" * 400,
-    b"x",
-)
+    *NUMBERS, None, "", "x", "²", "centre", "active", [], [1], [1, 2], [[1, 2], [3, 4]], {}, {"a": 1}, "9" * 400, b"x",
+)  # fmt: skip
 
 
 class WrongError(AssertionError):
@@ -323,9 +309,8 @@ def snapshots(rng, folder):
     snapshot = swarm.snapshot()
     name = pick(rng, list(snapshot))
     if rng.random() < 0.3:
-        snapshot[name] = pick(
-            rng, (snapshot[name][:1], snapshot[name].astype(np.int8), np.zeros(0), snapshot[name][..., None])
-        )
+        old = snapshot[name]
+        snapshot[name] = pick(rng, (old[:1], old.astype(np.int8), np.zeros(0), old[..., None]))
     elif snapshot[name].size:
         array = snapshot[name].reshape(-1)
         with warnings.catch_warnings():
@@ -376,16 +361,9 @@ def checkpoints(rng, folder):
         tensors = safetensors.numpy.load(bytes(data))
         meta = json.loads(data[8 : 8 + length])["__metadata__"]
         name = pick(rng, list(tensors))
-        tensors[name] = pick(
-            rng,
-            (
-                tensors[name] * np.float32(np.nan),
-                tensors[name][..., None],
-                tensors[name][:1],
-                tensors[name].astype(np.float64),
-                np.full_like(tensors[name], 1e38),
-            ),
-        )
+        old = tensors[name]
+        forms = (old * np.float32(np.nan), old[..., None], old[:1], old.astype(np.float64), np.full_like(old, 1e38))
+        tensors[name] = pick(rng, forms)
         data = bytearray(safetensors.numpy.save({k: np.ascontiguousarray(v) for k, v in tensors.items()}, meta))
     else:
         tensors = safetensors.numpy.load(bytes(data))

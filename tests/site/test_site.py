@@ -1,6 +1,5 @@
 """The built site is complete, loads nothing from other sites and fits a telephone: make test-docs builds it first."""
 
-import json
 import re
 from importlib.util import find_spec
 from pathlib import Path
@@ -104,46 +103,6 @@ def test_every_module_is_in_the_reference(names):
     modules = (path.relative_to(ROOT) for path in (ROOT / "uuv_marl").rglob("*.py") if "cli" not in path.parts)
     public = {".".join(path.with_suffix("").parts).removesuffix(".__init__") for path in modules}
     assert {name for name in public if "._" not in name} <= names
-
-
-def test_a_compiled_function_shows_its_signature():
-    text = (SITE / "api" / "uuv_marl" / "sim" / "trigonometry" / "index.html").read_text()
-    [name] = BeautifulSoup(text, "html.parser").select('dt[id="uuv_marl.sim.trigonometry.cos_sin"]')
-    assert name.get_text("", strip=True).startswith("uuv_marl.sim.trigonometry.cos_sin(angle:float)")
-
-
-@pytest.mark.parametrize(("word", "found_on"), [
-    ("sonar", "docs/environment"), ("remus", "docs/vehicles"), ("bluerov2", "docs/vehicles"),
-    ("glossari", "README"), ("mappo", "docs/mappo"), ("parallel_env", "docs/interfaces"),
-])  # fmt: skip
-def test_the_search_finds(word, found_on):
-    index = json.loads(re.fullmatch(r"Search\.setIndex\((.*)\)", (SITE / "searchindex.js").read_text())[1])
-    found = (index[kind].get(word, []) for kind in ("terms", "titleterms"))
-    assert found_on in {index["docnames"][k] for one in found for k in ([one] if isinstance(one, int) else one)}
-
-
-@pytest.mark.parametrize(
-    "markdown",
-    [path for path in SHOWN if path.parent.name != "tutorials"],  # what runs draws pictures of its own
-    ids=lambda path: str(path.relative_to(ROOT)),
-)
-def test_a_page_shows_its_pictures(markdown):
-    """That they exist, the test of links says."""
-    text = re.sub(r"^```.*?^```", "", markdown.read_text(), flags=re.M | re.S)
-    pictures = re.findall(r"!\[.*?\]\(([^)]*)\)", text)
-    shown = BeautifulSoup(built(markdown).read_text(), "html.parser").select("article img")
-    for picture, tag in zip(pictures, shown, strict=True):
-        assert Path(unquote(tag["src"])).stem.startswith(Path(picture).stem)
-
-
-def test_a_link_to_a_source_file_shows_it(site):
-    for name in ("examples/extending/policy.py", "uuv_marl/sim/arrays.py", "uuv_marl/scenario/vehicles"):
-        shown = SITE / "source" / f"{name}.html"
-        assert any(link.endswith(f"source/{name}.html") for one in site.values() for link in one.links)
-        path = ROOT / name
-        for file in path.glob("*.toml") if path.is_dir() else [path]:
-            words = re.findall(r"\w+", file.read_text())
-            assert set(words) <= set(re.findall(r"\w+", BeautifulSoup(shown.read_text(), "html.parser").get_text()))
 
 
 def test_a_telephone_shows_every_page_in_its_width_and_asks_for_nothing(tmp_path):

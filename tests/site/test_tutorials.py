@@ -1,6 +1,5 @@
 """The tutorials run from top to bottom, each in a clean folder, and take about as long as they say."""
 
-import itertools
 import os
 import re
 from pathlib import Path
@@ -10,7 +9,6 @@ from myst_nb.core.read import read_myst_markdown_notebook
 from nbclient import NotebookClient
 
 FOLDER = Path(__file__).resolve().parent.parent.parent / "docs" / "tutorials"
-INDEX = FOLDER / "README.md"
 PAGES = sorted(FOLDER.glob("[0-9]*.md"))
 STATED = re.compile(r"^- \*\*Time\*\*: about (\d) minutes? on two cores, of which (\d+) s are compiling", re.MULTILINE)
 GENEROUS = 3.0
@@ -39,23 +37,3 @@ def test_a_tutorial_runs_in_a_clean_folder_and_in_its_time(page, tmp_path):
     notebook, before = read_myst_markdown_notebook(page.read_text()), worked()
     NotebookClient(notebook, timeout=None, resources={"metadata": {"path": str(tmp_path)}}).execute()
     assert worked() - before < GENEROUS * 60.0 * minutes(page)[0]
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_cells_are_short_and_explained(page):
-    cells = read_myst_markdown_notebook(page.read_text()).cells
-    shown = [c for c in cells if c.cell_type == "markdown" or "remove-cell" not in c.metadata.get("tags", [])]
-    kinds = [cell.cell_type for cell in shown]
-    assert kinds[0] == kinds[-1] == "markdown"
-    assert all({one, other} != {"code"} for one, other in itertools.pairwise(kinds))
-    assert all(len(cell.source.splitlines()) < 30 for cell in cells if cell.cell_type == "code")
-
-
-def test_the_index_states_the_same_times():
-    assert len(PAGES) == 6
-    lines = re.findall(r"\]\((\d.*?\.md)\).*?About\s+(\d) minutes?\.$", INDEX.read_text(), re.DOTALL | re.MULTILINE)
-    assert dict(lines) == {page.name: str(minutes(page)[0]) for page in PAGES}
-
-
-def test_all_together_are_quick_once_compiled():
-    assert sum(whole - compiling for whole, compiling in map(minutes, PAGES)) < 6.0

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,8 +97,12 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
 class Policy:
     """Maps the percepts of any number of worlds to actions.
 
-    A subclass defines ``decide``. A subclass with a memory also declares its arrays in ``Memory`` and defines
-    ``remember``; the base class makes, clears, saves and restores these arrays.
+    - A policy defines ``decide(percept)``, which returns actions. Who runs it calls ``act`` once for every decision.
+    - A policy with a memory also declares its arrays in ``Memory`` and defines ``remember(percept, worlds)``, which
+      changes them; ``decide`` reads ``self.memory``. They are made, cleared, saved and restored here.
+    - ``act`` is ``hear`` (remember, once for each time), ``decide``, ``drive`` (to the actuators), in this order.
+    - A filter is a policy with a policy inside: its ``decide`` calls the other's ``hear`` and ``decide`` and changes
+      what comes of it. A training calls ``hear``, lets its actor decide, and calls ``drive``.
 
     Args:
         scenario: gives the vehicle's limits, the decision period and the percept's layout.
@@ -110,7 +114,8 @@ class Policy:
 
     Memory: ClassVar[type[Any] | None] = None
     """Table of what is remembered (``uuv_marl.sim.tables``): a NamedTuple of arrays over world, vehicle, sector and
-    active sub-sector. Zero is nothing: so it starts, and so it is forgotten."""
+    active sub-sector. Zero is nothing: so it starts, and so it is forgotten. An array ``action``, of shape (world,
+    vehicle, 2), is filled with the actions that were taken."""
     channels: ClassVar[tuple[str, ...]] = ()
     """Channels needed beyond the percept, of ``uuv_marl.percept.CHANNELS``. ``modem`` can stand in for ``link``: then
     the link's fields lie where ``at`` says, and ``percept["link_velocity"]`` is not there."""
@@ -120,14 +125,14 @@ class Policy:
     """Full torque of that vehicle [N m], ``literature_185`` where nothing else is said."""
     wishes_force: ClassVar[bool] = False
     """Whether ``decide`` gives a wished force in the body frame, as shares of full thrust and torque
-    (``write_action``). Where the vehicle has a rudder ``act`` then gives thrust and rudder (``steer_by_rudder``); else
-    what ``decide`` gives goes to the actuators as it is."""
+    (``write_action``). Where the vehicle has a rudder ``drive`` then gives thrust and rudder (``steer_by_rudder``);
+    else what ``decide`` gives goes to the actuators as it is."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.name: str = getattr(self, "name", type(self).__name__)
         """The policy's name in messages."""
-        if type(self).act is Policy.act and type(self).decide is Policy.decide:
-            raise PolicyError(f"policy {self.name!r} must define decide(percept), or act(percept) if it has no memory")
+        if type(self).act is not Policy.act or type(self).decide is Policy.decide:
+            raise PolicyError(f"policy {self.name!r} must define decide(percept), and leave act, which calls it, alone")
         if scenario.scale != Scale():
             raise PolicyError(
                 f"{self.name} computes in the paper's units, and scenario {scenario.name!r} is in the scale of "
@@ -150,8 +155,8 @@ class Policy:
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)
         """How often a numerical clamp bound since the reset, shape (world,)."""
         self.active: Bool = np.ones(num_worlds, np.bool_)
-        """Worlds whose actions count, shape (world,), all unless a caller says otherwise; ``act`` may leave the others'
-        zero, to save time, and remembers nothing of them."""
+        """Worlds whose actions count, shape (world,), all unless a caller says otherwise. Nothing of the others is
+        remembered, and ``decide`` may leave their actions zero, to save time."""
         self._time_s: Float64 = np.full(num_worlds, np.nan)
         self._episode = np.zeros(num_worlds, np.uint64)
         sonar = scenario.sonar
@@ -172,15 +177,12 @@ class Policy:
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Forget the past of these worlds (default all); world w draws from ``seed + w``, or one seed for each."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
-        seeds = [own or 0 for own in world_seeds(seed, chosen)]
+        world_seeds(seed, chosen)  # refuses what is no seed
         self.clamps[chosen], self._time_s[chosen] = 0, np.nan
         for array in self.memory:
             array[chosen] = 0
-        self.forget(chosen, seeds)
 
-    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:
-        """Hook: start anew, in these worlds, what is not in ``memory``, such as random streams."""
-
+    @final
     def act(self, percept: Percept) -> Float32:
         """Remember the percept, then decide. Call this method once for every decision.
 
@@ -196,35 +198,14 @@ class Policy:
         Raises:
             PolicyError: the percept is of another swarm; or the policy has a memory and a decision was left out.
         """
-        percept = self.read(percept)
-        action = self.steered(percept, self.wish(percept))
-        if self.Memory is not None:
-            self.acted(action, self.active)
-        return action
-
-    def read(self, percept: Percept) -> Percept:
-        """A percept in the policy's units, as ``hear`` and ``wish`` take it."""
-        return percept if self.reader is None else self.reader.read(percept)
-
-    def wish(self, percept: Percept) -> Float32:
-        """Remember what is perceived, then decide: ``act`` without the way from a wished force to the actuators."""
-        if type(self).decide is Policy.decide:
-            return self.act(percept)
+        if self.reader is not None:
+            percept = self.reader.read(percept)
         self.hear(percept)
-        return self.decide(percept)
+        return self.drive(percept, self.decide(percept))
 
-    def steered(self, percept: Percept, wish: Float32) -> Float32:
-        """Actions from what ``decide`` gave, shape (world, vehicle, 2), which is overwritten."""
-        if self.rudder is not None:
-            steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, wish)
-        return wish
-
+    @final
     def hear(self, percept: Percept) -> None:
-        """Remember what is perceived: the first half of ``act``, for who looks at ``memory`` before deciding.
-
-        Args:
-            percept: of shape (world, vehicle, ...).
-        """
+        """Remember what is perceived, in the policy's units, where it is new: before ``decide``."""
         if self.Memory is not None:
             self.flat(percept)
             self.remember(percept, self._gone_on(percept.clock))
@@ -236,8 +217,18 @@ class Policy:
         """Actions, or wished forces (``wishes_force``), from the percept and ``memory``, which stay as they are."""
         raise NotImplementedError
 
-    def acted(self, action: Float32, worlds: Bool) -> None:
-        """Hook: take into ``memory`` what these worlds' vehicles do, shape (world, vehicle, 2)."""
+    @final
+    def drive(self, percept: Percept, wish: Float32) -> Float32:
+        """The actions for what ``decide`` gave, shape (world, vehicle, 2), which may be overwritten; after it."""
+        if self.rudder is not None:
+            steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, wish)
+        self._taken(wish)
+        return wish
+
+    def _taken(self, action: Float32) -> None:
+        """Remember the actions that are taken, if ``Memory`` has a place for them."""
+        if "action" in getattr(self.Memory, "_fields", ()):
+            self.memory.action[self.active] = action[self.active]
 
     def _gone_on(self, clock: Clock | None) -> Bool:
         """Worlds that have gone on since the latest call, shape (world,); those that were reset are forgotten."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.types import Float32
 
@@ -19,15 +20,15 @@ class Random(Policy):
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         super().__init__(scenario, num_worlds)
-        self._rngs: list[np.random.Generator] = []
+        self._rngs = [np.random.default_rng()] * num_worlds
         self.reset()
 
-    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:
+    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Start the random streams of these worlds; never the stream that the world itself draws from."""
-        if not self._rngs:
-            self._rngs = [np.random.default_rng()] * self.num_worlds
-        for w, seed in zip(worlds, seeds, strict=True):
-            self._rngs[w] = np.random.default_rng((seed, 1))
+        super().reset(seed, worlds)
+        chosen = list(range(self.num_worlds) if worlds is None else worlds)
+        for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
+            self._rngs[w] = np.random.default_rng((own or 0, 1))
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """A copy of all that later decisions depend on, random streams included."""

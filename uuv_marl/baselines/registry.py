@@ -96,7 +96,7 @@ class EnvPolicy:
 
 GUARDED = "guarded:"
 """Prefix of a policy's name that puts it inside the safety filter."""
-OWN = "own:"
+OWN = "own_clock:"
 """Prefix of a policy's name, before all others, that runs it with a decision at every control hold and the inner loop
 that it declares, as it was tuned, where the scenario fixes others for all (``timing.fixed``)."""
 
@@ -110,12 +110,12 @@ class Named(NamedTuple):
 
 
 def parse_policy(name: str) -> Named:
-    """A policy from its name: ``[own:][guarded:]NAME[,key=value ...]``.
+    """A policy from its name: ``[own_clock:][guarded:]NAME[,key=value ...]``.
 
     Args:
         name: NAME is one of ``POLICIES``, the path of a checkpoint, or ``module:Class``; each key is one of the
-            policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter; ``own:`` changes the
-            scenario alone (``granted``).
+            policy's parameters or gains. ``guarded:`` puts the policy inside the safety filter; ``own_clock:`` changes
+            the scenario alone (``granted``).
 
     Raises:
         PolicyError: no policy has that name; the message gives the most similar name.
@@ -175,7 +175,7 @@ def granted(name: str, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels and the inner loop (``inner_loop_nms``) that a policy declares.
 
     Where the scenario fixes the inner loop for all (``timing.fixed``), only the channels, unless the name begins with
-    ``own:``, which also gives the policy a decision at every control hold.
+    ``own_clock:``, which also gives the policy a decision at every control hold.
     If the scenario has ``modem``, a policy that declares ``link`` gets ``modem`` instead. There are two exceptions: a
     policy that declares both, and a trained policy, which knows only the channels of its training.
     """
@@ -235,11 +235,6 @@ def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parame
         return _made(name, kind, scenario, num_worlds, parameters)
     need_granted(name, kind, scenario)
     policy = _made(name, kind, in_own_units(scenario), num_worlds, parameters)
-    if type(policy).act is not Policy.act:
-        raise PolicyError(
-            f"{name} defines act, which can't be converted to the scale of {scenario.vehicle.name} in scenario "
-            f"{scenario.name!r}; define decide instead of act"
-        )
     policy.reader = reader
     return policy
 

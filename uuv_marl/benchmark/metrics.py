@@ -46,7 +46,7 @@ class Measures(TypedDict):
 
 
 class Metrics(Measures, Success):
-    """The metrics of one run; docs/results-format.md defines every key."""
+    """The metrics of one run; docs/benchmark.md defines every key."""
 
     task: NotRequired[dict[str, float | None]]
     """The task's own measures (``uuv_marl.tasks.Task.metrics``); absent in ``follow``, whose own are the others."""

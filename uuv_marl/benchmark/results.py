@@ -60,7 +60,7 @@ class Knowledge(TypedDict):
 
 
 class Content(TypedDict):
-    """What ``results.json`` holds; docs/results-format.md defines every key."""
+    """What ``results.json`` holds; docs/benchmark.md defines every key."""
 
     __pydantic_config__ = ConfigDict(strict=True, extra="forbid")  # pyright: ignore[reportGeneralTypeIssues]
 
@@ -236,7 +236,7 @@ def load_trace(path: UserPath) -> dict[str, Float32]:
     """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
 
     Also ``obstacles`` and ``waypoints``, and for seeds whose routes are kept the fields of ``evaluate.Routes``, as
-    ``route_time_s`` and so on; docs/results-format.md has shapes and units.
+    ``route_time_s`` and so on; docs/benchmark.md has shapes and units.
 
     Raises:
         ResultsError: the file is missing or broken.

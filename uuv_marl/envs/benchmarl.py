@@ -96,6 +96,7 @@ class SwarmTask(Task):
     """
 
     STARTER = None
+    TRAINING_FIELD = None
     SEA_TRIAL = None
     TRACKING = None
     SINGLE_OBSTACLE = None

@@ -41,8 +41,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
         render_options: as for ``uuv_marl.parallel_env``.
         options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
-            ``overrides``, as
-            for ``uuv_marl.parallel_env``.
+            ``overrides``, as for ``uuv_marl.parallel_env``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - SB3's own form

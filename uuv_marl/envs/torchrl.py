@@ -37,8 +37,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         seed: of the first reset, in which world w starts from ``seed + w``; as ``set_seed``.
         device: where the tensors go; the simulation stays on the CPU.
         options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
-            ``overrides``, as
-            for ``uuv_marl.parallel_env``.
+            ``overrides``, as for ``uuv_marl.parallel_env``.
     """
 
     def __init__(

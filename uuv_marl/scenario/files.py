@@ -72,9 +72,7 @@ def load_scenario(
         own = {field: changes.pop(field) for field in list(changes) if field.partition(".")[0] in _OWN}
         for field, value in own.items():
             if field == "vehicle" and isinstance(value, str):
-                data = merged(data, load_vehicle(value))
-                if data["timing"].get("fixed"):  # the loop that it fixes was the other vehicle's
-                    data["actuators"]["yaw_damping_nms"] = 0.0
+                data = _of_vehicle(merged(data, load_vehicle(value)), data)
             else:
                 data["vehicle"] = (left_out(value) if field == "vehicle" else None) or data["vehicle"]
                 assign(data, field, value)
@@ -207,14 +205,22 @@ def _data(scenario: Any) -> dict[str, Any]:
         )
     data: dict[str, Any] = {}
     for file in _layers(path):
-        below = left_out(file.data.get("vehicle"))
+        before, below = data, left_out(file.data.get("vehicle"))
         if below is not None:
-            data["vehicle"] = below
+            data = {**data, "vehicle": below}
         if isinstance(file.data.get("scale"), str) and isinstance(data.get("scale"), dict):
             raise ScenarioError(f"{file.path} extends a scenario that is in scale already; leave scale out")
-        data = merged(data, file.data)
+        data = _of_vehicle(merged(data, file.data), before)
     data.pop("extends", None)
     return {**data, "name": path.stem}
+
+
+def _of_vehicle(data: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+    """Fields and values. With another vehicle than before goes the inner loop that the scenario fixed for that one."""
+    names = [each.get("vehicle", {}).get("name") for each in (before, data)]
+    if data.get("timing", {}).get("fixed") and None not in names and names[0] != names[1]:
+        data["actuators"]["yaw_damping_nms"] = 0.0
+    return data
 
 
 def _frozen(value: Any) -> Any:

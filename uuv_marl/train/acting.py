@@ -89,9 +89,7 @@ class Trims:
 
     def actions(self, output: Float32) -> Float32:
         """Those of the policy, which is told what it did, for a number for each trim."""
-        action = self._policy.steered(self._percept, self._policy.trim(output))
-        self._policy.acted(action, self._policy.active)
-        return action
+        return self._policy.drive(self._percept, self._policy.trim(output))
 
     def snapshot(self) -> Arrays:
         """What is remembered."""

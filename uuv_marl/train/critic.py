@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from uuv_marl.sim.arrays import Float32, Float64
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Float32, Float64
 
 PRIVILEGED_SIZE = 18
 """Entries of it."""

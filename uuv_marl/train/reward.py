@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.sim.arrays import Float64
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Float64
 
 
 class Weights(NamedTuple):

@@ -13,8 +13,8 @@ from uuv_marl.errors import PolicyError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.sim.arrays import Float32
 from uuv_marl.train.training import in_si_units
+from uuv_marl.types import Float32
 
 with extra("sb3", "training with Stable-Baselines3"):
     from stable_baselines3 import PPO

@@ -98,7 +98,7 @@ def _model(policy: Learned, graph: "Graph") -> onnx.ModelProto:
 
 
 def _learned_nodes(g: "Graph", policy: Learned, observation: "Value") -> None:
-    """``Learned.act``: the actions (vehicle, 2), float32, from an observation (vehicle, size), float32."""
+    """``Learned.decide``: the actions (vehicle, 2), float32, from an observation (vehicle, size), float32."""
     card, layers, _ = policy.checkpoint
     flat = observation * policy.layout.scale
     features, barrier = _look(g, flat.double(), policy.layout, card.barrier, policy.limits)

@@ -20,6 +20,7 @@ from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.baselines.steering import wished_velocity
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import SeedLike
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Bool, Float32, Float64
@@ -41,14 +42,16 @@ class Guarded(Filtered):
         self.declare_as(inner)
         super().__init__(scenario, num_worlds, barrier)
 
-    def forget(self, worlds: Sequence[int], seeds: Sequence[int]) -> None:
+    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Reset the policy inside, too."""
-        self.inner.reset(list(seeds), worlds)
+        super().reset(seed, worlds)
+        self.inner.reset(seed, worlds)
 
     def decide(self, percept: Percept) -> Float32:
         """The policy's actions of shape (world, vehicle, 2), changed where they are not safe."""
         self.inner.active = self.active
-        action = self.inner.wish(percept)
+        self.inner.hear(percept)
+        action = self.inner.decide(percept)
         guard_all(
             self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes,
             action,
@@ -56,10 +59,10 @@ class Guarded(Filtered):
         self.clamps[...] = self.inner.clamps
         return action
 
-    def acted(self, action: Float32, worlds: Bool) -> None:
-        """Keep the action that is taken; the policy inside is told too."""
-        super().acted(action, worlds)
-        self.inner.acted(action, worlds)
+    def _taken(self, action: Float32) -> None:
+        """The policy inside is told too."""
+        super()._taken(action)
+        self.inner._taken(action)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Those of the policy inside too."""

@@ -12,7 +12,7 @@ from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.turning import turning_radius
-from uuv_marl.types import Bool, Float32, Float64, Int64
+from uuv_marl.types import Bool, Float64, Int64
 
 TURNS = 8.0
 """Turning radii at l(t)'s speed, at least, in which a vehicle with a rudder closes a distance that is left. By hand."""
@@ -73,7 +73,3 @@ class Filtered(Policy):
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Update the memory from the percept."""
         update_memory(self.flat(percept), self.layout.offsets, worlds, self.model, self.kept_s, self.memory)
-
-    def acted(self, action: Float32, worlds: Bool) -> None:
-        """Keep the action: the memory predicts the vehicle's next place from it."""
-        self.memory.action[worlds] = action[worlds]

@@ -59,4 +59,4 @@ PRESETS = {
     # 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
     "wary": Preset(_LEAD._replace(pull_in_doubt=-0.7, push_in_doubt=1.1), Barrier(obstacle_m=13.7)),
 }
-"""By name. All were found by hand on tuning seeds, ``lead`` and ``wary`` on disturbed ones too (docs/guarded.md)."""
+"""By name. All were found by hand on tuning seeds, ``lead`` and ``wary`` on disturbed ones too (docs/policies.md)."""

@@ -17,7 +17,7 @@ METRICS = (
     "success_share", "safe_share", "done_share", "swarm_success", "vehicles_faulty", "collisions",
     "min_obstacle_distance_m", "min_spacing_m", "centre_error_m", "task_time_s", "effort",
 )  # fmt: skip
-"""What is kept of an episode; docs/results-format.md defines them."""
+"""What is kept of an episode; docs/benchmark.md defines them."""
 DIGITS = ".6g"
 
 
