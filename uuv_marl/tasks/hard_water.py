@@ -116,6 +116,13 @@ class HardWater(Reach):
         grid = scenario.task_numbers.grid()
         return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns}
 
+    @classmethod
+    def longest_s(cls, scenario: Scenario) -> float:
+        """Three times the longest straight way at full speed."""
+        numbers = scenario.task_numbers
+        longest = numbers.length_m[1] + scenario.start.sides(scenario.swarm.num_vehicles)[0]
+        return 3.0 * longest / top_speed(scenario.vehicle, scenario.actuators)
+
     def draw(self, world: int, rng: np.random.Generator) -> Draw:
         """A map that can be passed, turned at random; the start is the scenario's."""
         scenario, memory, made = self.swarm.scenario, self.memory, self.draw_map(rng)
@@ -132,7 +139,7 @@ class HardWater(Reach):
         n = len(eta)
         return Draw(
             (goal,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
-            duration_s=float(memory.best_s[world].max()),
+            duration_s=min(float(memory.best_s[world].max()), self.longest_s(scenario)),
         )  # fmt: skip
 
     def draw_map(self, rng: np.random.Generator) -> Map:

@@ -11,6 +11,7 @@ from uuv_marl.percept import Table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
 from uuv_marl.sim.draw import Draw, usual_draw
+from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
 from uuv_marl.types import Bool, Float64
@@ -94,8 +95,13 @@ class Task:
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:  # noqa: ARG003 - for those who override it
-        """Lengths of axes: of ``group``, ``point`` (corners), ``obstacle`` where unusual, and of those of ``Memory``."""
+        """Lengths of axes: ``group``, ``point`` (corners), ``obstacle`` where unusual, and of those of ``Memory``."""
         return {}
+
+    @classmethod
+    def longest_s(cls, scenario: Scenario) -> float:
+        """The largest ``duration_s`` that ``draw`` gives [s]."""
+        return longest_duration(scenario)
 
     # What an episode starts from, and what moves.
 

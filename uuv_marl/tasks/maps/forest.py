@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from uuv_marl.sim.compiled import compiled
 from uuv_marl.tasks.maps.walls import Kind, Range, Water, joined, uniform
 from uuv_marl.types import Float64
 
@@ -22,15 +23,29 @@ class Forest(Kind):
         drawn = rng.random((_TRIES, 3))
         x, y = low + (high - low) * drawn[:, 0], water.half * (2.0 * drawn[:, 1] - 1.0)
         radius = self.radius_m[0] + (self.radius_m[1] - self.radius_m[0]) * drawn[:, 2]
-        placed = np.zeros((0, 3))
-        for disc in np.stack([x, y, radius], axis=1):
-            away = (placed[:, 0] - disc[0]) ** 2 + (placed[:, 1] - disc[1]) ** 2
-            if (away >= (placed[:, 2] + disc[2] + gap) ** 2).all():
-                placed = np.concatenate([placed, disc[None]])
-                if len(placed) == _MOST:
-                    break
-        return joined(placed)
+        placed = np.zeros((_MOST, 3))
+        num = _plant(np.stack([x, y, radius], axis=1), gap, placed)
+        return joined(placed[:num])
 
     def blocks(self) -> bool:
         """No: between the discs every way is open."""
         return False
+
+
+@compiled
+def _plant(discs: Float64, gap: float, placed: Float64) -> int:
+    """Fill ``placed`` with the discs that keep their gap [m] from all before them; how many were found."""
+    num = 0
+    for k in range(discs.shape[0]):
+        if num == placed.shape[0]:
+            break
+        free = True
+        for m in range(num):
+            dx, dy, near = placed[m, 0] - discs[k, 0], placed[m, 1] - discs[k, 1], placed[m, 2] + discs[k, 2] + gap
+            if dx * dx + dy * dy < near * near:
+                free = False
+                break
+        if free:
+            placed[num, 0], placed[num, 1], placed[num, 2] = discs[k, 0], discs[k, 1], discs[k, 2]
+            num += 1
+    return num

@@ -1,0 +1,123 @@
+"""Hard water: maps are drawn by the seed alone, can be passed, and are what their numbers say."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import label
+
+from uuv_marl import load_scenario
+from uuv_marl.errors import ScenarioError
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.maps import KINDS
+from uuv_marl.tasks.maps.ways import CELL_M, Grid, distances, free_cells, reached
+
+SEEDS = range(8)
+
+
+def water(kind, worlds=1, **changes):
+    return Swarm(load_scenario("hard_water", overrides={"task.kinds": [kind], **changes}), worlds)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_map_can_be_passed_from_each_start_with_its_clearance(kind):
+    """By a second hand: clearances by brute force, connectivity by SciPy's labels."""
+    swarm = water(kind)
+    task, numbers = swarm.task, swarm.task.numbers
+    grid = numbers.grid()
+    x, y = (
+        grid.x + CELL_M * np.arange(grid.rows)[:, None, None], grid.y + CELL_M * np.arange(grid.columns)[None, :, None]
+    )  # fmt: skip
+    for seed in SEEDS:
+        made = task.draw_map(np.random.default_rng(seed))
+        away = np.hypot(x - made.discs[:, 0], y - made.discs[:, 1]) - made.discs[:, 2]
+        free = away.min(axis=2) >= numbers.clearance_m
+        parts, _ = label(free)
+        goal = grid.cell(np.array(made.length), np.array(0.0))
+        swarm.reset(seed)
+        c, s = task.memory.turn[0]
+        north, east = swarm.state.eta[0, :, 0], swarm.state.eta[0, :, 1]
+        starts = parts[grid.cell(c * north + s * east, c * east - s * north)]
+        assert parts[goal] > 0
+        assert kind == made.kind
+        assert (starts > 0).all()
+        assert swarm.facts.clearance.min() >= numbers.start_clear_m
+        assert len(made.discs) < swarm.course.obstacles.shape[1]
+        assert (task.ways() >= swarm.facts.away).all()
+        assert (task.ways() < 3.0 * swarm.facts.away).all()
+
+
+def test_a_map_depends_on_its_seed_alone():
+    changes = {"task.kinds": list(KINDS)}
+    batch = Swarm(load_scenario("hard_water", overrides=changes), 6)
+    batch.reset(40)
+    for w in (0, 3, 5):
+        alone = Swarm(load_scenario("hard_water", overrides=changes))
+        alone.reset(40 + w)
+        for mine, theirs in (
+            (alone.course, batch.course),
+            (alone.state, batch.state),
+            (alone.task.memory, batch.task.memory),
+        ):
+            for name, array in mine._asdict().items():
+                np.testing.assert_array_equal(array[0], theirs._asdict()[name][w], err_msg=name)
+    assert len({int(kind) for kind in batch.task.memory.kind}) > 2
+
+
+def test_free_cells_and_ways_are_those_of_brute_force():
+    grid, rng = Grid(-20.0, -15.0, 30, 25), np.random.default_rng(0)
+    discs = np.concatenate([rng.uniform(-20, 50, (6, 2)), rng.uniform(2, 6, (6, 1))], axis=1)
+    x, y = grid.x + CELL_M * np.arange(30)[:, None, None], grid.y + CELL_M * np.arange(25)[None, :, None]
+    expected = ((x - discs[:, 0]) ** 2 + (y - discs[:, 1]) ** 2 >= (discs[:, 2] + 1.5) ** 2).all(axis=2)
+    free = free_cells(discs, grid, 1.5)
+    np.testing.assert_array_equal(free, expected)
+    parts, _ = label(free)
+    row, column = map(int, np.argwhere(free)[0])
+    np.testing.assert_array_equal(reached(free, row, column), parts == parts[row, column])
+    way = distances(free, row, column)
+    assert (np.isfinite(way) >= (parts == parts[row, column])).all()
+    empty = distances(np.ones_like(free), 15, 12)
+    straight = CELL_M * np.hypot(np.arange(30)[:, None] - 15, np.arange(25)[None, :] - 12)
+    assert (empty >= straight - 1e-9).all()
+    assert (empty <= straight / np.cos(np.radians(13.3)) + 1e-9).all()  # the widest gap between two steps
+
+
+def test_percepts_turn_with_a_map():
+    swarm = water("forest")
+    swarm.reset(3)
+    swarm.state.eta[0, :, :2] *= 0.2
+    before = swarm.observe().flat.copy()
+    angle, shift = 0.7, np.array([40.0, -25.0])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    for places in (swarm.state.eta[0, :, :2], swarm.course.obstacles[0, :, :2], swarm.course.waypoints[0, 0]):
+        places[...] = places @ turn + shift
+    swarm.state.eta[0, :, 2] += angle
+    np.testing.assert_allclose(swarm.observe().flat, before, atol=2e-4)
+
+
+def test_there_is_along_the_free_way():
+    """Behind a wall a vehicle may be near the goal, and is not there."""
+    swarm = water("gate", **{"task.near_m": 60.0})
+    swarm.reset(0)
+    task, goal = swarm.task, swarm.course.waypoints[0, 0, 1]
+    swarm.state.eta[0, :, :2] = goal + 4.0 * np.arange(10)[:, None]
+    swarm.observe()
+    assert task.there().all()
+    task.memory.way[0] += 100.0  # as if all ways were longer
+    assert not task.there().any()
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"task.kinds": ["gates"]}, "task.kinds must name some of pocket, bar, .*got .'gates'."),
+    ({"task.kinds": []}, "task.kinds must name some of"),
+    ({"task.gate.gap_m": [20.0, 10.0]}, r"a range must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
+    ({"task.bar.hole_m": 3.0}, "task.bar.hole_m is unknown"),
+])  # fmt: skip
+def test_numbers_that_can_not_be_are_refused(changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("hard_water", overrides=changes)
+
+
+def test_knobs_that_leave_no_way_are_refused_with_the_remedy():
+    with pytest.raises(
+        ScenarioError, match="of gate, and none can be passed with task.clearance_m = 3; widen the gaps"
+    ):
+        water("gate", **{"task.gate.gap_m": [1.0, 2.0]}).reset(0)
