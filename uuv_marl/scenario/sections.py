@@ -203,6 +203,8 @@ class Contact(Section):
     """Vehicles collide when their centres are closer than twice this; with an obstacle at this surface distance."""
     ends_vehicle: bool
     """Whether a vehicle that collides is lost."""
+    stops: bool
+    """Whether a hull stops at what it meets, with no velocity into it; if not, it passes through."""
 
 
 class Arrival(Section):

@@ -33,6 +33,8 @@ class Rules(NamedTuple):
     """Radius of a hull."""
     contact_ends: bool
     """Whether a vehicle that touches something is lost."""
+    contact_stops: bool
+    """Whether it stands still there."""
     passes: bool
     """Whether the swarm arrives in passage, and l(t) goes on beyond the end (``arrival.by``)."""
     dwell_ticks: int
@@ -71,6 +73,7 @@ def rules(scenario: Scenario) -> Rules:
         steps=timing.steps_per_hold,
         hull=scenario.contact.hull_radius_m,
         contact_ends=scenario.contact.ends_vehicle,
+        contact_stops=scenario.contact.stops,
         passes=passes,
         dwell_ticks=0 if passes else round(arrival.dwell_s / timing.control_hold_s),
         spread=arrival.spread_m * growth(scenario.swarm.num_vehicles),

@@ -16,6 +16,7 @@ from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sea.actuation import is_lost_to_fault
 from uuv_marl.sim.sea.sea import Sea, begin_sea, drift, integrate_at_sea, know, reads, take_readings
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
+from uuv_marl.sim.stopping import stop_hulls
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields, sea_fields
@@ -242,6 +243,8 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
     world.state.tick[w] += 1
     apply_losses(w, world, model.rules, sea)
     move_obstacles(w, world.course, model.rules.hold_s)
+    if model.rules.contact_stops:
+        stop_hulls(w, world, model.rules, model.plant, workspace.now, sea)
     grid = sort_into_cells(w, world, model, workspace)
     began = measure_distances(w, world, model, workspace, grid)
     if model.rules.contact_ends and began > 0:

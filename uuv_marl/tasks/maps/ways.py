@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.types import Bool, Float64, Int64
+from uuv_marl.types import Bool, Float64, Int32, Int64
 
 CELL_M = 2.5
 """Side of a cell [m]. Assumed: fine enough for gaps of 10 m, and a map is drawn in milliseconds."""
@@ -64,7 +64,7 @@ def distances(free: Bool, row: int, column: int) -> Float64:
 
 
 @functools.cache
-def _edges(rows: int, columns: int) -> tuple[Int64, Int64, Float64, Int64]:
+def _edges(rows: int, columns: int) -> tuple[Int64, Int32, Float64, Int32]:
     """All steps on a grid: from, to, length [m], and where those of each cell begin."""
     row, column = np.divmod(np.arange(rows * columns), columns)
     first, second, length = [], [], []

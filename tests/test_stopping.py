@@ -1,0 +1,106 @@
+"""Contacts that hurt: laws of a hull that has run into something."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uuv_marl import load_scenario
+from uuv_marl.sim.swarm import Swarm
+
+STOPS = {"contact.stops": True, "obstacles": [{"centre_m": [0.0, 0.0], "radius_m": 20.0}]}
+STOPS |= {"trajectory.waypoints_m": [[200.0, 0.0], [400.0, 0.0]]}
+NOTHING = np.zeros((1, 2, 2))
+
+
+def two(first, second, *, nu=((0.0, 0.0, 0.0),) * 2, **changes):
+    """Two vehicles at these poses, the disc of 20 m around the origin."""
+    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=2, overrides={**STOPS, **changes}))
+    swarm.reset(0)
+    swarm.state.eta[0], swarm.state.nu[0] = np.array([first, second]), np.array(nu)
+    swarm.observe()
+    return swarm
+
+
+def energy(swarm):
+    """Kinetic energy through the water [J]."""
+    m_11, m_22, m_23, m_33 = swarm.scenario.vehicle.inertia
+    u, v, r = np.moveaxis(swarm.state.nu[0], -1, 0)
+    return 0.5 * float((m_11 * u * u + m_22 * v * v + 2 * m_23 * v * r + m_33 * r * r).sum())
+
+
+def test_a_hull_that_pushes_on_stands_at_the_wall_and_touches_it_once():
+    """Full thrust at a wall for 10 s: no further than a millimetre in, and one contact episode."""
+    swarm = two((-30.0, 0.0, 0.0), (300.0, 0.0, 0.0))
+    contacts = 0
+    for _ in range(100):
+        swarm.step(np.array([[[1.0, 0.0], [0.0, 0.0]]]))
+        contacts += int(swarm.facts.contacts[0, 0])
+        assert swarm.facts.clearance[0, 0] >= 0.998
+    assert contacts == 1
+    assert swarm.state.touched[0].tolist() == [True, False]
+    assert abs(swarm.state.nu[0, 0, 0]) < 1e-9
+    for _ in range(50):  # and it leaves by its own thrust
+        swarm.step(np.array([[[-1.0, 0.0], [0.0, 0.0]]]))
+    assert swarm.facts.clearance[0, 0] > 5.0
+
+
+def test_along_a_wall_a_hull_glides():
+    """The impulse has no component along the surface: that velocity stays, but for drag."""
+    swarm = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    for _ in range(6):
+        swarm.step(NOTHING)
+    assert swarm.state.touched[0, 0]
+    assert swarm.state.nu[0, 0, 0] > 2.0
+
+
+poses = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.1, 3.1))
+speeds = st.tuples(st.floats(-5.0, 5.0), st.floats(-3.0, 3.0), st.floats(-1.0, 1.0))
+
+
+@settings(max_examples=40, deadline=None)
+@given(pose=poses, first=speeds, second=speeds, x_g=st.sampled_from([0.0, 0.1]))
+def test_energy_never_rises_and_two_hulls_keep_their_momentum(pose, first, second, x_g):
+    """Without drag and forces: what two hulls lose in a hold, they lose to each other."""
+    still = dict.fromkeys((f"vehicle.{name}" for name in ("X_u", "Y_v", "N_r")), 0.001)
+    still |= dict.fromkeys((f"vehicle.{name}" for name in ("X_uu", "Y_vv", "N_rr")), 0.0)
+    swarm = two(
+        (300.0 + pose[0], pose[1], pose[2]), (300.0, 0.0, 0.0), nu=(first, second), **still, **{"vehicle.x_G_m": x_g}
+    )
+    before = energy(swarm)
+    for _ in range(10):
+        swarm.step(NOTHING)
+    assert energy(swarm) <= before * (1.0 + 1e-3) + 1e-6  # Runge-Kutta's own share at 0.1 s
+
+
+def test_two_hulls_head_on_share_their_momentum():
+    swarm = two((300.0, 0.0, 0.0), (302.1, 0.0, np.pi), nu=((3.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    swarm.step(NOTHING)
+    ahead = swarm.state.nu[0, 0, 0] * np.cos(swarm.state.eta[0, 0, 2])
+    other = swarm.state.nu[0, 1, 0] * np.cos(swarm.state.eta[0, 1, 2])
+    assert ahead == pytest.approx(other, abs=1e-9)
+    assert 0.7 < ahead < 1.0  # half of 3 - 1, less the drag of 0.1 s
+    assert swarm.facts.contacts[0].tolist() == [1, 1]
+
+
+def test_a_disc_that_drifts_carries_a_hull_along():
+    swarm = two((22.0, 0.0, 0.0), (300.0, 0.0, 0.0))
+    swarm.course.drift[0, 0] = (2.0, 0.0)
+    for _ in range(50):
+        swarm.step(NOTHING)
+        swarm.course.drift[0, 0] = (2.0, 0.0)
+    assert swarm.state.nu[0, 0, 0] == pytest.approx(2.0, abs=0.05)
+    assert swarm.facts.clearance[0, 0] >= 0.99
+
+
+def test_off_is_as_before():
+    on, off = (two((-30.0, 1.0, 0.0), (300.0, 0.0, 0.0), **{"contact.stops": stops}) for stops in (True, False))
+    for k in range(100):
+        for swarm in (on, off):
+            swarm.step(np.array([[[0.7, 0.01], [0.3, 0.1]]]))
+        if off.facts.contacts[0].any():
+            assert k > 5
+            break
+        np.testing.assert_array_equal(on.state.eta, off.state.eta)
+    else:
+        pytest.fail("nothing was touched")
