@@ -40,10 +40,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
 
     Args:
         batch: the worlds.
-        render_mode: ``rgb_array`` or None.
-        info_terms: put the reward's terms into the infos.
-        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED``, or its value.
-        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
+        render_mode, info_terms, autoreset_mode, render_options: as for ``vector_env``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form
@@ -189,9 +186,8 @@ def vector_env(
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
             ``SwarmVectorEnv``.
         options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
-            ``overrides``, as
-            for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each vehicle; the reward of
-            a row is the mean over all vehicles.
+            ``overrides``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each
+            vehicle; the reward of a row is the mean over all vehicles.
     """
     batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

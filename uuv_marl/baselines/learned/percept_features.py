@@ -68,14 +68,9 @@ def put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
 
 @compiled
 def _look(
-    flat: Float32,
-    at: Starts,
-    gains: BioInspiredGains,
-    limits: Limits,
-    features: Float32,
-    barrier: Float32,
+    flat: Float32, at: Starts, gains: BioInspiredGains, limits: Limits, features: Float32, barrier: Float32,
     clamps: Int64,
-) -> None:
+) -> None:  # fmt: skip
     """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do.
 
     ``barrier`` is filled with the force [full force], shape (world, vehicle, 2).
