@@ -168,7 +168,7 @@ class Nan(Policy):
 @pytest.mark.parametrize(
     ("name", "messages"),
     [
-        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in act", "users_own.py:10, in towards"]),
+        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in decide", "users_own.py:10, in towards"]),
         ("Nan", ["policy 'users_own:Nan'", "action", "finite"]),
     ],
 )
