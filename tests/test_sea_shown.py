@@ -92,8 +92,8 @@ def test_a_recording_tells_the_water_at_every_vehicle(sailed):
 def test_a_saved_trace_gives_the_same_water(sailed, tmp_path):
     results = Results(tmp_path, [sailed.scenario])
     runner.run_missing(results, [sailed.scenario], ["idle"], [0], lambda *a: None)
-    told = from_trace(results.trace_path("starter", "idle", 0)).water
-    at = np.searchsorted(sailed.time_s, results.trace("starter", "idle", 0)["route_time_s"] - 1e-4)
+    told = from_trace(results.trace_path("starter_0_1_s", "idle", 0)).water
+    at = np.searchsorted(sailed.time_s, results.trace("starter_0_1_s", "idle", 0)["route_time_s"] - 1e-4)
     np.testing.assert_array_equal(told.drift, sailed.water.drift[at])
     np.testing.assert_array_equal(told.eddies, sailed.water.eddies)
 

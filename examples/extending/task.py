@@ -19,7 +19,7 @@ class Rendezvous(Task):
     """Come within ``near_m`` of the swarm's centre, all of you, without touching. No vehicle perceives a reference."""
 
     class Numbers(Section):
-        near_m: Positive = 20.0
+        near_m: Positive = 10.0
 
     observed: ClassVar[tuple[PerceptField, ...]] = (PerceptField("near", (1,), FLAG, "1 within near_m of the centre"),)
     terms: ClassVar[Mapping[str, str]] = {"away": "-0.01/m for each decision", "collision": "-10 for each"}
