@@ -1,6 +1,5 @@
 """The water and the forces: laws of currents, lags, mismatch and faults. The sonar's are in test_sea_sonar.py."""
 
-import itertools
 import math
 
 import numpy as np
@@ -13,11 +12,11 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
-from uuv_marl.sim.sea.actuation import followed, own_plant, victims
+from uuv_marl.sim.sea.actuation import own_plant, victims
 from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
-from uuv_marl.sim.sea.sea import SEA_CHANNELS
+from uuv_marl.sim.sea.sea import SEA_CHANNELS, sea_tables
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
+from uuv_marl.sim.vehicle import Plant, plant
 
 OPEN = {"obstacles": []}
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
@@ -311,3 +310,10 @@ def test_every_number_of_a_vehicle_has_a_column():
     swarm = swim(MISMATCH, 0)
     swarm._sea.hull.plants[0, 2] = np.arange(len(Plant._fields))
     assert own_plant.py_func(0, 2, swarm._sea.hull) == Plant(*range(len(Plant._fields)))
+
+
+def test_no_array_of_a_swarm_hides_another_of_its_name():
+    """In snapshots: else half of the water is forgotten."""
+    swarm = swim(HEARD, 0)
+    names = [name for table in (*swarm._world, *sea_tables(swarm._sea)) for name in table._fields]
+    assert len(set(names)) == len(names)

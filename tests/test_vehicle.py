@@ -8,7 +8,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from tests.conftest import COUPLED, LIFT, RUDDER
-from tests.oracle.motion import matrices
 from uuv_marl import load_scenario
 from uuv_marl.scenario import ScenarioError, vehicle_checks
 from uuv_marl.sim import vehicle
@@ -95,32 +94,6 @@ def test_damping_never_adds_energy(u, v, r, p):
     d = vehicle.damping((u, v, r), p)
     scale = sum(abs(a * b) for a, b in zip((u, v, r), d, strict=True))
     assert u * d[0] + v * d[1] + r * d[2] >= -1e-12 * scale
-
-
-@given(speed, speed, speed)
-def test_energy_falls_by_what_damping_takes(u, v, r):
-    scenario = load_scenario("tracking", overrides=COUPLED)
-    nu = np.array([u, v, r])
-    m, _, d = matrices(scenario, nu)
-    power = nu @ m @ np.array(vehicle.acceleration((u, v, r), (0.0, 0.0), FULL))
-    assert power == pytest.approx(-nu @ d @ nu, rel=1e-9, abs=1e-6)
-
-
-def test_runge_kutta_converges_at_order_4():
-    # No velocity changes sign on the way: |v| v is smooth only away from zero.
-    start, tau, time = (0.0, 0.0, 0.3, 1.0, -0.5, 0.6), (900.0, 150.0), 1.6
-
-    def end(steps):
-        state = start
-        for _ in range(steps):
-            state = vehicle.advance(state, tau, STILL, time / steps, FULL)
-        return np.array(state)
-
-    exact = end(4096)
-    errors = [np.abs(end(steps) - exact).max() for steps in (16, 32, 64, 128)]
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert (orders > 3.7).all(), orders
-    assert (orders < 4.5).all(), orders
 
 
 @given(speed, speed, speed, st.floats(-3, 3), st.floats(-3, 3), st.floats(-500, 500), st.floats(-500, 500))
