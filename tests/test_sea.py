@@ -1,5 +1,6 @@
 """The water and the forces: laws of currents, lags, mismatch and faults. The sonar's are in test_sea_sonar.py."""
 
+import itertools
 import math
 
 import numpy as np
@@ -12,11 +13,11 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
-from uuv_marl.sim.sea.actuation import own_plant, victims
+from uuv_marl.sim.sea.actuation import followed, own_plant, victims
 from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.sea.sea import SEA_CHANNELS, sea_tables
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.vehicle import Plant, plant
+from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
 
 OPEN = {"obstacles": []}
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
@@ -236,16 +237,6 @@ def test_the_water_at_a_vehicle_is_the_field_there():
 def test_the_exponential_is_the_library_s(x, y):
     assert exp(x) == pytest.approx(math.exp(x), rel=3e-16, abs=1e-300)
     assert decay_mean(y) == pytest.approx(-math.expm1(-y) / y if y else 1.0, rel=1e-12)
-
-
-def test_a_lagging_force_follows_exactly_whatever_the_step():
-    """After t: asked (1 - e^(-t / lag))."""
-    for step in (0.01, 0.1, 0.5):
-        given_, half, whole = 0.0, exp(-0.5 * step / 0.6), exp(-step / 0.6)
-        for _ in range(round(2.0 / step)):
-            start, middle, given_ = followed(3000.0, given_, half, whole)
-            assert middle == pytest.approx(3000.0 + (start - 3000.0) * half)
-        assert given_ == pytest.approx(3000.0 * (1 - math.exp(-2.0 / 0.6)))
 
 
 def test_a_lag_keeps_the_integration_s_fourth_order():
