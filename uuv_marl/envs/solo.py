@@ -58,7 +58,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         **changes: Unpack[Changes],
     ) -> None:
         suited = _suited(others, changed(scenario), changed(scenario, **changes))
-        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe)
+        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
         self._info_terms = info_terms

@@ -189,5 +189,5 @@ def vector_env(
             ``overrides``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each
             vehicle; the reward of a row is the mean over all vehicles.
     """
-    batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), **options)
+    batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

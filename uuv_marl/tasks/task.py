@@ -25,7 +25,7 @@ class Payment(NamedTuple):
     reward: Float64
     """Sum of the terms, shape (world, vehicle)."""
     terms: Float64
-    """The weighted terms in the order of ``Task.terms``, shape (term, world, vehicle)."""
+    """The weighted terms in the order of ``Task.terms``, shape (term, world, vehicle); no world if not kept."""
     pay: Callable[[int, int], None]
     """Fills both for a range of worlds, from its first to its end."""
 
@@ -124,8 +124,8 @@ class Task:
         """What the latest step pays, weighted ``terms`` by name, shape (world, vehicle) each; VMAS: ``reward``."""
         return {}
 
-    def payment(self, name: str, running: Bool) -> Payment | None:  # noqa: ARG002
-        """Compiled pay for a reward by its name; None where ``reward`` is all there is."""
+    def payment(self, name: str, running: Bool, *, kept: bool = True) -> Payment | None:  # noqa: ARG002
+        """Compiled pay for a reward by its name, its terms only if they are ``kept``; None for ``reward`` alone."""
         return None
 
     # When it is done, and well done.
