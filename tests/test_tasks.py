@@ -40,7 +40,7 @@ class TwoWays(Task):
         )
 
     def move(self, running):
-        self.swarm.course.drift[running, 0] = (0.0, 2.0)
+        self.swarm.course.obstacle_velocity[running, 0] = (0.0, 2.0)
 
 
 class Broken(Task):

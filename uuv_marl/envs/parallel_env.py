@@ -34,9 +34,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
 
     Args:
         batch: the simulation, of one world.
-        render_mode: ``human``, ``rgb_array`` or None.
-        info_terms: put the reward's terms into every agent's info.
-        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
+        render_mode, info_terms, render_options: as for ``parallel_env``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form

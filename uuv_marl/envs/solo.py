@@ -109,13 +109,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
 
 
 def _suited(others: str, plain: Scenario, asked: Scenario) -> Scenario:
-    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for.
-
-    Args:
-        others: name of their policy.
-        plain: the scenario before the overrides.
-        asked: the scenario after them.
-    """
+    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for."""
     suited = granted(others, asked)
     remedy = "leave it out, or choose other others"
     heard = suited.sonar.channels

@@ -40,10 +40,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
 
     Args:
         batch: the worlds.
-        render_mode: ``rgb_array`` or None.
-        info_terms: put the reward's terms into the infos.
-        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED``, or its value.
-        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
+        render_mode, info_terms, autoreset_mode, render_options: as for ``vector_env``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form

@@ -187,7 +187,7 @@ class Swarm:
         course.group[w], course.informed[w] = drawn.group, drawn.informed
         self._duration_s[w] = drawn.duration_s
         course.obstacles[w, :m], course.obstacles[w, m:] = drawn.obstacles, 0.0
-        course.num_obstacles[w], course.drift[w] = m, 0.0
+        course.num_obstacles[w], course.obstacle_velocity[w] = m, 0.0
         state.eta[w], state.nu[w] = drawn.eta, drawn.nu
         state.before[w] = state.eta[w, :, :2]
         state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, drawn.obstacles

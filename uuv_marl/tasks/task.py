@@ -109,7 +109,7 @@ class Task:
             array[world] = 0
 
     def move(self, running: Bool) -> None:
-        """Before a step: steer what the policies don't, for instance ``swarm.course.drift``; VMAS: ``pre_step``."""
+        """Before a step: steer what policies don't, such as ``swarm.course.obstacle_velocity``; VMAS: ``pre_step``."""
 
     def update(self, running: Bool) -> None:
         """After a step: remember what later hooks need; VMAS: ``post_step``."""
