@@ -52,9 +52,7 @@ def test_the_papers_inputs_are_the_scenarios():
     assert {entry.verdict for entry in given_entries()} == {"as given"}
 
 
-def ledger_of_nothing():
-    """The ledger of runs that measured nothing."""
-
+def test_a_ledger_of_nothing_claims_nothing():
     class Empty(Suite):
         def metric(self, case, name):
             return np.array([np.nan])
@@ -62,11 +60,7 @@ def ledger_of_nothing():
         def traces(self, case):
             return []
 
-    return ledger(Empty(Path("nowhere"), 1))
-
-
-def test_a_ledger_of_nothing_claims_nothing():
-    rows = ledger_of_nothing()
+    rows = ledger(Empty(Path("nowhere"), 1))
     assert {row.verdict for row in rows if row.kind == "number"} == {"differs"}
     assert {row.verdict for row in rows if row.kind == "claim" and row.ours is None} == {"does not hold"}
 
