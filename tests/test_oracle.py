@@ -44,7 +44,7 @@ for _ in range(8):
     swarm.step(np.full((2, 5, 2), 0.5))
 bits = {name: array.tobytes().hex() for name, array in swarm.snapshot().items()}
 actions = []
-for name in POLICIES:
+for name in () if scenario.current.flows else POLICIES:
     swarm, policy = Swarm(granted(name, scenario)), make(name, granted(name, scenario))
     policy.reset(0)
     actions.append(policy.act(swarm.reset(0)).tolist())

@@ -13,7 +13,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
-from uuv_marl.sim.sea.actuation import followed, own_plant, victims
+from uuv_marl.sim.sea.actuation import followed, victims
 from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.sea.sea import SEA_CHANNELS, sea_tables
 from uuv_marl.sim.swarm import Swarm
@@ -295,12 +295,6 @@ def test_faults_act_from_their_onset_for_their_duration():
             assert thrust[i] == (750.0 if i in victim[0] and hold >= 10 else 1500.0)
             assert (torque[i] == 0.0) == (i in victim[1] and 5 <= hold < 15)
         assert set(np.flatnonzero(~swarm.state.alive[0])) == (victim[2] if hold >= 19 else set())
-
-
-def test_every_number_of_a_vehicle_has_a_column():
-    swarm = swim(MISMATCH, 0)
-    swarm._sea.hull.plants[0, 2] = np.arange(len(Plant._fields))
-    assert own_plant.py_func(0, 2, swarm._sea.hull) == Plant(*range(len(Plant._fields)))
 
 
 def test_no_array_of_a_swarm_hides_another_of_its_name():

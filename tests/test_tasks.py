@@ -187,7 +187,8 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
 @pytest.mark.parametrize("library", ["gymnasium", "stable_baselines3", "torchrl"])
 def test_a_users_task_runs_in_other_libraries(library):
     pytest.importorskip(library)
-    how = {"scenario": "starter", "num_vehicles": 4, "task": EXAMPLE, "overrides": {"time_limit.factor": 0.1}}
+    apart = {"name": EXAMPLE, "near_m": 0.5}  # never all there
+    how = {"scenario": "starter", "num_vehicles": 4, "task": apart, "overrides": {"time_limit.factor": 0.1}}
     if library == "gymnasium":
         import gymnasium
 
