@@ -29,7 +29,7 @@ class TwoWays(Task):
     def sizes(cls, scenario):
         return {"group": 2}
 
-    def draw(self, rng):
+    def draw(self, world, rng):
         drawn = usual_draw(self.swarm.scenario, rng)
         n = len(drawn.eta)
         return drawn._replace(
@@ -41,6 +41,13 @@ class TwoWays(Task):
 
     def move(self, running):
         self.swarm.course.obstacle_velocity[running, 0] = (0.0, 2.0)
+
+
+class Endless(Task):
+    """Draws a longer way than it says."""
+
+    def draw(self, world, rng):
+        return usual_draw(self.swarm.scenario, rng)._replace(duration_s=1e4)
 
 
 class Broken(Task):
@@ -151,6 +158,12 @@ def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
     env.reset(seed=0)
     with pytest.raises(RewardError, match="reward of Broken must give the terms one, got two"):
         env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+
+
+def test_a_task_may_draw_no_longer_way_than_it_says():
+    env = uuv_marl.parallel_env("starter", task=f"{__name__}:Endless")
+    with pytest.raises(ValueError, match="drew duration_s = 10000, and its longest_s gives 30; override longest_s"):
+        env.reset(seed=0)
 
 
 def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():

@@ -25,9 +25,9 @@ class Rendezvous(Task):
     terms: ClassVar[Mapping[str, str]] = {"away": "-0.01/m for each decision", "collision": "-10 for each"}
     columns: ClassVar[Mapping[str, str]] = {"spread_m": "mean distance from the centre at the end [m]"}
 
-    def draw(self, rng: np.random.Generator) -> Draw:
-        drawn = super().draw(rng)
-        return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)), duration_s=60.0)
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+        drawn = super().draw(world, rng)
+        return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)))
 
     def _away(self) -> Floats:
         return np.hypot(*np.moveaxis(self.swarm.state.eta[:, :, :2] - self.swarm.facts.centre[:, None], -1, 0))

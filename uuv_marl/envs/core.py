@@ -14,7 +14,6 @@ from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
-from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.task import Payment, Task, paid
 from uuv_marl.types import Bool, Float32, Float64
@@ -118,7 +117,7 @@ class BatchedEnv:
     def longest_episode(self) -> int:
         """Decisions after which any episode of the scenario is over."""
         scenario = self.swarm.scenario
-        seconds = scenario.time_limit.of(longest_duration(scenario))
+        seconds = scenario.time_limit.of(self.task.longest_s(scenario))
         cycles = math.ceil(seconds / scenario.timing.decision_period_s)
         return min(cycles, self.max_cycles or cycles)
 

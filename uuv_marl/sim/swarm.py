@@ -177,7 +177,14 @@ class Swarm:
 
     def _reset_world(self, w: int, rng: np.random.Generator) -> None:
         self._rngs[w], self.keys[w] = rng, episode_key(rng)
-        drawn: Draw = self.task.draw(rng)
+        for array in self._task_memory.values():
+            array[w] = 0
+        drawn: Draw = self.task.draw(w, rng)
+        if drawn.duration_s > (longest := self.task.longest_s(self.scenario)) + 1e-9:
+            raise ValueError(
+                f"task {self.scenario.task.name!r} drew duration_s = {drawn.duration_s:g}, and its longest_s gives "
+                f"{longest:g}; override longest_s, so that every episode ends in time"
+            )
         state, course, m = self.state, self.course, len(drawn.obstacles)
         for g, (waypoints, times) in enumerate(zip(drawn.waypoints, drawn.times, strict=True)):
             points = len(waypoints)

@@ -50,9 +50,9 @@ class Reach(Task):
         super().__init__(swarm)
         self._weight, self._limits = swarm.scenario.reward, swarm.scenario.constraints
 
-    def draw(self, rng: np.random.Generator) -> Draw:
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:
         """As the scenario says, but l(t) rests at the end all along."""
-        drawn = super().draw(rng)
+        drawn = super().draw(world, rng)
         return drawn._replace(times=tuple(np.zeros_like(times) for times in drawn.times))
 
     def reward(self, running: Bool) -> Terms:

@@ -11,6 +11,7 @@ from uuv_marl.percept import Table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
 from uuv_marl.sim.draw import Draw, usual_draw
+from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
 from uuv_marl.types import Bool, Float64
@@ -88,25 +89,28 @@ class Task:
     def __init__(self, swarm: Swarm) -> None:
         self.swarm = swarm
         self.numbers: Any = swarm.scenario.task_numbers
-        sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles}
+        sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles, **self.sizes(swarm.scenario)}
         self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
         """What is remembered, the arrays of ``Memory``."""
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:  # noqa: ARG003 - for those who override it
-        """Lengths of axes that differ from the usual: ``group``, ``point`` (corners of a trajectory), ``obstacle``."""
+        """Lengths of axes: ``group``, ``point`` (corners), ``obstacle`` where unusual, and of those of ``Memory``."""
         return {}
 
     # What an episode starts from, and what moves.
 
-    def draw(self, rng: np.random.Generator) -> Draw:
-        """What one world starts from, drawn from its own generator; VMAS: ``make_world``, ``reset_world_at``."""
+    @classmethod
+    def longest_s(cls, scenario: Scenario) -> float:
+        """The largest ``duration_s`` that ``draw`` gives [s]."""
+        return longest_duration(scenario)
+
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:  # noqa: ARG002
+        """What a world starts from, drawn from its own generator; ``memory`` is cleared. VMAS: ``reset_world_at``."""
         return usual_draw(self.swarm.scenario, rng)
 
     def begin(self, world: int) -> None:
-        """A world was reset: forget what was remembered of it, and look at how it stands."""
-        for array in self.memory:
-            array[world] = 0
+        """A world was reset: look at how it stands, and remember what later hooks need."""
 
     def move(self, running: Bool) -> None:
         """Before a step: steer what policies don't, such as ``swarm.course.obstacle_velocity``; VMAS: ``pre_step``."""
