@@ -10,6 +10,7 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,8 @@ SETS = {name: (name, {}) for name in ("tracking", "single_obstacle", "multi_obst
     for end, changes in all_changes.items()
 }  # fmt: skip
 """Scenario and changed fields of what episodes are run on, by name."""
+REWARD: Any = "sparse" if find_spec("uuv_marl.tasks") else "individual"
+"""The reward that both versions have, under its name in each."""
 SEED, MOST_AGENT_STEPS = 10_000, 30_000
 """The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
@@ -94,7 +97,7 @@ def parallel(scenario: str, policy: str, reward: Any) -> str:
 
 def vector(scenario: str) -> str:
     """Four worlds through ``vector_env``, random actions, with resets in the same step."""
-    envs, rng = uuv_marl.vector_env(4, scenario, max_cycles=40), np.random.default_rng(SEED)
+    envs, rng = uuv_marl.vector_env(4, scenario, max_cycles=40, reward=REWARD), np.random.default_rng(SEED)
     hashed = [digest(envs.reset(seed=SEED)[0])]
     for _ in range(100):
         *told, infos = envs.step(rng.uniform(-1.0, 1.0, envs.action_space.shape or ()).astype(np.float32))
@@ -136,8 +139,8 @@ def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any
         scenario = load_scenario(base, overrides=changes)
         yield "episodes", name, episodes, (scenario, policy, SEED + zlib.crc32(name.encode()) % 80_000)
     for name in SCENARIOS:
-        yield "parallel_env", f"{name} bio_inspired", parallel, (name, "bio_inspired", "individual")
-        yield "parallel_env", f"{name} random", parallel, (name, "random", "team")
+        yield "parallel_env", f"{name} bio_inspired", parallel, (name, "bio_inspired", REWARD)
+        yield "parallel_env", f"{name} random", parallel, (name, "random", REWARD)
         yield "vector_env", name, vector, (name,)
     for policy in POLICIES:
         yield "benchmark", policy, reported, (policy,)

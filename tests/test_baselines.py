@@ -72,22 +72,6 @@ def test_the_controller_is_equations_18_to_22(seed):
         np.testing.assert_allclose(action[0, i], written_as_in_the_paper(mine, GAINS, policy.limits), atol=1e-5)
 
 
-@pytest.mark.parametrize(("hold", "tolerance"), [(0.02, 0.01), (0.1, 0.8)])
-def test_a_lone_vehicle_lags_by_drag_over_zeta_l(hold, tolerance):
-    """Exactly so where the force is renewed often; at t_r = 0.1 s the vehicle weaves and trails a little more."""
-    clocks = dict.fromkeys(("control_hold_s", "integration_step_s", "decision_period_s"), hold)
-    overrides = {f"timing.{clock}": value for clock, value in clocks.items()}
-    overrides["trajectory.waypoints_m"] = [[0.0, 0.0], [4000.0, 0.0]]
-    scenario = load_scenario("tracking", num_vehicles=1, overrides=overrides)
-    swarm, policy = Swarm(scenario), make("bio_inspired", scenario)
-    percept = swarm.reset(0)
-    while swarm.facts.time_s[0] < 400.0:
-        percept = swarm.step(policy.act(percept))
-    drag = (70.0 + 100.0 * 4.0) * 4.0
-    lag = swarm.facts.reference[0, 0, 0] - swarm.state.eta[0, 0, 0]
-    assert lag == pytest.approx(drag / 30.0, abs=tolerance)  # 62.7 m
-
-
 @pytest.mark.parametrize("name", [*(name for name in POLICIES if name != "random"), "guarded:mappo"])
 def test_forces_turn_with_the_world(name):
     """Body-frame actions don't change, up to float32, when the world is rotated and moved."""

@@ -99,12 +99,9 @@ def test_the_lattices_force_is_the_gradient_of_its_potential(distance, a, b, uni
 def test_neighbours_repel_within_the_spacing_and_attract_beyond(a, b, spacing):
     gains = FLOCK._replace(attraction=a, repulsion=b, spacing=spacing)
     assert olfati_saber.neighbour_attraction(spacing, gains) == pytest.approx(0.0, abs=1e-6 * (a + b))
-    assert (
-        olfati_saber.neighbour_attraction(0.9 * spacing, gains)
-        < 0
-        < olfati_saber.neighbour_attraction(1.1 * spacing, gains)
-    )
-    assert olfati_saber.neighbour_attraction(1.5 * spacing, gains) == 0.0
+    near, far, beyond = (olfati_saber.neighbour_attraction(share * spacing, gains) for share in (0.9, 1.1, 1.5))
+    assert near < 0.0 < far
+    assert beyond == 0.0
     assert -b < olfati_saber.phi_alpha(0.0, gains) < 0.0
 
 

@@ -12,7 +12,8 @@ EXAMPLES = sorted((FOLDER / "extending").glob("*.py"))
 
 @pytest.mark.parametrize(("path", "says"), [
     ("policy", "after 30 s the swarm is"), ("reward", "all vehicles together were paid"),
-    ("vehicle", "slow: arrived after"), ("water", "m/s east: arrival"), ("sensor", "20 deg askew: arrived after"),
+    ("task", "gathered"), ("vehicle", "slow: arrived after"), ("water", "m/s east: arrival"),
+    ("sensor", "20 deg askew: arrived after"),
 ])  # fmt: skip
 def test_an_example_runs(path, says):
     file = next(example for example in EXAMPLES if example.stem == path)

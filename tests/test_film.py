@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.scene import TRAIL_S
@@ -16,7 +17,7 @@ from uuv_marl.replay.scenes import Scenes
 
 @pytest.fixture(scope="module")
 def starter():
-    return [record(load_scenario("starter"), policy, 0, inspect=(1,)) for policy in ("bio_inspired", "sff")]
+    return [record(load_scenario(STARTER), policy, 0, inspect=(1,)) for policy in ("bio_inspired", "sff")]
 
 
 @pytest.fixture(scope="module")

@@ -59,13 +59,6 @@ def test_with_a_lead_what_is_wanted_acts_after_one_period(lag_s, share, wanted, 
     assert lead(0, 0, 1, wanted, 0.0, component.kept) == wanted, "no lead asks for what is wanted"
 
 
-def test_what_a_lead_asks_of_actuators_that_answer_at_once_is_what_is_wanted():
-    kept = room()
-    for asked in np.random.default_rng(0).uniform(-1.0, 1.0, 50):
-        identify(0, 0, 1, asked, 0.0, PERIOD_S, kept)
-    assert lead(0, 0, 1, 0.3, 1.0, kept) == pytest.approx(0.3, abs=1e-12)
-
-
 @pytest.mark.parametrize(
     ("overrides", "least"),
     [

@@ -320,13 +320,12 @@ def test_a_reward_of_ones_own_is_learned_from(tmp_path, no_validation, monkeypat
             list(train(tmp_path / name, small(steps=1, reward=name)))
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_the_starter_scenario_is_learned_in_seconds(seed, tmp_path):
+def test_the_starter_scenario_is_learned_in_seconds(tmp_path):
     """From nothing to arrival, whatever the seed and the processor.
 
     All of five seeds were seen to arrive in 20 of 20 episodes, at most 3 s after l(t); with half of the steps none did.
     """
-    list(train(tmp_path / "a", Training(scenario="starter", sizes=((5, 40),), steps=400_000, seed=seed)))
+    list(train(tmp_path / "a", Training(scenario="starter", sizes=((5, 40),), steps=400_000)))
     policy = str(tmp_path / "a" / "best")
     runs = evaluate(granted(policy, load_scenario("starter")), policy, range(10))
     times = [event.metrics["task_time_s"] for event in runs if isinstance(event, Run)]
@@ -386,9 +385,7 @@ def episode(**changes):
 def test_costs_by_hand():
     assert validation_cost(episode()) == 0.5
     assert validation_cost(episode(task_time_s=None)) == 2.0
-    assert (
-        validation_cost(episode(collisions=7, min_obstacle_distance_m=6.5, min_spacing_m=3.25)) == 0.5 + 2.0 + 0.5 + 0.5
-    )
+    assert validation_cost(episode(collisions=7, min_obstacle_distance_m=6.5, min_spacing_m=3.25)) == 3.5
     result = validation_result([episode(), episode(task_time_s=None, min_obstacle_distance_m=20.0, collisions=2)])
     assert result == (-2.25, 0.5, 2, 30.0, 6.5, 20.0)
 

@@ -52,9 +52,7 @@ def test_the_papers_inputs_are_the_scenarios():
     assert {entry.verdict for entry in given_entries()} == {"as given"}
 
 
-def ledger_of_nothing():
-    """The ledger of runs that measured nothing."""
-
+def test_a_ledger_of_nothing_claims_nothing():
     class Empty(Suite):
         def metric(self, case, name):
             return np.array([np.nan])
@@ -62,11 +60,7 @@ def ledger_of_nothing():
         def traces(self, case):
             return []
 
-    return ledger(Empty(Path("nowhere"), 1))
-
-
-def test_a_ledger_of_nothing_claims_nothing():
-    rows = ledger_of_nothing()
+    rows = ledger(Empty(Path("nowhere"), 1))
     assert {row.verdict for row in rows if row.kind == "number"} == {"differs"}
     assert {row.verdict for row in rows if row.kind == "claim" and row.ours is None} == {"does not hold"}
 
@@ -83,21 +77,11 @@ def test_data_are_the_same_bytes_again_and_figures_come_from_them(made, tmp_path
     parts = ["figure-9", "figure-11", "table-2"]
     job.reproduce(tmp_path, 1, parts, lambda what, share: None)
     again = sorted((tmp_path / "data").glob("*.csv"))
-    assert [path.name for path in again] == [
-        "figure-11a.csv",
-        "figure-11b.csv",
-        "figure-9a.csv",
-        "figure-9b.csv",
-        "figure-9c.csv",
-        "table-2.csv",
-    ]
+    assert [path.stem for path in again] == ["figure-11a", "figure-11b", *(f"figure-9{k}" for k in "abc"), "table-2"]
     for path in again:
         assert path.read_bytes() == (made / "data" / path.name).read_bytes()
     for part in parts:
         assert (tmp_path / "figures" / f"{part}.png").read_bytes() == (made / "figures" / f"{part}.png").read_bytes()
-
-
-# What each sentence is tested against: swarms for which it is false.
 
 
 def test_eq_24_as_printed_is_of_first_order_and_ours_of_fourth():

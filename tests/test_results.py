@@ -168,7 +168,7 @@ class Nan(Policy):
 @pytest.mark.parametrize(
     ("name", "messages"),
     [
-        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in act", "users_own.py:10, in towards"]),
+        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in decide", "users_own.py:10, in towards"]),
         ("Nan", ["policy 'users_own:Nan'", "action", "finite"]),
     ],
 )
@@ -252,9 +252,7 @@ def test_the_page_of_the_format_has_every_key_and_array(tmp_path):
     assert keys("`results.json`") == set(Content.__annotations__) - {"__pydantic_config__"}
     assert keys("A policy") == set(Knowledge.__annotations__)
     assert keys("A run") == set(ResultRow._fields)
-    assert (
-        keys("Metrics") == set(Metrics.__annotations__) == {*results.rows[0].metrics, "task"}
-    )  # that of follow has none
+    assert keys("Metrics") == set(Metrics.__annotations__) == {*results.rows[0].metrics, "task"}  # follow has none
     assert set(Shares.__annotations__) == set(results.rows[0].metrics["constraint_share"])
     for share in Shares.__annotations__:
         assert f"`{share}`" in PAGE.read_text()

@@ -45,10 +45,8 @@ class Puppets:
         scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"arrival.dwell_s": 0.3, **overrides})
         self.batch, self.n = BatchedEnv(scenario, reward=reward), n
         self.batch.reset(0)
-        self.swarm, self.end = (
-            self.batch.swarm,
-            self.batch.swarm.course.waypoints[0, 0, self.batch.swarm.course.last[0, 0]],
-        )
+        self.swarm, course = self.batch.swarm, self.batch.swarm.course
+        self.end = course.waypoints[0, 0, course.last[0, 0]]
         self.paid = np.zeros(n)
 
     def put(self, offset, tick=2000):
@@ -150,11 +148,16 @@ def test_the_mean_does_not_depend_on_the_number_of_vehicles(task):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_terms_are_those_documented_and_sum_to_the_reward(task):
-    env = uuv_marl.parallel_env("starter", task=task, info_terms=True)
+def test_terms_are_those_documented_and_sum_to_the_reward_whose_mean_the_team_has(task):
+    env, team = (
+        uuv_marl.parallel_env("starter", task=task, **own) for own in ({"info_terms": True}, {"reward": "team"})
+    )
     env.reset(seed=0)
+    team.reset(seed=0)
     for _ in range(20):
-        _, rewards, *_, infos = env.step({agent: np.ones(2, np.float32) for agent in env.agents})
+        action = dict.fromkeys(env.agents, np.ones(2, np.float32))
+        _, rewards, *_, infos = env.step(action)
+        assert list(team.step(action)[1].values()) == pytest.approx(len(rewards) * [np.mean(list(rewards.values()))])
         for agent, info in infos.items():
             assert list(info["reward_terms"]) == list(TASKS[task].terms)
             assert sum(info["reward_terms"].values()) == pytest.approx(rewards[agent], abs=1e-12)

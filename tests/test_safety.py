@@ -132,7 +132,7 @@ def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
     assert policy.barrier.obstacle_m == 9.0
     with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"):
         make("guarded:bio_inspired,barrier=5", scenario)
-    with pytest.raises(PolicyError, match="names the filter twice"):
+    with pytest.raises(PolicyError, match="has a prefix too many"):
         make("guarded:guarded:bio_inspired", scenario)
     guarded = make("guarded:sff", granted("guarded:sff", scenario))
     with pytest.raises(PolicyError, match=r"the snapshot's inner\.identity must be"):

@@ -50,25 +50,6 @@ def test_every_number_of_a_scenario_has_a_dimension():
     assert [name for name in sorted(names) if dimension(name) is None] == []
 
 
-@pytest.mark.parametrize(
-    ("field", "unit"),
-    [
-        ("X_u", "kg/s"), ("X_uu", "kg/m"), ("Y_r", "kg m/s"), ("N_v", "kg m/s"), ("N_r", "kg m2/s"), ("Y_rr", "kg m"),
-        ("N_rr", "kg m2"), ("Y_uv", "kg/m"), ("Y_ur", "kg"), ("N_uv", "kg"), ("N_ur", "kg m"), ("Y_uud", "kg/m"),
-        ("N_uud", "kg"), ("yaw_damping_nms", "kg m2/s"), ("max_torque_nm", "kg m2/s2"), ("eddies", ""),
-        ("turn_max_deg", ""), ("tracking", "1/s"), ("variation_time_s", "s"),
-    ],
-)  # fmt: skip
-def test_a_fields_dimension_is_that_of_its_unit(field, unit):
-    """Units of the vehicles' files, which were written by hand from the sources."""
-    above, _, below = unit.partition("/")
-    exponents = {"m": 0, "s": 0, "kg": 0}
-    for text, sign in ((above, 1), (below, -1)):
-        for symbol, power in re.findall(r"(kg|m|s)(\d?)", text):
-            exponents[symbol] += sign * int(power or 1)
-    assert dimension(field) == (exponents["m"], exponents["s"], exponents["kg"])
-
-
 # --- The rule ---
 
 

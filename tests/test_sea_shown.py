@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.golden import STARTER
 from tests.test_replay_page import node
 from uuv_marl import load_scenario
 from uuv_marl.benchmark import runner
@@ -27,7 +28,7 @@ FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
 
 def carried(decisions=30):
     """The same actions in still water and in a current, which moves no bit of headings and velocities through it."""
-    swarms = [Swarm(load_scenario("starter", overrides=change)) for change in ({"obstacles": []}, CURRENT)]
+    swarms = [Swarm(load_scenario(STARTER, overrides=change)) for change in ({"obstacles": []}, CURRENT)]
     for swarm in swarms:
         swarm.reset(3)
         rng = np.random.default_rng(7)
@@ -47,7 +48,7 @@ def turned(vector, swarm):
 
 def test_traces_and_recordings_hold_the_velocity_over_ground():
     """Vehicles that do nothing end up with the water, at rest relative to it."""
-    scenario = load_scenario("starter", overrides=CURRENT)
+    scenario = load_scenario(STARTER, overrides=CURRENT)
     (run,) = [event for event in evaluate(scenario, "idle", [0]) if isinstance(event, Run)]
     np.testing.assert_allclose(run.routes.velocity[-1], np.tile(FLOW, (5, 1)), atol=0.01)
     step = np.diff(run.routes.position[-3:-1], axis=0)[0] / np.diff(run.routes.time_s[-3:-1])
@@ -73,7 +74,7 @@ SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0}
 
 @pytest.fixture(scope="module")
 def sailed():
-    return record(load_scenario("starter", overrides=WATER | SHORT), "idle", 0)
+    return record(load_scenario(STARTER, overrides=WATER | SHORT), "idle", 0)
 
 
 def test_a_recording_tells_the_water_at_every_vehicle(sailed):
@@ -85,14 +86,14 @@ def test_a_recording_tells_the_water_at_every_vehicle(sailed):
         swarm.step(np.zeros((1, 5, 2)))
     np.testing.assert_allclose(field.at(swarm.state.eta[0, :, :2]), swarm.flow[0], atol=1e-6)
     assert len(np.unique(sailed.water.drift, axis=0)) > 40
-    assert record(load_scenario("starter", overrides=SHORT), "idle", 0).water is None
+    assert record(load_scenario(STARTER, overrides=SHORT), "idle", 0).water is None
 
 
 def test_a_saved_trace_gives_the_same_water(sailed, tmp_path):
     results = Results(tmp_path, [sailed.scenario])
     runner.run_missing(results, [sailed.scenario], ["idle"], [0], lambda *a: None)
-    told = from_trace(results.trace_path("starter", "idle", 0)).water
-    at = np.searchsorted(sailed.time_s, results.trace("starter", "idle", 0)["route_time_s"] - 1e-4)
+    told = from_trace(results.trace_path("starter_0_1_s", "idle", 0)).water
+    at = np.searchsorted(sailed.time_s, results.trace("starter_0_1_s", "idle", 0)["route_time_s"] - 1e-4)
     np.testing.assert_array_equal(told.drift, sailed.water.drift[at])
     np.testing.assert_array_equal(told.eddies, sailed.water.eddies)
 

@@ -109,16 +109,6 @@ def test_readings_that_are_neither_late_nor_wrong_move_no_bit():
 # --- Late ---
 
 
-@pytest.mark.parametrize("every", [1.0, 1.5, 2.5, 1.4999999999999998, 1.0 / 0.7, 7.0, 13.37])
-def test_an_array_reads_at_the_control_holds_nearest_to_its_times(every):
-    holds = [math.floor(m * every + 0.5) for m in range(400)]
-    assert [hold_of(m, every) for m in range(400)] == holds
-    for hold in range(int(300 * every)):
-        assert latest(hold, every) == max(m for m in range(400) if holds[m] <= hold)
-        assert due(hold, every, 0, 1) == (holds.index(hold) if hold in holds else -1)
-    assert latest(-1, every) == -1
-
-
 @pytest.mark.parametrize(("every", "delay", "holds"), [*itertools.product([1.0, 2.5, 7.0], [0, 1, 3, 20], [1, 5])])
 def test_the_readings_taken_are_those_that_a_decision_sees(every, delay, holds):
     seen = {latest(decision - delay, every) for decision in range(0, 600, holds)} - {-1}

@@ -85,10 +85,10 @@ def test_two_hulls_head_on_share_their_momentum():
 
 def test_a_disc_that_drifts_carries_a_hull_along():
     swarm = two((22.0, 0.0, 0.0), (300.0, 0.0, 0.0))
-    swarm.course.drift[0, 0] = (2.0, 0.0)
+    swarm.course.obstacle_velocity[0, 0] = (2.0, 0.0)
     for _ in range(50):
         swarm.step(NOTHING)
-        swarm.course.drift[0, 0] = (2.0, 0.0)
+        swarm.course.obstacle_velocity[0, 0] = (2.0, 0.0)
     assert swarm.state.nu[0, 0, 0] == pytest.approx(2.0, abs=0.05)
     assert swarm.facts.clearance[0, 0] >= 0.99
 

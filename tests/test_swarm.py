@@ -124,13 +124,6 @@ def test_after_a_fork_a_batch_goes_on_with_threads_of_its_own():
     assert done.stdout.strip() == "7", done.stderr
 
 
-def test_a_loss_at_the_start_happens_in_the_first_step():
-    swarm = Swarm(load_scenario("tracking", num_vehicles=3, overrides={"disturbance.loss_times_s": [0.0]}))
-    swarm.reset(0)
-    swarm.step(np.zeros((1, 3, 2), np.float32))
-    assert swarm.state.alive.sum() == 2
-
-
 def test_inactive_worlds_stand_still():
     swarm = Swarm(load_scenario("tracking", num_vehicles=4), 2)
     swarm.reset(0)
@@ -141,9 +134,10 @@ def test_inactive_worlds_stand_still():
     assert swarm.facts.time_s.tolist() == [0.1, 0.0]
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 54, 55, 200])
-def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n):
-    scenario = load_scenario("single_obstacle", num_vehicles=n)
+@pytest.mark.parametrize(("n", "spacing"), [(1, 13.0), (2, 13.0), (5, 13.0), (54, 17.0), (55, 13.0), (200, 13.0)])
+def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n, spacing):
+    """At 17 m random placement jams."""
+    scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"start.spacing_m": spacing})
     swarm = Swarm(scenario, 3)
     swarm.reset(0)
     length, width = scenario.start.sides(n)
@@ -159,15 +153,7 @@ def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n):
         assert (nu[:, 0] <= 4).all()
         assert not nu[:, 1:].any()
     if n > 1:
-        assert swarm.facts.min_spacing.min() >= 13.0
-
-
-def test_placement_ends_where_random_placement_jams():
-    scenario = load_scenario("single_obstacle", overrides={"start.spacing_m": 17.0})
-    swarm = Swarm(scenario, 4)
-    swarm.reset(0)
-    assert swarm.facts.min_spacing.min() >= 17.0
-    assert not np.array_equal(swarm.state.eta[0], swarm.state.eta[1])
+        assert swarm.facts.min_spacing.min() >= spacing
 
 
 def test_arrival_needs_rest_nearness_spread_and_dwell(place):
@@ -205,7 +191,7 @@ def test_arrival_needs_rest_nearness_spread_and_dwell(place):
 
 
 def test_lost_vehicles_fall_silent_and_leave_the_centre():
-    scenario = load_scenario("lossy", overrides={"disturbance.loss_times_s": [0.25, 1.0]})
+    scenario = load_scenario("lossy", overrides={"disturbance.loss_times_s": [0.0, 0.25, 1.0]})
     swarm = Swarm(scenario)
     swarm.reset(5)
     action = np.zeros((1, 54, 2), np.float32)
@@ -214,7 +200,7 @@ def test_lost_vehicles_fall_silent_and_leave_the_centre():
         percept = swarm.step(action)
         for i in np.flatnonzero(swarm.facts.lost[0]):
             lost_at[int(i)] = step
-    assert sorted(lost_at.values()) == [3, 10]
+    assert sorted(lost_at.values()) == [1, 3, 10]
     assert list(lost_at) == swarm.course.losses[0].tolist()
     gone = list(lost_at)
     assert not np.isin(swarm.heard[0], gone).any()
@@ -225,34 +211,6 @@ def test_lost_vehicles_fall_silent_and_leave_the_centre():
     still = swarm.state.eta[0, gone].copy()
     swarm.step(np.ones((1, 54, 2), np.float32))
     np.testing.assert_array_equal(swarm.state.eta[0, gone], still)
-
-
-def test_a_contact_counts_once_while_it_lasts(place):
-    swarm = place(load_scenario("tracking"), [[0, 0, 0], [8, 0, math.pi]], nu=[[3, 0, 0], [3, 0, 0]])
-    action = np.zeros((1, 2, 2), np.float32)
-    counts = []
-    for _ in range(60):
-        swarm.step(action)
-        counts.append(int(swarm.facts.collisions[0]))
-    assert sum(counts) == 1
-    assert counts.index(1) > 5
-    swarm.state.eta[0, :, 0] = [0, 30]
-    swarm.step(action)
-    assert swarm.facts.collisions[0] == 0
-    swarm.state.eta[0, :, 0] = [0, 2.3]
-    swarm.state.nu[0, :, 0] = 3.0
-    swarm.step(action)
-    assert swarm.facts.collisions[0] == 1
-    assert swarm.facts.contacts[0].tolist() == [1, 1]
-
-
-def test_contact_ends_the_vehicles_only_where_the_scenario_says_so(place):
-    scenario = load_scenario("tracking", overrides={"contact.ends_vehicle": True})
-    swarm = place(scenario, [[0, 0, 0], [4, 0, math.pi], [30, 20, 0]], nu=[[3, 0, 0], [3, 0, 0], [0, 0, 0]])
-    for _ in range(10):
-        swarm.step(np.zeros((1, 3, 2), np.float32))
-    assert swarm.state.alive[0].tolist() == [False, False, True]
-    assert not np.isin(swarm.heard[0, 2], [0, 1]).any()
 
 
 @settings(max_examples=40)

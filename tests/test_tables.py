@@ -15,17 +15,8 @@ from uuv_marl.sim.workspace import Cells, Columns, Listener, Workspace, scratch,
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
           "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
-SIZES = {
-    "world": 2,
-    "vehicle": 5,
-    "group": 2,
-    "point": 3,
-    "obstacle": 4,
-    "loss": 1,
-    "sector": 21,
-    "radius": 4,
-    "entry": 98,
-}
+AXES = ("world", "vehicle", "group", "point", "obstacle", "loss", "sector", "radius", "entry")
+SIZES = dict(zip(AXES, (2, 5, 2, 3, 4, 1, 21, 4, 98), strict=True))
 LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5}
 
 

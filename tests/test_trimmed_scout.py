@@ -14,9 +14,8 @@ from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES
 from uuv_marl.baselines.learned.network import forward
 from uuv_marl.baselines.learned.trimmed_scout import TrimmedScout
 from uuv_marl.baselines.memory.doubt import doubt, trim_weights
-from uuv_marl.baselines.memory.response import PRODUCTS, SQUARES
 from uuv_marl.baselines.scout.gains import ScoutGains
-from uuv_marl.baselines.scout.trims import MOST_TRIM, softened, wary
+from uuv_marl.baselines.scout.trims import softened, wary
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -153,20 +152,6 @@ def test_whatever_the_actor_says_the_filter_has_the_last_word(saved):
     scenario = granted(policy, load_scenario("random_field", overrides=FEW))
     runs = [event for event in evaluate(scenario, policy, [10_007, 10_008]) if isinstance(event, Run)]
     assert [run.metrics["collisions"] for run in runs] == [0, 0]
-
-
-def test_a_trim_is_a_bounded_factor_of_a_vehicle_s_own_steering():
-    scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
-    swarm, policy = Swarm(scenario), TrimmedScout(scenario)
-    policy.hear(swarm.reset(0))
-    policy.memory.response[..., PRODUCTS] = policy.memory.response[..., SQUARES] = 9.0
-    quiet = policy.trim(np.zeros((1, 2, 1), np.float32)).copy()
-    first = np.zeros((1, 2, 1), np.float32)
-    first[0, 0] = -MOST_TRIM
-    once = policy.trim(first).copy()
-    np.testing.assert_array_equal(policy.trim(20.0 * first), once)
-    assert (once[0, 0] != quiet[0, 0]).any()
-    np.testing.assert_array_equal(once[0, 1], quiet[0, 1], "the other's gains are as they were")
 
 
 def test_trims_by_hand():

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from tests.conftest import COUPLED, LIFT
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.paper.bio_inspired import BioInspired
@@ -22,12 +23,11 @@ POLICIES = (
     "bio_inspired", "bio_inspired_plus", "scout", "sff", "sdc", "apf", "olfati_saber", "orca_informed",
     "pull", "mappo", "guarded:bio_inspired_plus", "guarded:mappo",
 )  # fmt: skip
-RUDDER = {
-    "vehicle.Y_uv": -60.0, "vehicle.N_uv": 15.0, "vehicle.N_ur": -10.0, "actuators.kind": "rudder",
-    "actuators.Y_uud": 100.0, "actuators.N_uud": -90.0, "actuators.rudder_max_deg": 20.0,
+RUDDER = LIFT | {
+    "actuators.kind": "rudder", "actuators.Y_uud": 100.0, "actuators.N_uud": -90.0, "actuators.rudder_max_deg": 20.0,
     "actuators.max_astern_n": 100.0, "arrival.by": "passage",
 }  # fmt: skip
-LAGGING = {"actuators.thrust_lag_s": 0.25, "actuators.yaw_lag_s": 0.25, "actuators.yaw_authority": 0.5}
+LAGGING = COUPLED | {"current.speed_mps": 0.25, "actuators.thrust_lag_s": 0.25, "actuators.yaw_lag_s": 0.25}
 SHORT = {"random_field.legs": [1, 1], "random_field.leg_length_m": [250.0, 250.0]}
 
 
@@ -63,9 +63,6 @@ def test_a_vehicle_that_is_alike_swims_alike_bit_for_bit(policy, vehicle, scale)
         np.testing.assert_array_equal(swarms[1].state.nu, swarms[0].state.nu * [speed, speed, speed / length])
     assert swarms[1].facts.time_s[0] == swarms[0].facts.time_s[0] * length / speed
     np.testing.assert_array_equal(swarms[1].facts.effort, swarms[0].facts.effort)
-
-
-# --- The inner loop ---
 
 
 # --- The rudder ---
@@ -162,16 +159,8 @@ def test_bad_combinations_are_refused_with_the_remedy():
 
 @pytest.mark.parametrize(("vehicle", "damping"), [("literature_185", 600.0), ("bluerov2_heavy", 5.8), ("lauv", 0.0)])
 def test_a_training_has_the_inner_loop_of_its_vehicle(vehicle, damping):
-    slow = {
-        "vehicle": vehicle,
-        "trajectory.speed_mps": 0.5,
-        "start.speed_max_mps": 0.5,
-        "timing.integration_step_s": 0.05,
-    }
-    changes = overrides_for("random_field", slow)
+    slow = {"trajectory.speed_mps": 0.5, "start.speed_max_mps": 0.5, "timing.integration_step_s": 0.05}
+    changes = overrides_for("random_field", {"vehicle": vehicle, **slow})
     assert changes["actuators.yaw_damping_nms"] == pytest.approx(damping)
     assert load_scenario("random_field", overrides=changes).timing.decision_period_s == 0.5
     assert overrides_for("random_field", {"actuators.yaw_damping_nms": 7.0})["actuators.yaw_damping_nms"] == 7.0
-
-
-# --- Gains tuned for a hull ---

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from research.dynamics.acceptance import sway_yaw
 from tests.conftest import COUPLED, LIFT, RUDDER
-from tests.oracle.motion import matrices
 from uuv_marl import load_scenario
 from uuv_marl.scenario import ScenarioError, vehicle_checks
 from uuv_marl.sim import vehicle
@@ -97,32 +97,6 @@ def test_damping_never_adds_energy(u, v, r, p):
     assert u * d[0] + v * d[1] + r * d[2] >= -1e-12 * scale
 
 
-@given(speed, speed, speed)
-def test_energy_falls_by_what_damping_takes(u, v, r):
-    scenario = load_scenario("tracking", overrides=COUPLED)
-    nu = np.array([u, v, r])
-    m, _, d = matrices(scenario, nu)
-    power = nu @ m @ np.array(vehicle.acceleration((u, v, r), (0.0, 0.0), FULL))
-    assert power == pytest.approx(-nu @ d @ nu, rel=1e-9, abs=1e-6)
-
-
-def test_runge_kutta_converges_at_order_4():
-    # No velocity changes sign on the way: |v| v is smooth only away from zero.
-    start, tau, time = (0.0, 0.0, 0.3, 1.0, -0.5, 0.6), (900.0, 150.0), 1.6
-
-    def end(steps):
-        state = start
-        for _ in range(steps):
-            state = vehicle.advance(state, tau, STILL, time / steps, FULL)
-        return np.array(state)
-
-    exact = end(4096)
-    errors = [np.abs(end(steps) - exact).max() for steps in (16, 32, 64, 128)]
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert (orders > 3.7).all(), orders
-    assert (orders < 4.5).all(), orders
-
-
 @given(speed, speed, speed, st.floats(-3, 3), st.floats(-3, 3), st.floats(-500, 500), st.floats(-500, 500))
 def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
     tau = (700.0, -300.0)
@@ -137,15 +111,10 @@ def test_motion_does_not_depend_on_where_north_is(u, v, r, psi, turn, x, y):
 @pytest.mark.parametrize(("damping", "limit_mps"), [(0.0, 0.682), (600.0, 2.459)])
 def test_the_hull_is_directionally_unstable_above_the_speed_that_the_docs_state(damping, limit_mps):
     """The Munk moment: det < 0 of the sway-yaw equations, linearised at a speed u. docs/paper.md."""
-    assert sway_yaw(0.99 * limit_mps, damping).max() < 0.0 < sway_yaw(1.01 * limit_mps, damping).max()
-
-
-def sway_yaw(u, damping=0.0, h=1e-6):
-    """Real parts of the eigenvalues of sway and yaw at speed u [1/s]."""
-    p = plant(load_scenario("single_obstacle"))
-    rate = lambda v, r: np.array(vehicle.acceleration((u, v, r), (0.0, -damping * r), p)[1:])  # noqa: E731
-    columns = [(rate(*(h * e)) - rate(*(-h * e))) / (2 * h) for e in np.eye(2)]
-    return np.linalg.eigvals(np.stack(columns, axis=1)).real
+    plain = load_scenario("single_obstacle")
+    change = {"vehicle.N_r": plain.vehicle.N_r + damping, "timing.integration_step_s": 0.02}
+    stable, unstable = (sway_yaw(load_scenario(plain, overrides=change), share * limit_mps) for share in (0.99, 1.01))
+    assert stable.real.max() < 0.0 < unstable.real.max()
 
 
 @pytest.mark.parametrize("munk", [True, False])

@@ -178,6 +178,3 @@ def test_a_vehicle_that_replaces_another_leaves_nothing_of_it():
     back, never = (load_scenario(s, overrides={**SLOW, "vehicle": "literature_185"}) for s in (torpedo, "tracking"))
     assert back.vehicle == never.vehicle
     assert back.actuators == never.actuators
-
-
-# --- The command ---

@@ -19,7 +19,7 @@ class Rendezvous(Task):
     """Come within ``near_m`` of the swarm's centre, all of you, without touching. No vehicle perceives a reference."""
 
     class Numbers(Section):
-        near_m: Positive = 20.0
+        near_m: Positive = 10.0
 
     observed: ClassVar[tuple[PerceptField, ...]] = (PerceptField("near", (1,), FLAG, "1 within near_m of the centre"),)
     terms: ClassVar[Mapping[str, str]] = {"away": "-0.01/m for each decision", "collision": "-10 for each"}
@@ -27,8 +27,7 @@ class Rendezvous(Task):
 
     def draw(self, world: int, rng: np.random.Generator) -> Draw:
         drawn = super().draw(world, rng)
-        drawn.eta[:, :2] *= 3.0  # farther apart
-        return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)), duration_s=60.0)
+        return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)))
 
     def _away(self) -> Floats:
         return np.hypot(*np.moveaxis(self.swarm.state.eta[:, :, :2] - self.swarm.facts.centre[:, None], -1, 0))
@@ -54,7 +53,7 @@ class Rendezvous(Task):
 
 if __name__ == "__main__":
     env = uuv_marl.parallel_env("starter", task=f"{__name__}:Rendezvous")
-    observations, infos = env.reset(seed=0)
+    _, infos = env.reset(seed=0)
     while env.agents:
-        observations, *_, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+        *_, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
     print("gathered" if infos["uuv_0"]["is_success"] else "not gathered")

@@ -50,9 +50,12 @@ def weights(running):
 
 
 AT_SEA = {**SMALL, "overrides": {**SMALL["overrides"], **contract.SEA}}
+OWN = {**SMALL, "task": contract.OWN_TASK}
 
 
-@pytest.mark.parametrize(("algorithm", "how"), [(MappoConfig, SMALL), (IppoConfig, SMALL), (MappoConfig, AT_SEA)])
+@pytest.mark.parametrize(
+    ("algorithm", "how"), [(MappoConfig, SMALL), (IppoConfig, SMALL), (MappoConfig, AT_SEA), (MappoConfig, OWN)]
+)
 def test_it_trains(tmp_path, algorithm, how):
     running = experiment(tmp_path, SwarmTask.RANDOM_FIELD.get_task(how), algorithm)
     before = weights(running)

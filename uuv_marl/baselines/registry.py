@@ -240,15 +240,7 @@ def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parame
 
 
 def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
-    """The policy with these parameters, inside the safety filter where its name says so.
-
-    Args:
-        name: as the user wrote it, for messages.
-        kind: what makes the policy.
-        scenario: that it is made for.
-        num_worlds: first axis of the percepts.
-        parameters: by name; texts stand for what they say. ``barrier`` is the filter's where there is one.
-    """
+    """The policy with these parameters, inside the safety filter where its name says so."""
     name = name.removeprefix(OWN)
     if not name.startswith(GUARDED):
         return _alone(name, kind, scenario, num_worlds, parameters)

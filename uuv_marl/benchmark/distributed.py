@@ -94,12 +94,6 @@ def evaluate_on_cluster(scenario: Scenario, policy: str, seeds: Sequence[int], *
     A run depends on its seed alone, so neither the chunks nor the nodes change it, as long as all nodes have the same
     kind of processor. Ending the iteration cancels what is unfinished.
 
-    Args:
-        scenario: what to simulate.
-        policy: its name, see ``uuv_marl.baselines.make``.
-        seeds: of the episodes, one each.
-        parameters: go to the policy.
-
     Raises:
         ClusterError: a node has other code, libraries or weights, or a worker died repeatedly.
         PolicyError: a node can't import the policy.
@@ -127,15 +121,7 @@ def chunks(seeds: Sequence[int], num_cpus: int) -> list[Sequence[int]]:
 def _chunk(
     scenario: Scenario, policy: str, seeds: Sequence[int], parameters: dict[str, object], wanted: dict[str, str | None]
 ) -> list[Run]:
-    """The runs of a few seeds, on a node of the cluster.
-
-    Args:
-        scenario: what to simulate.
-        policy: its name, see ``uuv_marl.baselines.make``.
-        seeds: of the episodes, one each.
-        parameters: go to the policy.
-        wanted: ``origin`` of the policy, which the node must have too.
-    """
+    """The runs of a few seeds, on a node of the cluster whose ``origin`` of the policy must be the ``wanted`` one."""
     here = origin(policy)
     for name, value in wanted.items():
         if here.get(name) != value:

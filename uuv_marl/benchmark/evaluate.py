@@ -111,15 +111,7 @@ def _look_away(swarm: Swarm, action: Float32 | None) -> None:
 def _batch(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch, parameters: dict[str, object]
 ) -> Iterator[Run | Progress]:
-    """The episodes of seeds that are stepped together.
-
-    Args:
-        scenario: what to simulate.
-        policy: its name, see ``uuv_marl.baselines.make``.
-        seeds: of the episodes, one each.
-        watch: sees every step.
-        parameters: go to the policy.
-    """
+    """The episodes of seeds that are stepped together."""
     swarm = Swarm(scenario, len(seeds))
     actor = make(policy, scenario, len(seeds), **parameters)
     percept = swarm.reset(list(seeds))

@@ -24,14 +24,7 @@ _TICKS_M = (-20, -10, -5, 0, 5, 10, 20, 50, 100, 200)
 
 
 def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Path]:
-    """All pictures of a scenario, as PNG in ``figures/``; the paths.
-
-    Args:
-        results: with the runs; the pictures go into its folder.
-        scenario: its name.
-        policies: their names; those without runs are left out.
-        seeds: whose runs are drawn.
-    """
+    """All pictures of a scenario, as PNG in ``figures/``; the paths."""
     present = [policy for policy in policies if results.select(scenario, policy, seeds)]
     if not present:
         return []
@@ -147,11 +140,7 @@ def _over_time(
 ) -> tuple[Figure, list[Axes]]:
     """Median and range over seeds, a panel for each policy with all others' medians behind; the used panels.
 
-    Args:
-        curves: time series of the runs of each policy.
-        value: what is drawn of a run, shape (time,).
-        limits: lines across all panels [m], by their words in the legend.
-        what: label of the vertical axis.
+    ``value`` of a run has shape (time,); ``limits`` are lines across all panels [m], by their words in the legend.
     """
     figure, axes = _grid(len(curves), (3.1, 2.7))
     bands = {policy: _band([(trace["time_s"], value(trace)) for trace in traces]) for policy, traces in curves.items()}

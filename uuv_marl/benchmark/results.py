@@ -213,14 +213,7 @@ class Results:
 
 
 def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
-    """Where the time series of a run are.
-
-    Args:
-        folder: of the ``results.json``.
-        scenario: its name.
-        policy: its name.
-        seed: of the run.
-    """
+    """Where the time series of a run are."""
     return folder / "traces" / f"{run_name(scenario, policy, seed)}.npz"
 
 

@@ -31,14 +31,7 @@ def house_style() -> Generator[None]:
 def panels(
     num: int, columns: int = 4, size: tuple[float, float] = (5.2, 4.4), **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with at least ``num`` panels, by row; those beyond ``num`` are empty.
-
-    Args:
-        num: how many.
-        columns: most that stand side by side.
-        size: width and height of each [inch].
-        options: go to ``Figure.subplots``.
-    """
+    """A figure with at least ``num`` panels, by row; those beyond ``num`` are empty."""
     rows = -(-num // columns)
     across = -(-num // rows)
     figure = Figure(figsize=(size[0] * across, size[1] * rows))

@@ -71,11 +71,7 @@ class Suite:
     def run(self, cases: Sequence[Case], report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> None:
         """Run what is missing of these cases, here or where the evaluator does.
 
-        Args:
-            cases: in the order in which they are run.
-            report: called as it goes on.
-            evaluator: runs a policy over seeds.
-            anew: drop the runs of policies whose file has changed since, and make them again.
+        ``report`` is called as it goes on; ``anew`` drops runs of policies whose file has changed since.
 
         Raises:
             ResultsError: the folder holds other results, or those of a policy before its file changed.

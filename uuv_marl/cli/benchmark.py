@@ -11,6 +11,7 @@ import typer
 
 from uuv_marl.cli.console import (
     Anew,
+    Ray,
     changes_of,
     console,
     explained,
@@ -54,13 +55,7 @@ def benchmark(
     ] = None,
     output: Annotated[Path, path_option("Folder of results, table and pictures.")] = Path("results/benchmark"),
     anew: Anew = False,
-    ray: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
-        ),
-    ] = None,
+    ray: Ray = None,
 ) -> None:
     """Compare policies on scenarios over seeds.
 

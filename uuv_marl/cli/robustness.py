@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl.cli.benchmark import evaluator_at
-from uuv_marl.cli.console import Anew, console, explained, find_modules, path_option, working
+from uuv_marl.cli.console import Anew, Ray, console, explained, find_modules, path_option, working
 
 
 def robustness(
@@ -31,13 +31,7 @@ def robustness(
         list[str] | None, typer.Option(help="Name or TOML file. Repeat it for several. Default: random_field.")
     ] = None,
     seeds: Annotated[int | None, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1. Default: 20.")] = None,
-    ray: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
-        ),
-    ] = None,
+    ray: Ray = None,
     anew: Anew = False,
     output: Annotated[Path, path_option("Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:

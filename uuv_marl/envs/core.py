@@ -48,7 +48,11 @@ class StepResult(NamedTuple):
     @property
     def terms(self) -> Mapping[str, Float64]:
         """The reward's terms by name; empty for a user's own reward."""
-        return {} if self.weighted is None else dict(zip(self.named, self.weighted, strict=False))
+        return (
+            {}
+            if self.weighted is None or not self.weighted.size
+            else dict(zip(self.named, self.weighted, strict=False))
+        )
 
     @property
     def over(self) -> Bool:
@@ -67,6 +71,7 @@ class BatchedEnv:
             its own loss), or a function from the swarm to an array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
         observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
+        keep_terms: whether steps tell the reward's terms, which takes time in large batches.
     """
 
     def __init__(
@@ -76,6 +81,7 @@ class BatchedEnv:
         reward: Reward = "dense",
         max_cycles: int | None = None,
         observe: Observe = "positions",
+        keep_terms: bool = True,
     ) -> None:
         self.swarm = Swarm(scenario, num_worlds)
         self.layout = observation_layout(scenario, observe)
@@ -96,6 +102,7 @@ class BatchedEnv:
         """Contact episodes that began since the reset, shape (world,)."""
         self.max_cycles = max_cycles
         self._reward: Reward = reward
+        self._keep_terms = keep_terms or reward == "team"
 
     @property
     def max_cycles(self) -> int | None:
@@ -170,7 +177,7 @@ class BatchedEnv:
         swarm, task = self.swarm, self.task
         name = "sparse" if self._reward == "sparse" else task.rewards[0]
         observation, observe = observer(swarm.percept, self.layout)
-        payment = task.payment(name, running)
+        payment = task.payment(name, running, kept=self._keep_terms)
         if payment is not None and not task.observed:
             threaded = payment
 
@@ -255,6 +262,7 @@ def make_batched_env(
     max_cycles: int | None = None,
     reward: Reward = "dense",
     observe: Observe = "positions",
+    keep_terms: bool = True,
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes.
@@ -265,9 +273,10 @@ def make_batched_env(
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         reward: ``dense``, ``sparse``, ``team``, or a function from the swarm to an array (world, vehicle).
         observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
+        keep_terms: whether steps tell the reward's terms.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
     """
-    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, observe)
+    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, observe, keep_terms)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

@@ -23,20 +23,10 @@ class EnvMixin:
     metadata: dict[str, Any]
 
     def _wrap(
-        self,
-        batch: BatchedEnv,
-        render_mode: str | None,
-        options: RenderOptions | None = None,
+        self, batch: BatchedEnv, render_mode: str | None, options: RenderOptions | None = None,
         sonar_of: int | None = None,
-    ) -> None:
-        """Stand on these worlds.
-
-        Args:
-            batch: the worlds.
-            render_mode: one of the class's ``metadata["render_modes"]``, or None.
-            options: how to draw, see ``uuv_marl.envs.drawing.options``.
-            sonar_of: index of the vehicle whose sonar is drawn where the options name none.
-        """
+    ) -> None:  # fmt: skip
+        """Stand on these worlds; ``sonar_of``: the vehicle whose sonar is drawn where the options name none."""
         self._batch = batch
         self._renderer = Renderer(batch, render_mode, self.metadata["render_modes"], options, sonar_of)
         self.render_mode = render_mode

@@ -34,9 +34,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
 
     Args:
         batch: the simulation, of one world.
-        render_mode: ``human``, ``rgb_array`` or None.
-        info_terms: put the reward's terms into every agent's info.
-        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
+        render_mode, info_terms, render_options: as for ``parallel_env``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form
@@ -205,8 +203,8 @@ def parallel_env(
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
     """
     batch = make_batched_env(
-        scenario, max_cycles=max_cycles, reward=reward, observe=observe, num_vehicles=num_vehicles,
-        decision_period=decision_period, task=task, overrides=overrides,
+        scenario, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms,
+        num_vehicles=num_vehicles, decision_period=decision_period, task=task, overrides=overrides,
     )  # fmt: skip
     return SwarmParallelEnv(batch, render_mode, info_terms, render_options)
 

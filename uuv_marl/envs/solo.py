@@ -58,7 +58,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         **changes: Unpack[Changes],
     ) -> None:
         suited = _suited(others, changed(scenario), changed(scenario, **changes))
-        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe)
+        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
         self._info_terms = info_terms
@@ -109,13 +109,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
 
 
 def _suited(others: str, plain: Scenario, asked: Scenario) -> Scenario:
-    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for.
-
-    Args:
-        others: name of their policy.
-        plain: the scenario before the overrides.
-        asked: the scenario after them.
-    """
+    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for."""
     suited = granted(others, asked)
     remedy = "leave it out, or choose other others"
     heard = suited.sonar.channels

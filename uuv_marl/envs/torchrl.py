@@ -49,7 +49,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         device: torch.device | str = "cpu",
         **options: Unpack[EnvOptions],
     ) -> None:
-        batch = make_batched_env(scenario, num_worlds, **options)
+        batch = make_batched_env(scenario, num_worlds, keep_terms=False, **options)
         super().__init__(device=device, batch_size=torch.Size([num_worlds]))
         self._batch = batch
         self._pending: list[int | None]
@@ -113,22 +113,10 @@ class SwarmEnv(EnvMixin, EnvBase):
         )
 
     def _tensordict(
-        self,
-        group: dict[str, NDArray[Any]],
-        terminated: Bool,
-        truncated: Bool,
-        world_terminated: Bool,
+        self, group: dict[str, NDArray[Any]], terminated: Bool, truncated: Bool, world_terminated: Bool,
         world_truncated: Bool,
-    ) -> TensorDictBase:
-        """Arrays as a tensordict, with the endings of vehicles and worlds.
-
-        Args:
-            group: what stands under ``uuv``, arrays of shape (world, vehicle, ...).
-            terminated: of vehicles, shape (world, vehicle).
-            truncated: of vehicles, shape (world, vehicle).
-            world_terminated: shape (world,).
-            world_truncated: shape (world,).
-        """
+    ) -> TensorDictBase:  # fmt: skip
+        """What stands under ``uuv``, as a tensordict, with the endings of vehicles (world, vehicle) and worlds."""
         group |= _endings(terminated, truncated)
         root = {"state": self._batch.state(), **_endings(world_terminated, world_truncated)}
         batch = self.batch_size

@@ -40,10 +40,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
 
     Args:
         batch: the worlds.
-        render_mode: ``rgb_array`` or None.
-        info_terms: put the reward's terms into the infos.
-        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED``, or its value.
-        render_options: how to draw, see ``uuv_marl.envs.drawing.options``.
+        render_mode, info_terms, autoreset_mode, render_options: as for ``vector_env``.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form
@@ -192,5 +189,5 @@ def vector_env(
             ``overrides``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each
             vehicle; the reward of a row is the mean over all vehicles.
     """
-    batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), **options)
+    batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

@@ -5,13 +5,6 @@ from collections.abc import Sequence
 
 
 def command(scenario: str, policy: str, seed: int, overrides: Sequence[str] = ()) -> str:
-    """The ``uuv-marl replay`` that simulates an episode again, quoted for a shell.
-
-    Args:
-        scenario: its name or file.
-        policy: its name, checkpoint or ``module:Class``.
-        seed: of the episode.
-        overrides: fields that differ from the scenario's, as ``--set`` takes them.
-    """
+    """The ``uuv-marl replay`` that simulates an episode again, quoted for a shell."""
     sets = [part for text in overrides for part in ("--set", text)]
     return shlex.join(["uuv-marl", "replay", "--scenario", scenario, "--policy", policy, "--seed", str(seed), *sets])

@@ -172,16 +172,7 @@ def _entry(
     values: NDArray[Any], data: Int32, scale: float | None = None, stride: int = 1, order: int = 2,
     missing: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """An array as the page's ``decode.js`` reads it.
-
-    Args:
-        values: the array itself, which gives shape and type.
-        data: the same as whole numbers, differenced.
-        scale: what 1 stands for; None where the whole numbers are the array's own, or its bits.
-        stride: coarsest step of an array that is smooth in time; 1 for one that is not.
-        order: how often the numbers were differenced.
-        missing: which values are NaN, packed; None for none.
-    """
+    """An array as ``decode.js`` reads it: ``data`` are its whole numbers, differenced, in units of ``scale``."""
     return {
         "shape": list(values.shape), "dtype": str(values.dtype), "scale": scale, "stride": stride, "order": order,
         "missing": missing, "data": pack(data),

@@ -13,10 +13,7 @@ makes one mark, not a hundred."""
 def near_misses(kind: str, time_s: Float32, below: Bool) -> list[Event]:
     """An event for each sample at which near misses begin, with all vehicles whose miss begins there.
 
-    Args:
-        kind: of the events.
-        time_s: shape (time,).
-        below: whether a vehicle is below its limit, shape (time, vehicle).
+    ``below`` says whether a vehicle is below its limit, shape (time, vehicle).
     """
     events: list[Event] = []
     last = np.full(below.shape[1], -np.inf)
@@ -63,11 +60,7 @@ def contacts(time_s: Float32, began: Int32, clearance: Float32, position: Float3
 def _partner(i: int, left: Int32, position: Float32, touch_m: float) -> int | None:
     """Whom a vehicle hit between two samples: the nearest of those with contacts left, first of those apart before.
 
-    Args:
-        i: index of the vehicle.
-        left: contacts of each vehicle that have no event yet, shape (vehicle,).
-        position: at the two samples, north and east [m], shape (2, vehicle, 2).
-        touch_m: distance of two centres below which they are in contact [m].
+    ``left``: contacts of each without an event yet, shape (vehicle,); ``position`` (2, vehicle, 2) [m].
     """
     before, now = np.hypot(*np.moveaxis(position - position[:, i : i + 1], -1, 0))
     others = np.flatnonzero((left > 0) & (np.arange(len(left)) != i)).tolist()

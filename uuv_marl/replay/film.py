@@ -124,15 +124,7 @@ def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
 def _pictures(
     scenes: Sequence[Scenes], form: Format, camera: str, longest: float, progress: Callable[[float], object]
 ) -> Iterator[Picture]:
-    """The film's pictures, one after the other.
-
-    Args:
-        scenes: of the recordings, side by side.
-        form: how the film is cut.
-        camera: ``follow`` keeps the swarm in view, ``map`` the whole course.
-        longest: time of the last sample of all recordings [s].
-        progress: is called with the share that is done, 0 to 1.
-    """
+    """The film's pictures, one after the other."""
     frame, (common, names) = Frame(form.size, len(scenes), grid=not form.plain), _names(scenes)
     heading = f"{common}, {form.speed:.3g} times as fast" if form.speed != 1.0 else common
     num = int(np.ceil(longest / form.speed * form.fps)) + 1
@@ -144,14 +136,7 @@ def _pictures(
 
 
 def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) -> Picture:
-    """A row for each recording, from its start to the last one's end.
-
-    Args:
-        scenes: of the recordings, one below the other.
-        form: how large the picture is.
-        camera: ``follow`` keeps the swarm in view, ``map`` the whole course.
-        longest: time of the last sample of all recordings [s].
-    """
+    """A row for each recording, from its start to the last one's end."""
     common, names = _names(scenes)
     moments = np.linspace(0.0, longest, _MOMENTS).tolist()
     panels = [

@@ -102,14 +102,7 @@ def from_folder(folder: UserPath, scenario: str | None, policy: str | None, seed
 
 
 def _chosen(folder: UserPath, option: str, wanted: str | None, held: set[str]) -> str:
-    """What is wanted, or the only one that is held.
-
-    Args:
-        folder: the benchmark's, for the message.
-        option: with which one chooses, for the message.
-        wanted: the name; None for the only one.
-        held: the names that there are.
-    """
+    """What is wanted, or the only one that is held."""
     if wanted in held:
         return wanted
     if wanted is None and len(held) == 1:
@@ -125,15 +118,7 @@ def _listed(held: Iterable[Any]) -> str:
 
 
 def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics) -> Recording:
-    """The recording of one run.
-
-    Args:
-        saved: the benchmark's folder and results.
-        name: of the scenario.
-        policy: its name.
-        seed: of the run.
-        metrics: of the run.
-    """
+    """The recording of one run."""
     path, scenario = trace_path(saved.folder, name, policy, seed), _scenario(saved, name, policy)
     trace = load_trace(path)
     if not any(array.startswith("route_") for array in trace):

@@ -5,7 +5,6 @@ force or a moment over velocities (``X_uu``, ``N_r``). Names with neither are li
 time and mass then convert a whole scenario.
 """
 
-import re
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple, cast
 
@@ -22,11 +21,11 @@ class Dimension(NamedTuple):
 
 NUMBER = Dimension(0, 0, 0)
 """The dimension of counts, shares, angles and levels."""
-_RATE, _FORCE, _MOMENT = Dimension(0, -1, 0), Dimension(1, -2, 1), Dimension(2, -2, 1)
+_SPEED, _RATE, _FORCE, _MOMENT = Dimension(1, -1, 0), Dimension(0, -1, 0), Dimension(1, -2, 1), Dimension(2, -2, 1)
 _UNITS = {
     "m": Dimension(1, 0, 0),
     "s": Dimension(0, 1, 0),
-    "mps": Dimension(1, -1, 0),
+    "mps": _SPEED,
     "bps": _RATE,
     "kg": Dimension(0, 0, 1),
     "kgm": Dimension(1, 0, 1),
@@ -38,8 +37,9 @@ _UNITS = {
     "db": NUMBER,
 }
 """Dimensions by the end of a field's name."""
-_SYMBOL = re.compile(r"([XYN])_([uvrd]+)")
-"""A force or moment over these: u and v [m/s], r [1/s], and a rudder's angle d."""
+_FORCES = {"X": _FORCE, "Y": _FORCE, "N": _MOMENT}
+_OVER = {"u": _SPEED, "v": _SPEED, "r": _RATE, "d": NUMBER}
+"""A symbol is a force or moment over these, one for each letter; d is a rudder's angle."""
 _NUMBERS = {
     "added_mass", "arrival", "collision", "drag", "drift_share", "eddies", "efficiency", "factor",
     "false_echo_probability", "force", "legs", "length", "loss_probability", "mass", "num_vehicles", "obstacles",
@@ -73,12 +73,11 @@ def dimension(field: str) -> Dimension | None:
         return NUMBER
     if field in _RATES:
         return _RATE
-    symbol = _SYMBOL.fullmatch(field)
-    if symbol is None:
-        return _UNITS.get(field.rpartition("_")[2]) if "_" in field else None
-    length, time, mass = _FORCE if symbol[1] in "XY" else _MOMENT
-    speeds, rates = sum(symbol[2].count(letter) for letter in "uv"), symbol[2].count("r")
-    return Dimension(length - speeds, time + speeds + rates, mass)
+    stem, _, end = field.rpartition("_")
+    if stem in _FORCES and set(end) <= _OVER.keys():
+        over = [_OVER[letter] for letter in end]
+        return Dimension(*(exponent - sum(of) for exponent, *of in zip(_FORCES[stem], *over, strict=True)))
+    return _UNITS.get(end) if stem else None
 
 
 def converted(value: Any, units: Units, keep: Collection[str] = (), field: str = "") -> Any:

@@ -9,16 +9,7 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
 
-from uuv_marl.scenario.fields import (
-    Clock,
-    NonNegative,
-    Positive,
-    Radius,
-    Section,
-    Signed,
-    Speed,
-    within,
-)
+from uuv_marl.scenario.fields import Clock, NonNegative, Positive, Radius, Section, Signed, Speed, within
 from uuv_marl.types import Float64
 
 NOMINAL_VEHICLES = 54

@@ -25,11 +25,7 @@ SAMPLED_LIMIT = 2.0
 def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_mps: float) -> None:
     """Refuse a vehicle that is no passive body, or that the simulation can't follow.
 
-    Args:
-        vehicle: inertia and damping.
-        actuators: limits of thrust and torque, and the yaw damping within them.
-        timing: the control hold and the integration step.
-        speed_mps: the highest surge speed at the start [m/s].
+    ``speed_mps``: the highest surge speed at the start.
 
     Raises:
         ValueError: names the field, the value and the remedy.
@@ -132,12 +128,6 @@ def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float)
 
     That is judged by the motion's damping rate, and in a trial.
 
-    Args:
-        p: inertia and damping.
-        limits: of thrust and torque.
-        timing: the control hold and the integration step.
-        speed_mps: the highest surge speed at the start [m/s].
-
     Raises:
         ValueError: names the field, the value and the remedy.
     """
@@ -183,14 +173,7 @@ def _most_moment(limits: Actuators, speed_mps: float) -> float:
 
 @lru_cache(maxsize=1024)
 def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -> bool:
-    """Whether Runge-Kutta runs away somewhere: a trial of Eq. 2 at full action, held and switched.
-
-    Args:
-        p: inertia and damping.
-        limits: of thrust and torque.
-        speed_mps: the highest surge speed at the start [m/s].
-        step_s: the integration step that is tried [s].
-    """
+    """Whether Runge-Kutta runs away somewhere: a trial of Eq. 2 at full action, held and switched."""
     inverse = np.linalg.inv(inertia_matrix(p))
     motion = inverse @ resistance(p)
     thrust, steer = _pushes(limits)

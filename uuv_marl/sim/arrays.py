@@ -34,7 +34,9 @@ class Course(NamedTuple):
     group: Annotated[Int64, "world vehicle", "Group of the vehicle, whose l(t) is its reference.", Bounds(0, "group")]
     informed: Annotated[Bool, "world vehicle", "Whether the vehicle perceives its reference; else it perceives zeros."]
     obstacles: Annotated[Float64, "world obstacle 3", "Centre north, east and radius [m], padded."]
-    drift: Annotated[Float64, "world obstacle 2", "Velocity of the obstacle, north and east [m/s]; 0 in the paper."]
+    obstacle_velocity: Annotated[
+        Float64, "world obstacle 2", "Velocity of the obstacle, north and east [m/s]; 0 in the paper."
+    ]
     num_obstacles: Annotated[Int64, "world", "Obstacles that there are.", Bounds(0, "obstacle", 1)]
     losses: Annotated[Int64, "world loss", "Vehicle lost at each scheduled loss.", Bounds(0, "vehicle")]
 

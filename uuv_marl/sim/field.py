@@ -52,12 +52,6 @@ def _obstacles(scenario: Scenario, field: RandomField, waypoints: Float64, rng: 
 
     Grown by half of that they stay disjoint, so that the free water around them is connected, and some path keeps
     s_o + s_u from every surface.
-
-    Args:
-        scenario: gives the number of vehicles, their start, s_o and s_u.
-        field: the ranges to draw from.
-        waypoints: corners of the trajectory, north and east [m], shape (point, 2).
-        rng: the world's generator, which moves on.
     """
     n, gap = scenario.swarm.num_vehicles, 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
     end_clear = max(field.end_clear_m * growth(n), gap)

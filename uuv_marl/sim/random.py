@@ -72,15 +72,7 @@ def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -
 
 @compiled_inline
 def uniform(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> float:
-    """A number uniform in [0, 1).
-
-    Args:
-        key: of the episode (``Swarm.keys``).
-        purpose: what it is for, one number for each disturbance.
-        time: control hold, ping or decision at which it is used, below 2^32.
-        vehicle: whose it is.
-        slot: which of the vehicle's numbers at this time.
-    """
+    """A number uniform in [0, 1), from the same as ``uniforms``."""
     return uniforms(key, purpose, time, vehicle, slot)[0]
 
 

@@ -18,10 +18,6 @@ def source_key(module: str, settings: str = "") -> str | None:
     """Hash of the code that a module's functions are compiled from, and of ``settings``; None where code is missing.
 
     A package without sources (byte code alone, or a frozen program) has no key, since a change would not be seen.
-
-    Args:
-        module: name of an imported module.
-        settings: whatever else the compiled code depends on.
     """
     hashes = {name: _hash(name) for name in reached_modules(module)}
     if None in hashes.values():

@@ -36,7 +36,7 @@ def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, now: Columns, s
                 d, n_x, n_y = length_and_direction(dx, dy)
                 give_way(w, i, n_x, n_y, max(near - d - SINK_M, 0.0), world)
                 speed, yields = along(w, i, n_x, n_y, world, plant, sea)
-                speed -= n_x * course.drift[w, k, 0] + n_y * course.drift[w, k, 1]
+                speed -= n_x * course.obstacle_velocity[w, k, 0] + n_y * course.obstacle_velocity[w, k, 1]
                 push(w, i, n_x, n_y, max(-speed, 0.0) / yields, world, plant)
         for j in range(i):
             dx, dy = state.eta[w, i, 0] - state.eta[w, j, 0], state.eta[w, i, 1] - state.eta[w, j, 1]

@@ -180,6 +180,11 @@ class Swarm:
         for array in self._task_memory.values():
             array[w] = 0
         drawn: Draw = self.task.draw(w, rng)
+        if drawn.duration_s > (longest := self.task.longest_s(self.scenario)) + 1e-9:
+            raise ValueError(
+                f"task {self.scenario.task.name!r} drew duration_s = {drawn.duration_s:g}, and its longest_s gives "
+                f"{longest:g}; override longest_s, so that every episode ends in time"
+            )
         state, course, m = self.state, self.course, len(drawn.obstacles)
         for g, (waypoints, times) in enumerate(zip(drawn.waypoints, drawn.times, strict=True)):
             points = len(waypoints)
@@ -189,7 +194,7 @@ class Swarm:
         course.group[w], course.informed[w] = drawn.group, drawn.informed
         self._duration_s[w] = drawn.duration_s
         course.obstacles[w, :m], course.obstacles[w, m:] = drawn.obstacles, 0.0
-        course.num_obstacles[w], course.drift[w] = m, 0.0
+        course.num_obstacles[w], course.obstacle_velocity[w] = m, 0.0
         state.eta[w], state.nu[w] = drawn.eta, drawn.nu
         state.before[w] = state.eta[w, :, :2]
         state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, drawn.obstacles

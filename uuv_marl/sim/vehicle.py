@@ -191,14 +191,7 @@ def advance_lagging(
 ) -> State6:
     """The joint state h [s] later: the classical fourth-order Runge-Kutta method (Eq. 23-24).
 
-    Args:
-        state: pose and velocity relative to the water.
-        tau: thrust [N] and torque [N m], or the rudder's angle [rad], at the start.
-        tau_half: the same h / 2 later.
-        tau_end: the same h later.
-        flow: velocity of the water, north and east [m/s], held.
-        h: the step [s].
-        p: the vehicle.
+    ``tau``, ``tau_half`` and ``tau_end`` act at its start, in the middle, and h later; ``flow`` is held.
     """
     a = derivative(state, tau, flow, p)
     b = derivative(ahead(state, 0.5 * h, a), tau_half, flow, p)

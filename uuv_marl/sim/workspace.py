@@ -92,14 +92,7 @@ class Scratch(NamedTuple):
 
 
 def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -> Scratch:
-    """A column for each array of a workspace, and a cache line between one thread's and the next's.
-
-    Args:
-        threads: how many work at once.
-        num_vehicles: vehicles of a world.
-        num_sectors: sub-sectors of a vehicle's sonar.
-        num_cells: the most cells that a world is sorted into.
-    """
+    """A column for each array of a workspace, and a cache line between one thread's and the next's."""
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
     kinds = [(spec.axes, spec.dtype) for table in (Columns, Cells, Listener) for spec in array_specs(table).values()]
 

@@ -82,9 +82,9 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 def move_obstacles(w: int, course: Course, hold_s: float) -> None:
     """Obstacles go on, those that move, for one control hold."""
     for k in range(course.num_obstacles[w]):
-        if course.drift[w, k, 0] != 0.0 or course.drift[w, k, 1] != 0.0:
-            course.obstacles[w, k, 0] += course.drift[w, k, 0] * hold_s
-            course.obstacles[w, k, 1] += course.drift[w, k, 1] * hold_s
+        if course.obstacle_velocity[w, k, 0] != 0.0 or course.obstacle_velocity[w, k, 1] != 0.0:
+            course.obstacles[w, k, 0] += course.obstacle_velocity[w, k, 0] * hold_s
+            course.obstacles[w, k, 1] += course.obstacle_velocity[w, k, 1] * hold_s
 
 
 @compiled_inner

@@ -48,11 +48,12 @@ class Follow(Task):
         super().__init__(swarm)
         self._weights = reward_weights(swarm.scenario)
 
-    def payment(self, name: str, running: Bool) -> Payment:
+    def payment(self, name: str, running: Bool, *, kept: bool = True) -> Payment:
         """Pay while worlds are stepped: the weighted terms of ``dense``, or those of ``sparse``."""
         swarm = self.swarm
-        terms = np.zeros((len(self.terms) - (name == "sparse"), swarm.num_worlds, swarm.num_vehicles))
-        reward, limit_s = np.zeros(terms.shape[1:]), swarm.time_limit_s
+        worlds, n = swarm.num_worlds, swarm.num_vehicles
+        terms = np.zeros((len(self.terms) - (name == "sparse"), worlds if kept else 0, n))
+        reward, limit_s = np.zeros((worlds, n)), swarm.time_limit_s
 
         def pay(begin: int, end: int) -> None:
             _fill_some(begin, end, running, limit_s, swarm.state, swarm.facts, self._weights, terms, reward)
@@ -127,36 +128,39 @@ def shortfall(share: float) -> float:
 def _fill(
     w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
 ) -> None:
-    """Fill the weighted ``terms`` of one world, shape (term, world, vehicle), and their sum; both are zero before."""
+    """Fill the weighted ``terms`` of one world, shape (term, world or 0, vehicle), and their sum; zero before."""
     left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
     worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
     arrived = not math.isnan(facts.arrival_s[w, 0])
     arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is
     far, dense = weights.progress_far_m, terms.shape[0] > PROGRESS
+    kept = terms.shape[1] > 0
     for i in range(state.alive.shape[1]):
         alive, lost = state.alive[w, i], facts.lost[w, i]
         if not (alive or lost):
             continue
         away = facts.away[w, i]
-        terms[TRACKING, w, i] = -weights.tracking * weights.period_s * shortfall(away / weights.s_l_m - 1.0)
-        terms[OBSTACLE, w, i] = (
-            -weights.obstacle * weights.period_s * shortfall(1.0 - facts.clearance[w, i] / weights.s_o_m)
-        )
-        terms[SPACING, w, i] = (
-            -weights.spacing * weights.period_s * shortfall(1.0 - facts.spacing[w, i] / weights.s_u_m)
-        )
-        terms[EFFORT, w, i] = -weights.effort * weights.period_s * facts.effort[w, i]
-        terms[COLLISION, w, i] = -weights.collision * facts.contacts[w, i]
+        tracking = -weights.tracking * weights.period_s * shortfall(away / weights.s_l_m - 1.0)
+        obstacle = -weights.obstacle * weights.period_s * shortfall(1.0 - facts.clearance[w, i] / weights.s_o_m)
+        spacing = -weights.spacing * weights.period_s * shortfall(1.0 - facts.spacing[w, i] / weights.s_u_m)
+        effort = -weights.effort * weights.period_s * facts.effort[w, i]
+        collision = -weights.collision * facts.contacts[w, i]
+        loss, arrival, progress = 0.0, 0.0, 0.0
         if lost:
             left = (far - min(away, far)) / weights.progress_m if dense else 0.0
-            terms[LOSS, w, i] = -(weights.collision + weights.arrival + worst_rate * left_s + left)
+            loss = -(weights.collision + weights.arrival + worst_rate * left_s + left)
         if alive and arrives:
-            terms[ARRIVAL, w, i] = weights.arrival
+            arrival = weights.arrival
         if dense and (arrives or not arrived):
             left = 0.0 if arrives else min(away, far)
-            terms[PROGRESS, w, i] = (min(facts.was_away[w, i], far) - left) / weights.progress_m
-        for k in range(terms.shape[0]):
-            reward[w, i] += terms[k, w, i]
+            progress = (min(facts.was_away[w, i], far) - left) / weights.progress_m
+        reward[w, i] = 0.0 + tracking + obstacle + spacing + effort + collision + loss + arrival + progress
+        if kept:
+            terms[TRACKING, w, i], terms[OBSTACLE, w, i], terms[SPACING, w, i] = tracking, obstacle, spacing
+            terms[EFFORT, w, i], terms[COLLISION, w, i], terms[LOSS, w, i] = effort, collision, loss
+            terms[ARRIVAL, w, i] = arrival
+            if dense:
+                terms[PROGRESS, w, i] = progress
 
 
 @compiled

@@ -26,7 +26,7 @@ class Payment(NamedTuple):
     reward: Float64
     """Sum of the terms, shape (world, vehicle)."""
     terms: Float64
-    """The weighted terms in the order of ``Task.terms``, shape (term, world, vehicle)."""
+    """The weighted terms in the order of ``Task.terms``, shape (term, world, vehicle); no world if not kept."""
     pay: Callable[[int, int], None]
     """Fills both for a range of worlds, from its first to its end."""
 
@@ -98,12 +98,12 @@ class Task:
         """Lengths of axes: ``group``, ``point`` (corners), ``obstacle`` where unusual, and of those of ``Memory``."""
         return {}
 
+    # What an episode starts from, and what moves.
+
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
         """The largest ``duration_s`` that ``draw`` gives [s]."""
         return longest_duration(scenario)
-
-    # What an episode starts from, and what moves.
 
     def draw(self, world: int, rng: np.random.Generator) -> Draw:  # noqa: ARG002
         """What a world starts from, drawn from its own generator; ``memory`` is cleared. VMAS: ``reset_world_at``."""
@@ -113,7 +113,7 @@ class Task:
         """A world was reset: look at how it stands, and remember what later hooks need."""
 
     def move(self, running: Bool) -> None:
-        """Before a step: steer what the policies don't, for instance ``swarm.course.drift``; VMAS: ``pre_step``."""
+        """Before a step: steer what policies don't, such as ``swarm.course.obstacle_velocity``; VMAS: ``pre_step``."""
 
     def update(self, running: Bool) -> None:
         """After a step: remember what later hooks need; VMAS: ``post_step``."""
@@ -128,8 +128,8 @@ class Task:
         """What the latest step pays, weighted ``terms`` by name, shape (world, vehicle) each; VMAS: ``reward``."""
         return {}
 
-    def payment(self, name: str, running: Bool) -> Payment | None:  # noqa: ARG002
-        """Compiled pay for a reward by its name; None where ``reward`` is all there is."""
+    def payment(self, name: str, running: Bool, *, kept: bool = True) -> Payment | None:  # noqa: ARG002
+        """Compiled pay for a reward by its name, its terms only if they are ``kept``; None for ``reward`` alone."""
         return None
 
     # When it is done, and well done.

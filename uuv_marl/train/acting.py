@@ -18,13 +18,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 class Forces:
-    """An actor without memory: its output is a force [full force], to which a fixed barrier is added.
-
-    Args:
-        scenario: what is simulated.
-        num_worlds: of the swarm.
-        training: not used.
-    """
+    """An actor without memory: its output is a force [full force], to which a fixed barrier is added."""
 
     def __init__(self, scenario: Scenario, num_worlds: int, training: Training) -> None:  # noqa: ARG002
         self._features = Features(scenario, BARRIER)
@@ -59,13 +53,7 @@ class Forces:
 
 
 class Trims:
-    """An actor with memory: its output trims the gains of the hand-made law, and the filter makes what it does safe.
-
-    Args:
-        scenario: what is simulated.
-        num_worlds: of the swarm.
-        training: says the law's gains, the filter's margins, and what the actor changes.
-    """
+    """An actor with memory: its output trims the gains of the hand-made law, and the filter makes what it does safe."""
 
     size = NUM_MEMORY_FEATURES
 

@@ -252,11 +252,7 @@ class Learner:
 
 
 class Mappo:
-    """A learner with its environment, taken an iteration at a time.
-
-    Args:
-        training: what is trained on, and how.
-    """
+    """A learner with its environment, taken an iteration at a time."""
 
     def __init__(self, training: Training) -> None:
         self._by = training.mappo

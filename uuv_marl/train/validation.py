@@ -36,12 +36,7 @@ class ValidationResult(NamedTuple):
 
 
 def validate(policy: Path, training: Training) -> ValidationResult:
-    """Run a checkpoint on a training's validation seeds: with each size of swarm, and under each of its conditions.
-
-    Args:
-        policy: the checkpoint.
-        training: its own; under the conditions there are as many vehicles as its scenario has.
-    """
+    """Run a checkpoint on a training's validation seeds: with each size of swarm, and under each of its conditions."""
     metrics: list[Metrics] = []
     scenario = training.loaded_for_validation
     for n, count in training.validation:

@@ -101,14 +101,7 @@ def escape(
 
 
 @compiled
-def _add(
-    planes: Float64,
-    num: int,
-    u: float,
-    v: float,
-    demand: tuple[float, float, float, float],
-    share: float,
-) -> int:
+def _add(planes: Float64, num: int, u: float, v: float, demand: tuple[float, float, float, float], share: float) -> int:
     """Write the half-plane of velocities that take a share of a change; the number of planes then.
 
     u and v are the vehicle's own velocity [m/s], ``demand`` is that of ``escape``, ``share`` of the change.
@@ -121,17 +114,9 @@ def _add(
 
 @compiled
 def _act(
-    flat: Float32,
-    at: Starts,
-    g: OrcaGains,
-    limits: Limits,
-    speed: float,
-    follow: float,
-    period: float,
-    centres: bool,
-    planes: Float64,
-    action: Float32,
-) -> None:
+    flat: Float32, at: Starts, g: OrcaGains, limits: Limits, speed: float, follow: float, period: float, centres: bool,
+    planes: Float64, action: Float32,
+) -> None:  # fmt: skip
     """The law for every vehicle. ``speed``: the vehicle's largest [m/s]; ``follow``: of ``velocity_gain`` [N s/m]."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):

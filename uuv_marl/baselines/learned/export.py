@@ -117,15 +117,7 @@ def _forward(g: "Graph", x: "Value", layers: Sequence[Layer]) -> "Value":
 def _look(
     g: "Graph", flat: "Value", layout: PerceptLayout, gains: BioInspiredGains, limits: Limits
 ) -> "tuple[Value, Value]":
-    """``features.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts.
-
-    Args:
-        g: takes the nodes.
-        flat: percepts in physical units, double, shape (vehicle, entry).
-        layout: of the percepts.
-        gains: of the barrier.
-        limits: of the actuators, and the surge resistance.
-    """
+    """``features.Features.look``: features (vehicle, size) and barrier (vehicle, 2) [full force] from percepts."""
     sizes = {row.name: row.size for row in layout.table}
     percept = dict(zip(sizes, g.split(flat, list(sizes.values())), strict=True))
     sectors, active = sizes["heard"], sizes["echo"]

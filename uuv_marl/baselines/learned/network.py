@@ -53,8 +53,6 @@ class Learned(Policy):
     """A checkpoint's actor: tanh layers from local, body-frame features to a force, plus the barrier. Deterministic.
 
     Args:
-        scenario: gives the percept's layout and the vehicle's limits.
-        num_worlds: first axis of the percepts.
         name: of the policy in messages.
         checkpoint: the actor, and what it was trained on.
         any_vehicle: whether it may run on a vehicle that it was not trained on.

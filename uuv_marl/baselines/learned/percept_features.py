@@ -15,10 +15,17 @@ BARRIER = BioInspiredGains(zeta_l=0.0, zeta_n=0.8, delta_n=35.0, zeta_o=0.3, del
 MOST_BARRIER = 8.0
 """The barrier is bounded here [full force]; the action is bounded by 1 after the sum."""
 
+SURGE, SWAY, YAW, LED_X, LED_Y, L_X, L_Y, TO_X, TO_Y = range(9)
+"""Features of a vehicle's own motion, of l(t)'s velocity and place, and of the direction to it, shorter where near."""
+_OWN, _PUT = 9, 4
+"""How many features a vehicle's own are, and those of a neighbour (``put``)."""
+_CLOSE, _RANGE, _TOWARDS_X, _TOWARDS_Y, _ECHO = range(5)
+"""Features of an echo, and how many: nearness, range, direction, longer where near."""
+
 
 def num_features(sectors: int, active_sectors: int) -> int:
     """Entries that ``Features`` has for so many sub-sectors, ``active_sectors`` of them with echoes."""
-    return 11 + 4 * sectors + 4 * active_sectors
+    return _OWN + _PUT * sectors + _ECHO * active_sectors + 2
 
 
 class Features:
@@ -61,14 +68,9 @@ def put(p_x: float, p_y: float, near: float, out: Float32, k: int) -> None:
 
 @compiled
 def _look(
-    flat: Float32,
-    at: Starts,
-    gains: BioInspiredGains,
-    limits: Limits,
-    features: Float32,
-    barrier: Float32,
+    flat: Float32, at: Starts, gains: BioInspiredGains, limits: Limits, features: Float32, barrier: Float32,
     clamps: Int64,
-) -> None:
+) -> None:  # fmt: skip
     """``Features.look``. Every feature is bounded: by about 2, velocities by what the vehicle can do.
 
     ``barrier`` is filled with the force [full force], shape (world, vehicle, 2).
@@ -78,30 +80,32 @@ def _look(
         for i in range(flat.shape[1]):
             out = features[w, i]
             out[:] = 0.0
-            out[0], out[1], out[2] = see.velocity[w, i, 0] / 4.0, see.velocity[w, i, 1], see.yaw_rate[w, i, 0]
-            out[3], out[4] = see.reference_velocity[w, i, 0] / 4.0, see.reference_velocity[w, i, 1] / 4.0
+            out[SURGE], out[SWAY] = see.velocity[w, i, 0] / 4.0, see.velocity[w, i, 1]
+            out[YAW] = see.yaw_rate[w, i, 0]
+            out[LED_X], out[LED_Y] = see.reference_velocity[w, i, 0] / 4.0, see.reference_velocity[w, i, 1] / 4.0
             l_x, l_y = see.reference[w, i, 0], see.reference[w, i, 1]
             length = np.sqrt(l_x * l_x + l_y * l_y)
-            out[5], out[6] = l_x / max(64.0, 0.5 * length), l_y / max(64.0, 0.5 * length)
-            out[7], out[8] = l_x / (length + 8.0), l_y / (length + 8.0)
-            f_x, f_y, k = 0.0, 0.0, 9
+            out[L_X], out[L_Y] = l_x / max(64.0, 0.5 * length), l_y / max(64.0, 0.5 * length)
+            out[TO_X], out[TO_Y] = l_x / (length + 8.0), l_y / (length + 8.0)
+            f_x, f_y, k = 0.0, 0.0, _OWN
             for s in range(see.heard.shape[2]):
                 if see.heard[w, i, s] > 0.0:
                     p_x, p_y = see.neighbour[w, i, s, 0], see.neighbour[w, i, s, 1]
                     put(p_x, p_y, 10.0, out, k)
                     d_x, d_y, clamped = neighbour_force(p_x, p_y, gains)
                     f_x, f_y, clamps[w] = f_x + d_x, f_y + d_y, clamps[w] + clamped
-                k += 4
+                k += _PUT
             for a in range(see.echo.shape[2]):
                 if see.echo[w, i, a] > 0.0:
                     p_x, p_y = see.echo_position[w, i, a, 0], see.echo_position[w, i, a, 1]
                     reach = see.echo_range[w, i, a]
                     away = max(np.sqrt(p_x * p_x + p_y * p_y), 1e-3)
-                    out[k], out[k + 1] = 20.0 / (reach + 10.0), reach / 64.0
-                    out[k + 2], out[k + 3] = out[k] * p_x / away, out[k] * p_y / away
+                    out[k + _CLOSE], out[k + _RANGE] = 20.0 / (reach + 10.0), reach / 64.0
+                    out[k + _TOWARDS_X] = out[k + _CLOSE] * p_x / away
+                    out[k + _TOWARDS_Y] = out[k + _CLOSE] * p_y / away
                     d_x, d_y, clamped = obstacle_force(p_x, p_y, gains)
                     f_x, f_y, clamps[w] = f_x + d_x, f_y + d_y, clamps[w] + clamped
-                k += 4
+                k += _ECHO
             f_x, f_y = f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque
             shrink = min(1.0, MOST_BARRIER / max(np.sqrt(f_x * f_x + f_y * f_y), 1e-9))
             barrier[w, i, 0], barrier[w, i, 1] = shrink * f_x, shrink * f_y

@@ -9,8 +9,6 @@ import numpy as np
 from uuv_marl.baselines.learned.checkpoint import Checkpoint
 from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES, fill_memory_features
 from uuv_marl.baselines.learned.network import forward, need_same
-from uuv_marl.baselines.safety.barrier import Barrier
-from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.baselines.scout.trims import MOST_TRIM, heeded
 from uuv_marl.percept import Percept
@@ -19,26 +17,9 @@ from uuv_marl.types import Bool, Float32
 
 
 class TrimmedScout(Scout):
-    """``scout``'s law, which an actor trims.
-
-    Args:
-        scenario: gives the vehicle, the decision period and the percept's layout.
-        num_worlds: first axis of the percepts.
-        gains: of the law.
-        barrier: margins and rates of the filter.
-    """
+    """``scout``'s law, which an actor trims."""
 
     num_trims = 1
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        num_worlds: int = 1,
-        *,
-        gains: ScoutGains | None = None,
-        barrier: Barrier | None = None,
-    ) -> None:
-        super().__init__(scenario, num_worlds, gains=gains, barrier=barrier)
 
     def look(self, features: Float32, rows: Bool | None = None) -> None:
         """Fill the features of the memory that an actor sees.
@@ -61,18 +42,7 @@ class TrimmedScout(Scout):
 
 
 class LearnedScout(TrimmedScout):
-    """A checkpoint's actor inside ``scout``'s law, memory and filter. Deterministic.
-
-    Args:
-        scenario: gives the vehicle, the decision period and the percept's layout.
-        num_worlds: first axis of the percepts.
-        name: of the policy in messages.
-        checkpoint: the actor, and what it was trained on.
-        any_vehicle: whether it may run on a vehicle that it was not trained on.
-
-    Raises:
-        PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.
-    """
+    """A checkpoint's actor inside ``scout``'s law, memory and filter, made as ``network.Learned`` is. Deterministic."""
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False

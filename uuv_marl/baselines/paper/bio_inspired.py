@@ -45,8 +45,6 @@ class BioInspired(Policy):
     """Attraction to l(t), attraction and repulsion among neighbours, repulsion from obstacles. Eq. 18-22.
 
     Args:
-        scenario: gives the vehicle's limits and the percept's layout.
-        num_worlds: first axis of the percepts.
         gains: Table 1 by default.
         obstacle_term: Eq. 21's sum runs over echoes, or over obstacles. Adjacent sub-sectors that echo count as one
             obstacle where their positions agree (centres) or follow without a gap (surfaces); its nearest echo counts.
@@ -81,8 +79,6 @@ class BioInspiredPlus(BioInspired):
     """The same law with feed-forward of the reference's velocity, yaw damping, and tuned gains.
 
     Args:
-        scenario: gives the vehicle's limits and the percept's layout.
-        num_worlds: first axis of the percepts.
         gains: those that were tuned by default.
         tuned_for: a vehicle of the catalogue, in whose scale they were tuned; ``literature_185`` by default.
     """
@@ -147,15 +143,9 @@ def counts_once(w: int, i: int, a: int, see: Fields, centres: bool) -> bool:
 
 @compiled
 def _act(
-    flat: Float32,
-    at: Starts,
-    g: BioInspiredGains,
-    limits: Limits,
-    once: bool,
-    centres: bool,
-    action: Float32,
+    flat: Float32, at: Starts, g: BioInspiredGains, limits: Limits, once: bool, centres: bool, action: Float32,
     clamps: Int64,
-) -> None:
+) -> None:  # fmt: skip
     """The law for every vehicle. Eq. 18-22. With ``once``, adjacent echoes of one obstacle count once."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):

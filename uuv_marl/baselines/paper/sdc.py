@@ -153,17 +153,9 @@ def hexagonal_slots(n: int) -> Float64:
 
 @compiled
 def _act(
-    flat: Float32,
-    at: Starts,
-    g: SdcGains,
-    limits: Limits,
-    slots: Float64,
-    depth: Float64,
-    all_informed: bool,
-    rho: Float64,
-    action: Float32,
-    clamps: Int64,
-) -> None:
+    flat: Float32, at: Starts, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, all_informed: bool,
+    rho: Float64, action: Float32, clamps: Int64,
+) -> None:  # fmt: skip
     """The law for every vehicle.
 
     ``slots``: place of every vehicle in the formation, north and east [m], shape (world, vehicle, 2); ``depth``:
@@ -187,16 +179,9 @@ def _index(identity: float, num: int) -> int:
 
 @compiled
 def _force(
-    w: int,
-    i: int,
-    see: Fields,
-    g: SdcGains,
-    limits: Limits,
-    slots: Float64,
-    depth: Float64,
-    informed: bool,
+    w: int, i: int, see: Fields, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, informed: bool,
     rho: float,
-) -> tuple[float, float, int]:
+) -> tuple[float, float, int]:  # fmt: skip
     """Body-frame force on one vehicle [N], forward and to starboard, and 1 where the funnel's bound binds.
 
     ``slots`` and ``depth`` are those of the world, ``rho`` the half width of the funnel [m]. An ``informed`` vehicle

@@ -30,8 +30,6 @@ class Guarded(Filtered):
     """A policy inside the safety filter.
 
     Args:
-        scenario: gives the vehicle, the decision period and the percept's layout.
-        num_worlds: first axis of the percepts.
         inner: the policy that decides, made for the same scenario and worlds.
         barrier: margins and rates of the filter.
     """

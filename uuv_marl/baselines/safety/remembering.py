@@ -31,13 +31,7 @@ def turnable(barrier: Barrier, scenario: Scenario) -> Barrier:
 
 
 class Filtered(Policy):
-    """A policy that remembers, and whose velocities are made safe. A subclass defines ``decide``.
-
-    Args:
-        scenario: gives the vehicle, the decision period and the percept's layout.
-        num_worlds: first axis of the percepts.
-        barrier: margins and rates of the filter.
-    """
+    """A policy that remembers, and whose velocities are made safe. A subclass defines ``decide``."""
 
     wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = Surroundings

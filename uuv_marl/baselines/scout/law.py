@@ -31,8 +31,6 @@ class Scout(Filtered):
     """Feed-forward and pull, pushes among near neighbours, a flow round remembered obstacles, and the safety filter.
 
     Args:
-        scenario: gives the vehicle, the decision period and the percept's layout.
-        num_worlds: first axis of the percepts.
         preset: name of the set of numbers, of ``PRESETS``.
         gains: of the wished velocity, instead of the preset's.
         barrier: margins and rates of the filter, instead of the preset's.

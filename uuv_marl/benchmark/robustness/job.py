@@ -77,17 +77,10 @@ def _places(plan: Plan) -> Iterator[tuple[str, int]]:
 
 
 def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> Path:
-    """Run what is missing of a plan, and write all its episodes to ``EPISODES``, a row each.
+    """Run what is missing of a plan, and write all its episodes to ``EPISODES``, a row each; the file.
 
-    Args:
-        folder: holds a benchmark's results of each scenario, axis and level, in ``cells``.
-        plan: what to run.
-        report: called as it goes on.
-        evaluator: runs a policy over seeds, here or elsewhere.
-        anew: drop the runs of policies whose file has changed since, and make them again.
-
-    Returns:
-        The file.
+    The folder holds a benchmark's results of each scenario, axis and level, in ``cells``. The rest is as for
+    ``Suite.run``.
 
     Raises:
         PolicyError: a policy does not exist, or cannot be run on one of the scenarios.

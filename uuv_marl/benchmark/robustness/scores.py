@@ -81,11 +81,7 @@ def axis_score(table: Any, axis: str) -> AxisScore | None:
     levels = (0, *(int(level) for level in both[axis]))
     calm, rest = both[CALM].to_numpy()[:, 0], both[axis].to_numpy()
     shares = np.column_stack([calm, rest])
-    return AxisScore(
-        success=scored(rest.mean(axis=1)),
-        critical=scored(shares, partial(_critical, levels)),
-        levels=levels,
-    )
+    return AxisScore(scored(rest.mean(axis=1)), scored(shares, partial(_critical, levels)), levels)
 
 
 def _critical(levels: tuple[int, ...], *shares: Float64, axis: int) -> Float64:

@@ -17,15 +17,7 @@ _MOST, _LEAST = 1.6, 0.08
 
 
 def paint_current(surface: pygame.Surface, scene: Scene, view: Camera, cell: float, unit: float) -> None:
-    """Four arrows in every cell of the grid, which stay where they are while the view moves.
-
-    Args:
-        surface: to paint on.
-        scene: with the water; nothing is painted where it is still.
-        view: the camera.
-        cell: side of the grid's cells [m].
-        unit: pixels of the surface in one of a picture of the usual size.
-    """
+    """Four arrows in every cell of the grid, of this side [m], which stay where they are while the view moves."""
     if scene.water is None:
         return
     apart = cell / 2.0
@@ -42,14 +34,7 @@ def paint_current(surface: pygame.Surface, scene: Scene, view: Camera, cell: flo
 
 
 def arrow(surface: pygame.Surface, start: Float, vector: Float, unit: float) -> None:
-    """An arrow from a point along a vector.
-
-    Args:
-        surface: to paint on.
-        start: where it begins, right and down [px], shape (2,).
-        vector: from there to its tip, right and down [px], shape (2,); longer than 0.
-        unit: pixels of the surface in one of a picture of the usual size.
-    """
+    """An arrow from a point along a vector [px], longer than 0."""
     tip, length = start + vector, float(np.hypot(*vector))
     ahead = vector / length
     aside, wing = np.array([-ahead[1], ahead[0]]), min(5.0 * unit, 0.5 * length)

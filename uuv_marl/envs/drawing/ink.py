@@ -46,14 +46,7 @@ def _font(height: int, bold: bool) -> pygame.font.Font:
 
 @functools.lru_cache(maxsize=1024)
 def text(words: str, height: int, colour: Colour = TEXT, bold: bool = False) -> pygame.Surface:
-    """Words as a picture.
-
-    Args:
-        words: the text.
-        height: of the letters [px].
-        colour: of the letters.
-        bold: whether they are bold.
-    """
+    """Words as a picture."""
     if not pygame.font.get_init():  # the user called pygame.quit()
         _font.cache_clear()
     return _font(height, bold).render(words, True, colour)
@@ -63,17 +56,7 @@ def write(
     surface: pygame.Surface, words: str, at: tuple[float, float], height: int, colour: Colour = TEXT,
     *, bold: bool = False, halo: bool = False,
 ) -> None:  # fmt: skip
-    """Put words on a surface.
-
-    Args:
-        surface: to write on.
-        words: the text.
-        at: its upper left corner, right and down [px].
-        height: of the letters [px].
-        colour: of the letters.
-        bold: whether they are bold.
-        halo: whether a white edge keeps them readable on lines.
-    """
+    """Put words on a surface."""
     x, y = round(at[0]), round(at[1])
     if halo:
         edge = text(words, height, WHITE, bold)

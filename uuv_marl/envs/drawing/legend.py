@@ -50,14 +50,7 @@ def legend_rows(width: int, scene: Scene, height: int) -> int:
 
 
 def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height: int) -> None:
-    """Draw a scene's legend.
-
-    Args:
-        surface: to draw on.
-        area: where on it, with room for its ``legend_rows`` [px].
-        scene: what the frame shows, which decides on the signs.
-        height: of the letters [px].
-    """
+    """Draw a scene's legend in an area with room for its ``legend_rows`` [px]."""
     unit = height / 12.0
     for row, x, words, sign in _flow(area.width, scene, height):
         y = area.top + (3 + 20 * row) * unit

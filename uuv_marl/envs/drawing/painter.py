@@ -186,15 +186,7 @@ class Painter:
 
 
 def diagonal_cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:
-    """A diagonal cross.
-
-    Args:
-        surface: to paint on.
-        at: its middle, right and down [px], shape (2,).
-        size: half its width, which is half its height [px].
-        colour: of its lines.
-        width: of its lines [px].
-    """
+    """A diagonal cross of half this width ``size`` and lines of this ``width`` [px]."""
     for slope in (1.0, -1.0):
         start, end = (at + size * np.array([[-1.0, -slope], [1.0, slope]])).tolist()
         pygame.draw.line(surface, colour, start, end, width)

@@ -16,14 +16,7 @@ with extra("render", "rendering"):
 
 
 def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera) -> None:
-    """Every array as a fan with the edges of its sub-sectors, the active ones on top.
-
-    Args:
-        surface: to paint on.
-        scene: gives the arrays and the vehicle's pose.
-        sonar: gives the vehicle.
-        view: the camera.
-    """
+    """Every array as a fan with the edges of its sub-sectors, the active ones on top."""
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     middle, far = view.pixels(pose).tolist(), 3.0 * math.hypot(*view.reach)
     for array in sorted(scene.scenario.sonar.arrays, key=lambda array: array.kind == "active"):
@@ -36,15 +29,7 @@ def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: 
 
 
 def paint_heard(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera, line_px: float) -> None:
-    """Lines to the vehicles that are heard, and echoes as arcs across their sub-sectors.
-
-    Args:
-        surface: to paint on.
-        scene: gives the arrays and the vehicle's pose.
-        sonar: what the vehicle hears.
-        view: the camera.
-        line_px: pixels of the surface in one of a picture of the usual size.
-    """
+    """Lines to the vehicles that are heard, and echoes as arcs across their sub-sectors."""
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     ahead, aside = unit(heading), unit(heading + math.pi / 2)
     middle = view.pixels(pose).tolist()

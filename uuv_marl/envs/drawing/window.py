@@ -43,12 +43,7 @@ class Window:
         self._paused, self._once, self._left_out = False, False, 0
 
     def show(self, scene: Callable[[int | None], Scene], *, wait: bool) -> None:
-        """Draw a step, and wait as long as it lasts or the window is paused; nothing once the user has closed it.
-
-        Args:
-            scene: gives the world as it stands, with the sonar of the vehicle asked for.
-            wait: whether the step is new; else it is only drawn.
-        """
+        """Draw a step, and ``wait`` while it lasts or the window is paused; nothing once the user has closed it."""
         while self._shown is not None:
             touched = [self._act_on(event) for event in pygame.event.get()]
             if self._shown is None:

@@ -79,15 +79,7 @@ def actuation(scenario: Scenario) -> Actuation:
 
 
 def draw_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hull: Hull) -> None:
-    """The vehicles of world w's new episode.
-
-    Args:
-        w: index of the world.
-        key: of its episode.
-        duration_s: time that l(t) takes to its end, in which faults begin [s].
-        scenario: gives the shares.
-        hull: is written.
-    """
+    """The vehicles of world w's new episode, whose faults begin within ``duration_s``; ``hull`` is written."""
     hull.tau[w] = 0.0
     mismatch, nominal = scenario.mismatch, plant(scenario)
     hull.plants[w], hull.thrust[w] = nominal, 1.0
@@ -116,15 +108,7 @@ def victims(key: np.uint64, fault: int, scenario: Scenario) -> list[int]:
 
 
 def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario: Scenario) -> tuple[int, int]:
-    """Control holds from which and up to which a fault acts on a vehicle.
-
-    Args:
-        key: of the episode.
-        fault: index of the fault in the scenario.
-        vehicle: index of the vehicle.
-        duration_s: time that l(t) takes to its end, in which an onset is drawn [s].
-        scenario: gives the fault's onset and duration, where it states them.
-    """
+    """Control holds from which and up to which a fault acts on a vehicle; an onset is drawn within ``duration_s``."""
     given = scenario.faults[fault]
     drawn = duration_s * uniform(key, ONSET, 0, vehicle, fault)
     hold, onset = scenario.timing.control_hold_s, drawn if given.onset_s is None else given.onset_s

@@ -100,16 +100,7 @@ def water(scenario: Scenario) -> WaterModel:
 
 
 def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: WaterModel, flow: Flow) -> None:
-    """The current of world w's new episode.
-
-    Args:
-        w: index of the world.
-        key: of its episode.
-        waypoints: corners of its course, shape (point, 2) [m].
-        scenario: gives the number of eddies.
-        water: the scenario's numbers.
-        flow: is written.
-    """
+    """The current of world w's new episode, along the corners (point, 2) [m] of its course; ``flow`` is written."""
     angle = water.direction
     if math.isnan(angle):
         angle = 2.0 * math.pi * uniform(key, DIRECTION, 0, 0, 0)

@@ -36,7 +36,7 @@ class Track(NamedTuple):
     """What each vehicle's navigation gets wrong."""
 
     astray: Annotated[Float64, "world vehicle 2", "Direction of its drift, a unit vector north and east."]
-    drift: Annotated[Float64, "world vehicle 2", "Known less true position, north and east [m]."]
+    strayed: Annotated[Float64, "world vehicle 2", "Known less true position, north and east [m]."]
     bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's error, clockwise."]
 
 
@@ -48,7 +48,7 @@ def navigation(scenario: Scenario) -> NavigationModel:
 
 def draw_track(w: int, key: np.uint64, navigation: NavigationModel, track: Track) -> None:
     """Directions and errors of world w's new episode, from its key."""
-    for i in range(track.drift.shape[1]):
+    for i in range(track.strayed.shape[1]):
         track.astray[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
         track.bias[w, i] = cos_sin(navigation.compass_bias * normal(key, COMPASS, 0, i, 0))
 
@@ -56,7 +56,7 @@ def draw_track(w: int, key: np.uint64, navigation: NavigationModel, track: Track
 @compiled_inner
 def find_oneself(w: int, track: Track) -> None:
     """The vehicles of world w know where they are."""
-    track.drift[w] = 0.0
+    track.strayed[w] = 0.0
 
 
 @compiled_inner
@@ -67,8 +67,8 @@ def go_astray(w: int, state: State, navigation: NavigationModel, track: Track) -
     for i in range(state.eta.shape[1]):
         dx, dy = state.eta[w, i, 0] - state.before[w, i, 0], state.eta[w, i, 1] - state.before[w, i, 1]
         off = navigation.drift_share * math.sqrt(dx * dx + dy * dy)
-        track.drift[w, i, 0] += off * track.astray[w, i, 0]
-        track.drift[w, i, 1] += off * track.astray[w, i, 1]
+        track.strayed[w, i, 0] += off * track.astray[w, i, 0]
+        track.strayed[w, i, 1] += off * track.astray[w, i, 1]
 
 
 @compiled
@@ -93,8 +93,8 @@ def navigate(w: int, world: World, navigation: NavigationModel, track: Track, se
         c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], track)
         if world.course.informed[w, i]:
             l_t = reference[w, world.course.group[w, i]]
-            dx = l_t[0] - (eta[w, i, 0] + track.drift[w, i, 0])
-            dy = l_t[1] - (eta[w, i, 1] + track.drift[w, i, 1])
+            dx = l_t[0] - (eta[w, i, 0] + track.strayed[w, i, 0])
+            dy = l_t[1] - (eta[w, i, 1] + track.strayed[w, i, 1])
             v_x, v_y = l_t[2], l_t[3]
             see.reference[w, i, 0], see.reference[w, i, 1] = toward(dx, dy, c, s)
             see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)

@@ -139,8 +139,8 @@ def collect(
         if not world.state.alive[w, i]:
             continue
         x, y, c, s = eta[w, i, 0], eta[w, i, 1], heading[w, i, 0], heading[w, i, 1]
-        readings.pose[w, at.slot, i, a, 0] = x + track.drift[w, i, 0]
-        readings.pose[w, at.slot, i, a, 1] = y + track.drift[w, i, 1]
+        readings.pose[w, at.slot, i, a, 0] = x + track.strayed[w, i, 0]
+        readings.pose[w, at.slot, i, a, 1] = y + track.strayed[w, i, 1]
         readings.pose[w, at.slot, i, a, 2], readings.pose[w, at.slot, i, a, 3] = c, s
         for k in range(listening.first[a], listening.first[a + 1]):
             j = heard[w, i, k]
@@ -259,7 +259,7 @@ def own_move(at: Reading, i: int, world: World, track: Track, readings: Readings
     x, y = pose[at.w, at.slot, i, at.a, 0], pose[at.w, at.slot, i, at.a, 1]
     c_then, s_then = pose[at.w, at.slot, i, at.a, 2], pose[at.w, at.slot, i, at.a, 3]
     c, s = heading[at.w, i, 0], heading[at.w, i, 1]
-    dx, dy = eta[at.w, i, 0] + track.drift[at.w, i, 0] - x, eta[at.w, i, 1] + track.drift[at.w, i, 1] - y
+    dx, dy = eta[at.w, i, 0] + track.strayed[at.w, i, 0] - x, eta[at.w, i, 1] + track.strayed[at.w, i, 1] - y
     return c_then * c + s_then * s, s * c_then - c * s_then, c * dx + s * dy, c * dy - s * dx
 
 

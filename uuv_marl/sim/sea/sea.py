@@ -13,15 +13,7 @@ from uuv_marl.sim.arrays import Course, State, World
 from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.sea.actuation import PLANT, Actuation, Hull, actuation, draw_hulls, integrate_each, weaken
-from uuv_marl.sim.sea.current import (
-    Flow,
-    WaterModel,
-    advance_gust,
-    draw_flow,
-    know_velocities,
-    read_flow,
-    water,
-)
+from uuv_marl.sim.sea.current import Flow, WaterModel, advance_gust, draw_flow, know_velocities, read_flow, water
 from uuv_marl.sim.sea.modem import Mail, ModemModel, draw_mail, exchange, know_mail, modem
 from uuv_marl.sim.sea.navigation import (
     NavigationModel,
@@ -96,15 +88,7 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
 
 
 def draw_sea(w: int, scenario: Scenario, course: Course, duration_s: float, sea: Sea) -> None:
-    """The sea of world w's new episode, from its key alone.
-
-    Args:
-        w: index of the world.
-        scenario: what to draw from.
-        course: as drawn for the episode.
-        duration_s: time that l(t) takes to its end [s].
-        sea: is written.
-    """
+    """The sea of world w's new episode, from its key alone."""
     key = np.uint64(sea.keys[w])
     corners = [points[: last + 1] for points, last in zip(course.waypoints[w], course.last[w], strict=True)]
     draw_flow(w, key, np.concatenate(corners), scenario, sea.water, sea.flow)
