@@ -48,29 +48,40 @@ def test_a_hull_that_pushes_on_stands_at_the_wall_and_touches_it_once():
 def test_along_a_wall_a_hull_glides():
     """The impulse has no component along the surface: that velocity stays, but for drag."""
     swarm = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    free = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)), **{"contact.stops": False})
     for _ in range(6):
         swarm.step(NOTHING)
+        free.step(NOTHING)
     assert swarm.state.touched[0, 0]
-    assert swarm.state.nu[0, 0, 0] > 2.0
+    assert swarm.state.nu[0, 0, 0] > 0.7 * free.state.nu[0, 0, 0]
 
 
 poses = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.1, 3.1))
 speeds = st.tuples(st.floats(-5.0, 5.0), st.floats(-3.0, 3.0), st.floats(-1.0, 1.0))
 
 
+def momentum(swarm):
+    """Of all vehicles through still water, north and east [N s]."""
+    m_11, m_22, *_ = swarm.scenario.vehicle.inertia
+    (u, v, _), psi = np.moveaxis(swarm.state.nu[0], -1, 0), swarm.state.eta[0, :, 2]
+    c, s = np.cos(psi), np.sin(psi)
+    return np.array([(c * m_11 * u - s * m_22 * v).sum(), (s * m_11 * u + c * m_22 * v).sum()])
+
+
 @settings(max_examples=40, deadline=None)
 @given(pose=poses, first=speeds, second=speeds, x_g=st.sampled_from([0.0, 0.1]))
 def test_energy_never_rises_and_two_hulls_keep_their_momentum(pose, first, second, x_g):
-    """Without drag and forces: what two hulls lose in a hold, they lose to each other."""
-    still = dict.fromkeys((f"vehicle.{name}" for name in ("X_u", "Y_v", "N_r")), 0.001)
-    still |= dict.fromkeys((f"vehicle.{name}" for name in ("X_uu", "Y_vv", "N_rr")), 0.0)
-    swarm = two(
-        (300.0 + pose[0], pose[1], pose[2]), (300.0, 0.0, 0.0), nu=(first, second), **still, **{"vehicle.x_G_m": x_g}
+    """Beside the same hulls that pass through each other: what differs after a hold is the impulse alone."""
+    start = (300.0 + pose[0], pose[1], pose[2]), (300.0, 0.0, 0.0)
+    on, off = (
+        two(*start, nu=(first, second), **{"vehicle.x_G_m": x_g, "contact.stops": stops}) for stops in (True, False)
     )
-    before = energy(swarm)
-    for _ in range(10):
+    for swarm in (on, off):
         swarm.step(NOTHING)
-    assert energy(swarm) <= before * (1.0 + 1e-3) + 1e-6  # Runge-Kutta's own share at 0.1 s
+    assert energy(on) <= energy(off) * (1.0 + 1e-9) + 1e-9
+    if x_g == 0.0:  # else a push at the origin also turns the hull
+        np.testing.assert_allclose(momentum(on), momentum(off), atol=1e-6)
+    assert on.facts.spacing[0, 0] >= min(off.facts.spacing[0, 0], 1.998)
 
 
 def test_two_hulls_head_on_share_their_momentum():
@@ -97,7 +108,7 @@ def test_off_is_as_before():
     on, off = (two((-30.0, 1.0, 0.0), (300.0, 0.0, 0.0), **{"contact.stops": stops}) for stops in (True, False))
     for k in range(100):
         for swarm in (on, off):
-            swarm.step(np.array([[[0.7, 0.01], [0.3, 0.1]]]))
+            swarm.step(np.array([[[0.7, 0.0], [0.3, 0.1]]]))
         if off.facts.contacts[0].any():
             assert k > 5
             break
