@@ -79,7 +79,7 @@ def tasks() -> list[tuple[str, ...]]:
     """Every task that ships: its name, what it is, its numbers with their values."""
     return [
         (f"`{name}`", (made.__doc__ or "").splitlines()[0],
-         ", ".join(f"`{field}` = {value:g}" for field, value in made.Numbers()) or "none")
+         ", ".join(f"`{field}`" for field in made.Numbers.model_fields) or "none")
         for name, made in TASKS.items()
     ]  # fmt: skip
 
