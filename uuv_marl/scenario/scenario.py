@@ -76,7 +76,8 @@ class Scenario(fields.Section):
     @property
     def max_obstacles(self) -> int:
         """Most obstacles that a world of this scenario can hold."""
-        return self.random_field.obstacles[1] if self.random_field else len(self.obstacles)
+        drawn = self.task_class.sizes(self).get("obstacle")
+        return drawn or (self.random_field.obstacles[1] if self.random_field else len(self.obstacles))
 
     @property
     def loses_vehicles(self) -> bool:
