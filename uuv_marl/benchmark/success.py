@@ -1,4 +1,6 @@
-"""Success in disturbed water: the share of vehicles that touched nothing and came to the goal.
+"""Success of ``follow`` in disturbed water: the share of vehicles that touched nothing and came to the goal.
+
+A task's own success is in ``tasks/task.py``.
 
 The paper's arrival asks a whole swarm to park within metres, which a current or one dead thruster forbids to policies
 that are perfectly safe. Here a vehicle is ``safe`` if it touched no obstacle and no living vehicle in the whole

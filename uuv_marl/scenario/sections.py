@@ -240,7 +240,7 @@ class Disturbance(Section):
 
 
 class Reward(Section):
-    """Weights of the terms of ``follow`` (``tasks/follow.py``)."""
+    """Weights of the terms of ``follow`` and ``reach`` (``tasks/``)."""
 
     tracking: NonNegative
     obstacle: NonNegative

@@ -1,5 +1,7 @@
 """The sonar suite (Eq. 8-12): arrays of sub-sectors, and the table that finds a direction's sub-sector.
 
+Echoes are made in ``perception.py``; whom a vehicle hears is found in ``hearing.py``.
+
 A direction is given by its vector in the body frame, x forward and y starboard. A sub-sector holds the directions
 clockwise of its lower edge up to and including its upper edge, so that an edge belongs to the lower index, and arrays
 that tile the circle hear every direction once. Membership is decided by signs of cross products alone.

@@ -118,7 +118,7 @@ def coriolis(nu: Vector3, p: Plant) -> Vector3:
 
 @compiled_inline
 def damping(nu: Vector3, p: Plant) -> Vector3:
-    """D(nu) nu = (D_l + D_nl) nu [N, N, N m], less the lift of body and fins. Eq. 4.
+    """Drag, D(nu) nu = (D_l + D_nl) nu [N, N, N m], less the lift of body and fins. Eq. 4.
 
     The paper has no lift. Its form, bilinear in the speed ahead and in sway or yaw, is that of Prestero (Verification
     of a six-degree of freedom simulation model for the REMUS autonomous underwater vehicle, MIT, 2001).

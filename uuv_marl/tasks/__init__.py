@@ -1,4 +1,7 @@
-"""Tasks: what a swarm is to do, one file each. ``Task`` is the base of your own."""
+"""Tasks: what a swarm is to do, one file each. ``Task`` is the base of your own.
+
+``uuv_marl.scenario.task`` finds a task by the name that a scenario gives, so that the water can ask it what to draw.
+"""
 
 from uuv_marl.tasks.follow import Follow
 from uuv_marl.tasks.hard_water import HardWater
