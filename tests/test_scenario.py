@@ -191,7 +191,10 @@ def test_bad_values_name_field_value_and_remedy(overrides, message):
     [
         ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
         ({"scenario": "single_obstcle"}, "did you mean 'single_obstacle'"),
-        ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of lossy, .* or a path ending in .toml"),
+        (
+            {"scenario": "mycourse"},
+            "scenario 'mycourse' is unknown; give one of hard_water, .* or a path",
+        ),
         ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
         ({"num_vehicles": True}, "swarm.num_vehicles must be a whole number, got True"),
         ({"overrides": "x"}, "overrides must be a dictionary of fields and values, got 'x'"),
