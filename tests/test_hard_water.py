@@ -11,7 +11,7 @@ from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import HardWater
 from uuv_marl.tasks.maps import KINDS
-from uuv_marl.tasks.maps.ways import CELL_M, Grid, distances, free_cells, reached
+from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
 
 SEEDS = range(8)
 
@@ -66,7 +66,7 @@ def test_a_map_depends_on_its_seed_alone():
 
 
 def test_free_cells_and_ways_are_those_of_brute_force():
-    grid, rng = Grid(-20.0, -15.0, 30, 25), np.random.default_rng(0)
+    grid, rng = WayGrid(-20.0, -15.0, 30, 25), np.random.default_rng(0)
     discs = np.concatenate([rng.uniform(-20, 50, (6, 2)), rng.uniform(2, 6, (6, 1))], axis=1)
     x, y = grid.x + CELL_M * np.arange(30)[:, None, None], grid.y + CELL_M * np.arange(25)[None, :, None]
     expected = ((x - discs[:, 0]) ** 2 + (y - discs[:, 1]) ** 2 >= (discs[:, 2] + 1.5) ** 2).all(axis=2)

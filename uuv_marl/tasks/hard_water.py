@@ -14,8 +14,8 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
-from uuv_marl.tasks.maps.walls import Kind, Range, Water, banks, joined, uniform
-from uuv_marl.tasks.maps.ways import CELL_M, Grid, distances, free_cells, reached
+from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
+from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.types import Bool, Float64
 
@@ -64,10 +64,10 @@ class HardWaterNumbers(ReachNumbers):
     harbour: Harbour
     piles: Piles
 
-    def grid(self) -> Grid:
+    def grid(self) -> WayGrid:
         """Cells that hold the largest water."""
         rows = int((self.behind_m + self.length_m[1] + self.beyond_m) / CELL_M) + 1
-        return Grid(-self.behind_m, -self.half_width_m[1], rows, int(2.0 * self.half_width_m[1] / CELL_M) + 1)
+        return WayGrid(-self.behind_m, -self.half_width_m[1], rows, int(2.0 * self.half_width_m[1] / CELL_M) + 1)
 
 
 class Map(NamedTuple):
@@ -108,7 +108,7 @@ class HardWater(Reach):
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
-        self._grid: Grid = self.numbers.grid()
+        self._grid: WayGrid = self.numbers.grid()
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
@@ -151,9 +151,9 @@ class HardWater(Reach):
         numbers = self.numbers
         for tries in range(1, MOST_TRIES + 1):
             kind = numbers.kinds[int(rng.integers(len(numbers.kinds)))]
-            length, half = uniform(rng, numbers.length_m), uniform(rng, numbers.half_width_m)
-            water = Water(length, half, numbers.first_wall_m, length - numbers.goal_clear_m)
-            own: Kind = getattr(numbers, kind)
+            length, half = between(rng, numbers.length_m), between(rng, numbers.half_width_m)
+            water = Basin(length, half, numbers.first_wall_m, length - numbers.goal_clear_m)
+            own: MapKind = getattr(numbers, kind)
             walls = own.walls(rng, water)
             shore = banks(length, half, numbers.behind_m, numbers.beyond_m, numbers.bank_radius_m)
             made = Map(kind, length, joined(walls, shore), tries)

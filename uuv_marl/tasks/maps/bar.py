@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Share, Water, joined, side, uniform, wall
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, Share, between, joined, side, wall
 from uuv_marl.types import Float64
 
 
-class Bar(Kind):
+class Bar(MapKind):
     """Where the open side is, nobody knows before he comes there."""
 
     open_m: Range
@@ -16,11 +16,11 @@ class Bar(Kind):
     bend_m: Range
     """How far its bend is ahead of its foot, or behind."""
 
-    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+    def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Two walls that meet somewhere around the middle."""
-        radius, x, bank = uniform(rng, self.radius_m), uniform(rng, (water.near, water.far)), side(rng)
-        end = -bank * (water.half - uniform(rng, self.open_m) - radius)
-        bend = side(rng) * uniform(rng, self.bend_m) if rng.random() < self.bent else 0.0
+        radius, x, bank = between(rng, self.radius_m), between(rng, (water.near, water.far)), side(rng)
+        end = -bank * (water.half - between(rng, self.open_m) - radius)
+        bend = side(rng) * between(rng, self.bend_m) if rng.random() < self.bent else 0.0
         middle = (water.ahead(x + bend), float(rng.uniform(-0.4, 0.4)) * water.half)
         tip = (water.ahead(x + float(rng.uniform(-25.0, 25.0))), end)
         return joined(wall((x, bank * (water.half + INTO_BANK_M)), middle, radius), wall(middle, tip, radius))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.tasks.maps.walls import Kind, Range, Water, joined, uniform
+from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, between, joined
 from uuv_marl.types import Float64
 
 _TRIES, _MOST = 2000, 160
@@ -11,15 +11,15 @@ _CLEAR_M = 40.0
 """Around the goal [m]. Assumed: less than behind walls, since each vehicle finds its own place between discs."""
 
 
-class Forest(Kind):
+class Forest(MapKind):
     """As many discs as find a place."""
 
     gap_m: Range
     """Smallest gap between two of them."""
 
-    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+    def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Discs from just ahead of the start up to the goal's free water."""
-        gap, low, high = uniform(rng, self.gap_m), 60.0, water.length - _CLEAR_M - self.radius_m[1]
+        gap, low, high = between(rng, self.gap_m), 60.0, water.length - _CLEAR_M - self.radius_m[1]
         drawn = rng.random((_TRIES, 3))
         x, y = low + (high - low) * drawn[:, 0], water.half * (2.0 * drawn[:, 1] - 1.0)
         radius = self.radius_m[0] + (self.radius_m[1] - self.radius_m[0]) * drawn[:, 2]

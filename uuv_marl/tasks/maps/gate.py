@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Share, Water, joined, uniform, wall
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, Share, between, joined, wall
 from uuv_marl.types import Float64
 
 
-class Gate(Kind):
+class Gate(MapKind):
     """A single gap, anywhere within a share of the width."""
 
     gap_m: Range
@@ -14,10 +14,10 @@ class Gate(Kind):
     within: Share
     """How far from the middle it may lie, as a share of the banks' distance."""
 
-    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+    def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Two walls, a little aslant."""
-        radius, gap = uniform(rng, self.radius_m), uniform(rng, self.gap_m)
-        at, x = float(rng.uniform(-1.0, 1.0)) * self.within * water.half, uniform(rng, (water.near, water.far))
+        radius, gap = between(rng, self.radius_m), between(rng, self.gap_m)
+        at, x = float(rng.uniform(-1.0, 1.0)) * self.within * water.half, between(rng, (water.near, water.far))
         aslant, bank = float(rng.uniform(-0.25, 0.25)), water.half + INTO_BANK_M
 
         def on(y: float) -> tuple[float, float]:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Water, joined, side, uniform, wall
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, between, joined, side, wall
 from uuv_marl.types import Float64
 
 
-class Harbour(Kind):
+class Harbour(MapKind):
     """Piers stand square to the banks, every basin between two of them is a dead end."""
 
     pier_m: Range
@@ -16,16 +16,16 @@ class Harbour(Kind):
     mole_m: Range
     """Length of the mole that lies across the way, off both banks."""
 
-    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+    def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Piers along both banks, and the mole between two of them."""
-        radius, made = uniform(rng, self.radius_m), list[Float64]()
+        radius, made = between(rng, self.radius_m), list[Float64]()
         for bank in (1.0, -1.0):
             x = water.near + rng.uniform(0.0, 20.0)
             while x < water.far:
-                tip = bank * max(water.half - uniform(rng, self.pier_m), 10.0)
+                tip = bank * max(water.half - between(rng, self.pier_m), 10.0)
                 made.append(wall((x, bank * (water.half + INTO_BANK_M)), (x, tip), radius))
-                x += uniform(rng, self.basin_m) + 2.0 * radius
-        x, half = uniform(rng, (water.near, water.far)), uniform(rng, self.mole_m) / 2.0
+                x += between(rng, self.basin_m) + 2.0 * radius
+        x, half = between(rng, (water.near, water.far)), between(rng, self.mole_m) / 2.0
         middle = side(rng) * float(rng.uniform(0.0, 0.3)) * half
         made.append(wall((x, middle - half), (x, middle + half), radius))
         return joined(*made)

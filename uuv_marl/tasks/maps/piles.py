@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from uuv_marl.tasks.maps.walls import Kind, Range, Share, Water, joined, uniform, wall
+from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, Share, between, joined, wall
 from uuv_marl.types import Float64
 
 
-class Piles(Kind):
+class Piles(MapKind):
     """A grid that fills the water from bank to bank."""
 
     apart_m: Range
@@ -14,9 +14,9 @@ class Piles(Kind):
     braced: Share
     """Share of neighbouring piles across the way that a wall joins."""
 
-    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+    def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Rows of piles across the way, turned a little as a whole."""
-        apart, radius = uniform(rng, self.apart_m), uniform(rng, self.radius_m)
+        apart, radius = between(rng, self.apart_m), between(rng, self.radius_m)
         rows = max(1, int((water.far - water.near) // apart) + 1)
         columns = int(water.half // apart)
         aslant = float(rng.uniform(-0.15, 0.15))

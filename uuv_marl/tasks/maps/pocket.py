@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from uuv_marl.tasks.maps.walls import INTO_BANK_M, Kind, Range, Share, Water, joined, side, uniform, wall
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, Share, between, joined, side, wall
 from uuv_marl.types import Float64
 
 
-class Pocket(Kind):
+class Pocket(MapKind):
     """A U or a V."""
 
     depth_m: Range
@@ -18,12 +18,12 @@ class Pocket(Kind):
     closed: Share
     """Share of maps in which one of its sides is closed to the bank, so that only the other way leads past it."""
 
-    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+    def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Three walls, and the one to the bank."""
-        radius, depth = uniform(rng, self.radius_m), uniform(rng, self.depth_m)
-        x = uniform(rng, (min(water.near + depth, water.far), water.far))
+        radius, depth = between(rng, self.radius_m), between(rng, self.depth_m)
+        x = between(rng, (min(water.near + depth, water.far), water.far))
         off = side(rng) * rng.uniform(0.0, 0.25) * water.half
-        mouth = min(uniform(rng, self.half_width_m), water.half - abs(off) - 16.0)
+        mouth = min(between(rng, self.half_width_m), water.half - abs(off) - 16.0)
         back = mouth * rng.uniform(0.2, 1.0)
         front = water.ahead(x - depth)
         corners = [(front, off - mouth), (x, off - back), (x, off + back), (front, off + mouth)]
@@ -32,6 +32,6 @@ class Pocket(Kind):
             which = side(rng)
             made.append(wall(
                 corners[3] if which > 0 else corners[0],
-                (uniform(rng, (front, x)), which * (water.half + INTO_BANK_M)), radius,
+                (between(rng, (front, x)), which * (water.half + INTO_BANK_M)), radius,
             ))  # fmt: skip
         return joined(*made)

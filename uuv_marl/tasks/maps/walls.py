@@ -31,7 +31,7 @@ Range = Annotated[tuple[NonNegative, NonNegative], AfterValidator(_ordered)]
 Share = Annotated[float, within(0, 1)]
 
 
-class Water(NamedTuple):
+class Basin(NamedTuple):
     """Closed water before its walls are drawn."""
 
     length: float
@@ -48,13 +48,13 @@ class Water(NamedTuple):
         return min(max(x, self.near), self.far)
 
 
-class Kind(Section):
+class MapKind(Section):
     """Numbers of one kind of map."""
 
     radius_m: Range
     """Radius of the discs that its walls are made of."""
 
-    def walls(self, rng: np.random.Generator, water: Water) -> Float64:
+    def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Discs, x, y and radius [m], shape (disc, 3). The same generator gives the same walls."""
         raise NotImplementedError
 
@@ -63,7 +63,7 @@ class Kind(Section):
         return True
 
 
-def uniform(rng: np.random.Generator, bounds: tuple[float, float]) -> float:
+def between(rng: np.random.Generator, bounds: tuple[float, float]) -> float:
     """A number between two bounds."""
     return float(rng.uniform(*bounds))
 

@@ -20,7 +20,7 @@ _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
 """To neighbours; those of a knight make a length at most 2.8 % too long (1 / cos 13.3 deg)."""
 
 
-class Grid(NamedTuple):
+class WayGrid(NamedTuple):
     """Cells in the frame of a map (``walls.py``)."""
 
     x: float
@@ -38,7 +38,7 @@ class Grid(NamedTuple):
         )  # fmt: skip
 
 
-def free_cells(discs: Float64, grid: Grid, clearance: float) -> Bool:
+def free_cells(discs: Float64, grid: WayGrid, clearance: float) -> Bool:
     """Cells whose centres keep a clearance [m] from all discs, shape (row, column)."""
     free = np.ones((grid.rows, grid.columns), np.bool_)
     _stamp(discs, grid.x, grid.y, clearance, free)
