@@ -103,6 +103,7 @@ def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid
         if cells.nearest[p] < touch * touch:
             new = new_contacts(w, p, touch, before, cells, grid)
             facts.contacts[w, i] += new
+            world.state.touched[w, i] = world.state.touched[w, i] or new > 0
             began += new
     return began // 2
 
@@ -130,6 +131,7 @@ def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Gri
             was_x, was_y = obstacles_before[w, k, 0] - before[w, i, 0], obstacles_before[w, k, 1] - before[w, i, 1]
             if math.sqrt(was_x * was_x + was_y * was_y) - obstacles_before[w, k, 2] >= hull:
                 facts.contacts[w, i] += 1
+                world.state.touched[w, i] = True
                 began += 1
     for k in range(num):
         for c in range(3):

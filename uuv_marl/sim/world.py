@@ -101,7 +101,6 @@ def measure_distances(w: int, world: World, model: Model, workspace: Workspace, 
     began += measure_obstacles(w, hull, world, workspace.cells, grid)
     for i in range(facts.spacing.shape[1]):
         facts.min_spacing[w] = min(facts.min_spacing[w], facts.spacing[w, i])
-        world.state.touched[w, i] = world.state.touched[w, i] or facts.contacts[w, i] > 0
     facts.max_spacing[w] = extent(workspace.cells, grid)
     facts.collisions[w] += began
     return began
