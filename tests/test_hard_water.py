@@ -34,11 +34,11 @@ def test_every_map_can_be_passed_from_each_start_with_its_clearance(kind):
         away = np.hypot(x - made.discs[:, 0], y - made.discs[:, 1]) - made.discs[:, 2]
         free = away.min(axis=2) >= numbers.clearance_m
         parts, _ = label(free)
-        goal = grid.cell(np.array(made.length), np.array(0.0))
+        goal = grid.cell(made.length, 0.0)
         swarm.reset(seed)
         c, s = task.memory.turn[0]
         north, east = swarm.state.eta[0, :, 0], swarm.state.eta[0, :, 1]
-        starts = parts[grid.cell(c * north + s * east, c * east - s * north)]
+        starts = parts[grid.cells(c * north + s * east, c * east - s * north)]
         assert parts[goal] > 0
         assert kind == made.kind
         assert (starts > 0).all()

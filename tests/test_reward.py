@@ -9,7 +9,7 @@ import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.tasks import TASKS
+from uuv_marl.scenario.task import task_class
 
 PUPPETS = ("follow", "reach")
 """Tasks that any scenario can have."""
@@ -32,10 +32,10 @@ def mean_returns(name, scenario, reward, worlds):
 @pytest.mark.parametrize("task", PUPPETS)
 @pytest.mark.parametrize(("scenario", "reward", "seeds"), GUIDED)
 def test_the_guide_of_a_task_beats_the_floors(task, scenario, reward, seeds):
-    if reward not in TASKS[task].rewards:
+    if reward not in task_class(task).rewards:
         pytest.skip(f"{task} has no such reward")
     loaded = load_scenario(scenario, overrides={"task": task})
-    best = mean_returns(TASKS[task].guide, loaded, reward, seeds).mean()
+    best = mean_returns(task_class(task).guide, loaded, reward, seeds).mean()
     for floor in ("random", "idle"):
         assert best > mean_returns(floor, loaded, reward, seeds).mean(), floor
 
@@ -114,7 +114,7 @@ def test_a_contact_lowers_the_return_of_both(reward):
 @pytest.mark.parametrize("reward", ["dense", "sparse", "team"])
 def test_dying_never_pays_the_one_who_dies(reward, task):
     """Idle vehicles are left behind for minutes: dying at once must cost more than that."""
-    if reward not in (*TASKS[task].rewards, "team"):
+    if reward not in (*task_class(task).rewards, "team"):
         pytest.skip(f"{task} has no such reward")
     changes = {"time_limit.factor": 0.5, "task": task}
     base = load_scenario("single_obstacle", num_vehicles=6, overrides=changes)
@@ -161,7 +161,7 @@ def test_terms_are_those_documented_and_sum_to_the_reward_whose_mean_the_team_ha
         _, rewards, *_, infos = env.step(action)
         assert list(team.step(action)[1].values()) == pytest.approx(len(rewards) * [np.mean(list(rewards.values()))])
         for agent, info in infos.items():
-            assert list(info["reward_terms"]) == list(TASKS[task].terms)
+            assert list(info["reward_terms"]) == list(task_class(task).terms)
             assert sum(info["reward_terms"].values()) == pytest.approx(rewards[agent], abs=1e-12)
 
 

@@ -294,6 +294,15 @@ def test_light_commands_import_nothing_heavy():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_a_scenario_is_read_without_the_simulation():
+    code = (
+        "import sys; from uuv_marl import load_scenario\n"
+        "for name in ('starter', 'random_field'): load_scenario(name)\n"
+        "assert not {'numba', 'scipy'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_a_scenario_names_its_vehicle_whose_numbers_stand_in_a_file(tmp_path):
     scenario = load_scenario("tracking")
     assert scenario.vehicle.name == "literature_185"

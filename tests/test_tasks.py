@@ -151,6 +151,11 @@ def test_a_task_that_can_not_be_is_refused_by_field_value_and_remedy(task, messa
         load_scenario("starter", overrides={"task": task})
 
 
+def test_numbers_that_a_task_needs_are_missed_when_a_swarm_is_made():
+    with pytest.raises(ScenarioError, match="task.kinds Field required"):
+        uuv_marl.parallel_env("starter", task="hard_water")
+
+
 def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
     with pytest.raises(ValueError, match="reward must be 'dense', 'team' or a function of the swarm, got 'sparse'"):
         uuv_marl.parallel_env("starter", task="reach", reward="sparse")

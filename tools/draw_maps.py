@@ -20,9 +20,9 @@ def way(discs: np.ndarray, length: float, task: object) -> np.ndarray:
     """A shortest way from the start to the goal that keeps the clearance, shape (point, 2) [m]."""
     numbers = task.numbers
     grid = numbers.grid()
-    goal = tuple(int(k) for k in grid.cell(np.array(length), np.array(0.0)))
+    goal = grid.cell(length, 0.0)
     far = distances(free_cells(discs, grid, numbers.clearance_m), *goal)
-    at = [tuple(int(k) for k in grid.cell(np.array(0.0), np.array(0.0)))]
+    at = [grid.cell(0.0, 0.0)]
     while at[-1] != goal:
         r, c = at[-1]
         near = [(r + i, c + k) for i in range(-2, 3) for k in range(-2, 3)]

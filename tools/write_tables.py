@@ -15,6 +15,7 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.observation import closeness_table
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
+from uuv_marl.scenario.task import task_class
 from uuv_marl.tasks import TASKS, Follow, Reach
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -80,7 +81,7 @@ def tasks() -> list[tuple[str, ...]]:
     return [
         (f"`{name}`", (made.__doc__ or "").splitlines()[0],
          ", ".join(f"`{field}`" for field in made.Numbers.model_fields) or "none")
-        for name, made in TASKS.items()
+        for name, made in ((name, task_class(name)) for name in TASKS)
     ]  # fmt: skip
 
 

@@ -5,7 +5,17 @@ from typing import Literal
 
 import numpy as np
 
-from uuv_marl.percept import DIRECTION, SPEED, YAW_RATE, Kind, Percept, PerceptField, PerceptLayout, Starts
+from uuv_marl.percept import (
+    DIRECTION,
+    SPEED,
+    YAW_RATE,
+    Kind,
+    Percept,
+    PerceptField,
+    PerceptLayout,
+    Starts,
+    percept_table,
+)
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
@@ -16,6 +26,8 @@ Observe = Literal["positions", "closeness"]
 CLOSENESS = Kind("1", 1.0, 0.0, 2.0)
 _SIGNED = Kind("1", 1.0, -2.0, 2.0)
 _NEAR = Kind("1", 1.0, 0.0, 4.0)
+_BASE = len(percept_table(0, 0, ()))
+"""Rows that every percept has; ``closeness`` stands for these."""
 _BEFORE = 9
 """Entries of ``closeness`` before those of sub-sectors: velocities, reference."""
 
@@ -31,7 +43,7 @@ def observation_layout(scenario: Scenario, observe: Observe) -> PerceptLayout:
         return percept
     if observe != "closeness":
         raise ValueError(f"observe must be 'positions' or 'closeness', got {observe!r}")
-    return PerceptLayout((*closeness_table(scenario), *percept.table[9:]))
+    return PerceptLayout((*closeness_table(scenario), *percept.table[_BASE:]))
 
 
 def closeness_table(scenario: Scenario) -> tuple[PerceptField, ...]:
@@ -60,7 +72,7 @@ def observer(percept: Percept, layout: PerceptLayout) -> tuple[Float32, Callable
     inverse = np.float32(1.0) / layout.scale
     if layout == own:
         return observation, lambda begin, end: _scale(begin, end, flat, inverse, observation)
-    rest = sum(field.size for field in own.table[:9])
+    rest = sum(field.size for field in own.table[:_BASE])
     return observation, lambda begin, end: _weigh(begin, end, flat, own.offsets, rest, inverse, observation)
 
 

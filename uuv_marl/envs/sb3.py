@@ -23,7 +23,7 @@ with extra("sb3", "SwarmVecEnv"):
 Indices = None | int | Iterable[int]
 
 WORLDS = 8
-"""Worlds by default: with SB3's default PPO, all of whose steps are 2,048, ``starter`` is learned in 25 updates."""
+"""Worlds by default: with SB3's default PPO, which learns after 2,048 steps, ``starter`` is learned in 12 updates."""
 
 
 class SwarmVecEnv(EnvMixin, VecEnv):

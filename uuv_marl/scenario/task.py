@@ -5,6 +5,7 @@ from typing import Any, cast
 
 from pydantic import ConfigDict, ValidationError
 
+from uuv_marl.errors import ScenarioError
 from uuv_marl.modules import named_object
 from uuv_marl.scenario.fields import Section
 
@@ -23,26 +24,41 @@ def named_task(given: Any) -> Any:
     return {"name": given} if isinstance(given, str) else given
 
 
+def shipped() -> dict[str, str]:
+    """Where the class of each shipped task is, by its name. Raises nothing, and imports no task."""
+    return cast(dict[str, str], named_object("uuv_marl.tasks:TASKS"))
+
+
+def check_task(task: TaskSettings) -> None:
+    """Raise ScenarioError for what is no task, or has numbers that can't be.
+
+    A shipped task without numbers is taken at its word until a swarm is made, so that reading a scenario does not
+    import the simulation.
+    """
+    if task.model_extra or task.name not in shipped():
+        task_numbers(task)
+
+
 def task_class(name: str) -> Any:
     """The class of a task, by its name.
 
     Raises:
-        ValueError: there is none; the message gives the most similar name.
+        ScenarioError: there is none; the message gives the most similar name.
     """
-    tasks = cast(dict[str, Any], named_object("uuv_marl.tasks:TASKS"))
-    if name in tasks:
-        return tasks[name]
-    if ":" not in name:
-        near = difflib.get_close_matches(name, list(tasks), n=1, cutoff=0.4)
+    tasks = shipped()
+    if name not in tasks and ":" not in name:
+        near = difflib.get_close_matches(name, tasks, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise ValueError(f"task {name!r} is unknown; {hint}There are {', '.join(tasks)}, and module:Class for your own")
+        raise ScenarioError(
+            f"task {name!r} is unknown; {hint}There are {', '.join(tasks)}, and module:Class for your own"
+        )
     try:
-        made = named_object(name)
+        made = named_object(tasks.get(name, name))
     except ImportError as error:
-        raise ValueError(f"task {name!r} {error}; give module:Class of a module that Python finds") from None
+        raise ScenarioError(f"task {name!r} {error}; give module:Class of a module that Python finds") from None
     base: Any = named_object("uuv_marl.tasks:Task")
     if not (isinstance(made, type) and issubclass(made, base)):
-        raise ValueError(f"task {name!r} must be a subclass of uuv_marl.tasks.Task, got {made!r}")
+        raise ScenarioError(f"task {name!r} must be a subclass of uuv_marl.tasks.Task, got {made!r}")
     return made
 
 
@@ -50,7 +66,7 @@ def task_numbers(task: TaskSettings) -> Any:
     """The task's own numbers, checked by its class.
 
     Raises:
-        ValueError: a number is unknown or out of its range; the message names it, its value and the remedy.
+        ScenarioError: a number is unknown or out of its range; the message names it, its value and the remedy.
     """
     numbers = task_class(task.name).Numbers
     try:
@@ -60,7 +76,7 @@ def task_numbers(task: TaskSettings) -> Any:
         field = ".".join(map(str, ("task", *first["loc"])))
         if first["type"] == "extra_forbidden":
             there = ", ".join(numbers.model_fields) or "none of its own"
-            raise ValueError(f"{field} is unknown; the numbers of task {task.name!r} are {there}") from None
+            raise ScenarioError(f"{field} is unknown; the numbers of task {task.name!r} are {there}") from None
         if "ctx" in first and first["type"] == "value_error":
-            raise ValueError(str(first["ctx"]["error"])) from None
-        raise ValueError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None
+            raise ScenarioError(str(first["ctx"]["error"])) from None
+        raise ScenarioError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None

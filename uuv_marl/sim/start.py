@@ -36,10 +36,10 @@ def _group(scenario: Scenario, count: int, rng: np.random.Generator) -> Float64:
     """Places (vehicle, 2) in one rectangle [0, length] x [0, width]: random, or on a lattice where random jams."""
     n, start = scenario.swarm.num_vehicles, scenario.start
     length, width = start.sides(n)
-    candidates = rng.random((count * _TRIES_PER_VEHICLE, 2)) * (length, width)
-    places = np.empty((count, 2))
-    if _scatter(candidates, start.spacing_m, places) == count:
-        return places
+    candidates, placed = np.zeros((count * _TRIES_PER_VEHICLE, 3)), np.empty((count, 3))
+    candidates[:, :2] = rng.random((len(candidates), 2)) * (length, width)
+    if scatter(candidates, start.spacing_m, placed) == count:
+        return placed[:, :2]
     columns, rows, row_m = start.lattice(n)
     row, column = np.divmod(rng.permutation(columns * rows)[:count], columns)
     lattice = np.stack([row * row_m, (column + 0.5 * (row % 2)) * start.spacing_m], axis=1)
@@ -48,20 +48,24 @@ def _group(scenario: Scenario, count: int, rng: np.random.Generator) -> Float64:
 
 
 @compiled
-def _scatter(candidates: Float64, spacing: float, places: Float64) -> int:
-    """Fill ``places`` with the candidates that keep their distance from all before them; how many were found."""
+def scatter(candidates: Float64, gap: float, placed: Float64) -> int:
+    """Fill ``placed`` with the discs that keep a gap [m] from all before them; how many were found.
+
+    Both have shape (disc, 3): two coordinates and a radius [m], 0 for a point.
+    """
     found = 0
     for k in range(candidates.shape[0]):
-        if found == places.shape[0]:
+        if found == placed.shape[0]:
             break
         free = True
         for m in range(found):
-            dx = candidates[k, 0] - places[m, 0]
-            dy = candidates[k, 1] - places[m, 1]
-            if dx * dx + dy * dy < spacing * spacing:
+            dx, dy = candidates[k, 0] - placed[m, 0], candidates[k, 1] - placed[m, 1]
+            near = candidates[k, 2] + placed[m, 2] + gap
+            if dx * dx + dy * dy < near * near:
                 free = False
                 break
         if free:
-            places[found, 0], places[found, 1] = candidates[k, 0], candidates[k, 1]
+            for c in range(3):
+                placed[found, c] = candidates[k, c]
             found += 1
     return found

@@ -1,5 +1,6 @@
 """``hard_water``: closed water with walls, drawn by seed, through which every swarm can pass, if it finds the way."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -17,11 +18,12 @@ from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, 
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
 from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
 from uuv_marl.tasks.reach import Reach, ReachNumbers
-from uuv_marl.types import Bool, Float64
+from uuv_marl.types import Bool, Float64, Int64
 
 MOST_DISCS = 320
 """Most discs of a map."""
 MOST_TRIES = 1000
+"""Maps that are drawn before the numbers are refused."""
 FAR_M = 5000.0
 """Length of a way where there is none [m]."""
 
@@ -49,7 +51,7 @@ class HardWaterNumbers(ReachNumbers):
     bank_radius_m: Positive
     """Radius of the discs that make the banks."""
     first_wall_m: Positive
-    """Least place of a wall, ahead of the start; single discs begin at 60 m."""
+    """Least place of a wall, ahead of the start."""
     start_clear_m: Positive
     """Smallest distance of a wall from the start's box."""
     goal_clear_m: Positive
@@ -85,8 +87,7 @@ class Map(NamedTuple):
 class HardWaterMemory(NamedTuple):
     """What ``hard_water`` remembers."""
 
-    paid: Annotated[Bool, "world vehicle", "Whether the vehicle has been there before."]
-    there_s: Annotated[Float64, "world vehicle", "When it was there first [s]; 0 before."]
+    there_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
     best_s: Annotated[Float64, "world vehicle", "Length of its free way at the start over full speed [s]."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
     way: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
@@ -104,7 +105,6 @@ class HardWater(Reach):
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]",
     }
-    guide: ClassVar[str] = "bio_inspired"
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
@@ -132,11 +132,11 @@ class HardWater(Reach):
         discs[:, :2] = made.discs[:, :2] @ turn
         eta, nu = start_state(scenario, goal, rng)
         free = free_cells(made.discs, self._grid, scenario.contact.hull_radius_m)
-        row, column = self._grid.cell(np.array(made.length), np.array(0.0))
-        memory.way[world] = np.minimum(distances(free, int(row), int(column)), FAR_M)
+        memory.way[world] = np.minimum(distances(free, *self._grid.cell(made.length, 0.0)), FAR_M)
         memory.kind[world] = list(KINDS).index(made.kind)
-        memory.best_s[world] = self._ways(world, eta[:, :2], goal[1]) / top_speed(scenario.vehicle, scenario.actuators)
         n = len(eta)
+        ways = self._ways(np.full(n, world), eta[:, :2], goal[1])
+        memory.best_s[world] = ways / top_speed(scenario.vehicle, scenario.actuators)
         return Draw(
             (goal,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
             duration_s=min(float(memory.best_s[world].max()), self.longest_s(scenario)),
@@ -172,43 +172,44 @@ class HardWater(Reach):
         length, width = scenario.start.sides(scenario.swarm.num_vehicles)
         side = width + scenario.start.gap_m / 2.0 + numbers.start_clear_m
         free = free_cells(made.discs, self._grid, numbers.clearance_m)
-        row, column = self._grid.cell(np.array(made.length), np.array(0.0))
-        led = reached(free, int(row), int(column))
-        rows, columns = self._grid.cell(
-            np.array([-length - numbers.start_clear_m, numbers.start_clear_m]), np.array([-side, side])
-        )
-        return bool(led[rows[0] : rows[1] + 1, columns[0] : columns[1] + 1].all())
+        led = reached(free, *self._grid.cell(made.length, 0.0))
+        top, left = self._grid.cell(-length - numbers.start_clear_m, -side)
+        bottom, right = self._grid.cell(numbers.start_clear_m, side)
+        return bool(led[top : bottom + 1, left : right + 1].all())
 
-    def _ways(self, world: int, place: Float64, goal: Float64) -> Float64:
-        """Length of the shortest free way from places [m], north and east, shape (..., 2), to the goal."""
-        c, s = self.memory.turn[world]
-        x, y = c * place[..., 0] + s * place[..., 1], c * place[..., 1] - s * place[..., 0]
-        row, column = self._grid.cell(x, y)
+    def _ways(self, world: Int64, place: Float64, goal: Float64) -> Float64:
+        """Length of the shortest free way [m] from places to a goal each, north and east, shape (place, 2).
+
+        ``world`` is the world of each place, shape (place,).
+        """
+        (c, s), (north, east) = self.memory.turn[world].T, place.T
+        x, y = c * north + s * east, c * east - s * north
+        row, column = self._grid.cells(x, y)
         best = np.full(x.shape, FAR_M)
-        for d_r in (-1, 0, 1):
-            for d_c in (-1, 0, 1):
-                r, k = np.clip(row + d_r, 0, self._grid.rows - 1), np.clip(column + d_c, 0, self._grid.columns - 1)
-                off = np.hypot(x - (self._grid.x + r * CELL_M), y - (self._grid.y + k * CELL_M))
-                best = np.minimum(best, self.memory.way[world][r, k] + off)
-        return np.maximum(best, np.hypot(*np.moveaxis(place - goal, -1, 0)))
+        for d_r, d_c in itertools.product((-1, 0, 1), repeat=2):
+            r, k = np.clip(row + d_r, 0, self._grid.rows - 1), np.clip(column + d_c, 0, self._grid.columns - 1)
+            off = np.hypot(x - (self._grid.x + r * CELL_M), y - (self._grid.y + k * CELL_M))
+            best = np.minimum(best, self.memory.way[world, r, k] + off)
+        return np.maximum(best, np.hypot(*(place - goal).T))
 
-    def ways(self) -> Float64:
-        """Length of every vehicle's shortest free way to its goal now [m], shape (world, vehicle)."""
-        state, course = self.swarm.state, self.swarm.course
-        return np.array([
-            self._ways(w, state.eta[w, :, :2], course.waypoints[w, 0, 1]) for w in range(self.swarm.num_worlds)
-        ])  # fmt: skip
+    def ways(self, which: Bool | None = None) -> Float64:
+        """Length of the shortest free way of vehicles to their goals now [m].
 
-    def update(self, running: Bool) -> None:
-        """When vehicles are there first."""
-        facts, memory = self.swarm.facts, self.memory
-        first = running[:, None] & self.there() & self.swarm.state.alive & (memory.there_s == 0.0)
-        memory.there_s[first] = np.broadcast_to(facts.time_s[:, None], first.shape)[first]
+        Args:
+            which: of which vehicles, shape (world, vehicle); the result has shape (vehicle,). None for all, and then
+                the shape is (world, vehicle).
+        """
+        eta, goals = self.swarm.state.eta, self.swarm.course.waypoints[:, 0, 1]
+        chosen = np.ones(eta.shape[:2], np.bool_) if which is None else which
+        world = np.nonzero(chosen)[0]
+        found = self._ways(world, eta[chosen][:, :2], goals[world])
+        return found.reshape(eta.shape[:2]) if which is None else found
 
     def there(self) -> Bool:
         """Vehicles within ``near_m`` of the goal, along the free way."""
         near = self.swarm.facts.away <= self.numbers.near_m
-        return near & (self.ways() <= self.numbers.near_m) if near.any() else near
+        near[near] = self.ways(near) <= self.numbers.near_m
+        return near
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also how long vehicles took, and the map's kind by its place in ``KINDS``."""

@@ -9,7 +9,7 @@ from uuv_marl.scenario.fields import Positive, Section
 from uuv_marl.sim.draw import Draw
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.task import Task, Terms
-from uuv_marl.types import Bool
+from uuv_marl.types import Bool, Float64
 
 
 class ReachNumbers(Section):
@@ -22,7 +22,7 @@ class ReachNumbers(Section):
 class Reached(NamedTuple):
     """What ``reach`` remembers."""
 
-    paid: Annotated[Bool, "world vehicle", "Whether the vehicle has been there before."]
+    there_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
 
 
 class Reach(Task):
@@ -55,15 +55,19 @@ class Reach(Task):
         drawn = super().draw(world, rng)
         return drawn._replace(times=tuple(np.zeros_like(times) for times in drawn.times))
 
-    def reward(self, running: Bool) -> Terms:
+    def update(self, running: Bool) -> None:
+        """When vehicles are there first."""
+        first = running[:, None] & self.there() & self.swarm.state.alive & (self.memory.there_s == 0.0)
+        self.memory.there_s[first] = np.broadcast_to(self.swarm.facts.time_s[:, None], first.shape)[first]
+
+    def reward(self, running: Bool) -> Terms:  # noqa: ARG002
         """The weighted terms of the latest step."""
         facts, weight, limits = self.swarm.facts, self._weight, self._limits
         dt, far = self.swarm.scenario.timing.decision_period_s, weight.progress_far_m
         now, before = np.minimum(facts.away, far), np.minimum(facts.was_away, far)
         left_s = np.maximum(self.swarm.time_limit_s - facts.time_s, 0.0)[:, None]
         worst = weight.collision + weight.arrival + (weight.obstacle + weight.spacing + weight.effort) * left_s
-        arrives = self.there() & self.swarm.state.alive & ~self.memory.paid
-        self.memory.paid[running] |= arrives[running]
+        arrives = (self.memory.there_s > 0.0) & (self.memory.there_s == facts.time_s[:, None])
         return {
             "obstacle": -weight.obstacle * dt * np.clip(1.0 - facts.clearance / limits.s_o_m, 0.0, 1.0),
             "spacing": -weight.spacing * dt * np.clip(1.0 - facts.spacing / limits.s_u_m, 0.0, 1.0),

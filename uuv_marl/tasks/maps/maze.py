@@ -5,6 +5,10 @@ import numpy as np
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, between, joined, side, wall
 from uuv_marl.types import Float64
 
+_ASLANT_M, _SAME_BANK = 12.0, 0.25
+"""How far the tip of a bar is ahead of its foot, or behind [m]; share of bars that begin at the bank of the one before.
+Assumed, as piloted."""
+
 
 class Maze(MapKind):
     """Two or three bars."""
@@ -22,7 +26,7 @@ class Maze(MapKind):
             if x > water.far:
                 break
             end = -bank * (water.half - between(rng, self.open_m) - radius)
-            tip = water.ahead(x + float(rng.uniform(-12.0, 12.0)))
+            tip = water.ahead(x + between(rng, (-_ASLANT_M, _ASLANT_M)))
             made.append(wall((x, bank * (water.half + INTO_BANK_M)), (tip, end), radius))
-            bank, x = side(rng) if rng.random() < 0.5 else -bank, x + between(rng, self.apart_m)
+            bank, x = bank if rng.random() < _SAME_BANK else -bank, x + between(rng, self.apart_m)
         return joined(*made)

@@ -5,6 +5,9 @@ import numpy as np
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, Share, between, joined, wall
 from uuv_marl.types import Float64
 
+_ASLANT = 0.15
+"""Largest slant of the grid, ahead over across [1]. Assumed."""
+
 
 class Piles(MapKind):
     """A grid that fills the water from bank to bank."""
@@ -19,7 +22,7 @@ class Piles(MapKind):
         apart, radius = between(rng, self.apart_m), between(rng, self.radius_m)
         rows = max(1, int((water.far - water.near) // apart) + 1)
         columns = int(water.half // apart)
-        aslant = float(rng.uniform(-0.15, 0.15))
+        aslant = between(rng, (-_ASLANT, _ASLANT))
         joins = rng.random((rows, 2 * columns + 2)) < self.braced
         made: list[Float64] = []
         for row in range(rows):

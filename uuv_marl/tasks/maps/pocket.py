@@ -7,6 +7,10 @@ import numpy as np
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, Share, between, joined, side, wall
 from uuv_marl.types import Float64
 
+_OFF, _BACK, _PASS_M = 0.25, 0.2, 16.0
+"""Largest place aside, as a share of the banks' distance; least width of the back, as a share of the mouth's; least
+water between mouth and bank [m]. Assumed, as piloted."""
+
 
 class Pocket(MapKind):
     """A U or a V."""
@@ -22,9 +26,9 @@ class Pocket(MapKind):
         """Three walls, and the one to the bank."""
         radius, depth = between(rng, self.radius_m), between(rng, self.depth_m)
         x = between(rng, (min(water.near + depth, water.far), water.far))
-        off = side(rng) * rng.uniform(0.0, 0.25) * water.half
-        mouth = min(between(rng, self.half_width_m), water.half - abs(off) - 16.0)
-        back = mouth * rng.uniform(0.2, 1.0)
+        off = side(rng) * rng.uniform(0.0, _OFF) * water.half
+        mouth = min(between(rng, self.half_width_m), water.half - abs(off) - _PASS_M)
+        back = mouth * rng.uniform(_BACK, 1.0)
         front = water.ahead(x - depth)
         corners = [(front, off - mouth), (x, off - back), (x, off + back), (front, off + mouth)]
         made = [wall(a, b, radius) for a, b in pairwise(corners)]

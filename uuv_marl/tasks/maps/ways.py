@@ -30,12 +30,17 @@ class WayGrid(NamedTuple):
     """Along x."""
     columns: int
 
-    def cell(self, x: Float64, y: Float64) -> tuple[Int64, Int64]:
-        """Row and column of the cells nearest to places."""
+    def cells(self, x: Float64, y: Float64) -> tuple[Int64, Int64]:
+        """Rows and columns of the cells nearest to places [m], shape (place,)."""
         row, column = np.rint((x - self.x) / CELL_M), np.rint((y - self.y) / CELL_M)
         return (
             np.clip(row, 0, self.rows - 1).astype(np.int64), np.clip(column, 0, self.columns - 1).astype(np.int64),
         )  # fmt: skip
+
+    def cell(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of the cell nearest to a place [m]."""
+        row, column = self.cells(np.array([x]), np.array([y]))
+        return int(row[0]), int(column[0])
 
 
 def free_cells(discs: Float64, grid: WayGrid, clearance: float) -> Bool:
