@@ -24,7 +24,7 @@ def named_task(given: Any) -> Any:
     return {"name": given} if isinstance(given, str) else given
 
 
-def shipped() -> dict[str, str]:
+def shipped_tasks() -> dict[str, str]:
     """Where the class of each shipped task is, by its name. Raises nothing, and imports no task."""
     return cast(dict[str, str], named_object("uuv_marl.tasks:TASKS"))
 
@@ -35,7 +35,7 @@ def check_task(task: TaskSettings) -> None:
     A shipped task without numbers is taken at its word until a swarm is made, so that reading a scenario does not
     import the simulation.
     """
-    if task.model_extra or task.name not in shipped():
+    if task.model_extra or task.name not in shipped_tasks():
         task_numbers(task)
 
 
@@ -45,7 +45,7 @@ def task_class(name: str) -> Any:
     Raises:
         ScenarioError: there is none; the message gives the most similar name.
     """
-    tasks = shipped()
+    tasks = shipped_tasks()
     if name not in tasks and ":" not in name:
         near = difflib.get_close_matches(name, tasks, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]!r}? " if near else ""
