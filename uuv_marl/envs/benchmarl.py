@@ -96,6 +96,7 @@ class SwarmTask(Task):
     """
 
     STARTER = None
+    HARD_WATER = None
     TRAINING_FIELD = None
     SEA_TRIAL = None
     TRACKING = None
