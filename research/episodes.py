@@ -15,8 +15,9 @@ Row = Mapping[str, str]
 
 
 def cells(metrics: Metrics, names: Sequence[str], digits: str) -> dict[str, str]:
-    """What was measured as it stands in a file, such as ``.6g``: six significant digits."""
-    values = {name: dict[str, Any](metrics)[name] for name in names}
+    """What was measured, the task's own too, as it stands in a file, such as ``.6g``: six significant digits."""
+    found: dict[str, Any] = {**metrics, **metrics.get("task", {})}
+    values = {name: found[name] for name in names}
     return {k: "" if v is None else f"{v:{digits}}" if isinstance(v, float) else str(v) for k, v in values.items()}
 
 

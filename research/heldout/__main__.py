@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from research import FOLDER
-from research.heldout.job import run
 from research.heldout.page import write_page
+from research.heldout.sets import METRICS, SETS
+from research.sets import run
 from uuv_marl.atomic import locked
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 
@@ -35,7 +36,7 @@ def main(
     with explained(FOLDER):
         with working(f"The finished episodes are in {output}") as bar:
             report = progress_line(bar, "held out")
-            rows = run(output, only or [], seeds, lambda what, share: report(share, what[-60:]))
+            rows = run(output, SETS, only or [], seeds, METRICS, lambda what, share: report(share, what[-60:]))
             report(1.0)
         with locked(output, wait_s=60.0):
             for path in write_page(output, rows):

@@ -12,9 +12,10 @@ from research.dynamics import sea_trials
 from research.episodes import Row as Cells
 from research.episodes import cells as told
 from research.episodes import read_text
-from research.heldout import job as heldout
-from research.heldout.sets import SETS
+from research.hard_water import sets as hard_water
+from research.heldout import sets as heldout
 from research.paper import report as paper
+from research.sets import DIGITS
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import FILE, Content, knowledge, read_content
 from uuv_marl.benchmark.robustness import job as robustness
@@ -101,14 +102,15 @@ def rows_of(file: Path) -> list[Row]:
 def _kind(head: Sequence[str]) -> Kind | None:
     """The kind of table that has these columns: those that say which episode it is, then metrics."""
     kinds: tuple[tuple[tuple[str, ...], Callable[[Cells], Source], str], ...] = (
-        (("set", "policy", "seed"), _heldout, heldout.DIGITS),
+        (("set", "policy", "seed"), _set, DIGITS),
         (("scenario", "axis", "level", "policy", "seed"), _robustness, robustness.DIGITS),
         (("scenario", "vehicle", "policy", "seed"), _sea_trial, sea_trials.DIGITS),
         (("scenario", "policy", "seed"), _paper, paper.DIGITS),
     )
+    known = {*Metrics.__annotations__, *hard_water.METRICS}
     for keys, source, digits in kinds:
         measured = tuple(head[len(keys) :])
-        if tuple(head[: len(keys)]) == keys and measured and set(measured) <= set(Metrics.__annotations__):
+        if tuple(head[: len(keys)]) == keys and measured and {*measured} <= known:
             return Kind(keys, measured, source, partial(_written, measured, digits))
     return None
 
@@ -121,11 +123,11 @@ def _of(case: Case) -> Source:
     return Source(case.load(), case.policy, case.parameters)
 
 
-def _heldout(cells: Cells) -> Source:
-    held = next((held for held in SETS if held.name == cells["set"]), None)
-    if held is None:
+def _set(cells: Cells) -> Source:
+    found = next((each for each in (*heldout.SETS, *hard_water.SETS) if each.name == cells["set"]), None)
+    if found is None:
         raise ResultsError(f"there is no set {cells['set']!r} in this version")
-    return _of(Case(held.name, held.scenario, cells["policy"], held.overrides))
+    return _of(Case(found.name, found.scenario, cells["policy"], found.overrides))
 
 
 def _robustness(cells: Cells) -> Source:

@@ -96,7 +96,9 @@ class SwarmTask(Task):
     """
 
     STARTER = None
+    HARD_WATER_EASY = None
     HARD_WATER = None
+    HARD_WATER_HARD = None
     TRAINING_FIELD = None
     SEA_TRIAL = None
     TRACKING = None
