@@ -1,4 +1,4 @@
-"""``python -m research.hard_water.learn``: Stable-Baselines3's PPO from the sonar alone, a quarter of an hour of one core."""
+"""``python -m research.hard_water.learn``: Stable-Baselines3's PPO from the sonar alone, in fifteen minutes of one core."""
 
 import time
 from collections.abc import Callable
