@@ -23,7 +23,7 @@ from uuv_marl.types import Float32, Float64
 class OracleGains(NamedTuple):
     """Free parameters, found by hand on seeds from 10,000 on."""
 
-    speed: float = 3.4
+    speed: float = 4.2
     """Along the way [m/s]."""
     slow: float = 0.25
     """Largest speed over the length of the way left [1/s]."""
@@ -35,6 +35,8 @@ class OracleGains(NamedTuple):
     """Least distance to neighbours [m]."""
     apart_rate: float = 0.5
     """The same for neighbours [1/s]."""
+    follow: float = 0.9
+    """Plus this share of the speed at which the neighbour goes away [1]."""
     push: float = 2.5
     """Speed away from a neighbour that is touched [m/s]."""
     push_range: float = 9.0
@@ -105,6 +107,8 @@ def _neighbour_planes(w: int, i: int, see: Fields, g: OracleGains, planes: Float
             push = g.push * max(1.0 - away / g.push_range, 0.0)
             x, y = x / away, y / away
             p_x, p_y = p_x - push * x, p_y - push * y
-            planes[num, 0], planes[num, 1], planes[num, 2] = x, y, g.apart_rate * (away - g.apart)
+            goes = max(x * see.link_velocity[w, i, k, 0] + y * see.link_velocity[w, i, k, 1], 0.0)
+            planes[num, 0], planes[num, 1] = x, y
+            planes[num, 2] = g.follow * goes + g.apart_rate * (away - g.apart)
             num += 1
     return p_x, p_y, num
