@@ -39,6 +39,10 @@ class OracleGains(NamedTuple):
     """Plus this share of the speed at which the neighbour goes away [1]."""
     push: float = 2.5
     """Speed away from a neighbour that is touched [m/s]."""
+    behind: float = 0.5
+    """Share of it from a neighbour farther [1]."""
+    apart_behind: float = 3.5
+    """m"""
     push_range: float = 9.0
     """Distance at which that ends [m]."""
 
@@ -78,7 +82,7 @@ def _act(
             w_x, w_y = float(way[w, i, 0]), float(way[w, i, 1])
             pace = min(g.speed, g.slow * length[w, i, 0]) / max(math.hypot(w_x, w_y), 1e-6)
             num = _wall_planes(walls[w, i], g, planes)
-            p_x, p_y, all_ = _neighbour_planes(w, i, see, g, planes, num)
+            p_x, p_y, all_ = _neighbour_planes(w, i, see, w_x, w_y, g, planes, num)
             v_x, v_y, _ = nearest_velocity(pace * w_x + p_x, pace * w_y + p_y, planes, all_, num, 5.0)
             steer(v_x, v_y, see.velocity[w, i, 0], see.velocity[w, i, 1], gain, limits, action[w, i])
 
@@ -97,18 +101,21 @@ def _wall_planes(walls: Float32, g: OracleGains, planes: Float64) -> int:
 
 
 @compiled
-def _neighbour_planes(w: int, i: int, see: Fields, g: OracleGains, planes: Float64, num: int) -> tuple[float, float, int]:
+def _neighbour_planes(
+    w: int, i: int, see: Fields, w_x: float, w_y: float, g: OracleGains, planes: Float64, num: int
+) -> tuple[float, float, int]:
     """Likewise for neighbours, from row ``num`` on; the push [m/s], and how many planes there are then."""
     p_x, p_y = 0.0, 0.0
     for k in range(see.heard.shape[2]):
         x, y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         away = math.hypot(x, y)
         if see.heard[w, i, k] > 0.0 and 0.0 < away < 25.0:
-            push = g.push * max(1.0 - away / g.push_range, 0.0)
+            first = math.hypot(w_x - x, w_y - y) < math.hypot(w_x, w_y)
+            push = (1.0 if first else g.behind) * g.push * max(1.0 - away / g.push_range, 0.0)
             x, y = x / away, y / away
             p_x, p_y = p_x - push * x, p_y - push * y
             goes = max(x * see.link_velocity[w, i, k, 0] + y * see.link_velocity[w, i, k, 1], 0.0)
             planes[num, 0], planes[num, 1] = x, y
-            planes[num, 2] = g.follow * goes + g.apart_rate * (away - g.apart)
+            planes[num, 2] = g.follow * goes + g.apart_rate * (away - (g.apart if first else g.apart_behind))
             num += 1
     return p_x, p_y, num
