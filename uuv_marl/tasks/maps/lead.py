@@ -1,4 +1,4 @@
-"""Where a shortest way leads: a point on it ahead of a vehicle, and the walls around, which no vehicle could measure."""
+"""Where a shortest way leads: a point ahead on it, and the walls around, which no vehicle could measure."""
 
 import math
 from typing import NamedTuple
@@ -38,7 +38,7 @@ class Seen(NamedTuple):
 
 
 @compiled
-def ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
+def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
     """Row and column on the way that ``field`` descends, about ``AHEAD_M`` from a cell of it, or where it ends.
 
     ``field``: what is left from each cell, shape (row, column); infinite on walls, which are thicker than a step.
@@ -80,7 +80,7 @@ def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float6
 
 
 @compiled
-def look(seen: Seen, lead: Float64, grid: WayGrid, way: Float64, walls: Float64) -> None:
+def tell_way(seen: Seen, lead: Float64, grid: WayGrid, way: Float64, walls: Float64) -> None:
     """Fill ``way`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2) with the channel's rows of these names.
 
     ``lead``: what is left from each cell, dear near walls, shape (world, row, column).
@@ -91,7 +91,7 @@ def look(seen: Seen, lead: Float64, grid: WayGrid, way: Float64, walls: Float64)
             pose, c, s = seen.eta[w, v], seen.heading[w, v, 0], seen.heading[w, v, 1]
             x, y = turn_c * pose[0] + turn_s * pose[1], turn_c * pose[1] - turn_s * pose[0]
             row, column = round((x - grid.x) / CELL_M), round((y - grid.y) / CELL_M)
-            i, j = ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
+            i, j = point_ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
             x, y = grid.x + i * CELL_M - x, grid.y + j * CELL_M - y
             x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
             way[w, v, 0], way[w, v, 1] = c * x + s * y, c * y - s * x
