@@ -94,8 +94,8 @@ class BatchedEnv:
                 f"reward must be {', '.join(map(repr, names))} or a function of the swarm, got {reward!r}; these are "
                 f"the rewards of task {scenario.task.name!r}"
             )
-        if isinstance(reward, str) and reward in self.task.rewards:
-            self.task.paying = reward
+        if reward in self.task.rewards:
+            self.task.paying = str(reward)
         self.state_layout = state_layout(scenario)
         self._waiting = set(range(num_worlds))
         """Worlds that were never reset."""
