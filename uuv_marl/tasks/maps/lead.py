@@ -1,0 +1,97 @@
+"""Where a shortest way leads: a point ahead on it, and the walls around, which no vehicle could measure."""
+
+import math
+
+from uuv_marl.percept import LENGTH, POSITION, PerceptField
+from uuv_marl.sim.arrays import Course, State
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.tasks.maps.ways import CELL_M, WayGrid
+from uuv_marl.types import Float64
+
+NUM_WALLS = 8
+"""Walls around that are told: the nearest. Assumed: all that a hull can touch within a second or two."""
+AHEAD_M = 12.0
+"""How far ahead the point on the way is [m]. Assumed: as piloted."""
+WAY = (
+    PerceptField("way", (2,), POSITION, "vector to a point ahead on a short way to the goal that keeps off walls"),
+    PerceptField("way_length", (1,), LENGTH, "length of the shortest free way to the goal"),
+    PerceptField("way_walls", (NUM_WALLS, 2), POSITION, "vectors to the surfaces of the nearest obstacles, else 0"),
+)
+"""Rows of the channel ``way``."""
+_TOUCH_M = 1e-3
+"""Distances below this count as this, so that there is a direction [m]; assumed."""
+
+
+@compiled
+def _straight(field: Float64, i: int, j: int, to_i: int, to_j: int) -> bool:
+    """Whether the straight line from a cell to another meets no wall."""
+    num = 2 * max(abs(to_i - i), abs(to_j - j))
+    for k in range(1, num):
+        if field[round(i + (to_i - i) * k / num), round(j + (to_j - j) * k / num)] == math.inf:
+            return False
+    return True
+
+
+@compiled
+def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
+    """Row and column on the way that ``field`` descends, up to ``AHEAD_M`` straight from a cell of it.
+
+    ``field``: what is left from each cell, shape (row, column); infinite on walls.
+    """
+    i, j, far = row, column, 0.0
+    while far < AHEAD_M:
+        to_i, to_j = i, j
+        for a in range(max(i - 2, 0), min(i + 3, field.shape[0])):
+            for b in range(max(j - 2, 0), min(j + 3, field.shape[1])):
+                if abs(a - i) + abs(b - j) < 4 and field[a, b] < field[to_i, to_j]:
+                    to_i, to_j = a, b
+        if (to_i == i and to_j == j) or (far > 0.0 and not _straight(field, row, column, to_i, to_j)):
+            break
+        far += CELL_M * math.hypot(to_i - i, to_j - j)
+        i, j = to_i, to_j
+    return i, j
+
+
+@compiled
+def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float64) -> None:
+    """Fill ``out`` with vectors to the nearest surfaces in the body frame [m], the nearest first, shape (wall, 2).
+
+    ``pose``: north, east [m], shape (at least 2,); c, s: cosine and sine of the heading; ``discs``: north, east and
+    radius [m], shape (disc, 3).
+    """
+    found, out[:] = 0, 0.0
+    for m in range(discs.shape[0]):
+        x, y = discs[m, 0] - pose[0], discs[m, 1] - pose[1]
+        away = max(math.hypot(x, y), _TOUCH_M)
+        gap = max(away - discs[m, 2], _TOUCH_M)
+        if found == out.shape[0] and gap >= math.hypot(out[found - 1, 0], out[found - 1, 1]):
+            continue
+        found = min(found + 1, out.shape[0])
+        k = found - 1
+        while k > 0 and math.hypot(out[k - 1, 0], out[k - 1, 1]) > gap:
+            out[k, 0], out[k, 1] = out[k - 1, 0], out[k - 1, 1]
+            k -= 1
+        out[k, 0], out[k, 1] = (c * x + s * y) * gap / away, (c * y - s * x) * gap / away
+
+
+@compiled
+def tell_way(
+    state: State, course: Course, heading: Float64, turn: Float64, lead: Float64, grid: WayGrid, way: Float64,
+    walls: Float64,
+) -> None:  # fmt: skip
+    """Fill ``way`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2) with the channel's rows.
+
+    ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``lead``: what is left from
+    each cell, dear near walls, shape (world, row, column).
+    """
+    for w in range(way.shape[0]):
+        turn_c, turn_s, discs = turn[w, 0], turn[w, 1], course.obstacles[w, : course.num_obstacles[w]]
+        for v in range(way.shape[1]):
+            pose, c, s = state.eta[w, v], heading[w, v, 0], heading[w, v, 1]
+            x, y = turn_c * pose[0] + turn_s * pose[1], turn_c * pose[1] - turn_s * pose[0]
+            row, column = round((x - grid.x) / CELL_M), round((y - grid.y) / CELL_M)
+            i, j = point_ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
+            x, y = grid.x + i * CELL_M - x, grid.y + j * CELL_M - y
+            x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
+            way[w, v, 0], way[w, v, 1] = c * x + s * y, c * y - s * x
+            nearest_walls(pose, c, s, discs, walls[w, v])
