@@ -53,6 +53,7 @@ class Scenario(fields.Section):
     time_limit: sections.TimeLimit
     disturbance: sections.Disturbance
     current: sea.Current
+    traffic: sea.Traffic
     latency: sea.Latency
     noise: sea.Noise
     navigation: sea.Navigation
@@ -99,6 +100,7 @@ class Scenario(fields.Section):
         check_task(self.task)
         _check_start(self)
         _check_course(self)
+        _check_traffic(self)
         _check_losses(self)
         _check_times(self)
         _check_sonar(self)
@@ -138,6 +140,7 @@ def _check_start(scenario: Scenario) -> None:
 def _check_course(scenario: Scenario) -> None:
     """One trajectory, and no obstacle on its start or end."""
     points, clear = scenario.trajectory.waypoints_m, scenario.constraints.s_o_m
+    clear += scenario.traffic.way_m if scenario.traffic.moves else 0.0
     if (points is None) == (scenario.random_field is None):
         raise ValueError(
             "trajectory.waypoints_m is needed, unless random_field draws the trajectory; "
@@ -154,6 +157,30 @@ def _check_course(scenario: Scenario) -> None:
             raise ValueError(f"{where} lies on the start; keep {clear:g} m from the two start rectangles")
         if math.dist(centre, points[-1]) < apart:
             raise ValueError(f"{where} lies on the trajectory's end; keep {clear:g} m from it")
+
+
+def _check_traffic(scenario: Scenario) -> None:
+    """Obstacles that move have room to turn in, and leave every map passable."""
+    traffic, constraints = scenario.traffic, scenario.constraints
+    if not traffic.moves:
+        return
+    if not scenario.task_class.traffic:
+        raise ValueError(
+            f"traffic.speed_mps must be 0 for task {scenario.task.name!r}, whose walls would open and close, got "
+            f"{traffic.speed_mps:g}; leave it out"
+        )
+    least = traffic.speed_mps * scenario.timing.control_hold_s
+    if traffic.way_m < least:
+        raise ValueError(
+            f"traffic.way_m must be at least {least:g}, which traffic.speed_mps = {traffic.speed_mps:g} makes in a "
+            f"control hold, got {traffic.way_m:g}; raise it or lower the speed"
+        )
+    most = constraints.s_o_m + constraints.s_u_m
+    if scenario.random_field is not None and traffic.way_m > most * (1.0 + 1e-9):
+        raise ValueError(
+            f"traffic.way_m must be at most constraints.s_o_m + s_u_m = {most:g} where random_field draws obstacles, "
+            f"so that they never close a way, got {traffic.way_m:g}; lower it"
+        )
 
 
 def _check_losses(scenario: Scenario) -> None:

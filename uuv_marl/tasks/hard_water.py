@@ -102,6 +102,7 @@ class HardWater(Reach):
 
     Numbers = HardWaterNumbers
     Memory: ClassVar[type[Any] | None] = HardWaterMemory
+    traffic: ClassVar[bool] = False  # a wall whose discs move has gaps, and a gate may close
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]",
     }
