@@ -140,7 +140,6 @@ def _check_start(scenario: Scenario) -> None:
 def _check_course(scenario: Scenario) -> None:
     """One trajectory, and no obstacle on its start or end."""
     points, clear = scenario.trajectory.waypoints_m, scenario.constraints.s_o_m
-    clear += scenario.traffic.way_m if scenario.traffic.moves else 0.0
     if (points is None) == (scenario.random_field is None):
         raise ValueError(
             "trajectory.waypoints_m is needed, unless random_field draws the trajectory; "
@@ -155,13 +154,14 @@ def _check_course(scenario: Scenario) -> None:
         where = f"obstacles.{k} at {list(centre)} m, radius {obstacle.radius_m:g} m,"
         if scenario.start.distance(scenario.swarm.num_vehicles, points[0], points[1], centre) < apart:
             raise ValueError(f"{where} lies on the start; keep {clear:g} m from the two start rectangles")
-        if math.dist(centre, points[-1]) < apart:
-            raise ValueError(f"{where} lies on the trajectory's end; keep {clear:g} m from it")
+        way = scenario.traffic.way_m if scenario.traffic.moves else 0.0
+        if math.dist(centre, points[-1]) < apart + way:
+            raise ValueError(f"{where} lies on the trajectory's end; keep {clear + way:g} m from it")
 
 
 def _check_traffic(scenario: Scenario) -> None:
-    """Obstacles that move have room to turn in, and leave every map passable."""
-    traffic, constraints = scenario.traffic, scenario.constraints
+    """Obstacles that move have room to turn in, open no walls, and keep off the trajectory's end."""
+    traffic = scenario.traffic
     if not traffic.moves:
         return
     if not scenario.task_class.traffic:
@@ -175,11 +175,11 @@ def _check_traffic(scenario: Scenario) -> None:
             f"traffic.way_m must be at least {least:g}, which traffic.speed_mps = {traffic.speed_mps:g} makes in a "
             f"control hold, got {traffic.way_m:g}; raise it or lower the speed"
         )
-    most = constraints.s_o_m + constraints.s_u_m
-    if scenario.random_field is not None and traffic.way_m > most * (1.0 + 1e-9):
+    most = math.inf if scenario.random_field is None else scenario.random_field.end_clear_m - scenario.constraints.s_o_m
+    if traffic.way_m > most:
         raise ValueError(
-            f"traffic.way_m must be at most constraints.s_o_m + s_u_m = {most:g} where random_field draws obstacles, "
-            f"so that they never close a way, got {traffic.way_m:g}; lower it"
+            f"traffic.way_m must be at most random_field.end_clear_m - constraints.s_o_m = {most:g}, so that no obstacle "
+            f"comes to the trajectory's end, got {traffic.way_m:g}; lower it"
         )
 
 
