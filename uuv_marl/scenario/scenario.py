@@ -178,8 +178,8 @@ def _check_traffic(scenario: Scenario) -> None:
     most = math.inf if scenario.random_field is None else scenario.random_field.end_clear_m - scenario.constraints.s_o_m
     if traffic.way_m > most:
         raise ValueError(
-            f"traffic.way_m must be at most random_field.end_clear_m - constraints.s_o_m = {most:g}, so that no obstacle "
-            f"comes to the trajectory's end, got {traffic.way_m:g}; lower it"
+            f"traffic.way_m must be at most random_field.end_clear_m - constraints.s_o_m = {most:g}, so that no "
+            f"obstacle comes to the trajectory's end, got {traffic.way_m:g}; lower it"
         )
 
 
