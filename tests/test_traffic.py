@@ -90,6 +90,8 @@ def test_which_move_and_where_to_is_the_seed_s():
     pairs = [swarm("multi_obstacle", share=0.5, seed=seed).course.swing[0, :, 2:] for seed in (0, 0, 1)]
     np.testing.assert_array_equal(pairs[0], pairs[1])
     assert (pairs[0] != pairs[2]).any()
+    movers = {tuple(swarm("multi_obstacle", share=0.5, seed=seed).course.swing_holds[0] > 0) for seed in range(8)}
+    assert len(movers) > 2
 
 
 @pytest.mark.parametrize("name", ["random_field", "lossy"])
