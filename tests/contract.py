@@ -30,7 +30,7 @@ MEDIUM = {
     "noise.bearing_deg": 2.0, "noise.range_share": 0.02, "noise.silence_probability": 0.05, "noise.silence_readings": 3,
     "noise.passive_range_log_sd": 0.1, "noise.passive_r50_m": 100.0, "noise.active_r50_m": 75.0,
     "noise.false_echo_probability": 0.02,
-    "navigation.drift_share": 0.02, "navigation.compass_bias_deg": 2.0,
+    "traffic.speed_mps": 1.0, "navigation.drift_share": 0.02, "navigation.compass_bias_deg": 2.0,
     "actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2, "mismatch.drag": 0.2, "mismatch.mass": 0.1,
     "faults": [{"kind": "array", "share": 0.2, "array": "bow"}, {"kind": "thruster", "share": 0.2}],
     "sonar.echo_reports": "surface", "arrival.ends_episode": False,

@@ -14,6 +14,7 @@ const flow = (episode, sample, poses) =>
 const read = (episode, time) => ({
   ...episode.numbers(time),
   poses: [...episode.poses(time)],
+  discs: [...episode.discs(time)],
   flow: episode.current && flow(episode, episode.sampleAt(time), episode.poses(time)),
   hearing: episode.inspected.map((_, rank) => hearing(episode, rank, episode.sampleAt(time))),
 });

@@ -170,6 +170,7 @@ EPISODES = {
     "scheduled": (quick("lossy", **{"disturbance.loss_times_s": [1.0, 2.0, 3.0]}), "bio_inspired", 0, [1]),
     "alone": (quick("tracking", **{"swarm.num_vehicles": 1}), "bio_inspired", 0, [0]),
     "short": (quick(**{"time_limit.factor": 0.001, "time_limit.extra_s": 0.3}), "idle", 0, []),
+    "moving": (quick("random_field", **{"traffic.speed_mps": 2.0}), "idle", 0, []),
     "slow": (quick("random_field", **{"timing.decision_period_s": 0.5}), "mappo", 2, []),
 }
 
@@ -183,6 +184,9 @@ def test_a_browser_reads_the_recording(tmp_path):
             np.testing.assert_array_equal(arrays[name], values)
         for name in ("reference", "position", "speed", "force", "spacing"):
             assert_coded(name, arrays[name], getattr(recording, name))
+        if recording.traffic is not None:
+            assert_coded("traffic", arrays["traffic"], recording.traffic)
+        assert ("traffic" in arrays) == recording.scenario.traffic.moves
         inspected = list(recording.inspections)
         others = [i for i in range(recording.heading.shape[1]) if i not in inspected]
         heading = unwrapped(recording.heading)

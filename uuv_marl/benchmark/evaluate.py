@@ -46,7 +46,7 @@ class Run(NamedTuple):
     routes: Routes
     """Routes of all vehicles, sampled in time."""
     obstacles: Float32
-    """Centre north, east and radius [m], shape (obstacle, 3)."""
+    """Centre north, east and radius [m], at the end, shape (obstacle, 3)."""
     waypoints: Float32
     """Corners of the trajectory [m], shape (point, 2)."""
     marks: Float32

@@ -13,6 +13,7 @@ _TIME = Kind("1", 1.0, 0.0, 2.0)
 def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     """The fields in order. Positions are relative to l(t), north and east; vehicles come in the order of agents."""
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
+    speed = PerceptField("obstacle_velocity", (m, 2), SPEED, "per obstacle that moves: its velocity, north and east")
     return (
         PerceptField("alive", (n,), FLAG, "per vehicle: 1, or 0 once it is lost"),
         PerceptField("position", (n, 2), POSITION, "per vehicle: position relative to l(t), north and east"),
@@ -25,6 +26,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
         PerceptField("obstacle", (m,), FLAG, "per obstacle: 1, or 0 for an unused row"),
         PerceptField("obstacle_position", (m, 2), POSITION, "per obstacle: centre relative to l(t), north and east"),
         PerceptField("obstacle_radius", (m,), LENGTH, "per obstacle: radius"),
+        *([speed] if scenario.traffic.moves else []),
     )
 
 
@@ -53,6 +55,7 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
         present,
         (obstacles[:, :, :2] - origin) * present,
         obstacles[:, :, 2:] * present,
+        *([course.obstacle_velocity[:, :m]] if swarm.scenario.traffic.moves else []),
     )
     rows = [np.reshape(field, (swarm.num_worlds, -1)) for field in fields]
     flat = np.concatenate(rows, axis=1, dtype=np.float32, casting="same_kind")

@@ -56,6 +56,7 @@ CODINGS = {
     "echo_position": Coding(0.25, stride=1, order=1),
     "action": Coding(0.02, stride=1, order=1),
     "drift": Coding(0.01),
+    "traffic": Coding(0.03, 2),
 }
 """In m, rad, m/s and shares of full force. A hull is 2 m wide, and a pixel of a whole map about 1 m; the sonar of
 inspected vehicles is drawn by their own, finer heading."""
@@ -125,6 +126,7 @@ def _arrays(recording: Recording) -> dict[str, Any]:
         "speed": recording.speed,
         "force": recording.force,
         "spacing": recording.spacing,
+        "traffic": recording.traffic,
     }
     exact = {**recording.series, "waypoints": recording.waypoints, "obstacles": recording.obstacles}
     exact["marks"] = recording.marks

@@ -81,6 +81,7 @@ class _Tape:
         percept = swarm.percept
         self._add("time_s", facts.time_s[0])
         self._add("reference", facts.reference[0, 0, :2])
+        self._add("traffic", swarm.course.obstacles[0, : swarm.course.num_obstacles[0], :2])
         self._add("drift", swarm.flow_field().drift)
         self._eddies = swarm.flow_field().eddies
         self._add("position", eta[:, :2])
@@ -113,6 +114,7 @@ class _Tape:
             metrics=run.metrics,
             waypoints=run.waypoints,
             obstacles=run.obstacles,
+            traffic=tape["traffic"] if np.ptp(tape["traffic"], axis=0).any() else None,
             marks=run.marks,
             time_s=tape["time_s"],
             reference=tape["reference"],

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Float32, Float64, Int32
@@ -60,7 +62,9 @@ class Recording(NamedTuple):
     waypoints: Float32
     """Corners of the trajectory, shape (point, 2)."""
     obstacles: Float32
-    """Centre north, east and radius, shape (obstacle, 3)."""
+    """Centre north, east and radius, at the end, shape (obstacle, 3)."""
+    traffic: Float32 | None
+    """Their centres at every sample, shape (time, obstacle, 2); None where none moves."""
     marks: Float32
     """What the task draws: centre north, east and radius of circles, at the end, shape (mark, 3)."""
     time_s: Float32
@@ -85,3 +89,7 @@ class Recording(NamedTuple):
     """What single vehicles heard, by index of the vehicle."""
     water: Water | None
     """None in still water."""
+
+    def discs(self, k: int) -> Float32:
+        """The obstacles at a sample: centre north, east and radius, shape (obstacle, 3)."""
+        return self.obstacles if self.traffic is None else np.hstack([self.traffic[k], self.obstacles[:, 2:]])

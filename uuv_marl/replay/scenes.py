@@ -44,7 +44,7 @@ class Scenes:
         return Scene(
             scenario=recording.scenario,
             waypoints=recording.waypoints,
-            obstacles=recording.obstacles,
+            obstacles=recording.discs(k),
             marks=recording.marks,
             time_s=now,
             reference=recording.reference[k],
@@ -65,7 +65,7 @@ class Scenes:
 
     def _near(self, k: int) -> Bool:
         recording, limits = self.recording, self.recording.scenario.constraints
-        discs, position = recording.obstacles, self._position[k]
+        discs, position = recording.discs(k), self._position[k]
         offset = position[:, None] - discs[None, :, :2]
         near = (np.hypot(offset[..., 0], offset[..., 1]) - discs[:, 2] < limits.s_o_m).any(axis=1)
         return near if recording.spacing is None else near | (recording.spacing[k] < limits.s_u_m)

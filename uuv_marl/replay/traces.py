@@ -22,7 +22,8 @@ from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.sim.sea.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import arrival_times, reference
-from uuv_marl.types import Float32
+from uuv_marl.sim.world import move_obstacles
+from uuv_marl.types import Float32, Float64
 
 _ELSE = "give the folder of a benchmark or a file of its folder traces, or simulate with --scenario and --policy"
 _MOST_LISTED = 10
@@ -139,6 +140,7 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
         metrics=metrics,
         waypoints=trace["waypoints"],
         obstacles=trace["obstacles"],
+        traffic=_traffic(scenario, seed, trace["route_time_s"]),
         marks=np.zeros((0, 3), np.float32),
         time_s=trace["route_time_s"],
         reference=_reference(trace["waypoints"], scenario, trace["route_time_s"]),
@@ -200,6 +202,19 @@ def _water(scenario: Scenario, seed: int, time_s: Float32) -> Water | None:
             advance_gust(0, swarm.keys[0], tick, numbers, cast(Flow, swarm.currents))
         drift[k] = swarm.flow_field().drift
     return Water(drift, swarm.flow_field().eddies)
+
+
+def _traffic(scenario: Scenario, seed: int, time_s: Float32) -> Float32 | None:
+    """Where the scenario's traffic was, which the seed decides alone."""
+    if not scenario.traffic.moves:
+        return None
+    swarm, hold_s = Swarm(scenario), scenario.timing.control_hold_s
+    swarm.reset(seed)
+    places: list[Float64] = []
+    for tick in np.rint(time_s / hold_s).astype(int).tolist():
+        move_obstacles(0, tick, swarm.course, hold_s)
+        places.append(swarm.course.obstacles[0, : swarm.course.num_obstacles[0], :2].copy())
+    return np.array(places, np.float32)
 
 
 def _reference(waypoints: Float32, scenario: Scenario, time_s: Float32) -> Float32:

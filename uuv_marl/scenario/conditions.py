@@ -14,6 +14,13 @@ def conditions(scenario: Scenario) -> str:
 
 def disturbances(scenario: Scenario) -> list[str]:
     """A phrase with numbers for each disturbance that is on."""
+    traffic = scenario.traffic
+    moving = f"{traffic.share:.3g} of obstacles move at {traffic.speed_mps:g} m/s, {traffic.way_m:g} m to and fro"
+    return [*sea_disturbances(scenario), *([moving] if traffic.moves else [])]
+
+
+def sea_disturbances(scenario: Scenario) -> list[str]:
+    """Those of the sea itself, which acts on vehicles; not those of the obstacles."""
     parts = (_current(scenario), _latency(scenario), _noise(scenario), _rest(scenario))
     return [phrase for part in parts for phrase, on in part.items() if on]
 

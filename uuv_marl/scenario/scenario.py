@@ -53,6 +53,7 @@ class Scenario(fields.Section):
     time_limit: sections.TimeLimit
     disturbance: sections.Disturbance
     current: sea.Current
+    traffic: sea.Traffic
     latency: sea.Latency
     noise: sea.Noise
     navigation: sea.Navigation
@@ -100,6 +101,7 @@ class Scenario(fields.Section):
         check_channels(self.task, self.sonar.channels)
         _check_start(self)
         _check_course(self)
+        _check_traffic(self)
         _check_losses(self)
         _check_times(self)
         _check_sonar(self)
@@ -153,8 +155,33 @@ def _check_course(scenario: Scenario) -> None:
         where = f"obstacles.{k} at {list(centre)} m, radius {obstacle.radius_m:g} m,"
         if scenario.start.distance(scenario.swarm.num_vehicles, points[0], points[1], centre) < apart:
             raise ValueError(f"{where} lies on the start; keep {clear:g} m from the two start rectangles")
-        if math.dist(centre, points[-1]) < apart:
-            raise ValueError(f"{where} lies on the trajectory's end; keep {clear:g} m from it")
+        way = scenario.traffic.way_m if scenario.traffic.moves else 0.0
+        if math.dist(centre, points[-1]) < apart + way:
+            raise ValueError(f"{where} lies on the trajectory's end; keep {clear + way:g} m from it")
+
+
+def _check_traffic(scenario: Scenario) -> None:
+    """Obstacles that move have room to turn in, open no walls, and keep off the trajectory's end."""
+    traffic = scenario.traffic
+    if not traffic.moves:
+        return
+    if not scenario.task_class.traffic:
+        raise ValueError(
+            f"traffic.speed_mps must be 0 for task {scenario.task.name!r}, whose walls would open and close, got "
+            f"{traffic.speed_mps:g}; leave it out"
+        )
+    least = traffic.speed_mps * scenario.timing.control_hold_s
+    if traffic.way_m < least:
+        raise ValueError(
+            f"traffic.way_m must be at least {least:g}, which traffic.speed_mps = {traffic.speed_mps:g} makes in a "
+            f"control hold, got {traffic.way_m:g}; raise it or lower the speed"
+        )
+    most = math.inf if scenario.random_field is None else scenario.random_field.end_clear_m - scenario.constraints.s_o_m
+    if traffic.way_m > most:
+        raise ValueError(
+            f"traffic.way_m must be at most random_field.end_clear_m - constraints.s_o_m = {most:g}, so that no "
+            f"obstacle comes to the trajectory's end, got {traffic.way_m:g}; lower it"
+        )
 
 
 def _check_losses(scenario: Scenario) -> None:

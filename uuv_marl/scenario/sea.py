@@ -47,6 +47,22 @@ class Current(Section):
         return 2 * math.ceil(self.eddies * squares / 2.0 - 1e-9)
 
 
+class Traffic(Section):
+    """Obstacles that move: to and fro along a direction that the seed draws, about their places, where they begin."""
+
+    speed_mps: Speed
+    """Their speed, the same for all; 0: they stand still."""
+    way_m: Radius
+    """How far they go to either side of their places."""
+    share: Probability
+    """Share of the obstacles that move, rounded up. A larger share moves the same obstacles and more."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether an obstacle moves."""
+        return self.speed_mps > 0.0 and self.share > 0.0
+
+
 class Latency(Section):
     """How late the sonar is. A reading is what an array hears at one time."""
 

@@ -37,6 +37,12 @@ class Course(NamedTuple):
     obstacle_velocity: Annotated[
         Float64, "world obstacle 2", "Velocity of the obstacle, north and east [m/s]; 0 in the paper."
     ]
+    swing: Annotated[
+        Float64, "world obstacle 4", "Of one that moves to and fro: its place and velocity at the start [m, m/s]."
+    ]
+    swing_holds: Annotated[
+        Int64, "world obstacle", "Control holds from there to where it turns; 0 if it does not move to and fro."
+    ]
     num_obstacles: Annotated[Int64, "world", "Obstacles that there are.", Bounds(0, "obstacle", 1)]
     losses: Annotated[Int64, "world loss", "Vehicle lost at each scheduled loss.", Bounds(0, "vehicle")]
 

@@ -22,6 +22,7 @@ from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_tables
 from uuv_marl.sim.spacing import NOWHERE
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
+from uuv_marl.sim.traffic import draw_traffic
 from uuv_marl.types import Bool, Float64, Int32
 
 _log = logging.getLogger("uuv_marl")
@@ -196,7 +197,8 @@ class Swarm:
         course.group[w], course.informed[w] = drawn.group, drawn.informed
         self._duration_s[w] = drawn.duration_s
         course.obstacles[w, :m], course.obstacles[w, m:] = drawn.obstacles, 0.0
-        course.num_obstacles[w], course.obstacle_velocity[w] = m, 0.0
+        course.num_obstacles[w] = m
+        draw_traffic(w, self.keys[w], self.scenario, course)
         state.eta[w], state.nu[w] = drawn.eta, drawn.nu
         state.before[w] = state.eta[w, :, :2]
         state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, drawn.obstacles

@@ -17,6 +17,7 @@ from uuv_marl.sim.sea.actuation import is_lost_to_fault
 from uuv_marl.sim.sea.sea import Sea, begin_sea, drift, integrate_at_sea, know, reads, take_readings
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
 from uuv_marl.sim.stopping import stop_hulls
+from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields, sea_fields
@@ -79,10 +80,16 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 
 @compiled_inner
-def move_obstacles(w: int, course: Course, hold_s: float) -> None:
-    """Obstacles go on, those that move, for one control hold."""
+def move_obstacles(w: int, tick: int, course: Course, hold_s: float) -> None:
+    """Obstacles go on, those that move, for one control hold; ``tick`` counts it."""
     for k in range(course.num_obstacles[w]):
-        if course.obstacle_velocity[w, k, 0] != 0.0 or course.obstacle_velocity[w, k, 1] != 0.0:
+        if course.swing_holds[w, k] > 0:
+            ahead = triangle(tick, course.swing_holds[w, k])
+            speed = ahead - triangle(tick - 1, course.swing_holds[w, k])
+            for c in range(2):
+                course.obstacles[w, k, c] = course.swing[w, k, c] + ahead * hold_s * course.swing[w, k, 2 + c]
+                course.obstacle_velocity[w, k, c] = speed * course.swing[w, k, 2 + c]
+        elif course.obstacle_velocity[w, k, 0] != 0.0 or course.obstacle_velocity[w, k, 1] != 0.0:
             course.obstacles[w, k, 0] += course.obstacle_velocity[w, k, 0] * hold_s
             course.obstacles[w, k, 1] += course.obstacle_velocity[w, k, 1] * hold_s
 
@@ -241,7 +248,7 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
     control_hold(w, first, world, model, workspace.now, sea)
     world.state.tick[w] += 1
     apply_losses(w, world, model.rules, sea)
-    move_obstacles(w, world.course, model.rules.hold_s)
+    move_obstacles(w, world.state.tick[w], world.course, model.rules.hold_s)
     if model.rules.contact_stops:
         stop_hulls(w, world, model.rules, model.plant, workspace.now, sea)
     grid = sort_into_cells(w, world, model, workspace)

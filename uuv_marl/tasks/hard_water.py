@@ -110,6 +110,7 @@ class HardWater(Reach):
     Memory: ClassVar[type[Any] | None] = HardWaterMemory
     channels: ClassVar[Mapping[str, Table]] = {"way": WAY}
     rewards: ClassVar[tuple[str, ...]] = ("dense", "geodesic")
+    traffic: ClassVar[bool] = False  # a wall whose discs move has gaps, and a gate may close
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]",
     }

@@ -83,6 +83,8 @@ class Task:
     """The terms of the first reward with their formulas, in order."""
     columns: ClassVar[Mapping[str, str]] = {}
     """The task's own metrics that tables show, with what they are and their unit."""
+    traffic: ClassVar[bool] = True
+    """Whether the scenario's ``traffic`` may move the obstacles that the task draws."""
     ending: ClassVar[str] = "done"
     """Name of the ending of an episode that is ``done``."""
     guide: ClassVar[str] = "bio_inspired"

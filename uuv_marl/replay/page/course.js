@@ -1,4 +1,4 @@
-/** What does not move: grid, course, obstacles, scale bar, and the small map of it all. */
+/** What vehicles are among: grid, course, obstacles, scale bar, and the small map of it all. */
 import { View } from "./camera.js";
 import { circle, label, star } from "./shapes.js";
 
@@ -28,9 +28,9 @@ function roundStep(number) {
 }
 
 /** Trajectory with start and goal, arrival radius, obstacles with their keep-out ring. */
-export function drawCourse(context, episode, view, palette, weight) {
+export function drawCourse(context, episode, time, view, palette, weight) {
   const corners = episode.values("waypoints");
-  const discs = episode.values("obstacles");
+  const discs = episode.discs(time);
   const [goal_x, goal_y] = [view.x(corners.at(-1)), view.y(corners.at(-2))];
   context.lineWidth = 1.5 * weight;
   context.strokeStyle = palette.track;
@@ -118,7 +118,7 @@ export function drawMap(context, episode, time, poses, view, look) {
   context.fill();
   context.globalAlpha = 1;
   context.clip();
-  drawCourse(context, episode, map, look.palette, 0.5);
+  drawCourse(context, episode, time, map, look.palette, 0.5);
   context.fillStyle = look.palette.scale[8];
   const dot = episode.vehicles > 200 ? 1 : 1.8;
   for (let i = 0; i < episode.vehicles; i++) {

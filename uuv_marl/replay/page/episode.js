@@ -75,6 +75,19 @@ export class Episode {
     return [0, 1].map((axis) => at[2 * sample + axis] + share * (at[2 * next + axis] - at[2 * sample + axis]));
   }
 
+  /** Centre north, east and radius [m] of the obstacles, one after the other. */
+  discs(time) {
+    const [sample, next, share] = this.#between(time);
+    const discs = this.values("obstacles");
+    const centre = this.values("traffic");
+    const row = (2 * discs.length) / 3;
+    return discs.map((value, k) => {
+      if (!centre || k % 3 === 2) return value;
+      const at = 2 * Math.floor(k / 3) + (k % 3);
+      return centre[sample * row + at] + share * (centre[next * row + at] - centre[sample * row + at]);
+    });
+  }
+
   /** Mean north and east [m] of those that are not lost; of all of them where everybody is. */
   centre(time, poses = this.poses(time)) {
     const sample = this.sampleAt(time);

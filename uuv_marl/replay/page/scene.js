@@ -23,7 +23,7 @@ export function drawScene(context, episode, time, poses, view, look) {
   context.fillRect(0, 0, view.width, view.height);
   drawGrid(context, view, look.palette);
   if (episode.current) drawCurrent(context, episode, sample, view, look.palette);
-  drawCourse(context, episode, view, look.palette, 1);
+  drawCourse(context, episode, time, view, look.palette, 1);
   if (look.trails) drawTrails(context, episode, sample, poses, view, look.palette);
   const shown = look.selected !== null && episode.inspected.indexOf(look.selected);
   if (shown >= 0 && shown !== false) drawSonar(context, episode, shown, sample, poses, view, look.palette);

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from uuv_marl.scenario import Scenario, disturbances
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.conditions import sea_disturbances
 from uuv_marl.sim.arrays import Course, State, World
 from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.model import Rules
@@ -64,7 +65,7 @@ def make_sea(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Sea 
         keys: of the worlds' episodes, shape (world,); kept, and read as they change.
         sizes: lengths of the axes of all tables.
     """
-    if not disturbances(scenario) and not set(SEA_CHANNELS) & set(scenario.sonar.channels):
+    if not sea_disturbances(scenario) and not set(SEA_CHANNELS) & set(scenario.sonar.channels):
         return None
     own = {"eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults)}
     peers = sizes["vehicle"] if "modem" in scenario.sonar.channels else 0

