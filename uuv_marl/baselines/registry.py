@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol, overload
 import numpy as np
 
 from uuv_marl.baselines.comparators.apf import Apf
+from uuv_marl.baselines.comparators.leader_follower import LeaderFollower, LeaderFollowerInformed
 from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
@@ -48,6 +49,8 @@ POLICIES: dict[str, Kind] = {
     "olfati_saber": OlfatiSaber,
     "olfati_saber_informed": OlfatiSaberInformed,
     "orca_informed": OrcaInformed,
+    "leader_follower": LeaderFollower,
+    "leader_follower_informed": LeaderFollowerInformed,
     "pull": Pull,
     "oracle": Oracle,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),

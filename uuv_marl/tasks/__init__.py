@@ -7,17 +7,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from uuv_marl.tasks.few_informed import FewInformed
     from uuv_marl.tasks.follow import Follow
     from uuv_marl.tasks.hard_water import HardWater
     from uuv_marl.tasks.reach import Reach
     from uuv_marl.tasks.task import Task
 
-__all__ = ["TASKS", "Follow", "HardWater", "Reach", "Task"]
+__all__ = ["TASKS", "FewInformed", "Follow", "HardWater", "Reach", "Task"]
 
 TASKS = {
     "follow": "uuv_marl.tasks.follow:Follow",
     "reach": "uuv_marl.tasks.reach:Reach",
     "hard_water": "uuv_marl.tasks.hard_water:HardWater",
+    "few_informed": "uuv_marl.tasks.few_informed:FewInformed",
 }
 """Every task that ships with the package: where its class is, imported when a swarm is to do it."""
 

@@ -151,8 +151,10 @@ def _act(flat: Float32, at: Starts, g: OlfatiSaberGains, limits: Limits, centres
         for i in range(flat.shape[1]):
             u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
             l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
-            pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
             r_x, r_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
+            if l_x == 0.0 and l_y == 0.0 and r_x == 0.0 and r_y == 0.0:  # not perceived
+                r_x, r_y = u, v
+            pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
             drag = surge_resistance(math.hypot(r_x, r_y), limits)
             f_x, f_y = pull * l_x + drag * r_x, pull * l_y + drag * r_y
             f_x, f_y = f_x + g.reference_velocity * (r_x - u), f_y + g.reference_velocity * (r_y - v)

@@ -118,7 +118,10 @@ def begin_map(w: int, i: int, see: Fields, kept: Surroundings) -> None:
 
 @compiled
 def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> None:
-    """A later percept: heading and place from l(t) while it stays on its leg, or at rest; else by dead reckoning."""
+    """A later percept: heading and place from l(t) while it stays on its leg, or at rest; else by dead reckoning.
+
+    Who does not perceive l(t), whose place and velocity then read zero, always reckons.
+    """
     pose, at, motion = kept.pose[w, i], kept.reference[w, i], kept.motion[w, i]
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed, half = math.hypot(v_x, v_y), 0.5 * own.period_s
@@ -134,7 +137,8 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
     c, s = to_map_axes(turn_c, turn_s, pose)
     moves, moved = speed > _MOVES_MPS, math.hypot(at[2], at[3]) > 0.0
     r_x, r_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
-    steady = moves == moved and math.hypot(r_x, r_y) < FARTHEST_FIX_M
+    perceived = moves or r_x != 0.0 or r_y != 0.0
+    steady = perceived and moves == moved and math.hypot(r_x, r_y) < FARTHEST_FIX_M
     if moves:
         b_x, b_y = v_x / speed, v_y / speed
         leg_c, leg_s = b_x * at[2] + b_y * at[3], b_x * at[3] - b_y * at[2]

@@ -95,11 +95,19 @@ def wished(w: int, i: int, g: ScoutGains, kept: Surroundings) -> tuple[float, fl
     if together > 0.0:
         m_x, m_y, _ = middle(w, i, kept)
         w_x, w_y = w_x + together * (to_x - m_x), w_y + together * (to_y - m_y)
+    return pushed(w_x, w_y, w, i, push, g.push_range, kept)
+
+
+@compiled
+def pushed(
+    w_x: float, w_y: float, w: int, i: int, push: float, push_range: float, kept: Surroundings
+) -> tuple[float, float]:
+    """A wished velocity [m/s] with pushes away from near neighbours, as ``ScoutGains`` has them."""
     for k in range(kept.known.shape[2]):
         away = max(kept.away[w, i, k], 1e-6)
-        if away < g.push_range:
-            d_x, d_y = pose[0] - kept.place[w, i, k, 0], pose[1] - kept.place[w, i, k, 1]
-            share = push * (1.0 / away - 1.0 / g.push_range)
+        if away < push_range:
+            d_x, d_y = kept.pose[w, i, 0] - kept.place[w, i, k, 0], kept.pose[w, i, 1] - kept.place[w, i, k, 1]
+            share = push * (1.0 / away - 1.0 / push_range)
             w_x, w_y = w_x + share * d_x, w_y + share * d_y
     return w_x, w_y
 

@@ -1,0 +1,93 @@
+"""``few_informed``: few vehicles perceive l(t); the others must follow by what their sonar hears of the swarm."""
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from uuv_marl.percept import FLAG, PerceptField, Table
+from uuv_marl.scenario.fields import Positive, within
+from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.start import start_state
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.tasks.reach import Reach, ReachNumbers
+from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.types import Bool, Float64
+
+_TRIES = 64
+"""Turns of the start that are tried until no obstacle is in it; then it is not turned."""
+
+
+class FewInformedNumbers(ReachNumbers):
+    """Numbers of ``few_informed``."""
+
+    near_m: Positive = 80.0
+    """A vehicle is there within this distance of l(t)'s end. Assumed: the paper's ``arrival.spread_m``."""
+    informed: Annotated[int, within(1, 16_384)]
+    """How many vehicles perceive l(t), drawn for each episode; all where there are fewer."""
+
+
+class FewInformed(Reach):
+    """Be within ``near_m`` of l(t)'s end at the time limit, untouched, though only ``informed`` vehicles perceive l(t).
+
+    For the others the reference and its velocity read zero, and the start is turned at random against the first leg, so
+    that nothing tells them the way but the motion of those whom they hear. They are paid as the informed are: by how
+    near l(t) is. The headline is ``uninformed_share``.
+    """
+
+    Numbers = FewInformedNumbers
+    observed: ClassVar[Table] = (
+        PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
+    )
+    terms: ClassVar[Mapping[str, str]] = {
+        **Reach.terms,
+        "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
+        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to l(t), perceived or not, D: "
+        "progress_far_m, c: progress_m",
+    }
+    columns: ClassVar[Mapping[str, str]] = {"uninformed_share": "share of the uninformed vehicles that succeed [1]"}
+    guide: ClassVar[str] = "leader_follower"
+
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+        """As the scenario says; the start is turned, and the informed are drawn."""
+        drawn = Task.draw(self, world, rng)
+        eta, nu = self._turned_start(drawn, rng)
+        n = len(eta)
+        informed = np.zeros(n, np.bool_)
+        informed[rng.permutation(n)[: self.numbers.informed]] = True
+        return drawn._replace(eta=eta, nu=nu, informed=informed)
+
+    def _turned_start(self, drawn: Draw, rng: np.random.Generator) -> tuple[Float64, Float64]:
+        """Pose and velocity of the vehicles, as ``start_state`` gives them, behind a leg that is turned at random."""
+        scenario, (first, second) = self.swarm.scenario, drawn.waypoints[0][:2]
+        gap = 2.0 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)  # as between the obstacles of a field
+        for _ in range(_TRIES):
+            c, s = cos_sin(rng.uniform(-np.pi, np.pi))
+            ahead = first + (second - first) @ np.array([[c, s], [-s, c]])
+            block = (scenario.swarm.num_vehicles, (first[0], first[1]), (ahead[0], ahead[1]))
+            if all(scenario.start.distance(*block, (x, y)) >= radius + gap for x, y, radius in drawn.obstacles):
+                return start_state(scenario, np.array([first, ahead]), rng)
+        return drawn.eta, drawn.nu
+
+    def observe(self, running: Bool) -> Terms:  # noqa: ARG002
+        """Who is informed."""
+        return {"informed": self.swarm.course.informed[:, :, None].astype(np.float64)}
+
+    def there(self) -> Bool:
+        """Vehicles within ``near_m`` of l(t), once it rests at its end."""
+        return (self.swarm.facts.time_s >= self.swarm.duration_s)[:, None] & super().there()
+
+    def done(self) -> Bool:
+        """No world: the time limit ends the episode, so that passing by is not enough."""
+        return Task.done(self)
+
+    def metrics(self, world: int) -> dict[str, float | None]:
+        """Also the headline; None where all are informed."""
+        uninformed = ~self.swarm.course.informed[world]
+        share = float(self.succeeded()[world, uninformed].mean()) if uninformed.any() else None
+        return {**super().metrics(world), "uninformed_share": share}
+
+    def marks(self, world: int) -> Float64:
+        """A circle around each informed vehicle."""
+        places = self.swarm.state.eta[world, self.swarm.course.informed[world], :2]
+        return np.column_stack([places, np.full(len(places), 3.0)])
