@@ -8,7 +8,7 @@ import math
 from uuv_marl.sim.arrays import Course, World
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.model import Rules
-from uuv_marl.sim.workspace import MOST_NEARBY, Obstacles
+from uuv_marl.sim.workspace import MOST_NEARBY, Obstacles, Unnamed, named
 
 Edges = tuple[float, float, float, float]
 """Lower and upper edge of a cone of directions, north and east each; all 0 for all directions."""
@@ -20,12 +20,14 @@ _SKIN_M = 5.0
 """How much farther than a vehicle's clearance obstacles are remembered: about as far as it moves in a decision."""
 
 
-@compiled_inner
-def load_obstacles(w: int, course: Course, obstacles: Obstacles) -> None:
-    """The columns of world w's obstacles."""
+@compiled_inline
+def load_obstacles(w: int, course: Course, room: Unnamed) -> None:
+    """The columns of world w's obstacles, all of them chosen; which are nearby is forgotten."""
+    obstacles = named(room)
+    obstacles.num_nearby[: course.group.shape[1]] = -1
     for k in range(course.num_obstacles[w]):
         obstacles.x[k], obstacles.y[k] = course.obstacles[w, k, 0], course.obstacles[w, k, 1]
-        obstacles.radius[k] = course.obstacles[w, k, 2]
+        obstacles.radius[k], obstacles.chosen[k] = course.obstacles[w, k, 2], k
 
 
 @compiled_inline
@@ -39,24 +41,23 @@ def choose(num: int, x: float, y: float, reach: float, cone: Edges, obstacles: O
         dx, dy, radius = obstacles.x[k] - x, obstacles.y[k] - y, obstacles.radius[k] + ROUND_M
         near = reach + radius
         meets = (l_x * dy - l_y * dx >= -radius) & (u_x * dy - u_y * dx <= radius)
-        obstacles.wanted[k] = int((dx * dx + dy * dy <= near * near) & meets)
+        obstacles.chosen[k] = int((dx * dx + dy * dy <= near * near) & meets)
     num_chosen = 0
     for k in range(num):
+        wanted = obstacles.chosen[k]
         obstacles.chosen[num_chosen] = k
-        num_chosen += obstacles.wanted[k]
+        num_chosen += wanted
     return num_chosen
 
 
 @compiled_inner
-def remember_nearby(w: int, world: World, rules: Rules, obstacles: Obstacles) -> None:
-    """Remember which obstacles may come near each vehicle until the next decision; of few obstacles, none.
+def remember_nearby(w: int, world: World, rules: Rules, room: Unnamed) -> None:
+    """Remember which obstacles may come near each vehicle until the next decision.
 
-    How near that is, is guessed from the clearance of the step before. ``obstacles`` is written.
+    How near that is, is guessed from the clearance of the step before. The room is written.
     """
+    obstacles = named(room)
     eta, velocity, num, fastest = world.state.eta, world.course.obstacle_velocity, world.course.num_obstacles[w], 0.0
-    obstacles.num_nearby[:] = -1
-    if num <= MOST_NEARBY:
-        return
     for k in range(num):
         fastest = max(fastest, abs(velocity[w, k, 0]) + abs(velocity[w, k, 1]))
     for i in range(eta.shape[1]):

@@ -11,7 +11,7 @@ from uuv_marl.sim.model import Model
 from uuv_marl.sim.nearby import choose
 from uuv_marl.sim.sonar import SonarSuite, cross
 from uuv_marl.sim.views import Fields
-from uuv_marl.sim.workspace import Obstacles, Workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, Unnamed, Workspace, named
 
 
 @compiled_inline
@@ -86,22 +86,28 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
             see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     if see.compass.shape[2] > 0:
         see.compass[w, i, 0], see.compass[w, i, 1] = c, s
-    l_x, l_y, u_x, u_y = model.suite.cone
-    cone = c * l_x - s * l_y, s * l_x + c * l_y, c * u_x - s * u_y, s * u_x + c * u_y
-    num = choose(course.num_obstacles[w], x, y, model.suite.reach, cone, workspace.obstacles)
-    if num > 0:
-        write_echoes(i, w, num, (x, y, c, s), workspace.obstacles, model.suite, see)
+    obstacles, num = named(workspace.obstacles), course.num_obstacles[w]
+    if num > MOST_NEARBY:
+        l_x, l_y, u_x, u_y = model.suite.cone
+        cone = c * l_x - s * l_y, s * l_x + c * l_y, c * u_x - s * u_y, s * u_x + c * u_y
+        num = choose(num, x, y, model.suite.reach, cone, obstacles)
+    for t in range(num):
+        m = obstacles.chosen[t]
+        dx, dy = obstacles.x[m] - x, obstacles.y[m] - y
+        if math.sqrt(dx * dx + dy * dy) - obstacles.radius[m] < model.suite.reach:
+            write_echoes(i, w, num, (x, y, c, s), workspace.obstacles, model.suite, see)
+            break
 
 
 @compiled_inner
 def write_echoes(
-    i: int, w: int, num: int, pose: Pose, obstacles: Obstacles, suite: SonarSuite, see: Fields
+    i: int, w: int, num: int, pose: Pose, room: Unnamed, suite: SonarSuite, see: Fields
 ) -> None:
     """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
 
     Of the obstacles the first ``num`` chosen count. What was written stays where nothing is heard.
     """
-    x, y, c, s = pose
+    (x, y, c, s), obstacles = pose, named(room)
     for t in range(num):
         m = obstacles.chosen[t]
         dx, dy = obstacles.x[m] - x, obstacles.y[m] - y

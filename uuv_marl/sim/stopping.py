@@ -14,7 +14,7 @@ from uuv_marl.sim.nearby import ROUND_M, nearest_surface
 from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
-from uuv_marl.sim.workspace import Workspace
+from uuv_marl.sim.workspace import Workspace, named
 
 SINK_M = 0.001
 """How deep a hull is left in what it touches [m], so that it stays one contact while it presses on. Assumed."""
@@ -26,11 +26,11 @@ def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, own: Workspace,
 
     Of two hulls each gives way by half. States are written, and their columns.
     """
-    state, course, touch = world.state, world.course, 2.0 * rules.hull
+    state, course, touch, obstacles = world.state, world.course, 2.0 * rules.hull, named(own.obstacles)
     for i in range(state.eta.shape[1]):
         if not state.alive[w, i]:
             continue
-        clear = min(nearest_surface(i, state.eta[w, i, 0], state.eta[w, i, 1], own.obstacles)) > rules.hull + ROUND_M
+        clear = min(nearest_surface(i, state.eta[w, i, 0], state.eta[w, i, 1], obstacles)) > rules.hull + ROUND_M
         for k in range(0 if clear else course.num_obstacles[w]):
             near = course.obstacles[w, k, 2] + rules.hull
             dx, dy = state.eta[w, i, 0] - course.obstacles[w, k, 0], state.eta[w, i, 1] - course.obstacles[w, k, 1]

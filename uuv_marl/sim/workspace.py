@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.sim.compiled import compiled_inner
+from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.tables import array_specs
 from uuv_marl.types import Float64, Int32, Int64
 
@@ -75,16 +75,24 @@ class Obstacles(NamedTuple):
     y: Annotated[Float64, "obstacle", "Centre, east [m]."]
     radius: Annotated[Float64, "obstacle", "Radius [m]."]
     squared: Annotated[Float64, "obstacle", "Squared distance of the nearest vehicle from the centre [m2]."]
-    ahead: Annotated[Float64, "obstacle", "How far the chosen are ahead of a vehicle [m]."]
+    ahead: Annotated[Float64, "obstacle", "How far those chosen are ahead of a vehicle [m]."]
     abeam: Annotated[Float64, "obstacle", "How far they are to starboard [m]."]
     gap: Annotated[Float64, "obstacle", "How far their surfaces are [m]."]
-    wanted: Annotated[Int64, "obstacle", "1 for those wanted, 0 for others."]
-    chosen: Annotated[Int64, "obstacle", "Indices of those wanted, in order."]
+    from_x: Annotated[Float64, "obstacle", "Where each vehicle was when those near it were chosen, north [m]."]
+    from_y: Annotated[Float64, "obstacle", "Where it was then, east [m]."]
+    beyond: Annotated[Float64, "obstacle", "How far all others stay from there, as long as the decision stands [m]."]
+    chosen: Annotated[Int64, "nearby", "Indices of those chosen, in order."]
     nearby: Annotated[Int64, "nearby", "Indices of those near each vehicle, ``MOST_NEARBY`` places for each."]
-    num_nearby: Annotated[Int64, "vehicle", "How many those are, -1 where they are not known."]
-    from_x: Annotated[Float64, "vehicle", "Where the vehicle was when they were chosen, north [m]."]
-    from_y: Annotated[Float64, "vehicle", "Where it was then, east [m]."]
-    beyond: Annotated[Float64, "vehicle", "How far all others stay from there, as long as the decision stands [m]."]
+    num_nearby: Annotated[Int64, "nearby", "How many those are, -1 where they are not known."]
+
+
+class Unnamed(NamedTuple):
+    """``Obstacles`` in two arrays, since each that is passed on costs time; ``named`` tells them apart."""
+
+    reals: Float64
+    """Shape (column, obstacle)."""
+    wholes: Int64
+    """Shape (column, nearby)."""
 
 
 class Workspace(NamedTuple):
@@ -93,7 +101,7 @@ class Workspace(NamedTuple):
     now: Columns
     cells: Cells
     listener: Listener
-    obstacles: Obstacles
+    obstacles: Unnamed
 
 
 TABLES = (Columns, Cells, Listener, Obstacles)
@@ -116,8 +124,6 @@ class Scratch(NamedTuple):
     """Shape (thread, column, cell)."""
     obstacle_reals: Float64
     """Shape (thread, column, obstacle)."""
-    obstacle_wholes: Int64
-    """Shape (thread, column, obstacle)."""
     nearby_wholes: Int64
     """Shape (thread, column, nearby)."""
 
@@ -125,7 +131,8 @@ class Scratch(NamedTuple):
 def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int, num_obstacles: int) -> Scratch:
     """A column for each array of a workspace, and a cache line between one thread's and the next's."""
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
-    lengths |= {"obstacle": num_obstacles + 9, "nearby": MOST_NEARBY * num_vehicles + 9}
+    lengths["obstacle"] = max(num_obstacles, num_vehicles) + 9
+    lengths["nearby"] = max(num_obstacles, MOST_NEARBY * num_vehicles) + 9
     kinds = [(spec.axes, spec.dtype) for table in TABLES for spec in array_specs(table).values()]
 
     def room(axis: str, dtype: type[Any]) -> NDArray[Any]:
@@ -139,7 +146,6 @@ def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int, n
         sector_wholes=room("sector", np.int64),
         cell_wholes=room("cell", np.int64),
         obstacle_reals=room("obstacle", np.float64),
-        obstacle_wholes=room("obstacle", np.int64),
         nearby_wholes=room("nearby", np.int64),
     )
 
@@ -164,10 +170,7 @@ def workspace(room: Scratch, t: int) -> Workspace:
     """Thread t's scratch by name."""
     reals, wholes, shorts = room.reals[t], room.wholes[t], room.shorts[t]
     sector_reals, sector_wholes, cell_wholes = room.sector_reals[t], room.sector_wholes[t], room.cell_wholes[t]
-    obstacle_reals, obstacle_wholes, nearby_wholes = (
-        room.obstacle_reals[t], room.obstacle_wholes[t], room.nearby_wholes[t]
-    )  # fmt: skip
-    n, c, e, o = _NOW, _CELLS, _LISTENER, _OBSTACLES
+    n, c, e = _NOW, _CELLS, _LISTENER
     return Workspace(
         Columns(
             x=reals[n.x], y=reals[n.y], psi=reals[n.psi], u=reals[n.u], v=reals[n.v], r=reals[n.r],
@@ -184,11 +187,16 @@ def workspace(room: Scratch, t: int) -> Workspace:
             vehicle=wholes[e.vehicle], squared=reals[e.squared], ahead=reals[e.ahead], abeam=reals[e.abeam],
             bin=shorts[e.bin], sector=wholes[e.sector], some=shorts[e.some],
         ),
-        Obstacles(
-            x=obstacle_reals[o.x], y=obstacle_reals[o.y], radius=obstacle_reals[o.radius],
-            squared=obstacle_reals[o.squared], ahead=obstacle_reals[o.ahead], abeam=obstacle_reals[o.abeam],
-            gap=obstacle_reals[o.gap], wanted=obstacle_wholes[o.wanted], chosen=obstacle_wholes[o.chosen],
-            nearby=nearby_wholes[o.nearby], num_nearby=wholes[o.num_nearby], from_x=reals[o.from_x],
-            from_y=reals[o.from_y], beyond=reals[o.beyond],
-        ),
+        Unnamed(room.obstacle_reals[t], room.nearby_wholes[t]),
+    )  # fmt: skip
+
+
+@compiled_inline
+def named(room: Unnamed) -> Obstacles:
+    """A world's obstacles by name."""
+    reals, wholes, o = room.reals, room.wholes, _OBSTACLES
+    return Obstacles(
+        x=reals[o.x], y=reals[o.y], radius=reals[o.radius], squared=reals[o.squared], ahead=reals[o.ahead],
+        abeam=reals[o.abeam], gap=reals[o.gap], from_x=reals[o.from_x], from_y=reals[o.from_y],
+        beyond=reals[o.beyond], chosen=wholes[o.chosen], nearby=wholes[o.nearby], num_nearby=wholes[o.num_nearby],
     )  # fmt: skip

@@ -21,7 +21,7 @@ from uuv_marl.sim.stopping import stop_hulls
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields, sea_fields
-from uuv_marl.sim.workspace import Columns, Obstacles, Workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Unnamed, Workspace, named
 from uuv_marl.types import Float32, Float64
 
 RUNAWAY = 1000.0
@@ -80,8 +80,9 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 
 @compiled_inner
-def move_obstacles(w: int, course: Course, hold_s: float, obstacles: Obstacles) -> None:
+def move_obstacles(w: int, course: Course, hold_s: float, room: Unnamed) -> None:
     """Obstacles go on, those that move, for one control hold. The course is written, and its columns."""
+    obstacles = named(room)
     for k in range(course.num_obstacles[w]):
         if course.obstacle_velocity[w, k, 0] != 0.0 or course.obstacle_velocity[w, k, 1] != 0.0:
             course.obstacles[w, k, 0] += course.obstacle_velocity[w, k, 0] * hold_s
@@ -223,7 +224,6 @@ def observe_world(w: int, world: World, model: Model, own: Workspace, sea: Sea |
     world.facts.diverged[w] = -1
     load_state(w, world.state, own.now)
     load_obstacles(w, world.course, own.obstacles)
-    own.obstacles.num_nearby[:] = -1
     grid = sort_into_cells(w, world, model, own)
     measure_distances(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
@@ -266,7 +266,8 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
     if facts.diverged[w] >= 0:
         return
     load_obstacles(w, world.course, workspace.obstacles)
-    remember_nearby(w, world, model.rules, workspace.obstacles)
+    if world.course.num_obstacles[w] > MOST_NEARBY:
+        remember_nearby(w, world, model.rules, workspace.obstacles)
     clear_facts(w, facts)
     num_alive = 0
     for i in range(action.shape[1]):
