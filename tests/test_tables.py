@@ -11,7 +11,7 @@ from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Course, Facts, Senses, State
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
-from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, scratch, workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, scratch, workspace
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
           "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
@@ -23,7 +23,8 @@ LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5, "obstacle": 4, "nearby": 7 * M
 @pytest.fixture
 def desks():
     room = scratch(threads=2, num_vehicles=7, num_sectors=21, num_cells=4, num_obstacles=3)
-    return room, [workspace.py_func(room, t) for t in range(2)]
+    own = [workspace.py_func(room, t) for t in range(2)]
+    return room, [(*desk[:-1], named.py_func(desk.obstacles)) for desk in own]
 
 
 def test_every_array_of_a_desk_has_room_of_its_own(desks):

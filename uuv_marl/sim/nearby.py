@@ -81,7 +81,7 @@ def nearest_surface(i: int, x: float, y: float, obstacles: Obstacles) -> tuple[f
         return math.inf, -math.inf
     nearest = math.inf
     for t in range(obstacles.num_nearby[i]):
-        k = obstacles.nearby[i * MOST_NEARBY + t]
+        k = int(obstacles.nearby[i * MOST_NEARBY + t])
         dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
         nearest = min(nearest, math.sqrt(dx * dx + dy * dy) - obstacles.radius[k])
     dx, dy = x - obstacles.from_x[i], y - obstacles.from_y[i]

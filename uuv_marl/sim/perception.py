@@ -100,9 +100,7 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 
 
 @compiled_inner
-def write_echoes(
-    i: int, w: int, num: int, pose: Pose, room: Unnamed, suite: SonarSuite, see: Fields
-) -> None:
+def write_echoes(i: int, w: int, num: int, pose: Pose, room: Unnamed, suite: SonarSuite, see: Fields) -> None:
     """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
 
     Of the obstacles the first ``num`` chosen count. What was written stays where nothing is heard.
@@ -119,7 +117,8 @@ def write_echoes(
         for t in range(num):
             if obstacles.gap[t] >= best:
                 continue
-            c_x, c_y, radius = obstacles.ahead[t], obstacles.abeam[t], obstacles.radius[obstacles.chosen[t]]
+            m = int(obstacles.chosen[t])
+            c_x, c_y, radius = obstacles.ahead[t], obstacles.abeam[t], obstacles.radius[m]
             reach, p_x, p_y = echo(
                 c_x, c_y, radius, suite.lower[k, 0], suite.lower[k, 1], suite.upper[k, 0], suite.upper[k, 1]
             )
