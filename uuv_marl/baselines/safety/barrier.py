@@ -78,7 +78,6 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surrounding
     """
     pose, num = kept.pose[w, i], 0
     x, y = pose[0], pose[1]
-    v_x, v_y = to_map_axes(kept.motion[w, i, 0], kept.motion[w, i, 1], pose)
     rate = min(barrier.obstacle_rate, MOST_CLOSED / period)
     for d in range(kept.score.shape[2]):
         if kept.score[w, i, d] < CONFIRMED:
@@ -90,6 +89,16 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surrounding
             planes[num, 0], planes[num, 1] = n_x / away, n_y / away
             planes[num, 2] = rate * (left - margin(w, i, d, barrier, kept))
             num += 1
+    return neighbour_planes(w, i, num, period, barrier, kept, planes)
+
+
+@compiled
+def neighbour_planes(
+    w: int, i: int, num: int, period: float, barrier: Barrier, kept: Surroundings, planes: Float64
+) -> int:
+    """Add the half-planes of neighbours to the first ``num``, and say how many there are then. See ``planes_of``."""
+    x, y = kept.pose[w, i, 0], kept.pose[w, i, 1]
+    v_x, v_y = to_map_axes(kept.motion[w, i, 0], kept.motion[w, i, 1], kept.pose[w, i])
     rate = min(barrier.neighbour_rate, MOST_CLOSED / period)
     for k in range(kept.known.shape[2]):
         away = max(kept.away[w, i, k], 1e-6)
