@@ -8,7 +8,8 @@ avoidance (van den Berg et al. 2011, see ``halfplanes``).
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar
 
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
@@ -19,6 +20,8 @@ from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float32, Float64
+
+G = TypeVar("G")
 
 
 class Barrier(NamedTuple):
@@ -52,6 +55,13 @@ MOST_CLOSED = 0.3
 """Share of the distance left that may be closed in a decision period [1]."""
 GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
 """The filter of ``guarded:``. It lets a policy nearer to obstacles than a law that makes room early has to go."""
+
+
+def with_numbers(values: Mapping[str, float], gains: G, barrier: Barrier) -> tuple[G, Barrier]:
+    """A law's gains, a NamedTuple, and its filter, with numbers by name that belong to the one or the other."""
+    both: tuple[Any, Any] = gains, barrier
+    made = [each._replace(**{name: value for name, value in values.items() if name in each._fields}) for each in both]
+    return made[0], made[1]
 
 
 @compiled
