@@ -10,17 +10,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
-from uuv_marl.baselines.bug.walls import Walls, update_walls, wall_planes
+from uuv_marl.baselines.bug.walls import Walls, WallsMemory, update_walls, wall_planes
 from uuv_marl.baselines.bug.ways import RAYS, choose_ways, rays
 from uuv_marl.baselines.memory import Surroundings, update_memory
-from uuv_marl.baselines.memory.table import with_surroundings
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety.barrier import Barrier, neighbour_planes, steer_safely
 from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32, Float64
 
 
@@ -35,7 +33,7 @@ class TangentBug(Filtered):
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
-    Memory: ClassVar[type[Any] | None] = with_surroundings(Walls)
+    Memory: ClassVar[type[Any] | None] = WallsMemory
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, gains: BugGains | None = None, barrier: Barrier | None = None

@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import ActiveSectors, centre_of, surface_point
 from uuv_marl.baselines.memory.pose import to_map
+from uuv_marl.baselines.memory.table import with_surroundings
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety.barrier import MOST_CLOSED, Barrier
 from uuv_marl.baselines.steering import full_speed
@@ -33,6 +34,10 @@ class Walls(NamedTuple):
     hit_m: Annotated[Float64, "world vehicle", "Distance of the goal when the way was blocked [m]."]
     turned: Annotated[Float64, "world vehicle", "How often it turned back since then."]
     way: Annotated[Float64, "world vehicle 2", "Unit vector of the way in the map."]
+
+
+WallsMemory = with_surroundings("WallsMemory", Walls)
+"""What ``tangent_bug`` remembers: its surroundings, and then its walls."""
 
 
 @compiled

@@ -4,6 +4,7 @@ The map's origin is the reference point l(t) when the vehicle first perceived it
 which l(t) moved then (the bow, if l(t) was at rest).
 """
 
+from collections import namedtuple
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from uuv_marl.sim.tables import described
@@ -52,8 +53,12 @@ class Surroundings(NamedTuple):
     error: Annotated[Float64, "world vehicle", "Errors of predicted places of neighbours, over their range [1]."]
 
 
-def with_surroundings(table: type[Any]) -> type[Any]:
-    """A table of the surroundings' arrays and, after them, of another's: the memory of who keeps more."""
-    return NamedTuple(f"{table.__name__}Memory", [  # pyright: ignore[reportReturnType] - a class, made here
-        field for each in (Surroundings, table) for field in get_type_hints(each, include_extras=True).items()
-    ])  # fmt: skip
+def with_surroundings(name: str, table: type[Any]) -> type[Any]:
+    """A table of the surroundings' arrays and, after them, of another's: the memory of who keeps more.
+
+    ``name`` is that of the new table in the other's module.
+    """
+    hints = {**get_type_hints(Surroundings, include_extras=True), **get_type_hints(table, include_extras=True)}
+    made: Any = namedtuple(name, hints, module=table.__module__)  # pyright: ignore[reportUntypedNamedTuple]
+    made.__annotations__ = hints
+    return made
