@@ -11,6 +11,8 @@ from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.tables import array_specs
 from uuv_marl.types import Float64, Int32, Int64
 
+MOST_NEARBY = 16
+"""Most obstacles that are remembered as near a vehicle; as many or fewer are gone through one by one."""
 Column = Annotated[Float64, "vehicle", "See uuv_marl.sim.vehicle."]
 
 
@@ -66,12 +68,35 @@ class Listener(NamedTuple):
     some: Annotated[Int32, "vehicle", "Room for a choice of them."]
 
 
+class Obstacles(NamedTuple):
+    """The obstacles of a world as columns, and which of them are near each vehicle (``nearby.py``)."""
+
+    x: Annotated[Float64, "obstacle", "Centre, north [m]."]
+    y: Annotated[Float64, "obstacle", "Centre, east [m]."]
+    radius: Annotated[Float64, "obstacle", "Radius [m]."]
+    squared: Annotated[Float64, "obstacle", "Squared distance of the nearest vehicle from the centre [m2]."]
+    ahead: Annotated[Float64, "obstacle", "How far the chosen are ahead of a vehicle [m]."]
+    abeam: Annotated[Float64, "obstacle", "How far they are to starboard [m]."]
+    gap: Annotated[Float64, "obstacle", "How far their surfaces are [m]."]
+    wanted: Annotated[Int64, "obstacle", "1 for those wanted, 0 for others."]
+    chosen: Annotated[Int64, "obstacle", "Indices of those wanted, in order."]
+    nearby: Annotated[Int64, "nearby", "Indices of those near each vehicle, ``MOST_NEARBY`` places for each."]
+    num_nearby: Annotated[Int64, "vehicle", "How many those are, -1 where they are not known."]
+    from_x: Annotated[Float64, "vehicle", "Where the vehicle was when they were chosen, north [m]."]
+    from_y: Annotated[Float64, "vehicle", "Where it was then, east [m]."]
+    beyond: Annotated[Float64, "vehicle", "How far all others stay from there, as long as the decision stands [m]."]
+
+
 class Workspace(NamedTuple):
     """What one thread works with."""
 
     now: Columns
     cells: Cells
     listener: Listener
+    obstacles: Obstacles
+
+
+TABLES = (Columns, Cells, Listener, Obstacles)
 
 
 class Scratch(NamedTuple):
@@ -89,12 +114,19 @@ class Scratch(NamedTuple):
     """Shape (thread, column, sector)."""
     cell_wholes: Int64
     """Shape (thread, column, cell)."""
+    obstacle_reals: Float64
+    """Shape (thread, column, obstacle)."""
+    obstacle_wholes: Int64
+    """Shape (thread, column, obstacle)."""
+    nearby_wholes: Int64
+    """Shape (thread, column, nearby)."""
 
 
-def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -> Scratch:
+def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int, num_obstacles: int) -> Scratch:
     """A column for each array of a workspace, and a cache line between one thread's and the next's."""
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
-    kinds = [(spec.axes, spec.dtype) for table in (Columns, Cells, Listener) for spec in array_specs(table).values()]
+    lengths |= {"obstacle": num_obstacles + 9, "nearby": MOST_NEARBY * num_vehicles + 9}
+    kinds = [(spec.axes, spec.dtype) for table in TABLES for spec in array_specs(table).values()]
 
     def room(axis: str, dtype: type[Any]) -> NDArray[Any]:
         return np.zeros((threads, kinds.count(((axis,), dtype)), lengths[axis]), dtype)
@@ -106,13 +138,16 @@ def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -
         sector_reals=room("sector", np.float64),
         sector_wholes=room("sector", np.int64),
         cell_wholes=room("cell", np.int64),
+        obstacle_reals=room("obstacle", np.float64),
+        obstacle_wholes=room("obstacle", np.int64),
+        nearby_wholes=room("nearby", np.int64),
     )
 
 
 def _columns() -> Iterator[Any]:
     """The tables of a workspace, in place of each array the number of its column among those of its axis and type."""
     taken: Counter[object] = Counter()
-    for table in (Columns, Cells, Listener):
+    for table in TABLES:
         kinds = [(spec.axes, spec.dtype) for spec in array_specs(table).values()]
         numbers: list[int] = []
         for kind in kinds:
@@ -121,7 +156,7 @@ def _columns() -> Iterator[Any]:
         yield table(*cast(Any, numbers))
 
 
-_NOW, _CELLS, _LISTENER = _columns()
+_NOW, _CELLS, _LISTENER, _OBSTACLES = _columns()
 
 
 @compiled_inner
@@ -129,7 +164,10 @@ def workspace(room: Scratch, t: int) -> Workspace:
     """Thread t's scratch by name."""
     reals, wholes, shorts = room.reals[t], room.wholes[t], room.shorts[t]
     sector_reals, sector_wholes, cell_wholes = room.sector_reals[t], room.sector_wholes[t], room.cell_wholes[t]
-    n, c, e = _NOW, _CELLS, _LISTENER
+    obstacle_reals, obstacle_wholes, nearby_wholes = (
+        room.obstacle_reals[t], room.obstacle_wholes[t], room.nearby_wholes[t]
+    )  # fmt: skip
+    n, c, e, o = _NOW, _CELLS, _LISTENER, _OBSTACLES
     return Workspace(
         Columns(
             x=reals[n.x], y=reals[n.y], psi=reals[n.psi], u=reals[n.u], v=reals[n.v], r=reals[n.r],
@@ -145,5 +183,12 @@ def workspace(room: Scratch, t: int) -> Workspace:
             kept_abeam=sector_reals[e.kept_abeam], nearest=sector_reals[e.nearest], x=reals[e.x], y=reals[e.y],
             vehicle=wholes[e.vehicle], squared=reals[e.squared], ahead=reals[e.ahead], abeam=reals[e.abeam],
             bin=shorts[e.bin], sector=wholes[e.sector], some=shorts[e.some],
+        ),
+        Obstacles(
+            x=obstacle_reals[o.x], y=obstacle_reals[o.y], radius=obstacle_reals[o.radius],
+            squared=obstacle_reals[o.squared], ahead=obstacle_reals[o.ahead], abeam=obstacle_reals[o.abeam],
+            gap=obstacle_reals[o.gap], wanted=obstacle_wholes[o.wanted], chosen=obstacle_wholes[o.chosen],
+            nearby=nearby_wholes[o.nearby], num_nearby=wholes[o.num_nearby], from_x=reals[o.from_x],
+            from_y=reals[o.from_y], beyond=reals[o.beyond],
         ),
     )  # fmt: skip
