@@ -19,7 +19,7 @@ class BugGains(NamedTuple):
     beyond_m: float = 15.0
     """... and for so much farther than what blocks the way to the goal [m]."""
     nearer_m: float = 5.0
-    """By so much nearer to the goal than where it was blocked, a vehicle leaves a wall, though another may follow [m]."""
+    """By so much nearer to the goal than where it was blocked, a vehicle leaves a wall; another may follow [m]."""
     turn_back_m: float = 50.0
     """A vehicle turns back if the other way round is shorter by this, twice as much each time [m]."""
     push: float = 2.5
