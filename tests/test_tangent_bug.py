@@ -66,6 +66,7 @@ def test_dead_reckoning_remembers_walls_where_they_are(surface):
     away = np.hypot(*(walls[:, None, :2] - swarm.course.obstacles[0, None, :, :2]).transpose(2, 0, 1))
     if surface:
         assert np.abs(away - 7.0).min(axis=1).max() < 1.0
+        assert not walls[:, 2].any()
     else:
         assert away.min(axis=1).max() < 1.0
         np.testing.assert_allclose(walls[:, 2], 7.0, atol=1.0)
