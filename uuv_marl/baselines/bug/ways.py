@@ -70,7 +70,7 @@ def past(side: int, reach: float, away: float, looks: Float64, free: Float64) ->
 
 
 @compiled
-def choose(w: int, i: int, away: float, g: BugGains, walls: Walls, looks: Float64, free: Float64) -> int:
+def chosen_ray(w: int, i: int, away: float, g: BugGains, walls: Walls, looks: Float64, free: Float64) -> int:
     """The direction to go in; what was decided is remembered. Arguments as for ``past``."""
     side = int(walls.side[w, i])
     near = free[0] >= min(g.look_m, away) and (side == 0 or away < walls.hit_m[w, i] - g.nearer_m)
@@ -109,5 +109,5 @@ def choose_ways(
                 looks[j, 0] = (x * turns[j, 0] - y * turns[j, 1]) / away
                 looks[j, 1] = (y * turns[j, 0] + x * turns[j, 1]) / away
             look_round(w, i, g.stand_m, kept, walls, looks, free)
-            j = choose(w, i, away, g, walls, looks, free)
+            j = chosen_ray(w, i, away, g, walls, looks, free)
             walls.way[w, i, 0], walls.way[w, i, 1] = looks[j, 0], looks[j, 1]
