@@ -173,11 +173,12 @@ def test_tuned_gains_come_from_shipped_trials(file):
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
     best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
     assert best == {"cost_s": data["best_cost_s"], **data["best"]}
-    policy = f"{name},tuned_for={hull}" if hull else name
+    policy = f"{name},tuned_for={hull}" if hull else "scout,preset=closed" if name == "scout" else name
     changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
     scenario = granted(policy, load_scenario("sea_trial" if hull else "tracking", overrides=changes))
-    gains = make(policy, scenario).gains._asdict()
-    assert {key: gains[key] for key in data["best"]} == data["best"]
+    made = make(policy, scenario)
+    numbers = made.gains._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
+    assert {key: numbers[key] for key in data["best"]} == data["best"]
 
 
 def flown(name, scenario, decisions=6, worlds=2):
@@ -270,7 +271,7 @@ class Nothing(Policy):
         ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
         ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
-        ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, got 'bold'"),
+        ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, closed, got 'bold'"),
         ("guarded:bio_insp", "did you mean 'bio_inspired'"),
     ],
 )

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
+from uuv_marl.baselines.safety import Barrier
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, ResultsError
@@ -182,6 +183,19 @@ def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path
     assert done.exit_code == 2
     assert message in " ".join(done.output.split())
     assert "Traceback" not in done.output
+
+
+def test_between_walls_tuning_pays_for_who_arrives_untouched_and_for_time():
+    from uuv_marl.baselines.scout.gains import ScoutGains
+    from uuv_marl.benchmark.tuning import MAPS, SPACES, tuning_cost
+
+    scenario = load_scenario("hard_water", num_vehicles=2)
+    idle = next(run for run in evaluate(scenario, "idle", MAPS[:1]) if isinstance(run, Run))
+    assert tuning_cost(idle, scenario) == pytest.approx(1000.0 + idle.routes.time_s[-1])
+    half = idle._replace(metrics=idle.metrics | {"task": {"untouched_share": 0.5}})
+    assert tuning_cost(half, scenario) == pytest.approx(500.0 + idle.routes.time_s[-1])
+    made = SPACES["scout"].parameters({"push_range": 9.0, "obstacle_m": 3.0})
+    assert made == {"gains": ScoutGains(push_range=9.0), "barrier": Barrier(obstacle_m=3.0)}
 
 
 @pytest.mark.needs("optuna")

@@ -11,36 +11,37 @@ from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Course, Facts, Senses, State
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
-from uuv_marl.sim.workspace import Cells, Columns, Listener, Workspace, scratch, workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, scratch, workspace
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
           "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
 AXES = ("world", "vehicle", "group", "point", "obstacle", "loss", "sector", "radius", "entry")
 SIZES = dict(zip(AXES, (2, 5, 2, 3, 4, 1, 21, 4, 98), strict=True))
-LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5}
+LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5, "obstacle": 4, "nearby": 7 * MOST_NEARBY}
 
 
 @pytest.fixture
 def desks():
-    room = scratch(threads=2, num_vehicles=7, num_sectors=21, num_cells=4)
-    return room, [workspace.py_func(room, t) for t in range(2)]
+    room = scratch(threads=2, num_vehicles=7, num_sectors=21, num_cells=4, num_obstacles=3)
+    own = [workspace.py_func(room, t) for t in range(2)]
+    return room, [(*desk[:-1], named.py_func(desk.obstacles)) for desk in own]
 
 
 def test_every_array_of_a_desk_has_room_of_its_own(desks):
     arrays = [array for own in desks[1] for table in own for array in table]
-    assert len(arrays) == 2 * sum(len(table._fields) for table in (Columns, Cells, Listener))
+    assert len(arrays) == 2 * sum(len(table._fields) for table in TABLES)
     for a, b in itertools.combinations(arrays, 2):
         assert not np.shares_memory(a, b)
 
 
 def test_a_desk_leaves_no_column_unused_and_has_the_declared_types(desks):
     room, own = desks
-    for table, arrays in zip((Columns, Cells, Listener), Workspace(*own[0]), strict=True):
+    for table, arrays in zip(TABLES, Workspace(*own[0]), strict=True):
         for (name, spec), array in zip(array_specs(table).items(), arrays, strict=True):
             assert array.dtype == spec.dtype, name
             assert len(array) >= LENGTHS[spec.axes[0]], name
     columns = sum(block.shape[1] for block in room)
-    assert columns == sum(len(table._fields) for table in (Columns, Cells, Listener))
+    assert columns == sum(len(table._fields) for table in TABLES)
 
 
 def test_a_table_tells_shapes_types_and_meaning():

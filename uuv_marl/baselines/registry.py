@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol, overload
 
 import numpy as np
 
+from uuv_marl.baselines.bug.law import TangentBug
 from uuv_marl.baselines.comparators.apf import Apf
 from uuv_marl.baselines.comparators.leader_follower import LeaderFollower, LeaderFollowerInformed
 from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaberInformed
@@ -53,6 +54,7 @@ POLICIES: dict[str, Kind] = {
     "leader_follower_informed": LeaderFollowerInformed,
     "pull": Pull,
     "oracle": Oracle,
+    "tangent_bug": TangentBug,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
     "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on random_field: as mappo, an actor plus a barrier."),
     "trimmed_scout": shipped(

@@ -12,8 +12,11 @@ from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import granted
+from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.comparators import apf, olfati_saber, orca
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
+from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.extras import silenced
 from uuv_marl.paths import UserPath, user_path
@@ -25,8 +28,16 @@ SEEDS = (10_000, 10_001, 10_002, 10_003)
 SCENARIO = "single_obstacle"
 SCALED = "sea_trial"
 """Where policies are tuned in the scale of a vehicle."""
+WALLS, MAPS = "hard_water", tuple(range(10_000, 10_024))
+"""Where policies are tuned that keep to the safety filter, and its seeds: each draws another map."""
+_FAILURE_COST_S = 1000.0
 _COLLISION_COST_S = 50.0
 _CLEARANCE_COST_S_PER_M = 20.0
+OBJECTIVES = (
+    "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
+    "mean time [s] over seeds, plus 1000 s for the share of vehicles that touched or did not come to the goal",
+)
+"""What is minimised, in the open and between walls."""
 
 
 class Range(NamedTuple):
@@ -46,19 +57,41 @@ def _ranges() -> dict[str, dict[str, Range]]:
 _RANGES = _ranges()
 _SFF = _RANGES["sff"] | _RANGES["obstacle"]
 _SDC = _RANGES["sdc"] | _RANGES["obstacle"] | _RANGES["informed"]
-SPACES: dict[str, tuple[dict[str, Range], Callable[..., Any]]] = {
-    "bio_inspired_plus": (
-        _RANGES["bio_inspired"],
-        partial(bio_inspired.BioInspiredGains, feed_forward=bio_inspired.FEED_FORWARD),
+
+
+class Space(NamedTuple):
+    """What is tuned, and where."""
+
+    free: dict[str, Range]
+    """Free parameters."""
+    gains: Callable[..., Any]
+    """From their values to the policy's gains."""
+    scenario: str = SCENARIO
+    barrier: Barrier | None = None
+    """The safety filter, whose numbers may be free, too; None for a policy without."""
+
+    def parameters(self, drawn: dict[str, float]) -> dict[str, object]:
+        """The policy's keyword arguments."""
+        if self.barrier is None:
+            return {"gains": self.gains(**drawn)}
+        gains, barrier = with_numbers(drawn, self.gains(), self.barrier)
+        return {"gains": gains, "barrier": barrier}
+
+
+SPACES: dict[str, Space] = {
+    "bio_inspired_plus": Space(
+        _RANGES["bio_inspired"], partial(bio_inspired.BioInspiredGains, feed_forward=bio_inspired.FEED_FORWARD)
     ),
-    "sff": (_SFF | _RANGES["uninformed"], sff.SffGains),
-    "sff_informed": (_SFF | _RANGES["informed"], sff.SffGains),
-    "sdc": (_SDC, sdc.SdcGains),
-    "sdc_informed": (_SDC, sdc.SdcGains),
-    "apf": (_RANGES["apf"], apf.ApfGains),
-    "olfati_saber": (_RANGES["olfati_saber"], olfati_saber.OlfatiSaberGains),
-    "olfati_saber_informed": (_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.OlfatiSaberGains),
-    "orca_informed": (_RANGES["orca"], orca.OrcaGains),
+    "sff": Space(_SFF | _RANGES["uninformed"], sff.SffGains),
+    "sff_informed": Space(_SFF | _RANGES["informed"], sff.SffGains),
+    "sdc": Space(_SDC, sdc.SdcGains),
+    "sdc_informed": Space(_SDC, sdc.SdcGains),
+    "apf": Space(_RANGES["apf"], apf.ApfGains),
+    "olfati_saber": Space(_RANGES["olfati_saber"], olfati_saber.OlfatiSaberGains),
+    "olfati_saber_informed": Space(_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.OlfatiSaberGains),
+    "orca_informed": Space(_RANGES["orca"], orca.OrcaGains),
+    "scout": Space(_RANGES["scout"] | _RANGES["filter"] | _RANGES["gaps"], ScoutGains, WALLS, Barrier()),
+    "tangent_bug": Space(_RANGES["tangent_bug"] | _RANGES["filter"], BugGains, WALLS, BUG_BARRIER),
 }
 """Free parameters of every tuned policy, and how they become its gains."""
 
@@ -67,10 +100,13 @@ def tuning_cost(run: Run, scenario: Scenario) -> float:
     """What tuning minimises for one seed [s]: the task time, or more than the time limit if the swarm fails.
 
     A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. On a
-    scenario in a vehicle's scale these seconds and metres are those of its scale.
+    scenario in a vehicle's scale these seconds and metres are those of its scale. In a task of its own it is the
+    episode's time, and 1000 s for the share of vehicles that touched something or did not come to the goal.
     """
     unit = scenario.scale.units
     metrics = run.metrics
+    if (share := metrics.get("task", {}).get("untouched_share")) is not None:
+        return float(run.routes.time_s[-1]) / unit.time + _FAILURE_COST_S * (1.0 - share)
     time, clearance = metrics["task_time_s"], metrics["min_obstacle_distance_m"]
     if time is None:
         time = scenario.time_limit.of(metrics["duration_s"])
@@ -138,20 +174,21 @@ def tune(
         trials: to reach in all, those before an interruption included.
         report: called with the number of trials done and the best cost [s].
         vehicle: the vehicle to tune for, in its scale (``sea_trial``); the files are then ``POLICY.VEHICLE.json``
-            and ``.csv``. None: the paper's vehicle on ``single_obstacle``.
+            and ``.csv``. None: the paper's vehicle on ``single_obstacle``, or on the scenario of the policy's space.
     """
     import optuna  # noqa: PLC0415 - an extra
 
     output = user_path(output)
-    space, gains = SPACES[policy]
-    where, changes = (SCENARIO, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
+    space = SPACES[policy]
+    where, changes = (space.scenario, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
     scenario, name = granted(policy, load_scenario(where, overrides=changes)), policy
+    seeds = MAPS if where == WALLS else SEEDS
     if vehicle is not None:
         name = f"{policy}.{vehicle}"
 
     def objective(trial: optuna.Trial) -> float:
-        drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.items()}
-        runs = [run for run in evaluate(scenario, policy, SEEDS, gains=gains(**drawn)) if isinstance(run, Run)]
+        drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.free.items()}
+        runs = [run for run in evaluate(scenario, policy, seeds, **space.parameters(drawn)) if isinstance(run, Run)]
         return sum(tuning_cost(run, scenario) for run in runs) / len(runs)
 
     def sampler(seed: int) -> optuna.samplers.BaseSampler:
@@ -161,20 +198,20 @@ def tune(
     best = min(finished, key=lambda trial: trial.values)
     result = {
         "policy": policy,
-        "objective": "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
+        "objective": OBJECTIVES[where == WALLS],
         "scenario": where,
         **({} if vehicle is None else {"vehicle": vehicle}),
-        "seeds": list(SEEDS),
+        "seeds": list(seeds),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
-        "space": {name: r._asdict() for name, r in space.items()},
+        "space": {name: r._asdict() for name, r in space.free.items()},
         "best": best.params,  # in full, as evaluated: four digits of them can be another swarm, with a collision
         "best_cost_s": round(best.values[0], 3),
     }
     trials_path, path = output / f"{name}.csv", output / f"{name}.json"
     with replacing(trials_path) as partial_path, partial_path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["cost_s", *space])
+        writer.writerow(["cost_s", *space.free])
         for trial in finished:
-            writer.writerow([f"{trial.values[0]:.3f}", *(trial.params[name] for name in space)])
+            writer.writerow([f"{trial.values[0]:.3f}", *(trial.params[name] for name in space.free)])
     write_text(path, json.dumps(result, indent=1) + "\n")
     return path

@@ -34,7 +34,7 @@ class Engine:
         n, self._num_worlds = scenario.swarm.num_vehicles, len(world.state.tick)
         self._threads = max(1, min(self._num_worlds, num_threads(), self._num_worlds * n // _LEAST))
         self._head = _HEAD // n
-        room = scratch(self._threads, n, scenario.sonar.num_sectors, max_cells(n))
+        room = scratch(self._threads, n, scenario.sonar.num_sectors, max_cells(n), world.course.obstacles.shape[1])
         self._numbers = (world, model(scenario), room, sea)
         self._every = np.ones(self._num_worlds, np.bool_)
 

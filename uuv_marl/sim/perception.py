@@ -4,16 +4,17 @@ import math
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import MAX_RANGE_M
-from uuv_marl.sim.arrays import Course, World
+from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.hearing import Pose
 from uuv_marl.sim.model import Model
+from uuv_marl.sim.nearby import choose
 from uuv_marl.sim.sonar import SonarSuite, cross
 from uuv_marl.sim.views import Fields
-from uuv_marl.sim.workspace import Workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, Unnamed, Workspace, named
 
 
-@compiled
+@compiled_inline
 def echo(
     c_x: float, c_y: float, radius: float, l_x: float, l_y: float, u_x: float, u_y: float
 ) -> tuple[float, float, float]:
@@ -21,12 +22,14 @@ def echo(
 
     Inside the disc the range is 0. The beam lies between l and u, unit vectors; c is the disc's centre.
     """
-    distance = math.hypot(c_x, c_y)
-    if distance <= radius:
-        return 0.0, 0.0, 0.0
-    if cross(l_x, l_y, c_x, c_y) > 0.0 and cross(u_x, u_y, c_x, c_y) <= 0.0:
-        share = 1.0 - radius / distance
-        return distance - radius, share * c_x, share * c_y
+    ahead = cross(l_x, l_y, c_x, c_y) > 0.0 and cross(u_x, u_y, c_x, c_y) <= 0.0
+    if ahead or c_x * c_x + c_y * c_y <= 1.001 * radius * radius:  # else a hypotenuse would be the longest part
+        distance = math.hypot(c_x, c_y)
+        if distance <= radius:
+            return 0.0, 0.0, 0.0
+        if ahead:
+            share = 1.0 - radius / distance
+            return distance - radius, share * c_x, share * c_y
     best, p_x, p_y = math.inf, 0.0, 0.0
     for edge in range(2):
         e_x, e_y = (l_x, l_y) if edge == 0 else (u_x, u_y)
@@ -83,28 +86,39 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
             see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     if see.compass.shape[2] > 0:
         see.compass[w, i, 0], see.compass[w, i, 1] = c, s
-    for m in range(course.num_obstacles[w]):
-        dx, dy = course.obstacles[w, m, 0] - x, course.obstacles[w, m, 1] - y
-        if math.sqrt(dx * dx + dy * dy) - course.obstacles[w, m, 2] < model.suite.reach:
-            write_echoes(i, w, (x, y, c, s), course, model.suite, see)
+    obstacles, num = named(workspace.obstacles), course.num_obstacles[w]
+    if num > MOST_NEARBY:
+        l_x, l_y, u_x, u_y = model.suite.cone
+        cone = c * l_x - s * l_y, s * l_x + c * l_y, c * u_x - s * u_y, s * u_x + c * u_y
+        num = choose(num, x, y, model.suite.reach, cone, obstacles)
+    for t in range(num):
+        m = obstacles.chosen[t]
+        dx, dy = obstacles.x[m] - x, obstacles.y[m] - y
+        if math.sqrt(dx * dx + dy * dy) - obstacles.radius[m] < model.suite.reach:
+            write_echoes(i, w, num, (x, y, c, s), workspace.obstacles, model.suite, see)
             break
 
 
 @compiled_inner
-def write_echoes(i: int, w: int, pose: Pose, course: Course, suite: SonarSuite, see: Fields) -> None:
+def write_echoes(i: int, w: int, num: int, pose: Pose, room: Unnamed, suite: SonarSuite, see: Fields) -> None:
     """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
 
-    What was written stays where nothing is heard.
+    Of the obstacles the first ``num`` chosen count. What was written stays where nothing is heard.
     """
-    x, y, c, s = pose
+    (x, y, c, s), obstacles = pose, named(room)
+    for t in range(num):
+        m = obstacles.chosen[t]
+        dx, dy = obstacles.x[m] - x, obstacles.y[m] - y
+        obstacles.ahead[t], obstacles.abeam[t] = c * dx + s * dy, c * dy - s * dx
+        obstacles.gap[t] = math.sqrt(dx * dx + dy * dy) - obstacles.radius[m]
     for a in range(suite.active.shape[0]):
         k = suite.active[a]
         best = suite.active_range[a]
-        for m in range(course.num_obstacles[w]):
-            dx, dy, radius = course.obstacles[w, m, 0] - x, course.obstacles[w, m, 1] - y, course.obstacles[w, m, 2]
-            if math.sqrt(dx * dx + dy * dy) - radius >= best:
+        for t in range(num):
+            if obstacles.gap[t] >= best:
                 continue
-            c_x, c_y = c * dx + s * dy, c * dy - s * dx
+            m = int(obstacles.chosen[t])
+            c_x, c_y, radius = obstacles.ahead[t], obstacles.abeam[t], obstacles.radius[m]
             reach, p_x, p_y = echo(
                 c_x, c_y, radius, suite.lower[k, 0], suite.lower[k, 1], suite.upper[k, 0], suite.upper[k, 1]
             )

@@ -7,6 +7,7 @@ clockwise of its lower edge up to and including its upper edge, so that an edge 
 that tile the circle hear every direction once. Membership is decided by signs of cross products alone.
 """
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -44,6 +45,8 @@ class SonarSuite(NamedTuple):
     """Their ranges [m], shape (active,)."""
     reach: float
     """The longest of them [m], 0 for none."""
+    cone: tuple[float, float, float, float]
+    """Lower and upper edge, unit vectors, of a cone around all active sub-sectors; zeros where none is so narrow."""
     reports_surface: bool
     """Whether an echo's position is the surface point heard, not the obstacle's centre."""
     obstacles_hide: bool
@@ -77,9 +80,21 @@ def suite(scenario: Scenario) -> SonarSuite:
         active=np.array(active, np.int64),
         active_range=np.array([ranges[k] for k in active]),
         reach=max((ranges[k] for k in active), default=0.0),
+        cone=_cone([(lower[k], upper[k]) for k in active]),
         reports_surface=scenario.sonar.echo_reports == "surface",
         obstacles_hide=scenario.sonar.obstacles_hide_vehicles,
     )
+
+
+def _cone(beams: list[tuple[tuple[float, float], tuple[float, float]]]) -> tuple[float, float, float, float]:
+    """``SonarSuite.cone``: narrower than half a turn, between the edges of beams that are."""
+    for lower, _ in beams:
+        for _, upper in beams:
+            edges = [lower, *itertools.chain(*beams), upper]
+            inside = all(cross(*lower, *edge) >= 0.0 and cross(*edge, *upper) >= 0.0 for edge in edges)
+            if inside and all(cross(*a, *b) > 0.0 for a, b in [*beams, (lower, upper)]):
+                return *lower, *upper
+    return 0.0, 0.0, 0.0, 0.0
 
 
 def _unit(degrees: float) -> tuple[float, float]:

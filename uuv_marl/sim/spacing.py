@@ -5,7 +5,8 @@ import math
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
-from uuv_marl.sim.workspace import Cells
+from uuv_marl.sim.nearby import nearest_surface
+from uuv_marl.sim.workspace import Cells, Obstacles, Unnamed, named
 from uuv_marl.types import Float64
 
 NOWHERE = (math.inf, math.inf, 0.0)
@@ -109,35 +110,58 @@ def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid
 
 
 @compiled_inner
-def measure_obstacles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
+def measure_obstacles(w: int, hull: float, world: World, room: Unnamed, cells: Cells, grid: Grid) -> int:
     """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began.
 
     A contact episode begins where a hull meets an obstacle now and did not one control hold ago; either may have moved.
     ``state.obstacles_before`` is written, too.
     """
-    obstacles, num, facts = world.course.obstacles, world.course.num_obstacles[w], world.facts
-    before, obstacles_before = world.state.before, world.state.obstacles_before
-    began = 0
+    num, facts, obstacles_before = world.course.num_obstacles[w], world.facts, world.state.obstacles_before
+    obstacles, began = named(room), 0
+    obstacles.squared[:num] = math.inf
     for p in range(grid.living):
-        i = cells.vehicle[p]
-        for k in range(num):
-            x, y, radius = obstacles[w, k, 0], obstacles[w, k, 1], obstacles[w, k, 2]
-            dx, dy = x - cells.x[p], y - cells.y[p]
-            gap = math.sqrt(dx * dx + dy * dy) - radius
-            facts.clearance[w, i] = min(facts.clearance[w, i], gap)
-            facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], gap)
-            if gap >= hull:
-                continue
-            was_x, was_y = obstacles_before[w, k, 0] - before[w, i, 0], obstacles_before[w, k, 1] - before[w, i, 1]
-            if math.sqrt(was_x * was_x + was_y * was_y) - obstacles_before[w, k, 2] >= hull:
-                facts.contacts[w, i] += 1
-                world.state.touched[w, i] = True
-                began += 1
+        i, x, y = cells.vehicle[p], cells.x[p], cells.y[p]
+        nearest, others = nearest_surface(i, x, y, obstacles)
+        if nearest >= hull and others > nearest:
+            facts.clearance[w, i] = min(facts.clearance[w, i], nearest)
+            lower_squares(num, x, y, obstacles)
+        else:
+            began += meet_obstacles(w, i, x, y, hull, world, obstacles)
     for k in range(num):
+        gap = math.sqrt(obstacles.squared[k]) - obstacles.radius[k]
+        facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], gap)
         for c in range(3):
-            obstacles_before[w, k, c] = obstacles[w, k, c]
-    for k in range(num, obstacles.shape[1]):
+            obstacles_before[w, k, c] = world.course.obstacles[w, k, c]
+    for k in range(num, obstacles_before.shape[1]):
         obstacles_before[w, k, 0], obstacles_before[w, k, 1], obstacles_before[w, k, 2] = NOWHERE
+    return began
+
+
+@compiled_inline
+def lower_squares(num: int, x: float, y: float, obstacles: Obstacles) -> None:
+    """Let the first ``num`` obstacles know of a vehicle at (x, y); ``obstacles.squared`` is lowered."""
+    for k in range(num):
+        dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
+        squared = dx * dx + dy * dy
+        obstacles.squared[k] = squared if squared < obstacles.squared[k] else obstacles.squared[k]
+
+
+@compiled_inline
+def meet_obstacles(w: int, i: int, x: float, y: float, hull: float, world: World, obstacles: Obstacles) -> int:
+    """Lower vehicle i's clearance, at (x, y), and the obstacles', and raise its contacts; how many episodes began."""
+    facts, before, obstacles_before, began = world.facts, world.state.before, world.state.obstacles_before, 0
+    for k in range(world.course.num_obstacles[w]):
+        dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
+        gap = math.sqrt(dx * dx + dy * dy) - obstacles.radius[k]
+        facts.clearance[w, i] = min(facts.clearance[w, i], gap)
+        facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], gap)
+        if gap >= hull:
+            continue
+        was_x, was_y = obstacles_before[w, k, 0] - before[w, i, 0], obstacles_before[w, k, 1] - before[w, i, 1]
+        if math.sqrt(was_x * was_x + was_y * was_y) - obstacles_before[w, k, 2] >= hull:
+            facts.contacts[w, i] += 1
+            world.state.touched[w, i] = True
+            began += 1
     return began
 
 

@@ -10,26 +10,28 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.motion import load_one
+from uuv_marl.sim.nearby import ROUND_M, nearest_surface
 from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
-from uuv_marl.sim.workspace import Columns
+from uuv_marl.sim.workspace import Workspace, named
 
 SINK_M = 0.001
 """How deep a hull is left in what it touches [m], so that it stays one contact while it presses on. Assumed."""
 
 
 @compiled_inner
-def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, now: Columns, sea: Sea | None) -> None:
+def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, own: Workspace, sea: Sea | None) -> None:
     """Hulls of world w that have run into something are put at its surface, and lose their velocity into it.
 
     Of two hulls each gives way by half. States are written, and their columns.
     """
-    state, course, touch = world.state, world.course, 2.0 * rules.hull
+    state, course, touch, obstacles = world.state, world.course, 2.0 * rules.hull, named(own.obstacles)
     for i in range(state.eta.shape[1]):
         if not state.alive[w, i]:
             continue
-        for k in range(course.num_obstacles[w]):
+        clear = min(nearest_surface(i, state.eta[w, i, 0], state.eta[w, i, 1], obstacles)) > rules.hull + ROUND_M
+        for k in range(0 if clear else course.num_obstacles[w]):
             near = course.obstacles[w, k, 2] + rules.hull
             dx, dy = state.eta[w, i, 0] - course.obstacles[w, k, 0], state.eta[w, i, 1] - course.obstacles[w, k, 1]
             if dx * dx + dy * dy < near * near:
@@ -51,7 +53,7 @@ def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, now: Columns, s
                 push(w, i, n_x, n_y, impulse, world, plant)
                 push(w, j, -n_x, -n_y, impulse, world, plant)
     for i in range(state.eta.shape[1]):
-        load_one(w, i, state, now)
+        load_one(w, i, state, own.now)
 
 
 @compiled

@@ -7,10 +7,12 @@ from typing import Annotated, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.sim.compiled import compiled_inner
+from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.tables import array_specs
 from uuv_marl.types import Float64, Int32, Int64
 
+MOST_NEARBY = 16
+"""Most obstacles that are remembered as near a vehicle; as many or fewer are gone through one by one."""
 Column = Annotated[Float64, "vehicle", "See uuv_marl.sim.vehicle."]
 
 
@@ -66,12 +68,43 @@ class Listener(NamedTuple):
     some: Annotated[Int32, "vehicle", "Room for a choice of them."]
 
 
+class Obstacles(NamedTuple):
+    """The obstacles of a world as columns, and which of them are near each vehicle (``nearby.py``)."""
+
+    x: Annotated[Float64, "obstacle", "Centre, north [m]."]
+    y: Annotated[Float64, "obstacle", "Centre, east [m]."]
+    radius: Annotated[Float64, "obstacle", "Radius [m]."]
+    squared: Annotated[Float64, "obstacle", "Squared distance of the nearest vehicle from the centre [m2]."]
+    ahead: Annotated[Float64, "obstacle", "How far those chosen are ahead of a vehicle [m]."]
+    abeam: Annotated[Float64, "obstacle", "How far they are to starboard [m]."]
+    gap: Annotated[Float64, "obstacle", "How far their surfaces are [m]."]
+    from_x: Annotated[Float64, "obstacle", "Where each vehicle was when those near it were chosen, north [m]."]
+    from_y: Annotated[Float64, "obstacle", "Where it was then, east [m]."]
+    beyond: Annotated[Float64, "obstacle", "How far all others stay from there, as long as the decision stands [m]."]
+    chosen: Annotated[Int64, "nearby", "Indices of those chosen, in order."]
+    nearby: Annotated[Int64, "nearby", "Indices of those near each vehicle, ``MOST_NEARBY`` places for each."]
+    num_nearby: Annotated[Int64, "nearby", "How many those are, -1 where they are not known."]
+
+
+class Unnamed(NamedTuple):
+    """``Obstacles`` in two arrays, since each that is passed on costs time; ``named`` tells them apart."""
+
+    reals: Float64
+    """Shape (column, obstacle)."""
+    wholes: Int64
+    """Shape (column, nearby)."""
+
+
 class Workspace(NamedTuple):
     """What one thread works with."""
 
     now: Columns
     cells: Cells
     listener: Listener
+    obstacles: Unnamed
+
+
+TABLES = (Columns, Cells, Listener, Obstacles)
 
 
 class Scratch(NamedTuple):
@@ -89,12 +122,18 @@ class Scratch(NamedTuple):
     """Shape (thread, column, sector)."""
     cell_wholes: Int64
     """Shape (thread, column, cell)."""
+    obstacle_reals: Float64
+    """Shape (thread, column, obstacle)."""
+    nearby_wholes: Int64
+    """Shape (thread, column, nearby)."""
 
 
-def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -> Scratch:
+def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int, num_obstacles: int) -> Scratch:
     """A column for each array of a workspace, and a cache line between one thread's and the next's."""
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
-    kinds = [(spec.axes, spec.dtype) for table in (Columns, Cells, Listener) for spec in array_specs(table).values()]
+    lengths["obstacle"] = max(num_obstacles, num_vehicles) + 9
+    lengths["nearby"] = max(num_obstacles, MOST_NEARBY * num_vehicles) + 9
+    kinds = [(spec.axes, spec.dtype) for table in TABLES for spec in array_specs(table).values()]
 
     def room(axis: str, dtype: type[Any]) -> NDArray[Any]:
         return np.zeros((threads, kinds.count(((axis,), dtype)), lengths[axis]), dtype)
@@ -106,13 +145,15 @@ def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int) -
         sector_reals=room("sector", np.float64),
         sector_wholes=room("sector", np.int64),
         cell_wholes=room("cell", np.int64),
+        obstacle_reals=room("obstacle", np.float64),
+        nearby_wholes=room("nearby", np.int64),
     )
 
 
 def _columns() -> Iterator[Any]:
     """The tables of a workspace, in place of each array the number of its column among those of its axis and type."""
     taken: Counter[object] = Counter()
-    for table in (Columns, Cells, Listener):
+    for table in TABLES:
         kinds = [(spec.axes, spec.dtype) for spec in array_specs(table).values()]
         numbers: list[int] = []
         for kind in kinds:
@@ -121,7 +162,7 @@ def _columns() -> Iterator[Any]:
         yield table(*cast(Any, numbers))
 
 
-_NOW, _CELLS, _LISTENER = _columns()
+_NOW, _CELLS, _LISTENER, _OBSTACLES = _columns()
 
 
 @compiled_inner
@@ -146,4 +187,16 @@ def workspace(room: Scratch, t: int) -> Workspace:
             vehicle=wholes[e.vehicle], squared=reals[e.squared], ahead=reals[e.ahead], abeam=reals[e.abeam],
             bin=shorts[e.bin], sector=wholes[e.sector], some=shorts[e.some],
         ),
+        Unnamed(room.obstacle_reals[t], room.nearby_wholes[t]),
+    )  # fmt: skip
+
+
+@compiled_inline
+def named(room: Unnamed) -> Obstacles:
+    """A world's obstacles by name."""
+    reals, wholes, o = room.reals, room.wholes, _OBSTACLES
+    return Obstacles(
+        x=reals[o.x], y=reals[o.y], radius=reals[o.radius], squared=reals[o.squared], ahead=reals[o.ahead],
+        abeam=reals[o.abeam], gap=reals[o.gap], from_x=reals[o.from_x], from_y=reals[o.from_y],
+        beyond=reals[o.beyond], chosen=wholes[o.chosen], nearby=wholes[o.nearby], num_nearby=wholes[o.num_nearby],
     )  # fmt: skip

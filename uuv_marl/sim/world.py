@@ -12,6 +12,7 @@ from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.hearing import hear, hear_nobody
 from uuv_marl.sim.model import Model, Rules
 from uuv_marl.sim.motion import apply_actuators, integrate, load_action, load_one, load_state
+from uuv_marl.sim.nearby import load_obstacles, remember_nearby
 from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sea.actuation import is_lost_to_fault
 from uuv_marl.sim.sea.sea import Sea, begin_sea, drift, integrate_at_sea, know, reads, take_readings
@@ -21,7 +22,7 @@ from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields, sea_fields
-from uuv_marl.sim.workspace import Columns, Workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Unnamed, Workspace, named
 from uuv_marl.types import Float32, Float64
 
 RUNAWAY = 1000.0
@@ -80,8 +81,9 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 
 @compiled_inner
-def move_obstacles(w: int, tick: int, course: Course, hold_s: float) -> None:
-    """Obstacles go on, those that move, for one control hold; ``tick`` counts it."""
+def move_obstacles(w: int, tick: int, course: Course, hold_s: float, room: Unnamed) -> None:
+    """Obstacles go on, those that move, for one control hold; ``tick`` counts it. Their columns are written, too."""
+    obstacles = named(room)
     for k in range(course.num_obstacles[w]):
         if course.swing_holds[w, k] > 0:
             ahead = triangle(tick, course.swing_holds[w, k])
@@ -92,6 +94,7 @@ def move_obstacles(w: int, tick: int, course: Course, hold_s: float) -> None:
         elif course.obstacle_velocity[w, k, 0] != 0.0 or course.obstacle_velocity[w, k, 1] != 0.0:
             course.obstacles[w, k, 0] += course.obstacle_velocity[w, k, 0] * hold_s
             course.obstacles[w, k, 1] += course.obstacle_velocity[w, k, 1] * hold_s
+        obstacles.x[k], obstacles.y[k] = course.obstacles[w, k, 0], course.obstacles[w, k, 1]
 
 
 @compiled_inner
@@ -105,7 +108,7 @@ def measure_distances(w: int, world: World, model: Model, workspace: Workspace, 
     """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
     facts, hull = world.facts, model.rules.hull
     began = measure_vehicles(w, hull, world, workspace.cells, grid)
-    began += measure_obstacles(w, hull, world, workspace.cells, grid)
+    began += measure_obstacles(w, hull, world, workspace.obstacles, workspace.cells, grid)
     for i in range(facts.spacing.shape[1]):
         facts.min_spacing[w] = min(facts.min_spacing[w], facts.spacing[w, i])
     facts.max_spacing[w] = extent(workspace.cells, grid)
@@ -227,6 +230,7 @@ def observe_world(w: int, world: World, model: Model, own: Workspace, sea: Sea |
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
     load_state(w, world.state, own.now)
+    load_obstacles(w, world.course, own.obstacles)
     grid = sort_into_cells(w, world, model, own)
     measure_distances(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
@@ -248,9 +252,9 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
     control_hold(w, first, world, model, workspace.now, sea)
     world.state.tick[w] += 1
     apply_losses(w, world, model.rules, sea)
-    move_obstacles(w, world.state.tick[w], world.course, model.rules.hold_s)
+    move_obstacles(w, world.state.tick[w], world.course, model.rules.hold_s, workspace.obstacles)
     if model.rules.contact_stops:
-        stop_hulls(w, world, model.rules, model.plant, workspace.now, sea)
+        stop_hulls(w, world, model.rules, model.plant, workspace, sea)
     grid = sort_into_cells(w, world, model, workspace)
     began = measure_distances(w, world, model, workspace, grid)
     if model.rules.contact_ends and began > 0:
@@ -268,6 +272,9 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
     facts, holds = world.facts, model.rules.holds
     if facts.diverged[w] >= 0:
         return
+    load_obstacles(w, world.course, workspace.obstacles)
+    if world.course.num_obstacles[w] > MOST_NEARBY:
+        remember_nearby(w, world, model.rules, workspace.obstacles)
     clear_facts(w, facts)
     num_alive = 0
     for i in range(action.shape[1]):

@@ -4,7 +4,8 @@ The map's origin is the reference point l(t) when the vehicle first perceived it
 which l(t) moved then (the bow, if l(t) was at rest).
 """
 
-from typing import Annotated, NamedTuple
+from collections import namedtuple
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from uuv_marl.sim.tables import described
 from uuv_marl.types import Float64
@@ -50,3 +51,14 @@ class Surroundings(NamedTuple):
     known: Annotated[Float64, "world vehicle sector", "Decisions at which each was heard, 0 for none."]
     since: Annotated[Float64, "world vehicle sector", "Time since its latest new reading [s]."]
     error: Annotated[Float64, "world vehicle", "Errors of predicted places of neighbours, over their range [1]."]
+
+
+def with_surroundings(name: str, table: type[Any]) -> type[Any]:
+    """A table of the surroundings' arrays and, after them, of another's: the memory of who keeps more.
+
+    ``name`` is that of the new table in the other's module.
+    """
+    hints = {**get_type_hints(Surroundings, include_extras=True), **get_type_hints(table, include_extras=True)}
+    made: Any = namedtuple(name, hints, module=table.__module__)  # pyright: ignore[reportUntypedNamedTuple]
+    made.__annotations__ = hints
+    return made

@@ -8,7 +8,8 @@ avoidance (van den Berg et al. 2011, see ``halfplanes``).
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar
 
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
@@ -19,6 +20,8 @@ from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float32, Float64
+
+G = TypeVar("G")
 
 
 class Barrier(NamedTuple):
@@ -54,6 +57,13 @@ GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
 """The filter of ``guarded:``. It lets a policy nearer to obstacles than a law that makes room early has to go."""
 
 
+def with_numbers(values: Mapping[str, float], gains: G, barrier: Barrier) -> tuple[G, Barrier]:
+    """A law's gains, a NamedTuple, and its filter, with numbers by name that belong to the one or the other."""
+    both: tuple[Any, Any] = gains, barrier
+    made = [each._replace(**{name: value for name, value in values.items() if name in each._fields}) for each in both]
+    return made[0], made[1]
+
+
 @compiled
 def margin(w: int, i: int, d: int, barrier: Barrier, kept: Surroundings) -> float:
     """Distance to keep from the surface of a remembered obstacle [m]: less where the gap to the next is narrow."""
@@ -78,7 +88,6 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surrounding
     """
     pose, num = kept.pose[w, i], 0
     x, y = pose[0], pose[1]
-    v_x, v_y = to_map_axes(kept.motion[w, i, 0], kept.motion[w, i, 1], pose)
     rate = min(barrier.obstacle_rate, MOST_CLOSED / period)
     for d in range(kept.score.shape[2]):
         if kept.score[w, i, d] < CONFIRMED:
@@ -90,6 +99,16 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surrounding
             planes[num, 0], planes[num, 1] = n_x / away, n_y / away
             planes[num, 2] = rate * (left - margin(w, i, d, barrier, kept))
             num += 1
+    return neighbour_planes(w, i, num, period, barrier, kept, planes)
+
+
+@compiled
+def neighbour_planes(
+    w: int, i: int, num: int, period: float, barrier: Barrier, kept: Surroundings, planes: Float64
+) -> int:
+    """Add the half-planes of neighbours to the first ``num``, and say how many there are then. See ``planes_of``."""
+    x, y = kept.pose[w, i, 0], kept.pose[w, i, 1]
+    v_x, v_y = to_map_axes(kept.motion[w, i, 0], kept.motion[w, i, 1], kept.pose[w, i])
     rate = min(barrier.neighbour_rate, MOST_CLOSED / period)
     for k in range(kept.known.shape[2]):
         away = max(kept.away[w, i, k], 1e-6)

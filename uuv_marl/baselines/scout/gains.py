@@ -3,7 +3,8 @@
 from typing import NamedTuple
 
 from uuv_marl.baselines.memory.neighbours import KEPT_S
-from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.policy import tuned
+from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 
 
 class ScoutGains(NamedTuple):
@@ -58,5 +59,7 @@ PRESETS = {
     # Keeps farther from others where it doubts, and from obstacles: with 13.5 m the smallest distance of ``lead`` was
     # 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
     "wary": Preset(_LEAD._replace(pull_in_doubt=-0.7, push_in_doubt=1.1), Barrier(obstacle_m=13.7)),
+    "closed": Preset(*with_numbers(tuned("scout"), ScoutGains(), Barrier())),  # for water with walls
 }
-"""By name. All were found by hand on tuning seeds, ``lead`` and ``wary`` on disturbed ones too (docs/policies.md)."""
+"""By name. All but ``closed``, which is tuned, were found by hand on tuning seeds, ``lead`` and ``wary`` on disturbed
+ones too (docs/policies.md)."""

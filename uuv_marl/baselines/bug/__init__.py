@@ -1,0 +1,1 @@
+"""``tangent_bug``: the strongest hand-made law here for water with walls."""

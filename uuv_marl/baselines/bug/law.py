@@ -1,0 +1,92 @@
+"""The law for water with walls: it goes round what blocks its way, as TangentBug does, and keeps to the safety filter.
+
+The wished velocity leads along the chosen way, with pushes from near neighbours; it is made safe against every echo
+that is remembered, and against neighbours.
+"""
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+
+from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
+from uuv_marl.baselines.bug.walls import Walls, WallsMemory, update_walls, wall_planes
+from uuv_marl.baselines.bug.ways import RAYS, choose_ways, rays
+from uuv_marl.baselines.memory import Surroundings, update_memory
+from uuv_marl.baselines.policy import Limits
+from uuv_marl.baselines.safety.barrier import Barrier, neighbour_planes, steer_safely
+from uuv_marl.baselines.safety.remembering import Filtered
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.types import Bool, Float32, Float64
+
+
+class TangentBug(Filtered):
+    """To the goal, or past the end of what blocks the way; pushes among near neighbours, and the safety filter.
+
+    Made for goals at rest: then the vector to the goal tells a vehicle's place, up to its heading.
+
+    Args:
+        gains: of the way and of the wished velocity.
+        barrier: margins and rates of the filter.
+    """
+
+    yaw_damping_nms: ClassVar[float] = 600.0
+    Memory: ClassVar[type[Any] | None] = WallsMemory
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: BugGains | None = None, barrier: Barrier | None = None
+    ) -> None:
+        super().__init__(scenario, num_worlds, barrier or BUG_BARRIER)
+        self.gains = gains or BugGains()
+        split = len(Surroundings._fields)
+        self._kept, self._walls = Surroundings(*self.memory[:split]), Walls(*self.memory[split:])
+        self.planes: Float64 = np.zeros((self._walls.echoes.shape[2] + scenario.sonar.num_sectors, 3))
+        self._view = rays(), rays(), np.zeros(RAYS)
+
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Update the memory from the percept, and choose the way."""
+        flat, at = self.flat(percept), self.layout.offsets
+        update_memory(flat, at, worlds, self.model, self.kept_s, self._kept)
+        update_walls(flat, at, worlds, self.model.sectors, self._kept, self._walls)
+        choose_ways(worlds, BugGains(*map(float, self.gains)), *self._view, self._kept, self._walls)
+
+    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
+        """Actions of shape (world, vehicle, 2)."""
+        action = np.zeros((*self._walls.num.shape, 2), np.float32)
+        _decide_all(
+            self.active, self.model.own.period_s, BugGains(*map(float, self.gains)), self.barrier, self.limits,
+            self.gain, self._kept, self._walls, self.planes, action,
+        )  # fmt: skip
+        return action
+
+
+@compiled
+def _wished(w: int, i: int, g: BugGains, kept: Surroundings, walls: Walls) -> tuple[float, float]:
+    """The velocity that a vehicle wishes, in its map [m/s]."""
+    pose, goal = kept.pose[w, i], kept.reference[w, i]
+    speed = min(g.cruise, g.pull * math.hypot(goal[0] - pose[0], goal[1] - pose[1]))
+    w_x, w_y = speed * walls.way[w, i, 0], speed * walls.way[w, i, 1]
+    for k in range(kept.known.shape[2]):
+        away = max(kept.away[w, i, k], 1e-6)
+        if away < g.push_range:
+            share = g.push * (1.0 / away - 1.0 / g.push_range)
+            w_x += share * (pose[0] - kept.place[w, i, k, 0])
+            w_y += share * (pose[1] - kept.place[w, i, k, 1])
+    return w_x, w_y
+
+
+@compiled
+def _decide_all(
+    worlds: Bool, period: float, g: BugGains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
+    walls: Walls, planes: Float64, action: Float32,
+) -> None:  # fmt: skip
+    """The law for every vehicle."""
+    for w in range(action.shape[0]):
+        for i in range(action.shape[1]):
+            if worlds[w] and kept.begun[w, i] > 0.0:
+                w_x, w_y = _wished(w, i, g, kept, walls)
+                num = wall_planes(w, i, period, barrier, limits, kept, walls, planes)
+                num = neighbour_planes(w, i, num, period, barrier, kept, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)

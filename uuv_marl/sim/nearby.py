@@ -1,0 +1,90 @@
+"""Which obstacles can matter to a vehicle, so that of hundreds only those are gone through.
+
+Obstacles are columns, over which loops pass on vector registers. What is passed over changes no result.
+"""
+
+import math
+
+from uuv_marl.sim.arrays import Course, World
+from uuv_marl.sim.compiled import compiled_inline, compiled_inner
+from uuv_marl.sim.model import Rules
+from uuv_marl.sim.workspace import MOST_NEARBY, Obstacles, Unnamed, named
+
+Edges = tuple[float, float, float, float]
+"""Lower and upper edge of a cone of directions, north and east each; all 0 for all directions."""
+
+ROUND_M = 1e-6
+"""Room for rounding [m]."""
+_EVERYWHERE = (0.0, 0.0, 0.0, 0.0)
+_SKIN_M = 5.0
+"""How much farther than a vehicle's clearance obstacles are remembered: about as far as it moves in a decision."""
+
+
+@compiled_inline
+def load_obstacles(w: int, course: Course, room: Unnamed) -> None:
+    """The columns of world w's obstacles, all of them chosen; which are nearby is forgotten."""
+    obstacles = named(room)
+    obstacles.num_nearby[: course.group.shape[1]] = -1
+    for k in range(course.num_obstacles[w]):
+        obstacles.x[k], obstacles.y[k] = course.obstacles[w, k, 0], course.obstacles[w, k, 1]
+        obstacles.radius[k], obstacles.chosen[k] = course.obstacles[w, k, 2], k
+
+
+@compiled_inline
+def choose(num: int, x: float, y: float, reach: float, cone: Edges, obstacles: Obstacles) -> int:
+    """Choose those of the obstacles that meet a cone from (x, y) within a reach [m]; how many. A few more, at its rim.
+
+    Of the obstacles the first ``num`` count. ``obstacles.chosen`` is written.
+    """
+    l_x, l_y, u_x, u_y = cone
+    for k in range(num):
+        dx, dy, radius = obstacles.x[k] - x, obstacles.y[k] - y, obstacles.radius[k] + ROUND_M
+        near = reach + radius
+        meets = (l_x * dy - l_y * dx >= -radius) & (u_x * dy - u_y * dx <= radius)
+        obstacles.chosen[k] = int((dx * dx + dy * dy <= near * near) & meets)
+    num_chosen = 0
+    for k in range(num):
+        wanted = obstacles.chosen[k]
+        obstacles.chosen[num_chosen] = k
+        num_chosen += wanted
+    return num_chosen
+
+
+@compiled_inner
+def remember_nearby(w: int, world: World, rules: Rules, room: Unnamed) -> None:
+    """Remember which obstacles may come near each vehicle until the next decision.
+
+    How near that is, is guessed from the clearance of the step before. The room is written.
+    """
+    obstacles = named(room)
+    eta, num, fastest = world.state.eta, world.course.num_obstacles[w], 0.0
+    velocity, swing = world.course.obstacle_velocity, world.course.swing
+    for k in range(num):
+        fastest = max(fastest, abs(velocity[w, k, 0]) + abs(velocity[w, k, 1]))
+        fastest = max(fastest, abs(swing[w, k, 2]) + abs(swing[w, k, 3]))
+    for i in range(eta.shape[1]):
+        x, y, first = eta[w, i, 0], eta[w, i, 1], i * MOST_NEARBY
+        reach = max(world.facts.clearance[w, i], rules.hull) + _SKIN_M
+        num_nearby = choose(num, x, y, reach, _EVERYWHERE, obstacles)
+        if num_nearby <= MOST_NEARBY:
+            for t in range(num_nearby):
+                obstacles.nearby[first + t] = obstacles.chosen[t]
+            obstacles.num_nearby[i], obstacles.from_x[i], obstacles.from_y[i] = num_nearby, x, y
+            obstacles.beyond[i] = reach - fastest * rules.holds * rules.hold_s
+
+
+@compiled_inline
+def nearest_surface(i: int, x: float, y: float, obstacles: Obstacles) -> tuple[float, float]:
+    """Distance of the nearest remembered surface from vehicle i, at (x, y), and what all others are beyond [m].
+
+    Where none are remembered, the others may be anywhere.
+    """
+    if obstacles.num_nearby[i] < 0:
+        return math.inf, -math.inf
+    nearest = math.inf
+    for t in range(obstacles.num_nearby[i]):
+        k = int(obstacles.nearby[i * MOST_NEARBY + t])
+        dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
+        nearest = min(nearest, math.sqrt(dx * dx + dy * dy) - obstacles.radius[k])
+    dx, dy = x - obstacles.from_x[i], y - obstacles.from_y[i]
+    return nearest, obstacles.beyond[i] - math.sqrt(dx * dx + dy * dy)
