@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import granted
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
-from uuv_marl.baselines.comparators import apf, olfati_saber, orca
+from uuv_marl.baselines.comparators import apf, leader_follower, olfati_saber, orca
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 from uuv_marl.baselines.scout.gains import ScoutGains
@@ -28,8 +28,10 @@ SEEDS = (10_000, 10_001, 10_002, 10_003)
 SCENARIO = "single_obstacle"
 SCALED = "sea_trial"
 """Where policies are tuned in the scale of a vehicle."""
-WALLS, MAPS = "hard_water", tuple(range(10_000, 10_024))
-"""Where policies are tuned that keep to the safety filter, and its seeds: each draws another map."""
+WALLS, FEW = "hard_water", "few_informed"
+"""Where policies are tuned that keep to the safety filter."""
+MAPS = tuple(range(10_000, 10_024))
+"""Seeds there: each draws another map."""
 _FAILURE_COST_S = 1000.0
 _COLLISION_COST_S = 50.0
 _CLEARANCE_COST_S_PER_M = 20.0
@@ -37,7 +39,7 @@ OBJECTIVES = (
     "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
     "mean time [s] over seeds, plus 1000 s for the share of vehicles that touched or did not come to the goal",
 )
-"""What is minimised, in the open and between walls."""
+"""What is minimised, in the paper's task and in others."""
 
 
 class Range(NamedTuple):
@@ -92,6 +94,9 @@ SPACES: dict[str, Space] = {
     "orca_informed": Space(_RANGES["orca"], orca.OrcaGains),
     "scout": Space(_RANGES["scout"] | _RANGES["filter"] | _RANGES["gaps"], ScoutGains, WALLS, Barrier()),
     "tangent_bug": Space(_RANGES["tangent_bug"] | _RANGES["filter"], BugGains, WALLS, BUG_BARRIER),
+    "leader_follower": Space(
+        _RANGES["leader_follower"] | _RANGES["filter"], leader_follower.LeaderFollowerGains, FEW, Barrier()
+    ),
 }
 """Free parameters of every tuned policy, and how they become its gains."""
 
@@ -182,7 +187,7 @@ def tune(
     space = SPACES[policy]
     where, changes = (space.scenario, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
     scenario, name = granted(policy, load_scenario(where, overrides=changes)), policy
-    seeds = MAPS if where == WALLS else SEEDS
+    seeds = MAPS if where in (WALLS, FEW) else SEEDS
     if vehicle is not None:
         name = f"{policy}.{vehicle}"
 
@@ -198,7 +203,7 @@ def tune(
     best = min(finished, key=lambda trial: trial.values)
     result = {
         "policy": policy,
-        "objective": OBJECTIVES[where == WALLS],
+        "objective": OBJECTIVES[seeds == MAPS],
         "scenario": where,
         **({} if vehicle is None else {"vehicle": vehicle}),
         "seeds": list(seeds),

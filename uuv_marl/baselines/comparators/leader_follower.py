@@ -1,8 +1,8 @@
 """Leader and follower by sonar: who does not perceive l(t) goes with whom it hears, and who does waits for them.
 
-A follower's wished velocity is a little more than the mean velocity of the neighbours that it remembers, nearer ones
-counting more, and a pull to their mean place. A leader's is to l(t), slower the farther it is ahead of the mean place of
-those that it remembers. Both are pushed off near neighbours, bent round obstacles and made safe as ``scout``'s. So
+A follower wishes for a little more than the mean velocity of the neighbours that it remembers, nearer ones counting
+more, and to their mean place. A leader goes to l(t), slower the farther it is ahead of the mean place of those that it
+remembers. Both are pushed off near neighbours, bent round obstacles and made safe as ``scout``'s. So
 informed individuals lead groups in Couzin, Krause, Franks and Levin, Effective leadership and decision-making in animal
 groups on the move, Nature 433, 2005; waiting is ours.
 """
@@ -29,7 +29,7 @@ class LeaderFollowerGains(NamedTuple):
     """Free parameters, found by hand on tuning seeds."""
 
     follow: float = 1.05
-    """Factor of the neighbours' mean velocity [1]: above 1, so that a swarm doesn't come to rest by following itself."""
+    """Factor of the neighbours' mean velocity [1]: above 1, or a swarm comes to rest by following itself."""
     near: float = 15.0
     """Their velocities count as e^(-distance / near) [m]."""
     sightings: float = 3.0
@@ -64,9 +64,10 @@ class LeaderFollower(Filtered):
     yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: LeaderFollowerGains | None = None
-    ) -> None:
-        super().__init__(scenario, num_worlds, Barrier())
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: LeaderFollowerGains | None = None,
+        barrier: Barrier | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(scenario, num_worlds, barrier or Barrier())
         self.gains = gains or LeaderFollowerGains()
 
     @property
