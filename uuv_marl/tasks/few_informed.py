@@ -14,9 +14,6 @@ from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Task, Terms
 from uuv_marl.types import Bool, Float64
 
-_TRIES = 64
-"""Turns of the start that are tried until no obstacle is in it; then it is not turned."""
-
 
 class FewInformedNumbers(ReachNumbers):
     """Numbers of ``few_informed``."""
@@ -49,25 +46,17 @@ class FewInformed(Reach):
     guide: ClassVar[str] = "leader_follower"
 
     def draw(self, world: int, rng: np.random.Generator) -> Draw:
-        """As the scenario says; the start is turned, and the informed are drawn."""
-        drawn = Task.draw(self, world, rng)
-        eta, nu = self._turned_start(drawn, rng)
-        n = len(eta)
+        """As the scenario says; the start is turned, obstacles in it are left out, and the informed are drawn."""
+        drawn, scenario, n = Task.draw(self, world, rng), self.swarm.scenario, self.swarm.num_vehicles
+        (first, second), (c, s) = drawn.waypoints[0][:2], cos_sin(rng.uniform(-np.pi, np.pi))
+        ahead = first + (second - first) @ np.array([[c, s], [-s, c]])
+        block = (n, (float(first[0]), float(first[1])), (float(ahead[0]), float(ahead[1])))
+        gap = 2.0 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)  # as between the obstacles of a field
+        clear = [scenario.start.distance(*block, (x, y)) >= radius + gap for x, y, radius in drawn.obstacles]
+        eta, nu = start_state(scenario, np.array([first, ahead]), rng)
         informed = np.zeros(n, np.bool_)
         informed[rng.permutation(n)[: self.numbers.informed]] = True
-        return drawn._replace(eta=eta, nu=nu, informed=informed)
-
-    def _turned_start(self, drawn: Draw, rng: np.random.Generator) -> tuple[Float64, Float64]:
-        """Pose and velocity of the vehicles, as ``start_state`` gives them, behind a leg that is turned at random."""
-        scenario, (first, second) = self.swarm.scenario, drawn.waypoints[0][:2]
-        gap = 2.0 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)  # as between the obstacles of a field
-        for _ in range(_TRIES):
-            c, s = cos_sin(rng.uniform(-np.pi, np.pi))
-            ahead = first + (second - first) @ np.array([[c, s], [-s, c]])
-            block = (scenario.swarm.num_vehicles, (first[0], first[1]), (ahead[0], ahead[1]))
-            if all(scenario.start.distance(*block, (x, y)) >= radius + gap for x, y, radius in drawn.obstacles):
-                return start_state(scenario, np.array([first, ahead]), rng)
-        return drawn.eta, drawn.nu
+        return drawn._replace(obstacles=drawn.obstacles[np.array(clear, np.bool_)], eta=eta, nu=nu, informed=informed)
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """Who is informed."""

@@ -5,7 +5,7 @@ each other towards a lattice; the nearest point of an obstacle's surface is a be
 reference point is the gamma-agent. The source's lengths have no unit; here ``unit`` metres stand for 1. Forces stand
 for the source's accelerations. Its agents meet no resistance, so vehicles balance theirs at the reference's velocity.
 
-A vehicle that does not perceive l(t) has no gamma-agent, and balances its resistance at its own velocity. With alignment
+A vehicle that does not perceive l(t) has no gamma-agent and balances its resistance at its own velocity. With alignment
 that is the extension by Su, Wang and Lin, Flocking of multi-agents with a virtual leader, ibid. 54(2), 293-307, 2009.
 """
 
