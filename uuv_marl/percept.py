@@ -126,6 +126,13 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
     return sum(granted, _sonar(num_sectors, num_active))
 
 
+def task_table(scenario: Scenario) -> Table:
+    """Rows that a scenario's task tells: those it always does, and those of its own channels that are granted."""
+    kind, granted = scenario.task_class, scenario.sonar.channels
+    rows: Table = kind.observed
+    return sum((own for name, own in kind.channels.items() if name in granted), rows)
+
+
 class Starts(NamedTuple):
     """Where each field that there can be starts in a flat percept, -1 where it is absent."""
 
@@ -159,8 +166,9 @@ class PerceptLayout:
     @staticmethod
     def of(scenario: Scenario) -> "PerceptLayout":
         """The layout that a scenario's sonar suite, channels and task make."""
-        sonar, more = scenario.sonar, scenario.task_class.observed
-        return PerceptLayout(percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels) + more)
+        sonar = scenario.sonar
+        own = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
+        return PerceptLayout(own + task_table(scenario))
 
     @functools.cached_property
     def size(self) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 
 from uuv_marl.baselines.comparators.apf import Apf
 from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaberInformed
+from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
 from uuv_marl.baselines.comparators.pull import Pull
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
@@ -48,6 +49,7 @@ POLICIES: dict[str, Kind] = {
     "olfati_saber_informed": OlfatiSaberInformed,
     "orca_informed": OrcaInformed,
     "pull": Pull,
+    "oracle": Oracle,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
     "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on random_field: as mappo, an actor plus a barrier."),
     "trimmed_scout": shipped(

@@ -19,7 +19,7 @@ from uuv_marl.tasks.task import Payment, Task, paid
 from uuv_marl.types import Bool, Float32, Float64
 
 ScenarioLike = UserPath | Scenario | Mapping[str, object]
-Reward = Literal["dense", "sparse", "team"] | RewardFunction
+Reward = Literal["dense", "sparse", "team", "geodesic"] | RewardFunction
 
 
 class StepResult(NamedTuple):
@@ -67,7 +67,7 @@ class BatchedEnv:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
         reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress, where the
-            task has it), ``team`` (every vehicle gets the mean of ``dense`` over all vehicles; a lost vehicle also pays
+            task has it), ``geodesic`` (progress along the free way, where the task knows it), ``team`` (every vehicle gets the mean of ``dense`` over all vehicles; a lost vehicle also pays
             its own loss), or a function from the swarm to an array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
         observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
@@ -93,6 +93,8 @@ class BatchedEnv:
                 f"reward must be {', '.join(map(repr, names))} or a function of the swarm, got {reward!r}; these are "
                 f"the rewards of task {scenario.task.name!r}"
             )
+        if reward in self.task.rewards:
+            self.task.paying = reward
         self.state_layout = state_layout(scenario)
         self._waiting = set(range(num_worlds))
         """Worlds that were never reset."""
@@ -175,10 +177,9 @@ class BatchedEnv:
     def _simulated(self, action: ArrayLike, running: Bool) -> tuple[Float32, Payment]:
         """One decision of the worlds that are ``running``; all observations, and what those worlds pay."""
         swarm, task = self.swarm, self.task
-        name = "sparse" if self._reward == "sparse" else task.rewards[0]
         observation, observe = observer(swarm.percept, self.layout)
-        payment = task.payment(name, running, kept=self._keep_terms)
-        if payment is not None and not task.observed:
+        payment = task.payment(task.paying, running, kept=self._keep_terms)
+        if payment is not None and not swarm.told:
             threaded = payment
 
             def tell(begin: int, end: int) -> None:

@@ -24,7 +24,8 @@ from uuv_marl.scenario.fields import (
 
 MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0
 """Widths of sub-sectors that the sonar's table of directions is made for."""
-Channel = Literal["compass", "link", "current", "age", "ranged", "modem"]
+CHANNEL_NAMES = ("compass", "link", "current", "age", "ranged", "modem")
+"""Channels that every task can grant."""
 
 
 class Vehicle(Section):
@@ -189,10 +190,10 @@ class Sonar(Section):
     """What an echo's position is: the obstacle's centre, or the nearest point of its surface in the beam."""
     obstacles_hide_vehicles: bool
     """Whether an obstacle on the line of sight silences a vehicle."""
-    channels: tuple[Channel, ...]
+    channels: tuple[str, ...]
     """Granted beyond the percept: ``compass`` (heading), ``link`` (an oracle of neighbours' identity and velocity),
     ``modem`` (the same as their latest messages tell it), ``current`` (own velocity over ground and through the water),
-    ``age`` (of each sub-sector's reading), ``ranged`` (whether its range was measured)."""
+    ``age`` (of each sub-sector's reading), ``ranged`` (whether its range was measured), and those of the task."""
     arrays: Annotated[tuple[SonarArray, ...], Field(min_length=1)]
     """The suite; their order is the order of sub-sectors in the percept."""
 

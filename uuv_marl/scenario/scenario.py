@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 
 from uuv_marl.scenario import fields, hardware, sea, sections
 from uuv_marl.scenario.scale import Scale
-from uuv_marl.scenario.task import TaskSettings, check_task, named_task, task_class, task_numbers
+from uuv_marl.scenario.task import TaskSettings, check_channels, check_task, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
 MAX_READINGS = 64
@@ -97,6 +97,7 @@ class Scenario(fields.Section):
 
     def _check(self) -> None:
         check_task(self.task)
+        check_channels(self.task, self.sonar.channels)
         _check_start(self)
         _check_course(self)
         _check_losses(self)

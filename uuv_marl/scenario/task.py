@@ -8,6 +8,7 @@ from pydantic import ConfigDict, ValidationError
 from uuv_marl.errors import ScenarioError
 from uuv_marl.modules import named_object
 from uuv_marl.scenario.fields import Section
+from uuv_marl.scenario.hardware import CHANNEL_NAMES
 
 
 class TaskSettings(Section):
@@ -37,6 +38,17 @@ def check_task(task: TaskSettings) -> None:
     """
     if task.model_extra or task.name not in shipped_tasks():
         task_numbers(task)
+
+
+def check_channels(task: TaskSettings, channels: tuple[str, ...]) -> None:
+    """Raise ScenarioError for a channel that neither every task knows nor this one; only then it is imported."""
+    for channel in channels:
+        if channel not in CHANNEL_NAMES and channel not in (own := task_class(task.name).channels):
+            having = [name for name in shipped_tasks() if channel in task_class(name).channels]
+            raise ScenarioError(
+                f"sonar.channels can't hold {channel!r} with task {task.name!r}, whose channels are "
+                f"{', '.join((*CHANNEL_NAMES, *own))}" + "".join(f"; task {name!r} has it" for name in having)
+            )
 
 
 def task_class(name: str) -> Any:

@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.percept import Clock, Percept, PerceptLayout
+from uuv_marl.percept import Clock, Percept, PerceptLayout, task_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
@@ -43,6 +43,8 @@ class Swarm:
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
+        self.told = task_table(scenario)
+        """Rows of the percept that the task writes, not the engine."""
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
         self._duration_s = np.zeros(num_worlds)
@@ -289,10 +291,10 @@ class Swarm:
 
     def _tell(self, worlds: Bool) -> None:
         """Write what the task lets the living of these worlds observe, shape (world,), into their percepts."""
-        if not self.task.observed:
+        if not self.told:
             return
         told, percept, there = self.task.observe(worlds), self.percept, worlds[:, None] & self.state.alive
-        for field in self.task.observed:
+        for field in self.told:
             percept[field.name][there] = np.clip(told[field.name][there], field.kind.low, field.kind.high)
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import AfterValidator
 
+from uuv_marl.percept import Table
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.scenario.fields import Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -15,9 +16,11 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
+from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, Seen, look
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
 from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
 from uuv_marl.tasks.reach import Reach, ReachNumbers
+from uuv_marl.tasks.task import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 MOST_DISCS = 320
@@ -26,6 +29,8 @@ MOST_TRIES = 1000
 """Maps that are drawn before the numbers are refused."""
 FAR_M = 5000.0
 """Length of a way where there is none [m]."""
+_DEAR_M, _DEAR = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0), 0.5
+"""Nearer to a surface than each of these [m], a way that leads (``lead``) costs so much more. Tried by hand."""
 
 
 def _known(kinds: tuple[str, ...]) -> tuple[str, ...]:
@@ -91,6 +96,7 @@ class HardWaterMemory(NamedTuple):
     best_s: Annotated[Float64, "world vehicle", "Length of its free way at the start over full speed [s]."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
     way: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
+    lead: Annotated[Float64, "world led column", "Cost of the way on from each cell; no row without channel ``way``."]
     kind: Annotated[Float64, "world", "Index of the map's kind in ``KINDS``."]
 
 
@@ -102,6 +108,8 @@ class HardWater(Reach):
 
     Numbers = HardWaterNumbers
     Memory: ClassVar[type[Any] | None] = HardWaterMemory
+    channels: ClassVar[Mapping[str, Table]] = {"way": WAY}
+    rewards: ClassVar[tuple[str, ...]] = ("dense", "geodesic")
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]",
     }
@@ -114,7 +122,8 @@ class HardWater(Reach):
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
         """Room for the discs of a map, and for its cells."""
         grid = scenario.task_numbers.grid()
-        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns}
+        led = grid.rows if "way" in scenario.sonar.channels else 0
+        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "led": led}
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
@@ -133,6 +142,9 @@ class HardWater(Reach):
         eta, nu = start_state(scenario, goal, rng)
         free = free_cells(made.discs, self._grid, scenario.contact.hull_radius_m)
         memory.way[world] = np.minimum(distances(free, *self._grid.cell(made.length, 0.0)), FAR_M)
+        if memory.lead.size:
+            dear = sum((~free_cells(made.discs, self._grid, near) for near in _DEAR_M), np.zeros(free.shape))
+            memory.lead[world] = distances(free, *self._grid.cell(made.length, 0.0), 1.0 + _DEAR * dear)
         memory.kind[world] = list(KINDS).index(made.kind)
         n = len(eta)
         ways = self._ways(np.full(n, world), eta[:, :2], goal[1])
@@ -204,6 +216,26 @@ class HardWater(Reach):
         world = np.nonzero(chosen)[0]
         found = self._ways(world, eta[chosen][:, :2], goals[world])
         return found.reshape(eta.shape[:2]) if which is None else found
+
+    def observe(self, running: Bool) -> Terms:  # noqa: ARG002
+        """The rows of ``way``, where it is granted."""
+        swarm, memory = self.swarm, self.memory
+        if not memory.lead.size:
+            return {}
+        state, course, shape = swarm.state, swarm.course, swarm.state.alive.shape
+        way, walls = np.zeros((*shape, 2)), np.zeros((*shape, NUM_WALLS, 2))
+        seen = Seen(state.eta, swarm.heading, course.obstacles, course.num_obstacles, memory.turn)
+        look(seen, memory.lead, self._grid, way, walls)
+        return {"way": way, "way_length": self.ways()[:, :, None], "way_walls": walls}
+
+    def move(self, running: Bool) -> None:  # noqa: ARG002
+        """Before a step that pays for the way: how long it is."""
+        if self.paying == "geodesic":
+            self._was = self.ways()
+
+    def left(self) -> tuple[Float64, Float64]:
+        """With the reward ``geodesic``, which knows the map, the free way; else the distance."""
+        return (self.ways(), self._was) if self.paying == "geodesic" else super().left()
 
     def there(self) -> Bool:
         """Vehicles within ``near_m`` of the goal, along the free way."""

@@ -64,7 +64,7 @@ class Reach(Task):
         """The weighted terms of the latest step."""
         facts, weight, limits = self.swarm.facts, self._weight, self._limits
         dt, far = self.swarm.scenario.timing.decision_period_s, weight.progress_far_m
-        now, before = np.minimum(facts.away, far), np.minimum(facts.was_away, far)
+        now, before = (np.minimum(left, far) for left in self.left())
         left_s = np.maximum(self.swarm.time_limit_s - facts.time_s, 0.0)[:, None]
         worst = weight.collision + weight.arrival + (weight.obstacle + weight.spacing + weight.effort) * left_s
         arrives = (self.memory.there_s > 0.0) & (self.memory.there_s == facts.time_s[:, None])
@@ -77,6 +77,10 @@ class Reach(Task):
             "arrival": weight.arrival * arrives,
             "progress": (before - now) / weight.progress_m,
         }
+
+    def left(self) -> tuple[Float64, Float64]:
+        """What progress counts: how far vehicles are from their goals, and were before the step [m]."""
+        return self.swarm.facts.away, self.swarm.facts.was_away
 
     def done(self) -> Bool:
         """Worlds in which all living vehicles are there."""

@@ -75,6 +75,8 @@ class Task:
     is nothing: so a world begins. It is part of the swarm's snapshots."""
     observed: ClassVar[Table] = ()
     """Rows that the task adds to every percept and observation, see ``uuv_marl.percept.PerceptField``."""
+    channels: ClassVar[Mapping[str, Table]] = {}
+    """Rows that it adds where ``sonar.channels`` grants them, by the channel's name: what no vehicle could measure."""
     rewards: ClassVar[tuple[str, ...]] = ("dense",)
     """Names of the rewards that the task knows; the first is the default."""
     terms: ClassVar[Mapping[str, str]] = {}
@@ -88,6 +90,8 @@ class Task:
 
     def __init__(self, swarm: Swarm) -> None:
         self.swarm = swarm
+        self.paying: str = self.rewards[0]
+        """Which of ``rewards`` an environment pays."""
         self.numbers: Any = swarm.scenario.task_numbers
         sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles, **self.sizes(swarm.scenario)}
         self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
@@ -121,7 +125,7 @@ class Task:
     # What is told and paid.
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
-        """The rows of ``observed`` by name, shape (world, vehicle, ...), physical units; VMAS: ``observation``."""
+        """The rows that are told by name, shape (world, vehicle, ...), physical units; VMAS: ``observation``."""
         return {}
 
     def reward(self, running: Bool) -> Terms:  # noqa: ARG002

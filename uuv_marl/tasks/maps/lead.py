@@ -1,0 +1,98 @@
+"""Where a shortest way leads: a point on it ahead of a vehicle, and the walls around, which no vehicle could measure."""
+
+import math
+from typing import NamedTuple
+
+from uuv_marl.percept import LENGTH, POSITION, PerceptField
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.tasks.maps.ways import CELL_M, WayGrid
+from uuv_marl.types import Float64, Int64
+
+NUM_WALLS = 8
+"""Walls around that are told: the nearest. Assumed: all that a hull can touch within a second or two."""
+AHEAD_M = 12.0
+"""How far ahead the point on the way is [m]. Assumed: as piloted."""
+WAY = (
+    PerceptField("way", (2,), POSITION, "vector to a point ahead on a short way to the goal that keeps off walls"),
+    PerceptField("way_length", (1,), LENGTH, "length of the shortest free way to the goal"),
+    PerceptField("way_walls", (NUM_WALLS, 2), POSITION, "vectors to the surfaces of the nearest obstacles, else 0"),
+)
+"""Rows of the channel ``way``."""
+_TOUCH_M = 1e-3
+"""Distances below this count as this, so that there is a direction [m]; assumed."""
+
+
+class Seen(NamedTuple):
+    """What the channel looks at, of all worlds."""
+
+    eta: Float64
+    """Poses, shape (world, vehicle, 3)."""
+    heading: Float64
+    """Cosine and sine of headings, shape (world, vehicle, 2)."""
+    obstacles: Float64
+    """North, east and radius [m], shape (world, obstacle, 3)."""
+    num: Int64
+    """How many obstacles there are, shape (world,)."""
+    turn: Float64
+    """Cosine and sine of the angle by which each map is turned, shape (world, 2)."""
+
+
+@compiled
+def ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
+    """Row and column on the way that ``field`` descends, about ``AHEAD_M`` from a cell of it, or where it ends.
+
+    ``field``: what is left from each cell, shape (row, column); infinite on walls, which are thicker than a step.
+    """
+    i, j, far = row, column, 0.0
+    while far < AHEAD_M:
+        to_i, to_j = i, j
+        for a in range(max(i - 2, 0), min(i + 3, field.shape[0])):
+            for b in range(max(j - 2, 0), min(j + 3, field.shape[1])):
+                if field[a, b] < field[to_i, to_j]:
+                    to_i, to_j = a, b
+        if to_i == i and to_j == j:
+            break
+        far += CELL_M * math.hypot(to_i - i, to_j - j)
+        i, j = to_i, to_j
+    return i, j
+
+
+@compiled
+def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float64) -> None:
+    """Fill ``out`` with vectors to the nearest surfaces in the body frame [m], the nearest first, shape (wall, 2).
+
+    ``pose``: north, east [m], shape (at least 2,); c, s: cosine and sine of the heading; ``discs``: north, east and
+    radius [m], shape (disc, 3).
+    """
+    found, out[:] = 0, 0.0
+    for m in range(discs.shape[0]):
+        x, y = discs[m, 0] - pose[0], discs[m, 1] - pose[1]
+        away = max(math.hypot(x, y), _TOUCH_M)
+        gap = max(away - discs[m, 2], _TOUCH_M)
+        if found == out.shape[0] and gap >= math.hypot(out[found - 1, 0], out[found - 1, 1]):
+            continue
+        found = min(found + 1, out.shape[0])
+        k = found - 1
+        while k > 0 and math.hypot(out[k - 1, 0], out[k - 1, 1]) > gap:
+            out[k, 0], out[k, 1] = out[k - 1, 0], out[k - 1, 1]
+            k -= 1
+        out[k, 0], out[k, 1] = (c * x + s * y) * gap / away, (c * y - s * x) * gap / away
+
+
+@compiled
+def look(seen: Seen, lead: Float64, grid: WayGrid, way: Float64, walls: Float64) -> None:
+    """Fill ``way`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2) with the channel's rows of these names.
+
+    ``lead``: what is left from each cell, dear near walls, shape (world, row, column).
+    """
+    for w in range(way.shape[0]):
+        turn_c, turn_s, discs = seen.turn[w, 0], seen.turn[w, 1], seen.obstacles[w, : seen.num[w]]
+        for v in range(way.shape[1]):
+            pose, c, s = seen.eta[w, v], seen.heading[w, v, 0], seen.heading[w, v, 1]
+            x, y = turn_c * pose[0] + turn_s * pose[1], turn_c * pose[1] - turn_s * pose[0]
+            row, column = round((x - grid.x) / CELL_M), round((y - grid.y) / CELL_M)
+            i, j = ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
+            x, y = grid.x + i * CELL_M - x, grid.y + j * CELL_M - y
+            x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
+            way[w, v, 0], way[w, v, 1] = c * x + s * y, c * y - s * x
+            nearest_walls(pose, c, s, discs, walls[w, v])
