@@ -63,7 +63,7 @@ class Oracle(Policy):
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         flat, starts = self.flat(percept), self.layout.starts
-        own = starts["way"], starts["way_length"], starts["way_walls"]
+        own = starts["way"], starts["way_length"], starts["way_walls"], starts.get("way_turn", -1)
         action = np.empty((*flat.shape[:2], 2), np.float32)
         _act(flat, self.at, own, self.gains, self.limits, self._gain, self._planes, action)
         return action
@@ -71,7 +71,7 @@ class Oracle(Policy):
 
 @compiled
 def _act(
-    flat: Float32, at: Starts, own: tuple[int, int, int], g: OracleGains, limits: Limits, gain: float,
+    flat: Float32, at: Starts, own: tuple[int, int, int, int], g: OracleGains, limits: Limits, gain: float,
     planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle."""
@@ -81,6 +81,8 @@ def _act(
         for i in range(flat.shape[1]):
             w_x, w_y = float(way[w, i, 0]), float(way[w, i, 1])
             pace = min(g.speed, g.slow * length[w, i, 0]) / max(math.hypot(w_x, w_y), 1e-6)
+            if own[3] >= 0:
+                pace *= flat[w, i, own[3]]
             num = _wall_planes(walls[w, i], g, planes)
             p_x, p_y, all_ = _neighbour_planes(w, i, see, w_x, w_y, g, planes, num)
             v_x, v_y, _ = nearest_velocity(pace * w_x + p_x, pace * w_y + p_y, planes, all_, num, 5.0)

@@ -96,3 +96,11 @@ def look(seen: Seen, lead: Float64, grid: WayGrid, way: Float64, walls: Float64)
             x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
             way[w, v, 0], way[w, v, 1] = c * x + s * y, c * y - s * x
             nearest_walls(pose, c, s, discs, walls[w, v])
+
+
+@compiled
+def see_walls(eta: Float64, heading: Float64, obstacles: Float64, num: Int64, walls: Float64) -> None:
+    """Fill ``walls`` (world, vehicle, wall, 2) with the row ``way_walls``; the others are as in ``Seen``."""
+    for w in range(walls.shape[0]):
+        for v in range(walls.shape[1]):
+            nearest_walls(eta[w, v], heading[w, v, 0], heading[w, v, 1], obstacles[w, : num[w]], walls[w, v])
