@@ -126,7 +126,7 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
     return sum(granted, _sonar(num_sectors, num_active))
 
 
-def task_table(scenario: Scenario) -> Table:
+def told_rows(scenario: Scenario) -> Table:
     """Rows that a scenario's task tells: those it always does, and those of its own channels that are granted."""
     kind, granted = scenario.task_class, scenario.sonar.channels
     rows: Table = kind.observed
@@ -168,7 +168,7 @@ class PerceptLayout:
         """The layout that a scenario's sonar suite, channels and task make."""
         sonar = scenario.sonar
         own = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
-        return PerceptLayout(own + task_table(scenario))
+        return PerceptLayout(own + told_rows(scenario))
 
     @functools.cached_property
     def size(self) -> int:

@@ -66,9 +66,10 @@ class BatchedEnv:
     Args:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
-        reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress, where the
-            task has it), ``geodesic`` (progress along the free way, where the task knows it), ``team`` (every vehicle gets the mean of ``dense`` over all vehicles; a lost vehicle also pays
-            its own loss), or a function from the swarm to an array (world, vehicle).
+        reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress) and
+            ``geodesic`` (progress along the free way) where the task has them, ``team`` (every vehicle gets the mean of
+            ``dense`` over all vehicles; a lost vehicle also pays its own loss), or a function from the swarm to an
+            array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
         observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
         keep_terms: whether steps tell the reward's terms, which takes time in large batches.
@@ -94,7 +95,7 @@ class BatchedEnv:
                 f"the rewards of task {scenario.task.name!r}"
             )
         if reward in self.task.rewards:
-            self.task.paying = reward
+            self.task.paying = str(reward)
         self.state_layout = state_layout(scenario)
         self._waiting = set(range(num_worlds))
         """Worlds that were never reset."""
@@ -272,7 +273,7 @@ def make_batched_env(
         scenario: a name, a TOML file or a ``Scenario``.
         num_worlds: worlds stepped together.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
-        reward: ``dense``, ``sparse``, ``team``, or a function from the swarm to an array (world, vehicle).
+        reward: ``dense``, ``sparse``, ``team``, ``geodesic`` or a function from the swarm to an array (world, vehicle).
         observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
         keep_terms: whether steps tell the reward's terms.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.

@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.percept import Clock, Percept, PerceptLayout, task_table
+from uuv_marl.percept import Clock, Percept, PerceptLayout, told_rows
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
@@ -43,7 +43,7 @@ class Swarm:
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
-        self.told = task_table(scenario)
+        self.told = told_rows(scenario)
         """Rows of the percept that the task writes, not the engine."""
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)

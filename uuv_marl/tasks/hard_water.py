@@ -16,7 +16,7 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
-from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, Seen, look
+from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, tell_way
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
 from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
 from uuv_marl.tasks.reach import Reach, ReachNumbers
@@ -117,6 +117,7 @@ class HardWater(Reach):
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
         self._grid: WayGrid = self.numbers.grid()
+        self._was = np.zeros(swarm.state.alive.shape)
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
@@ -143,7 +144,7 @@ class HardWater(Reach):
         free = free_cells(made.discs, self._grid, scenario.contact.hull_radius_m)
         memory.way[world] = np.minimum(distances(free, *self._grid.cell(made.length, 0.0)), FAR_M)
         if memory.lead.size:
-            dear = sum((~free_cells(made.discs, self._grid, near) for near in _DEAR_M), np.zeros(free.shape))
+            dear = np.sum([~free_cells(made.discs, self._grid, near) for near in _DEAR_M], axis=0)
             memory.lead[world] = distances(free, *self._grid.cell(made.length, 0.0), 1.0 + _DEAR * dear)
         memory.kind[world] = list(KINDS).index(made.kind)
         n = len(eta)
@@ -222,10 +223,9 @@ class HardWater(Reach):
         swarm, memory = self.swarm, self.memory
         if not memory.lead.size:
             return {}
-        state, course, shape = swarm.state, swarm.course, swarm.state.alive.shape
+        shape = swarm.state.alive.shape
         way, walls = np.zeros((*shape, 2)), np.zeros((*shape, NUM_WALLS, 2))
-        seen = Seen(state.eta, swarm.heading, course.obstacles, course.num_obstacles, memory.turn)
-        look(seen, memory.lead, self._grid, way, walls)
+        tell_way(swarm.state, swarm.course, swarm.heading, memory.turn, memory.lead, self._grid, way, walls)
         return {"way": way, "way_length": self.ways()[:, :, None], "way_walls": walls}
 
     def move(self, running: Bool) -> None:  # noqa: ARG002

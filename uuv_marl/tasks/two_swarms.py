@@ -14,7 +14,7 @@ from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.draw import Draw
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.tasks.maps.lead import AHEAD_M, NUM_WALLS, WAY, see_walls
+from uuv_marl.tasks.maps.lead import AHEAD_M, NUM_WALLS, WAY, tell_walls
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Range, banks, between, joined, wall
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Terms
@@ -23,6 +23,17 @@ from uuv_marl.types import Bool, Float64
 _BEFORE_M = 5.0
 """How far from the wall's surface a way turns to the gap [m]."""
 _TURN = PerceptField("way_turn", (1,), FLAG, "1 if those of the other group that go first are through, else 0")
+
+
+def turned(vectors: Float64, by: Float64) -> Float64:
+    """Vectors in axes that are turned by angles of which the cosine and sine are given, shape (..., 2) both."""
+    (x, y), (c, s) = np.moveaxis(vectors, -1, 0), np.moveaxis(by, -1, 0)
+    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
+
+
+def _through(place: Float64, goal: Float64, at: Float64 | float) -> Float64:
+    """Length of the straight ways to the gap and on [m]; all in the map's own frame, places and goals (..., 2)."""
+    return sum((np.hypot(end[..., 0], end[..., 1] - at) for end in (place, goal)), np.zeros(place.shape[:-1]))
 
 
 class TwoSwarmsNumbers(ReachNumbers):
@@ -60,7 +71,7 @@ class TwoSwarmsMemory(NamedTuple):
     best_s: Annotated[Float64, "world vehicle", "Its straight way through the gap's middle over full speed [s]."]
     side: Annotated[Float64, "world vehicle", "1 for who goes along the frame's x, -1 for who comes against it."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
-    gap: Annotated[Float64, "world 2", "Place along the wall and width of the gap [m]."]
+    gap: Annotated[Float64, "world", "Where along the wall the gap's middle is [m]."]
 
 
 class TwoSwarms(Reach):
@@ -95,15 +106,14 @@ class TwoSwarms(Reach):
         numbers, scenario, memory = self.numbers, self.swarm.scenario, self.memory
         gap, at = between(rng, numbers.gap_m), numbers.gap_aside_m * rng.uniform(-1.0, 1.0)
         c, s = cos_sin(rng.uniform(-math.pi, math.pi))
+        back, discs = np.array([c, -s]), numbers.discs(gap, at)
         place, eta, nu = self._start(rng, side := memory.side[world])
-        goal, turn = place + 2.0 * numbers.apart_m * side[:, None] * [1.0, 0.0], np.array([[c, s], [-s, c]])
-        discs, middle = numbers.discs(gap, at), np.array([0.0, at])
-        way = np.hypot(*(place - middle).T) + np.hypot(*(goal - middle).T)
-        memory.best_s[world] = way / top_speed(scenario.vehicle, scenario.actuators)
-        memory.turn[world], memory.gap[world] = (c, s), (at, gap)
-        discs[:, :2], eta[:, :2], n = discs[:, :2] @ turn, place @ turn, len(eta)
+        goal = place + 2.0 * numbers.apart_m * side[:, None] * [1.0, 0.0]
+        memory.best_s[world] = _through(place, goal, at) / top_speed(scenario.vehicle, scenario.actuators)
+        memory.turn[world], memory.gap[world] = (c, s), at
+        discs[:, :2], eta[:, :2], n = turned(discs[:, :2], back), turned(place, back), len(eta)
         return Draw(
-            tuple(np.stack([place @ turn, goal @ turn], axis=1)), (np.zeros(2),) * n, discs, eta, nu,
+            tuple(np.stack([eta[:, :2], turned(goal, back)], axis=1)), (np.zeros(2),) * n, discs, eta, nu,
             group=np.arange(n), informed=np.ones(n, np.bool_), duration_s=self.longest_s(scenario),
         )  # fmt: skip
 
@@ -122,36 +132,23 @@ class TwoSwarms(Reach):
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The rows of ``way``, where it is granted: through the gap's middle, the port group first."""
-        swarm, memory = self.swarm, self.memory
+        swarm, side = self.swarm, self.memory.side
         if "way" not in swarm.scenario.sonar.channels:
             return {}
-        goal, at, (c, s) = self._framed(swarm.course.waypoints[:, :, 1]), memory.gap[:, :1], np.moveaxis(swarm.heading, -1, 0)
-        place, edge = self._framed(swarm.state.eta[:, :, :2]), self.numbers.radius_m + _BEFORE_M
-        along = place[:, :, 0] * memory.side
-        ahead = np.stack([np.maximum(along + AHEAD_M, -edge) * memory.side, np.broadcast_to(at, along.shape)], axis=2)
-        after = (along + AHEAD_M > edge)[:, :, None]
-        way = self._framed(np.where(after, goal, ahead) - place, back=True)
-        middle = np.stack([np.zeros_like(along), np.broadcast_to(at, along.shape)], axis=2)
-        straight = np.hypot(*np.moveaxis(goal - place, -1, 0))
-        bent = np.hypot(*np.moveaxis(middle - place, -1, 0)) + np.hypot(*np.moveaxis(goal - middle, -1, 0))
-        length = np.where(along < 0.0, bent, straight)
-        first = (memory.side > 0.0) & swarm.state.alive & ~swarm.state.touched
-        through = (~first | (along > edge)).all(axis=1)
-        walls = np.zeros((*along.shape, NUM_WALLS, 2))
-        see_walls(swarm.state.eta, swarm.heading, swarm.course.obstacles, swarm.course.num_obstacles, walls)
-        x, y = np.moveaxis(way, -1, 0)
+        turn, at = self.memory.turn[:, None], self.memory.gap[:, None]
+        place, goal = turned(swarm.state.eta[:, :, :2], turn), turned(swarm.course.waypoints[:, :, 1], turn)
+        along, edge = place[:, :, 0] * side, self.numbers.radius_m + _BEFORE_M
+        point = np.stack([side * np.maximum(along + AHEAD_M, -edge), np.broadcast_to(at, side.shape)], axis=2)
+        point = np.where((along + AHEAD_M > edge)[:, :, None], goal, point)
+        to_come = (side > 0.0) & swarm.state.alive & ~swarm.state.touched & (along < edge)
+        walls = np.zeros((*side.shape, NUM_WALLS, 2))
+        tell_walls(swarm.state, swarm.course, swarm.heading, walls)
         return {
-            "way": np.stack([c * x + s * y, c * y - s * x], axis=2),
-            "way_length": length[:, :, None],
+            "way": turned(turned(point - place, turn * [1.0, -1.0]), swarm.heading),
+            "way_length": np.where(along < 0.0, _through(place, goal, at), swarm.facts.away)[:, :, None],
             "way_walls": walls,
-            "way_turn": ((memory.side > 0.0) | through[:, None])[:, :, None].astype(np.float64),
+            "way_turn": ((side > 0.0) | ~to_come.any(axis=1, keepdims=True))[:, :, None].astype(np.float64),
         }
-
-    def _framed(self, vectors: Float64, *, back: bool = False) -> Float64:
-        """Vectors north and east in the frame of each world's map, shape (world, vehicle, 2); ``back``: out of it."""
-        (c, s), (x, y) = self.memory.turn.T[:, :, None], np.moveaxis(vectors, -1, 0)
-        s = -s if back else s
-        return np.stack([c * x + s * y, c * y - s * x], axis=2)
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also how long vehicles took, and the last of them."""

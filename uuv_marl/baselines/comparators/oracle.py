@@ -1,7 +1,8 @@
-"""``oracle``: sees the map of ``hard_water`` and follows its way; the proof that every map can be passed, no contender.
+"""``oracle``: sees the map of ``hard_water`` and follows its way; the proof that maps can be passed, and no contender.
 
-Its wished velocity leads to a point ahead on the way, and away from near neighbours. Of the velocities by which no wall
-and no neighbour comes near too fast, it takes the nearest to that.
+Its wished velocity leads to a point ahead on the way that it is told (the channel ``way``), and off near neighbours.
+Of the velocities that come near no wall and no neighbour too fast, it takes the nearest to that. Who is nearer to that
+point goes first: it is pushed less, and keeps less distance, so that nobody gets stuck abreast at a gap.
 """
 
 import math
@@ -11,12 +12,11 @@ import numpy as np
 
 from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
-from uuv_marl.baselines.steering import steer, velocity_gain
+from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields, pairs, part
-from uuv_marl.tasks.maps.lead import NUM_WALLS
+from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Float32, Float64
 
 
@@ -30,25 +30,25 @@ class OracleGains(NamedTuple):
     wall: float = 2.6
     """Least distance to walls [m]."""
     wall_rate: float = 0.8
-    """Largest speed towards a wall over what the distance is above that [1/s]."""
+    """Largest speed towards a wall, over the distance above that [1/s]."""
     apart: float = 4.5
-    """Least distance to neighbours [m]."""
-    apart_rate: float = 0.5
-    """The same for neighbours [1/s]."""
-    follow: float = 0.9
-    """Plus this share of the speed at which the neighbour goes away [1]."""
-    push: float = 2.5
-    """Speed away from a neighbour that is touched [m/s]."""
-    behind: float = 0.5
-    """Share of it from a neighbour farther [1]."""
+    """Least distance to a neighbour that goes first [m]."""
     apart_behind: float = 3.5
-    """m"""
+    """Least distance to the others [m]."""
+    apart_rate: float = 0.5
+    """Largest speed towards a neighbour at rest, over the distance above that [1/s]."""
+    follow: float = 0.9
+    """What is added, as a share of the speed at which the neighbour goes away [1]."""
+    push: float = 2.5
+    """Speed away from a neighbour that goes first, at no distance [m/s]."""
+    push_behind: float = 1.25
+    """The same for the others [m/s]."""
     push_range: float = 9.0
-    """Distance at which that ends [m]."""
+    """Distance at which both end [m]."""
 
 
 class Oracle(Policy):
-    """Follows the way that it is told through walls that it is told: for ``hard_water`` alone."""
+    """Sees the map of hard_water and follows a shortest way: no contender, the proof that each map can be passed."""
 
     channels: ClassVar[tuple[str, ...]] = ("way", "link")
     wishes_force: ClassVar[bool] = True
@@ -58,66 +58,71 @@ class Oracle(Policy):
         super().__init__(scenario, num_worlds)
         self.gains = gains or OracleGains()
         self._gain = velocity_gain(scenario)
-        self._planes = np.zeros((NUM_WALLS + scenario.sonar.num_sectors, 3))
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        flat, starts = self.flat(percept), self.layout.starts
-        own = starts["way"], starts["way_length"], starts["way_walls"], starts.get("way_turn", -1)
+        flat = self.flat(percept)
+        way, walls = percept["way"], percept["way_walls"]
+        length = percept["way_length"] * (percept["way_turn"] if "way_turn" in self.layout.starts else 1.0)
+        planes = np.zeros((walls.shape[2] + self.scenario.sonar.num_sectors, 3))
         action = np.empty((*flat.shape[:2], 2), np.float32)
-        _act(flat, self.at, own, self.gains, self.limits, self._gain, self._planes, action)
+        _act(flat, self.at, way, length, walls, self.gains, self.limits, self._gain, planes, action)
         return action
 
 
 @compiled
 def _act(
-    flat: Float32, at: Starts, own: tuple[int, int, int, int], g: OracleGains, limits: Limits, gain: float,
-    planes: Float64, action: Float32,
+    flat: Float32, at: Starts, way: Float32, length: Float32, walls: Float32, g: OracleGains, limits: Limits,
+    gain: float, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle."""
-    see, way = fields(flat, at), part(flat, own[0], 2)[0]
-    length, walls = part(flat, own[1], 1)[0], pairs(flat, own[2], NUM_WALLS)[0]
+    """The law for every vehicle; ``planes`` is room for half-planes of velocities."""
+    see, most = fields(flat, at), full_speed(limits)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            w_x, w_y = float(way[w, i, 0]), float(way[w, i, 1])
-            pace = min(g.speed, g.slow * length[w, i, 0]) / max(math.hypot(w_x, w_y), 1e-6)
-            if own[3] >= 0:
-                pace *= flat[w, i, own[3]]
-            num = _wall_planes(walls[w, i], g, planes)
-            p_x, p_y, all_ = _neighbour_planes(w, i, see, w_x, w_y, g, planes, num)
-            v_x, v_y, _ = nearest_velocity(pace * w_x + p_x, pace * w_y + p_y, planes, all_, num, 5.0)
+            x, y = float(way[w, i, 0]), float(way[w, i, 1])
+            pace = min(g.speed, g.slow * length[w, i, 0]) / max(math.hypot(x, y), 1e-6)
+            firm = _keep_off_walls(walls[w, i], most, g, planes)
+            p_x, p_y, num = _keep_apart(w, i, see, x, y, most, g, planes, firm)
+            v_x, v_y, _ = nearest_velocity(pace * x + p_x, pace * y + p_y, planes, num, firm, most)
             steer(v_x, v_y, see.velocity[w, i, 0], see.velocity[w, i, 1], gain, limits, action[w, i])
 
 
 @compiled
-def _wall_planes(walls: Float32, g: OracleGains, planes: Float64) -> int:
-    """Fill ``planes`` with what walls, shape (wall, 2) [m], let the velocity be; how many they are."""
+def _keep_off_walls(walls: Float32, most: float, g: OracleGains, planes: Float64) -> int:
+    """Fill ``planes`` with what walls at these vectors [m] let the velocity be; how many bind below ``most`` [m/s]."""
     num = 0
     for k in range(walls.shape[0]):
         x, y = float(walls[k, 0]), float(walls[k, 1])
         gap = math.hypot(x, y)
-        if 0.0 < gap < 25.0:
-            planes[num, 0], planes[num, 1], planes[num, 2] = x / gap, y / gap, g.wall_rate * (gap - g.wall)
+        bound = g.wall_rate * (gap - g.wall)
+        if gap > 0.0 and bound < most:
+            planes[num, 0], planes[num, 1], planes[num, 2] = x / gap, y / gap, bound
             num += 1
     return num
 
 
 @compiled
-def _neighbour_planes(
-    w: int, i: int, see: Fields, w_x: float, w_y: float, g: OracleGains, planes: Float64, num: int
+def _keep_apart(
+    w: int, i: int, see: Fields, x: float, y: float, most: float, g: OracleGains, planes: Float64, num: int
 ) -> tuple[float, float, int]:
-    """Likewise for neighbours, from row ``num`` on; the push [m/s], and how many planes there are then."""
-    p_x, p_y = 0.0, 0.0
+    """Likewise for neighbours, from row ``num`` on; (x, y) is the point ahead [m].
+
+    Returns:
+        The push away from them [m/s], and how many planes there are then.
+    """
+    p_x, p_y, ahead = 0.0, 0.0, math.hypot(x, y)
     for k in range(see.heard.shape[2]):
-        x, y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
-        away = math.hypot(x, y)
-        if see.heard[w, i, k] > 0.0 and 0.0 < away < 25.0:
-            first = math.hypot(w_x - x, w_y - y) < math.hypot(w_x, w_y)
-            push = (1.0 if first else g.behind) * g.push * max(1.0 - away / g.push_range, 0.0)
-            x, y = x / away, y / away
-            p_x, p_y = p_x - push * x, p_y - push * y
-            goes = max(x * see.link_velocity[w, i, k, 0] + y * see.link_velocity[w, i, k, 1], 0.0)
-            planes[num, 0], planes[num, 1] = x, y
-            planes[num, 2] = g.follow * goes + g.apart_rate * (away - (g.apart if first else g.apart_behind))
+        n_x, n_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
+        away = math.hypot(n_x, n_y)
+        if see.heard[w, i, k] == 0.0 or away == 0.0:
+            continue
+        first = math.hypot(x - n_x, y - n_y) < ahead
+        n_x, n_y = n_x / away, n_y / away
+        push = (g.push if first else g.push_behind) * max(1.0 - away / g.push_range, 0.0)
+        p_x, p_y = p_x - push * n_x, p_y - push * n_y
+        goes = max(n_x * see.link_velocity[w, i, k, 0] + n_y * see.link_velocity[w, i, k, 1], 0.0)
+        bound = g.follow * goes + g.apart_rate * (away - (g.apart if first else g.apart_behind))
+        if bound < most:
+            planes[num, 0], planes[num, 1], planes[num, 2] = n_x, n_y, bound
             num += 1
     return p_x, p_y, num

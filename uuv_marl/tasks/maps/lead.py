@@ -1,12 +1,12 @@
-"""Where a shortest way leads: a point on it ahead of a vehicle, and the walls around, which no vehicle could measure."""
+"""Where a shortest way leads: a point ahead on it, and the walls around, which no vehicle could measure."""
 
 import math
-from typing import NamedTuple
 
 from uuv_marl.percept import LENGTH, POSITION, PerceptField
+from uuv_marl.sim.arrays import Course, State
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.tasks.maps.ways import CELL_M, WayGrid
-from uuv_marl.types import Float64, Int64
+from uuv_marl.types import Float64
 
 NUM_WALLS = 8
 """Walls around that are told: the nearest. Assumed: all that a hull can touch within a second or two."""
@@ -22,33 +22,18 @@ _TOUCH_M = 1e-3
 """Distances below this count as this, so that there is a direction [m]; assumed."""
 
 
-class Seen(NamedTuple):
-    """What the channel looks at, of all worlds."""
-
-    eta: Float64
-    """Poses, shape (world, vehicle, 3)."""
-    heading: Float64
-    """Cosine and sine of headings, shape (world, vehicle, 2)."""
-    obstacles: Float64
-    """North, east and radius [m], shape (world, obstacle, 3)."""
-    num: Int64
-    """How many obstacles there are, shape (world,)."""
-    turn: Float64
-    """Cosine and sine of the angle by which each map is turned, shape (world, 2)."""
-
-
 @compiled
-def ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
+def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
     """Row and column on the way that ``field`` descends, about ``AHEAD_M`` from a cell of it, or where it ends.
 
-    ``field``: what is left from each cell, shape (row, column); infinite on walls, which are thicker than a step.
+    ``field``: what is left from each cell, shape (row, column); infinite on walls.
     """
     i, j, far = row, column, 0.0
     while far < AHEAD_M:
         to_i, to_j = i, j
         for a in range(max(i - 2, 0), min(i + 3, field.shape[0])):
             for b in range(max(j - 2, 0), min(j + 3, field.shape[1])):
-                if field[a, b] < field[to_i, to_j]:
+                if abs(a - i) + abs(b - j) < 4 and field[a, b] < field[to_i, to_j]:
                     to_i, to_j = a, b
         if to_i == i and to_j == j:
             break
@@ -80,18 +65,22 @@ def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float6
 
 
 @compiled
-def look(seen: Seen, lead: Float64, grid: WayGrid, way: Float64, walls: Float64) -> None:
-    """Fill ``way`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2) with the channel's rows of these names.
+def tell_way(
+    state: State, course: Course, heading: Float64, turn: Float64, lead: Float64, grid: WayGrid, way: Float64,
+    walls: Float64,
+) -> None:  # fmt: skip
+    """Fill ``way`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2) with the channel's rows.
 
-    ``lead``: what is left from each cell, dear near walls, shape (world, row, column).
+    ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``lead``: what is left from
+    each cell, dear near walls, shape (world, row, column).
     """
     for w in range(way.shape[0]):
-        turn_c, turn_s, discs = seen.turn[w, 0], seen.turn[w, 1], seen.obstacles[w, : seen.num[w]]
+        turn_c, turn_s, discs = turn[w, 0], turn[w, 1], course.obstacles[w, : course.num_obstacles[w]]
         for v in range(way.shape[1]):
-            pose, c, s = seen.eta[w, v], seen.heading[w, v, 0], seen.heading[w, v, 1]
+            pose, c, s = state.eta[w, v], heading[w, v, 0], heading[w, v, 1]
             x, y = turn_c * pose[0] + turn_s * pose[1], turn_c * pose[1] - turn_s * pose[0]
             row, column = round((x - grid.x) / CELL_M), round((y - grid.y) / CELL_M)
-            i, j = ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
+            i, j = point_ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
             x, y = grid.x + i * CELL_M - x, grid.y + j * CELL_M - y
             x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
             way[w, v, 0], way[w, v, 1] = c * x + s * y, c * y - s * x
@@ -99,8 +88,9 @@ def look(seen: Seen, lead: Float64, grid: WayGrid, way: Float64, walls: Float64)
 
 
 @compiled
-def see_walls(eta: Float64, heading: Float64, obstacles: Float64, num: Int64, walls: Float64) -> None:
-    """Fill ``walls`` (world, vehicle, wall, 2) with the row ``way_walls``; the others are as in ``Seen``."""
+def tell_walls(state: State, course: Course, heading: Float64, walls: Float64) -> None:
+    """Fill ``walls`` alone, where a task knows the way without a grid; the others are as in ``tell_way``."""
     for w in range(walls.shape[0]):
         for v in range(walls.shape[1]):
-            nearest_walls(eta[w, v], heading[w, v, 0], heading[w, v, 1], obstacles[w, : num[w]], walls[w, v])
+            c, s, discs = heading[w, v, 0], heading[w, v, 1], course.obstacles[w, : course.num_obstacles[w]]
+            nearest_walls(state.eta[w, v], c, s, discs, walls[w, v])

@@ -57,14 +57,16 @@ def reached(free: Bool, row: int, column: int) -> Bool:
     return seen
 
 
-def distances(free: Bool, row: int, column: int, price: Float64 | float = 1.0) -> Float64:
+def distances(free: Bool, row: int, column: int, price: Float64 | None = None) -> Float64:
     """Length of the shortest free way [m] to a cell from each, shape (row, column); infinite where none leads.
 
-    ``price``: by which the length of a way through a cell is multiplied, shape (row, column).
+    ``price``: by which the length of a way through each cell is multiplied, shape (row, column); None for 1.
     """
     first, second, length, indptr = _edges(*free.shape)
-    cost = np.where(free, price, np.inf).ravel()
-    weights = length * (0.5 * (cost[first] + cost[second]))
+    flat = free.ravel()
+    weights = np.where(flat[first] & flat[second], length, np.inf)
+    if price is not None:
+        weights *= 0.5 * (price.ravel()[first] + price.ravel()[second])
     graph = csr_array((weights, second, indptr), shape=(free.size, free.size))
     shortest: Any = dijkstra
     found: Float64 = shortest(graph, directed=True, indices=row * free.shape[1] + column)
