@@ -193,11 +193,11 @@ def test_the_guide_beats_the_floors_and_terms_are_those_documented():
 
 def test_a_carrot_is_ahead_at_its_speed_and_to_starboard_and_ends_at_the_goal():
     scenario = load_scenario("two_swarms")
-    swarm, policy = Swarm(scenario), make("keeps_right,right_m=7,ahead_m=6,speed=3", scenario)
+    swarm, policy = Swarm(scenario), make("carrot,right_m=7,ahead_m=6,speed=3", scenario)
     swarm.reset(TUNING)
     swarm.state.eta[0, 0, :2] = swarm.course.waypoints[0, 0, 1] + (3.0, 0.0)
     percept = swarm.observe()
-    led, goal = policy._led(percept), percept["reference"].astype(float)
+    led, goal = policy.led(percept), percept["reference"].astype(float)
     np.testing.assert_array_equal(led["reference"][0, 0], percept["reference"][0, 0])
     assert (led["reference_velocity"][0, 0] == 0.0).all()
     for i in range(1, 20):

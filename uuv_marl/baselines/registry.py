@@ -23,7 +23,7 @@ from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_
 from uuv_marl.baselines.random_idle import Idle, Random
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
-from uuv_marl.baselines.scout.carrot import Carrot, KeepsRight, KeepsRightInformed, OneSideWaits
+from uuv_marl.baselines.scout.carrot import Carrot, CarrotInformed
 from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.modules import named_object
@@ -42,9 +42,7 @@ POLICIES: dict[str, Kind] = {
     "bio_inspired_plus": BioInspiredPlus,
     "scout": Scout,
     "carrot": Carrot,
-    "keeps_right": KeepsRight,
-    "keeps_right_informed": KeepsRightInformed,
-    "one_side_waits": OneSideWaits,
+    "carrot_informed": CarrotInformed,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,

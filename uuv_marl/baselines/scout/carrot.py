@@ -1,8 +1,8 @@
-"""``carrot`` and its kin: ``scout`` towards a goal at rest at a set speed, keeping to starboard, or waiting its turn.
+"""``carrot``: ``scout`` to a goal at rest at a set speed, to starboard of its way if you like, or in its turn.
 
-At rest ``scout`` pulls harder the farther its goal is, so that from afar neighbours' pushes count for nothing. A carrot
-is a reference a little ahead on the way that moves at a speed of its own. To keep to starboard is rule 9 of the COLREGs
-(in a narrow channel) and rule 14 (who meet head-on pass port to port).
+Afar from a goal at rest ``scout`` pulls so hard that pushes from neighbours count for nothing. A carrot is a reference a
+little ahead on the way, with a velocity. To keep to starboard is rule 9 of the COLREGs (in a narrow channel) and rule
+14 (who meet head-on pass port to port).
 """
 
 import dataclasses
@@ -19,66 +19,70 @@ from uuv_marl.types import Bool, Float32
 
 
 class Carrot(Scout):
-    """``scout`` behind a carrot on the straight way to a goal at rest.
+    """``scout`` behind a carrot on the straight way to a goal at rest; a reference that moves is followed as ever.
 
     Args:
-        speed: of the carrot [m/s].
-        ahead_m: how far ahead it is, and how near the goal it ends [m].
-        right_m: to starboard of the way [m].
+        speed: of the carrot [m/s]. 4 m/s is that of l(t) in the paper.
+        ahead_m: how far ahead it is [m]; nearer to the goal there is none. Assumed: as piloted.
+        right_m: how far to starboard of the point that it leads to [m].
+        preset: as for ``scout``, and so are ``gains`` and ``barrier``.
     """
 
-    right: ClassVar[float] = 0.0
-    """What ``right_m`` is where nothing is said [m]."""
-
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: ScoutGains | None = None,
-        barrier: Barrier | None = None, speed: float = 4.0, ahead_m: float = 6.0, right_m: float | None = None,
+        self, scenario: Scenario, num_worlds: int = 1, *, speed: float = 4.0, ahead_m: float = 6.0,
+        right_m: float = 0.0, preset: str = DEFAULT_PRESET, gains: ScoutGains | None = None,
+        barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
         super().__init__(scenario, num_worlds, preset=preset, gains=gains, barrier=barrier)
-        self.speed, self.ahead_m, self.right_m = speed, ahead_m, self.right if right_m is None else right_m
+        self.speed, self.ahead_m, self.right_m = speed, ahead_m, right_m
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Remember a percept with the carrot for a reference."""
-        super().remember(self._led(percept), worlds)
+        """Remember a percept whose reference is the carrot."""
+        super().remember(self.led(percept), worlds)
 
-    def _led(self, percept: Percept) -> Percept:
-        """The percept with the carrot for a goal at rest; with none while it waits."""
-        led = dataclasses.replace(percept, flat=percept.flat.copy())
-        way, left = self._way(percept)
+    def led(self, percept: Percept) -> Percept:
+        """The percept with the carrot in the place of a goal at rest."""
+        led, (to, left) = dataclasses.replace(percept, flat=percept.flat.copy()), self._way(percept)
         far = (left > self.ahead_m) & (percept["reference_velocity"] == 0.0).all(axis=-1)
-        along = way / np.maximum(np.hypot(way[..., 0], way[..., 1]), 1e-6)[..., None]
-        aim = way + self.right_m * np.stack([-along[..., 1], along[..., 0]], axis=-1)
-        aim /= np.maximum(np.hypot(aim[..., 0], aim[..., 1]), 1e-6)[..., None]
-        led["reference"][far], led["reference_velocity"][far] = self.ahead_m * aim[far], self.speed * aim[far]
+        to += self.right_m * _unit(np.stack([-to[..., 1], to[..., 0]], axis=-1))
+        along = _unit(to)[far]
+        led["reference"][far], led["reference_velocity"][far] = self.ahead_m * along, self.speed * along
         return led
 
     def _way(self, percept: Percept) -> tuple[Float32, Float32]:
-        """Vector to a point on the way [m], shape (world, vehicle, 2), and how far the goal is."""
-        goal = percept["reference"]
+        """A vector to lead along [m], shape (world, vehicle, 2), and how far it is to the goal."""
+        goal = percept["reference"].copy()
         return goal, np.hypot(goal[..., 0], goal[..., 1])
 
 
-class KeepsRight(Carrot):
-    """``carrot`` to starboard of the straight way; of the gap it knows nothing."""
+class CarrotInformed(Carrot):
+    """``carrot`` on a free way that it is told: for tasks with the channel ``way``.
 
-    right = 7.0
-
-
-class KeepsRightInformed(KeepsRight):
-    """``carrot`` to starboard of the way through a gap that it is told. For ``two_swarms`` and ``hard_water``."""
+    Args:
+        waits: whether to stay until it is one's turn, where the task has turns.
+    """
 
     channels: ClassVar[tuple[str, ...]] = ("way",)
 
-    def _way(self, percept: Percept) -> tuple[Float32, Float32]:
-        return percept["way"], percept["way_length"][..., 0]
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, waits: bool = False, right_m: float = 0.0,
+        preset: str = DEFAULT_PRESET,
+    ) -> None:  # fmt: skip
+        super().__init__(scenario, num_worlds, right_m=right_m, preset=preset)
+        self.waits = waits and "way_turn" in self.layout.starts
 
-
-class OneSideWaits(KeepsRightInformed):
-    """``carrot`` through the gap, the starboard group once the other is through. For ``two_swarms``."""
-
-    right = 0.0
-
-    def _led(self, percept: Percept) -> Percept:
-        led, waits = super()._led(percept), percept["way_turn"][..., 0] == 0.0
-        led["reference"][waits] = led["reference_velocity"][waits] = 0.0
+    def led(self, percept: Percept) -> Percept:
+        """Likewise; who waits has a reference at rest where it is."""
+        led = super().led(percept)
+        if self.waits:
+            stays = percept["way_turn"][..., 0] == 0.0
+            led["reference"][stays] = led["reference_velocity"][stays] = 0.0
         return led
+
+    def _way(self, percept: Percept) -> tuple[Float32, Float32]:
+        return percept["way"].copy(), percept["way_length"][..., 0]
+
+
+def _unit(vectors: Float32) -> Float32:
+    """Their directions, shape (..., 2)."""
+    return vectors / np.maximum(np.hypot(vectors[..., 0], vectors[..., 1]), 1e-6)[..., None]
