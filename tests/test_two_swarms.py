@@ -1,4 +1,4 @@
-"""Two swarms, one gap: the map is drawn by the seed alone, the gap is the only way, and each vehicle has its own goal."""
+"""Two swarms, one gap: maps are drawn by the seed alone, the gap is the only way, each vehicle has its own goal."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from scipy.ndimage import label
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.envs.core import BatchedEnv
+from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import TwoSwarms
 from uuv_marl.tasks.maps.ways import WayGrid, free_cells
@@ -41,7 +42,7 @@ def test_groups_swap_sides(tier):
         assert (side > 0.0).sum() == n // 2
         assert (np.sign(place[:, 0]) == -side).all()
         np.testing.assert_allclose(goal - place, np.stack([300.0 * side, np.zeros(n)], axis=1), atol=1e-9)
-        assert 0.0 < np.abs(place[side > 0.0, 1].mean() - place[side < 0.0, 1].mean())
+        assert np.abs(place[side > 0.0, 1].mean() - place[side < 0.0, 1].mean()) > 0.0
         apart = np.hypot(*np.moveaxis(goal[:, None] - goal[None], -1, 0)) + 1e3 * np.eye(n)
         assert apart.min() > 2.0 * swarm.task.numbers.near_m  # nobody takes another's place
     assert swarm.facts.min_spacing.min() >= swarm.scenario.start.spacing_m - 1e-9
@@ -189,6 +190,17 @@ def test_the_guide_beats_the_floors_and_terms_are_those_documented():
             assert list(result.terms) == list(TwoSwarms.terms)
         returns[name] = total.mean()
     assert returns[TwoSwarms.guide] > max(returns["idle"], returns["random"])
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
+     "task.half_width_m = 120, got 130"),
+    ({"task.gap_m": [20.0, 10.0]}, r"a range must be \[low, high\]"),
+    ({"start.width_m": 210.0}, "the groups must start in the water of task 'two_swarms'"),
+])  # fmt: skip
+def test_numbers_that_can_not_be_are_refused(changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        waters(**changes)
 
 
 def test_a_carrot_is_ahead_at_its_speed_and_to_starboard_and_ends_at_the_goal():

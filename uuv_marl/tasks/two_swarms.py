@@ -7,12 +7,14 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.errors import ScenarioError
 from uuv_marl.percept import FLAG, PerceptField, Table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import NonNegative, Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.draw import Draw
 from uuv_marl.sim.start import start_state
+from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps.lead import AHEAD_M, NUM_WALLS, WAY, tell_walls
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Range, banks, between, joined, wall
@@ -25,7 +27,7 @@ _BEFORE_M = 5.0
 _TURN = PerceptField("way_turn", (1,), FLAG, "1 if those of the other group that go first are through, else 0")
 
 
-def turned(vectors: Float64, by: Float64) -> Float64:
+def in_axes(vectors: Float64, by: Float64) -> Float64:
     """Vectors in axes that are turned by angles of which the cosine and sine are given, shape (..., 2) both."""
     (x, y), (c, s) = np.moveaxis(vectors, -1, 0), np.moveaxis(by, -1, 0)
     return np.stack([c * x + s * y, c * y - s * x], axis=-1)
@@ -55,6 +57,13 @@ class TwoSwarmsNumbers(ReachNumbers):
     """Water behind the middle of each group."""
     bank_radius_m: Positive
     """Radius of the discs that make the banks."""
+
+    def _check(self) -> None:
+        if (least := self.gap_aside_m + self.gap_m[1] / 2 + self.radius_m) > self.half_width_m:
+            raise ValueError(
+                "task.gap_m and task.gap_aside_m must leave a wall on both sides within task.half_width_m = "
+                f"{self.half_width_m:g}, got {least:g} for it"
+            )
 
     def discs(self, gap: float, at: float) -> Float64:
         """Wall and banks around the wall's middle, x ahead, y along the wall and radius [m], shape (disc, 3)."""
@@ -89,6 +98,15 @@ class TwoSwarms(Reach):
     }
     guide: ClassVar[str] = "scout"
 
+    def __init__(self, swarm: Swarm) -> None:
+        super().__init__(swarm)
+        numbers, (length, width) = self.numbers, swarm.scenario.start.sides(swarm.num_vehicles)
+        if length / 2 > numbers.behind_m or width / 2 + numbers.aside_m > numbers.half_width_m:
+            raise ScenarioError(
+                f"the groups must start in the water of task 'two_swarms': {length:g} x {width:g} m each, moved by "
+                f"task.aside_m = {numbers.aside_m:g}; raise task.half_width_m and task.behind_m, or shrink start"
+            )
+
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
         """A group per vehicle, and room for the discs of a map."""
@@ -111,9 +129,9 @@ class TwoSwarms(Reach):
         goal = place + 2.0 * numbers.apart_m * side[:, None] * [1.0, 0.0]
         memory.best_s[world] = _through(place, goal, at) / top_speed(scenario.vehicle, scenario.actuators)
         memory.turn[world], memory.gap[world] = (c, s), at
-        discs[:, :2], eta[:, :2], n = turned(discs[:, :2], back), turned(place, back), len(eta)
+        discs[:, :2], eta[:, :2], n = in_axes(discs[:, :2], back), in_axes(place, back), len(eta)
         return Draw(
-            tuple(np.stack([eta[:, :2], turned(goal, back)], axis=1)), (np.zeros(2),) * n, discs, eta, nu,
+            tuple(np.stack([eta[:, :2], in_axes(goal, back)], axis=1)), (np.zeros(2),) * n, discs, eta, nu,
             group=np.arange(n), informed=np.ones(n, np.bool_), duration_s=self.longest_s(scenario),
         )  # fmt: skip
 
@@ -136,7 +154,7 @@ class TwoSwarms(Reach):
         if "way" not in swarm.scenario.sonar.channels:
             return {}
         turn, at = self.memory.turn[:, None], self.memory.gap[:, None]
-        place, goal = turned(swarm.state.eta[:, :, :2], turn), turned(swarm.course.waypoints[:, :, 1], turn)
+        place, goal = in_axes(swarm.state.eta[:, :, :2], turn), in_axes(swarm.course.waypoints[:, :, 1], turn)
         along, edge = place[:, :, 0] * side, self.numbers.radius_m + _BEFORE_M
         point = np.stack([side * np.maximum(along + AHEAD_M, -edge), np.broadcast_to(at, side.shape)], axis=2)
         point = np.where((along + AHEAD_M > edge)[:, :, None], goal, point)
@@ -144,7 +162,7 @@ class TwoSwarms(Reach):
         walls = np.zeros((*side.shape, NUM_WALLS, 2))
         tell_walls(swarm.state, swarm.course, swarm.heading, walls)
         return {
-            "way": turned(turned(point - place, turn * [1.0, -1.0]), swarm.heading),
+            "way": in_axes(in_axes(point - place, turn * [1.0, -1.0]), swarm.heading),
             "way_length": np.where(along < 0.0, _through(place, goal, at), swarm.facts.away)[:, :, None],
             "way_walls": walls,
             "way_turn": ((side > 0.0) | ~to_come.any(axis=1, keepdims=True))[:, :, None].astype(np.float64),

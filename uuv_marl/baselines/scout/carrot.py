@@ -1,8 +1,8 @@
 """``carrot``: ``scout`` to a goal at rest at a set speed, to starboard of its way if you like, or in its turn.
 
-Afar from a goal at rest ``scout`` pulls so hard that pushes from neighbours count for nothing. A carrot is a reference a
-little ahead on the way, with a velocity. To keep to starboard is rule 9 of the COLREGs (in a narrow channel) and rule
-14 (who meet head-on pass port to port).
+Afar from a goal at rest ``scout`` pulls so hard that pushes from neighbours count for nothing. A carrot is a reference
+a little ahead on the way, with a velocity. To keep to starboard is rule 9 of the COLREGs (in a narrow channel) and
+rule 14 (who meet head-on pass port to port).
 """
 
 import dataclasses
