@@ -23,8 +23,18 @@ _TOUCH_M = 1e-3
 
 
 @compiled
+def _straight(field: Float64, i: int, j: int, to_i: int, to_j: int) -> bool:
+    """Whether the straight line from a cell to another meets no wall."""
+    num = 2 * max(abs(to_i - i), abs(to_j - j))
+    for k in range(1, num):
+        if field[round(i + (to_i - i) * k / num), round(j + (to_j - j) * k / num)] == math.inf:
+            return False
+    return True
+
+
+@compiled
 def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
-    """Row and column on the way that ``field`` descends, about ``AHEAD_M`` from a cell of it, or where it ends.
+    """Row and column on the way that ``field`` descends, up to ``AHEAD_M`` straight from a cell of it.
 
     ``field``: what is left from each cell, shape (row, column); infinite on walls.
     """
@@ -35,7 +45,7 @@ def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
             for b in range(max(j - 2, 0), min(j + 3, field.shape[1])):
                 if abs(a - i) + abs(b - j) < 4 and field[a, b] < field[to_i, to_j]:
                     to_i, to_j = a, b
-        if to_i == i and to_j == j:
+        if (to_i == i and to_j == j) or (far > 0.0 and not _straight(field, row, column, to_i, to_j)):
             break
         far += CELL_M * math.hypot(to_i - i, to_j - j)
         i, j = to_i, to_j
