@@ -270,7 +270,7 @@ class Nothing(Policy):
         ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
         ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
-        ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, got 'bold'"),
+        ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, gap, got 'bold'"),
         ("guarded:bio_insp", "did you mean 'bio_inspired'"),
     ],
 )

@@ -1,4 +1,4 @@
-"""``carrot``: ``scout`` to a goal at rest at a set speed, to starboard of its way if you like, or in its turn.
+"""``carrot``: ``scout`` to a goal at rest at a set speed, to starboard of its way, or in its turn.
 
 Afar from a goal at rest ``scout`` pulls so hard that pushes from neighbours count for nothing. A carrot is a reference
 a little ahead on the way, with a velocity. To keep to starboard is rule 9 of the COLREGs (in a narrow channel) and
@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from uuv_marl.baselines.safety.barrier import Barrier
-from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, ScoutGains
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -22,15 +22,15 @@ class Carrot(Scout):
     """``scout`` behind a carrot on the straight way to a goal at rest; a reference that moves is followed as ever.
 
     Args:
-        speed: of the carrot [m/s]. 4 m/s is that of l(t) in the paper.
-        ahead_m: how far ahead it is [m]; nearer to the goal there is none. Assumed: as piloted.
+        speed: of the carrot [m/s]. Found with the preset ``gap``, as are the next two.
+        ahead_m: how far ahead it is [m]; nearer to the goal there is none.
         right_m: how far to starboard of the point that it leads to [m].
         preset: as for ``scout``, and so are ``gains`` and ``barrier``.
     """
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, speed: float = 4.0, ahead_m: float = 6.0,
-        right_m: float = 0.0, preset: str = DEFAULT_PRESET, gains: ScoutGains | None = None,
+        self, scenario: Scenario, num_worlds: int = 1, *, speed: float = 2.9, ahead_m: float = 5.75,
+        right_m: float = 4.08, preset: str = "gap", gains: ScoutGains | None = None,
         barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
         super().__init__(scenario, num_worlds, preset=preset, gains=gains, barrier=barrier)
@@ -60,15 +60,16 @@ class CarrotInformed(Carrot):
 
     Args:
         waits: whether to stay until it is one's turn, where the task has turns.
+        speed: of the carrot [m/s]: that of l(t) in the paper, as nothing has to be found out.
     """
 
     channels: ClassVar[tuple[str, ...]] = ("way",)
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, waits: bool = False, right_m: float = 0.0,
-        preset: str = DEFAULT_PRESET,
+        self, scenario: Scenario, num_worlds: int = 1, *, waits: bool = False, speed: float = 4.0,
+        right_m: float = 0.0, preset: str = "gap",
     ) -> None:  # fmt: skip
-        super().__init__(scenario, num_worlds, right_m=right_m, preset=preset)
+        super().__init__(scenario, num_worlds, speed=speed, right_m=right_m, preset=preset)
         self.waits = waits and "way_turn" in self.layout.starts
 
     def led(self, percept: Percept) -> Percept:
