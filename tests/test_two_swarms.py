@@ -194,7 +194,7 @@ def test_the_guide_beats_the_floors_and_terms_are_those_documented():
 
 @pytest.mark.parametrize(("changes", "message"), [
     ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
-     "task.half_width_m = 120, got 130"),
+     "task.half_width_m = 120, got 129"),
     ({"task.gap_m": [20.0, 10.0]}, r"a range must be \[low, high\]"),
     ({"start.width_m": 210.0}, "the groups must start in the water of task 'two_swarms'"),
 ])  # fmt: skip
