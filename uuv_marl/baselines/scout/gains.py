@@ -58,7 +58,7 @@ PRESETS = {
     # Keeps farther from others where it doubts, and from obstacles: with 13.5 m the smallest distance of ``lead`` was
     # 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
     "wary": Preset(_LEAD._replace(pull_in_doubt=-0.7, push_in_doubt=1.1), Barrier(obstacle_m=13.7)),
-    # For gaps through which others come: 300 trials of CMA-ES with ``carrot`` on two_swarms, seeds 11000 to 11011.
+    # For gaps through which others come: 300 trials of CMA-ES with ``carrot``, two_swarms of 20, gap 14 to 18 m.
     "gap": Preset(
         ScoutGains(
             pull=0.0842, push=6.68, push_range=16.4, pull_at_rest=5.37, push_at_rest=1.72, steering=1.18, kept_s=2.76
