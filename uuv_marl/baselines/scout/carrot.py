@@ -44,7 +44,7 @@ class Carrot(Scout):
         """The percept with the carrot in the place of a goal at rest."""
         led, (to, left) = dataclasses.replace(percept, flat=percept.flat.copy()), self._way(percept)
         far = (left > self.ahead_m) & (percept["reference_velocity"] == 0.0).all(axis=-1)
-        to += self.right_m * _unit(np.stack([-to[..., 1], to[..., 0]], axis=-1))
+        to += np.float32(self.right_m) * _unit(np.stack([-to[..., 1], to[..., 0]], axis=-1))
         along = _unit(to)[far]
         led["reference"][far], led["reference_velocity"][far] = self.ahead_m * along, self.speed * along
         return led
@@ -86,4 +86,5 @@ class CarrotInformed(Carrot):
 
 def _unit(vectors: Float32) -> Float32:
     """Their directions, shape (..., 2)."""
-    return vectors / np.maximum(np.hypot(vectors[..., 0], vectors[..., 1]), 1e-6)[..., None]
+    length = np.maximum(np.hypot(vectors[..., 0], vectors[..., 1]), 1e-6)
+    return (vectors / length[..., None]).astype(np.float32)
