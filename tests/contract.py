@@ -135,6 +135,7 @@ def cases():
         Case("own_reward", "random_field", ARRIVES, options={"reward": own_reward}),
         Case("closeness", "random_field", BRIEF, options={"observe": "closeness"}),
         Case("reach", "starter", TIMES_OUT, options={"task": "reach"}),
+        Case("two_swarms", "two_swarms", TIMES_OUT),
         Case("own_task", "starter", TIMES_OUT, options={"task": OWN_TASK}),
         Case("own_task-arrives", "starter", {}, steps=5, options={"task": {"name": OWN_TASK, "near_m": 5000.0}}),
         Case("max_cycles", "single_obstacle", TIMES_OUT, options={"max_cycles": 9}),
