@@ -77,5 +77,5 @@ PRESETS = {
         ),
     ),
 }
-"""By name. All but ``closed`` and ``gap``, which are tuned, were found by hand on tuning seeds, ``lead`` and ``wary`` on
+"""By name. ``closed`` and ``gap`` are tuned; the others were found by hand on tuning seeds, ``lead`` and ``wary`` on
 disturbed ones too (docs/policies.md)."""
