@@ -12,6 +12,7 @@ from research.tasks.studies import METRICS, STUDIES, set_name
 from uuv_marl import load_scenario
 from uuv_marl.envs.observation import observation_layout
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.tasks.maps import KINDS
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 STUDY = STUDIES["hard_water"]
@@ -40,15 +41,7 @@ def test_reported_episodes_count_from_zero_and_every_set_is_what_its_name_says()
             usual = load_scenario(scenario.name).swarm.num_vehicles
             assert name == set_name(scenario.name, kind, 0 if n == usual else n)
             assert case.seeds == range(100)
-    assert [name.split("-")[1] for name in STUDY.judged] == [
-        "pocket",
-        "bar",
-        "gate",
-        "forest",
-        "maze",
-        "harbour",
-        "piles",
-    ]
+    assert [*STUDY.judged] == [set_name("hard_water", kind) for kind in KINDS]
 
 
 def test_the_page_by_hand():
