@@ -45,6 +45,8 @@ for _ in range(8):
 bits = {name: array.tobytes().hex() for name, array in swarm.snapshot().items()}
 actions = []
 for name in () if scenario.current.flows else POLICIES:
+    if "way" in POLICIES[name].channels:
+        continue  # flies in few tasks
     swarm, policy = Swarm(granted(name, scenario)), make(name, granted(name, scenario))
     policy.reset(0)
     actions.append(policy.act(swarm.reset(0)).tolist())

@@ -12,10 +12,10 @@ from research.dynamics import sea_trials
 from research.episodes import Row as Cells
 from research.episodes import cells as told
 from research.episodes import read_text
-from research.hard_water import sets as hard_water
 from research.heldout import sets as heldout
 from research.paper import report as paper
 from research.sets import DIGITS
+from research.tasks import studies
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import FILE, Content, knowledge, read_content
 from uuv_marl.benchmark.robustness import job as robustness
@@ -107,7 +107,7 @@ def _kind(head: Sequence[str]) -> Kind | None:
         (("scenario", "vehicle", "policy", "seed"), _sea_trial, sea_trials.DIGITS),
         (("scenario", "policy", "seed"), _paper, paper.DIGITS),
     )
-    known = {*Metrics.__annotations__, *hard_water.METRICS}
+    known = {*Metrics.__annotations__, *studies.METRICS}
     for keys, source, digits in kinds:
         measured = tuple(head[len(keys) :])
         if tuple(head[: len(keys)]) == keys and measured and {*measured} <= known:
@@ -124,7 +124,7 @@ def _of(case: Case) -> Source:
 
 
 def _set(cells: Cells) -> Source:
-    found = next((each for each in (*heldout.SETS, *hard_water.SETS) if each.name == cells["set"]), None)
+    found = next((each for each in (*heldout.SETS, *studies.SETS) if each.name == cells["set"]), None)
     if found is None:
         raise ResultsError(f"there is no set {cells['set']!r} in this version")
     return _of(Case(found.name, found.scenario, cells["policy"], found.overrides))

@@ -25,6 +25,7 @@ from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_
 from uuv_marl.baselines.random_idle import Idle, Random
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
+from uuv_marl.baselines.scout.carrot import Carrot, CarrotInformed
 from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.modules import named_object
@@ -42,6 +43,8 @@ POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
     "bio_inspired_plus": BioInspiredPlus,
     "scout": Scout,
+    "carrot": Carrot,
+    "carrot_informed": CarrotInformed,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,

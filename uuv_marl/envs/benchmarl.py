@@ -99,6 +99,9 @@ class SwarmTask(Task):
     HARD_WATER_EASY = None
     HARD_WATER = None
     HARD_WATER_HARD = None
+    TWO_SWARMS_EASY = None
+    TWO_SWARMS = None
+    TWO_SWARMS_HARD = None
     FEW_INFORMED_EASY = None
     FEW_INFORMED = None
     FEW_INFORMED_HARD = None

@@ -14,6 +14,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     """The fields in order. Positions are relative to l(t), north and east; vehicles come in the order of agents."""
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
     speed = PerceptField("obstacle_velocity", (m, 2), SPEED, "per obstacle that moves: its velocity, north and east")
+    groups = scenario.task_class.sizes(scenario).get("group", 1)
     return (
         PerceptField("alive", (n,), FLAG, "per vehicle: 1, or 0 once it is lost"),
         PerceptField("position", (n, 2), POSITION, "per vehicle: position relative to l(t), north and east"),
@@ -21,7 +22,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
         PerceptField("velocity", (n, 2), SPEED, "per vehicle: surge and sway velocity over ground"),
         PerceptField("yaw_rate", (n,), YAW_RATE, "per vehicle: yaw rate"),
         PerceptField("reference_velocity", (2,), SPEED, "velocity of l(t), north and east"),
-        PerceptField("end", (2,), POSITION, "end of the trajectory relative to l(t), north and east"),
+        PerceptField("end", (groups, 2), POSITION, "per group: end of its trajectory relative to l(t), north and east"),
         PerceptField("time", (1,), _TIME, "share of the time limit that has passed"),
         PerceptField("obstacle", (m,), FLAG, "per obstacle: 1, or 0 for an unused row"),
         PerceptField("obstacle_position", (m, 2), POSITION, "per obstacle: centre relative to l(t), north and east"),
@@ -38,7 +39,7 @@ def state_layout(scenario: Scenario) -> PerceptLayout:
 def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
     """The state of every world, scaled by its layout, shape (world, entry), float32; lost vehicles are zero."""
     state, course, facts = swarm.state, swarm.course, swarm.facts
-    worlds, m = np.arange(swarm.num_worlds), swarm.scenario.max_obstacles
+    m = swarm.scenario.max_obstacles
     alive, reference = state.alive[:, :, None].astype(np.float64), swarm.mean_reference
     origin = reference[:, None, :2]
     obstacles = course.obstacles[:, :m]
@@ -50,7 +51,7 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
         swarm.velocity * alive,
         state.nu[:, :, 2:] * alive,
         reference[:, 2:],
-        course.waypoints[worlds, 0, course.last[:, 0]] - origin[:, 0],
+        np.take_along_axis(course.waypoints, course.last[:, :, None, None], axis=2)[:, :, 0] - origin,
         facts.time_s / swarm.time_limit_s,
         present,
         (obstacles[:, :, :2] - origin) * present,

@@ -12,13 +12,15 @@ if TYPE_CHECKING:
     from uuv_marl.tasks.hard_water import HardWater
     from uuv_marl.tasks.reach import Reach
     from uuv_marl.tasks.task import Task
+    from uuv_marl.tasks.two_swarms import TwoSwarms
 
-__all__ = ["TASKS", "FewInformed", "Follow", "HardWater", "Reach", "Task"]
+__all__ = ["TASKS", "FewInformed", "Follow", "HardWater", "Reach", "Task", "TwoSwarms"]
 
 TASKS = {
     "follow": "uuv_marl.tasks.follow:Follow",
     "reach": "uuv_marl.tasks.reach:Reach",
     "hard_water": "uuv_marl.tasks.hard_water:HardWater",
+    "two_swarms": "uuv_marl.tasks.two_swarms:TwoSwarms",
     "few_informed": "uuv_marl.tasks.few_informed:FewInformed",
 }
 """Every task that ships with the package: where its class is, imported when a swarm is to do it."""

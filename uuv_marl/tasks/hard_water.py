@@ -29,8 +29,12 @@ MOST_TRIES = 1000
 """Maps that are drawn before the numbers are refused."""
 FAR_M = 5000.0
 """Length of a way where there is none [m]."""
-_DEAR_M, _DEAR = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0), 0.5
-"""Nearer to a surface than each of these [m], a way that leads (``lead``) costs so much more. Tried by hand."""
+QUEUE_S = 0.4
+"""Time [s] that each vehicle of a swarm adds to the way's in the time limit: at a gap they pass one by one. Assumed:
+two hulls that follow each other at 5 m/s."""
+_DEAR_M, _DEAR, _NARROW = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0), 0.5, 20.0
+"""Nearer to a surface than each of these [m], a way that leads (``lead``) costs so much more, and nearer than the
+clearance that each map has, so much. Tried by hand."""
 
 
 def _known(kinds: tuple[str, ...]) -> tuple[str, ...]:
@@ -129,10 +133,10 @@ class HardWater(Reach):
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
-        """Three times the longest straight way at full speed."""
-        numbers = scenario.task_numbers
-        longest = numbers.length_m[1] + scenario.start.sides(scenario.swarm.num_vehicles)[0]
-        return 3.0 * longest / top_speed(scenario.vehicle, scenario.actuators)
+        """Three times the longest straight way at full speed, and the queue."""
+        numbers, n = scenario.task_numbers, scenario.swarm.num_vehicles
+        longest = numbers.length_m[1] + scenario.start.sides(n)[0]
+        return 3.0 * longest / top_speed(scenario.vehicle, scenario.actuators) + QUEUE_S * n
 
     def draw(self, world: int, rng: np.random.Generator) -> Draw:
         """A map that can be passed, turned at random; the start is the scenario's."""
@@ -146,14 +150,15 @@ class HardWater(Reach):
         memory.way[world] = np.minimum(distances(free, *self._grid.cell(made.length, 0.0)), FAR_M)
         if memory.lead.size:
             dear = np.sum([~free_cells(made.discs, self._grid, near) for near in _DEAR_M], axis=0)
-            memory.lead[world] = distances(free, *self._grid.cell(made.length, 0.0), 1.0 + _DEAR * dear)
+            price = 1.0 + _DEAR * dear + _NARROW * ~free_cells(made.discs, self._grid, self.numbers.clearance_m)
+            memory.lead[world] = distances(free, *self._grid.cell(made.length, 0.0), price)
         memory.kind[world] = list(KINDS).index(made.kind)
         n = len(eta)
         ways = self._ways(np.full(n, world), eta[:, :2], goal[1])
         memory.best_s[world] = ways / top_speed(scenario.vehicle, scenario.actuators)
         return Draw(
             (goal,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
-            duration_s=min(float(memory.best_s[world].max()), self.longest_s(scenario)),
+            duration_s=min(float(memory.best_s[world].max()) + QUEUE_S * n, self.longest_s(scenario)),
         )  # fmt: skip
 
     def draw_map(self, rng: np.random.Generator) -> Map:

@@ -14,8 +14,8 @@ import numpy as np
 
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.pose import to_map_axes
-from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely
+from uuv_marl.baselines.policy import Limits, tuned
+from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
 from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.baselines.scout.law import modulated, pushed
 from uuv_marl.percept import Percept, Starts
@@ -26,7 +26,7 @@ from uuv_marl.types import Bool, Float32, Float64
 
 
 class LeaderFollowerGains(NamedTuple):
-    """Free parameters, found by hand on tuning seeds."""
+    """Free parameters. Those by default were found by hand; the policy has tuned ones."""
 
     follow: float = 1.05
     """Factor of the neighbours' mean velocity [1]: above 1, or a swarm comes to rest by following itself."""
@@ -67,8 +67,9 @@ class LeaderFollower(Filtered):
         self, scenario: Scenario, num_worlds: int = 1, *, gains: LeaderFollowerGains | None = None,
         barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
-        super().__init__(scenario, num_worlds, barrier or Barrier())
-        self.gains = gains or LeaderFollowerGains()
+        own_gains, own_barrier = with_numbers(tuned("leader_follower"), LeaderFollowerGains(), Barrier())
+        super().__init__(scenario, num_worlds, barrier or own_barrier)
+        self.gains = gains or own_gains
 
     @property
     def kept_s(self) -> float:

@@ -62,7 +62,8 @@ class Oracle(Policy):
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         flat = self.flat(percept)
-        way, length, walls = percept["way"], percept["way_length"], percept["way_walls"]
+        way, walls = percept["way"], percept["way_walls"]
+        length = percept["way_length"] * (percept["way_turn"] if "way_turn" in self.layout.starts else 1.0)
         planes = np.zeros((walls.shape[2] + self.scenario.sonar.num_sectors, 3))
         action = np.empty((*flat.shape[:2], 2), np.float32)
         _act(flat, self.at, way, length, walls, self.gains, self.limits, self._gain, planes, action)

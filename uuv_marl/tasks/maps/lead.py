@@ -95,3 +95,12 @@ def tell_way(
             x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
             way[w, v, 0], way[w, v, 1] = c * x + s * y, c * y - s * x
             nearest_walls(pose, c, s, discs, walls[w, v])
+
+
+@compiled
+def tell_walls(state: State, course: Course, heading: Float64, walls: Float64) -> None:
+    """Fill ``walls`` alone, where a task knows the way without a grid; the others are as in ``tell_way``."""
+    for w in range(walls.shape[0]):
+        for v in range(walls.shape[1]):
+            c, s, discs = heading[w, v, 0], heading[w, v, 1], course.obstacles[w, : course.num_obstacles[w]]
+            nearest_walls(state.eta[w, v], c, s, discs, walls[w, v])

@@ -1,7 +1,7 @@
-"""``python -m research.hard_water.learn``: Stable-Baselines3's PPO from the sonar alone, in fifteen minutes of one core."""
+"""``python -m research.tasks.learn``: Stable-Baselines3's PPO, from the sonar alone, in fifteen minutes."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -14,25 +14,21 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from research import FOLDER
 from research.episodes import Row, write_rows
-from research.hard_water.sets import KINDS, TOLD
+from research.tasks.studies import SEEDS, STUDIES
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.observation import Observe, observation_layout
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.types import Bool, Float32, Float64
 
 OBSERVE: Observe = "closeness"
 TRAINING_SEEDS, VALIDATION_SEEDS, VALIDATED = 100_000, 900_000, 32
 """First seed of a training, first seed on which its curve is measured, and how many."""
-WORLDS, STEPS = 64, 64
-"""Worlds, and decisions of each between two updates."""
+STEPS = 64
+"""Decisions of each world between two updates."""
 app = typer.Typer(add_completion=False)
-
-
-def scenario_of(*kinds: str) -> Scenario:
-    """The medium tier with these kinds of maps."""
-    return load_scenario(TOLD["tiers"]["medium"], overrides={"task.kinds": list(kinds)})
 
 
 def sight(scenario: Scenario, blind: bool) -> Float32:
@@ -103,14 +99,15 @@ class Budget(BaseCallback):
             })  # fmt: skip
 
 
-def learn(seed: int, blind: bool, minutes: float, report: Callable[[float], None]) -> tuple[PPO, list[Row]]:
-    """A model trained on the kinds that are for training, and its curve."""
+def learn(task: str, seed: int, blind: bool, minutes: float, report: Callable[[float], None]) -> tuple[PPO, list[Row]]:
+    """A model trained on a task, and its curve."""
     torch.set_num_threads(1)
-    scenario = scenario_of(*TOLD["trained"])
+    study = STUDIES[task]
+    scenario = load_scenario(study.learns)
     seen = sight(scenario, blind)
     model = PPO(
-        "MlpPolicy", Sighted(SwarmVecEnv(scenario, WORLDS, observe=OBSERVE), seen), learning_rate=1e-3, n_steps=STEPS,
-        batch_size=4096, n_epochs=4, policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.7},
+        "MlpPolicy", Sighted(SwarmVecEnv(scenario, study.worlds, observe=OBSERVE), seen), learning_rate=1e-3,
+        n_steps=STEPS, batch_size=4096, n_epochs=4, policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.7},
         seed=TRAINING_SEEDS + 1000 * seed, device="cpu",
     )  # fmt: skip
     budget = Budget(minutes, lambda model: judged(model, scenario, seen, VALIDATION_SEEDS, VALIDATED), report)
@@ -119,34 +116,40 @@ def learn(seed: int, blind: bool, minutes: float, report: Callable[[float], None
 
 @app.command()
 def main(
+    task: Annotated[str, typer.Argument(help="hard_water or two_swarms.")],
     seed: Annotated[int, typer.Option(min=0, help="Of the training.")] = 0,
     blind: Annotated[bool, typer.Option("--blind", help="Train with all echoes zeroed.")] = False,
     minutes: Annotated[float, typer.Option(min=0.1, help="Processor time of the training.")] = 15.0,
-    output: Annotated[Path, path_option("Folder for the model, its curve and its episodes.")] = Path("runs/hard_water"),
+    output: Annotated[Path, path_option("Folder that research.tasks writes to.")] = Path("results/tasks"),
 ) -> None:
-    """Train PPO on hard water (medium, the kinds for training), and run it on the maps of the tables.
+    """Train PPO on a task's scenario, and run it in the episodes of the tables.
 
     A sighted model is also run with its echoes zeroed. The time of a training is the processor's, and its measuring
-    does not count. The folder gets model.zip, curve.csv and episodes.csv.
+    does not count. OUTPUT/learned/TASK gets a folder with model.zip, curve.csv and episodes.csv.
 
-    Example: python -m research.hard_water.learn --seed 1 --blind
+    Example: python -m research.tasks.learn hard_water --seed 1 --blind
     """
-    folder = output / f"{'blind' if blind else 'sighted'}-{seed}"
-    with explained(FOLDER), working(f"Nothing is kept of a training that did not end; {folder} stays as it was") as bar:
-        model, curve = learn(seed, blind, minutes, progress_line(bar, folder.name))
+    with explained(FOLDER):
+        if task not in STUDIES:
+            raise ResultsError(f"task must be one of {', '.join(STUDIES)}, got {task!r}")
+        folder = output / "learned" / task / f"{'blind' if blind else 'sighted'}-{seed}"
+        with working(f"Nothing is kept of a training that did not end; {folder} stays as it was") as bar:
+            model, curve = learn(task, seed, blind, minutes, progress_line(bar, folder.name))
         write_rows(folder / "curve.csv", curve)
         model.save(folder / "model")
-        rows: list[Row] = []
-        for kind in KINDS:
-            scenario = scenario_of(kind)
-            for name, unseen in {folder.name: blind, **({} if blind else {f"zeroed-{seed}": True})}.items():
-                share = judged(model, scenario, sight(scenario, unseen), 0, TOLD["maps"])
-                rows += [
-                    {"learner": name, "kind": kind, "seed": str(k), "untouched_share": f"{each:.3f}"}
-                    for k, each in enumerate(share)
-                ]
-        write_rows(folder / "episodes.csv", rows)
+        names = {folder.name: blind, **({} if blind else {f"zeroed-{seed}": True})}
+        episodes = [row for name, unseen in names.items() for row in _rows(model, task, name, unseen)]
+        write_rows(folder / "episodes.csv", episodes)
         console.print(f"  {folder}", highlight=False)
+
+
+def _rows(model: PPO, task: str, name: str, unseen: bool) -> Iterator[Row]:
+    """Episodes of a model on the sets that it is judged on."""
+    study = STUDIES[task]
+    for each in study.judged:
+        scenario = load_scenario(study.sets[each].scenario, overrides=study.sets[each].overrides)
+        for seed, share in enumerate(judged(model, scenario, sight(scenario, unseen), 0, SEEDS)):
+            yield {"learner": name, "set": each, "seed": str(seed), "untouched_share": f"{share:.3f}"}
 
 
 if __name__ == "__main__":

@@ -1,1 +1,0 @@
-"""Hard water: how often laws and learners come through, tier by tier and kind by kind."""

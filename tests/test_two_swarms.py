@@ -1,0 +1,219 @@
+"""Two swarms, one gap: maps are drawn by the seed alone, the gap is the only way, each vehicle has its own goal."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import label
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.envs.core import BatchedEnv
+from uuv_marl.errors import ScenarioError
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks import TwoSwarms
+from uuv_marl.tasks.maps.ways import WayGrid, free_cells
+
+TIERS = ("two_swarms_easy", "two_swarms", "two_swarms_hard")
+TUNING = 10_000
+
+
+def waters(worlds=1, scenario="two_swarms", **changes):
+    return Swarm(load_scenario(scenario, overrides=changes), worlds)
+
+
+def framed(swarm, w):
+    """Places, goals and discs' middles of a world in its map's own frame: x through the gap, y along the wall."""
+    c, s = swarm.task.memory.turn[w]
+    turn = np.array([[c, -s], [s, c]])
+    return (
+        swarm.state.eta[w, :, :2] @ turn,
+        swarm.course.waypoints[w, :, 1] @ turn,
+        swarm.course.obstacles[w, : swarm.course.num_obstacles[w], :2] @ turn,
+    )
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_groups_swap_sides(tier):
+    swarm = waters(4, tier)
+    swarm.reset(TUNING)
+    n = swarm.num_vehicles
+    for w in range(4):
+        place, goal, _ = framed(swarm, w)
+        side = swarm.task.memory.side[w]
+        assert (side > 0.0).sum() == n // 2
+        assert (np.sign(place[:, 0]) == -side).all()
+        np.testing.assert_allclose(goal - place, np.stack([300.0 * side, np.zeros(n)], axis=1), atol=1e-9)
+        assert np.abs(place[side > 0.0, 1].mean() - place[side < 0.0, 1].mean()) > 0.0
+        apart = np.hypot(*np.moveaxis(goal[:, None] - goal[None], -1, 0)) + 1e3 * np.eye(n)
+        assert apart.min() > 2.0 * swarm.task.numbers.near_m  # nobody takes another's place
+    assert swarm.facts.min_spacing.min() >= swarm.scenario.start.spacing_m - 1e-9
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_the_gap_is_the_only_way_and_as_wide_as_its_numbers(tier):
+    """By SciPy's labels: the two sides meet through the gap, and no more once the gap is shut."""
+    swarm = waters(6, tier)
+    swarm.reset(TUNING)
+    grid, hull = WayGrid(-260.0, -160.0, 208, 128), swarm.scenario.contact.hull_radius_m
+    for w in range(6):
+        place, goal, middles = framed(swarm, w)
+        radius = swarm.course.obstacles[w, : len(middles), 2]
+        discs, at = np.column_stack([middles, radius]), swarm.task.memory.gap[w]
+        wall = discs[(np.abs(middles[:, 0]) < 1e-6) & (radius == swarm.task.numbers.radius_m)]
+        below, above = wall[wall[:, 1] < at], wall[wall[:, 1] > at]
+        gap = (above[:, 1] - above[:, 2]).min() - (below[:, 1] + below[:, 2]).max()
+        low, high = swarm.task.numbers.gap_m
+        assert low - 1e-6 <= gap <= high + 1e-6
+        assert np.abs(at) <= swarm.task.numbers.gap_aside_m
+        shut = np.concatenate([discs, [[0.0, at, 0.5 * gap]]])
+        for map_, open_ in ((discs, True), (shut, False)):
+            parts, _ = label(free_cells(map_, grid, hull))
+            here, there = (parts[grid.cells(each[:, 0], each[:, 1])] for each in (place, goal))
+            assert (here > 0).all()
+            assert (here == there).all() == open_
+            assert parts[0, 0] != here[0]  # the banks keep them in
+
+
+def test_a_map_depends_on_its_seed_alone():
+    batch = waters(5)
+    batch.reset(TUNING)
+    for w in (0, 2, 4):
+        alone = waters()
+        alone.reset(TUNING + w)
+        for mine, theirs in zip(
+            (alone.course, alone.state, alone.task.memory), (batch.course, batch.state, batch.task.memory), strict=True
+        ):
+            for name, array in mine._asdict().items():
+                np.testing.assert_array_equal(array[0], theirs._asdict()[name][w], err_msg=name)
+    assert len({float(gap) for gap in batch.task.memory.gap}) == 5
+
+
+def test_percepts_turn_with_a_map():
+    """What is told of the way, too."""
+    swarm = waters(**{"sonar.channels": ["way"]})
+    swarm.reset(TUNING)
+    rng = np.random.default_rng(0)
+    swarm.state.eta[0, :, :2] *= rng.uniform(0.3, 1.0, (40, 1))
+    before, angle = swarm.observe().flat.copy(), 0.7
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    places = (swarm.state.eta[0, :, :2], swarm.course.obstacles[0, :, :2], swarm.course.waypoints[0])
+    for each in places:
+        each[...] = each @ turn
+    swarm.state.eta[0, :, 2] += angle
+    swarm.task.memory.turn[0] = swarm.task.memory.turn[0] @ turn
+    np.testing.assert_allclose(swarm.observe().flat, before, atol=2e-4)
+
+
+def test_each_vehicles_reference_is_its_own_goal():
+    swarm = waters(2)
+    percept = swarm.reset(TUNING)
+    goals = swarm.course.waypoints[:, :, 1]
+    np.testing.assert_array_equal(swarm.own_reference[:, :, :2], goals)
+    np.testing.assert_allclose(
+        np.hypot(*np.moveaxis(percept["reference"], -1, 0)),
+        np.hypot(*np.moveaxis(goals - swarm.state.eta[:, :, :2], -1, 0)), rtol=1e-5,
+    )  # fmt: skip
+    assert (percept["reference_velocity"] == 0.0).all()
+    swarm.state.eta[0, 3, :2] = goals[0, 3]
+    swarm.state.eta[0, 4, :2] = goals[0, 5]  # another's
+    swarm.observe()
+    assert np.flatnonzero(swarm.task.there()[0]).tolist() == [3]
+
+
+def test_success_is_untouched_and_there_and_the_episode_ends_when_all_are_there():
+    batch = BatchedEnv(load_scenario("two_swarms_easy"))
+    batch.reset(TUNING)
+    swarm, task = batch.swarm, batch.task
+    swarm.state.eta[0, :, :2] = swarm.course.waypoints[0, :, 1]
+    swarm.state.eta[0, 0, :2] += (task.numbers.near_m + 1.0) * np.array([1.0, 0.0])
+    swarm.state.nu[0] = 0.0
+    swarm.observe()
+    swarm.state.touched[0, 2] = True
+    result = batch.step(np.zeros((1, 20, 2)))
+    assert not result.world_terminated[0]
+    assert task.metrics(0)["untouched_share"] == 18 / 20
+    assert task.metrics(0)["whole_ratio"] is None
+    swarm.state.eta[0, 0, :2] = swarm.course.waypoints[0, 0, 1]
+    result = batch.step(np.zeros((1, 20, 2)))
+    assert result.world_terminated[0]
+    measured = task.metrics(0)
+    assert (measured["untouched_share"], measured["whole"]) == (19 / 20, 0.0)
+    assert measured["whole_ratio"] == pytest.approx(1.0 / task.memory.best_s[0].max())  # two decisions of 0.5 s
+
+
+def test_the_straight_way_is_that_through_the_gaps_middle():
+    swarm = waters(3)
+    swarm.reset(TUNING)
+    for w in range(3):
+        place, goal, _ = framed(swarm, w)
+        gap = np.array([0.0, swarm.task.memory.gap[w]])
+        length = np.hypot(*(place - gap).T) + np.hypot(*(goal - gap).T)
+        np.testing.assert_allclose(swarm.task.memory.best_s[w] * 5.1, length, rtol=0.02)
+        assert (length < 1.2 * 300.0).all()
+
+
+def test_one_group_has_its_turn_once_the_other_is_through():
+    swarm = waters(**{"sonar.channels": ["way"]})
+    percept = swarm.reset(TUNING)
+    first = swarm.task.memory.side[0] > 0.0
+    assert (percept["way_turn"][0, :, 0] == first).all()
+    swarm.state.eta[0, first, :2] = swarm.course.waypoints[0, first, 1]
+    last = int(np.flatnonzero(first)[0])
+    swarm.state.eta[0, last, :2] = 0.0
+    assert (swarm.observe()["way_turn"][0, :, 0] == first).all()
+    swarm.state.touched[0, last] = True  # it has failed: nobody waits for it
+    swarm._tell(np.ones(1, np.bool_))
+    assert (percept["way_turn"] == 1.0).all()
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_the_oracle_passes(tier):
+    scenario = granted("oracle", load_scenario(tier))
+    batch, policy = BatchedEnv(scenario, 4), make("oracle", scenario, 4)
+    batch.reset(TUNING)
+    while not batch.over.all():
+        policy.active[:] = ~batch.over
+        batch.step(policy.act(batch.swarm.percept))
+    assert np.mean([batch.task.metrics(w)["untouched_share"] for w in range(4)]) >= 0.95
+
+
+def test_the_guide_beats_the_floors_and_terms_are_those_documented():
+    scenario, returns = load_scenario("two_swarms"), {}
+    for name in (TwoSwarms.guide, "idle", "random"):
+        batch, policy = BatchedEnv(scenario, 4), make(name, scenario, 4)
+        batch.reset(TUNING)
+        policy.reset(TUNING)
+        total = np.zeros(4)
+        while not batch.over.all():
+            policy.active[:] = ~batch.over
+            result = batch.step(policy.act(batch.swarm.percept))
+            total += result.world_reward
+            assert list(result.terms) == list(TwoSwarms.terms)
+        returns[name] = total.mean()
+    assert returns[TwoSwarms.guide] > max(returns["idle"], returns["random"])
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
+     "task.half_width_m = 120, got 128"),
+    ({"task.gap_m": [20.0, 10.0]}, r"a range must be \[low, high\]"),
+    ({"start.width_m": 210.0}, "the groups must start in the water of task 'two_swarms'"),
+])  # fmt: skip
+def test_numbers_that_can_not_be_are_refused(changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        waters(**changes)
+
+
+def test_a_carrot_is_ahead_at_its_speed_and_to_starboard_and_ends_at_the_goal():
+    scenario = load_scenario("two_swarms")
+    swarm, policy = Swarm(scenario), make("carrot,right_m=7,ahead_m=6,speed=3", scenario)
+    swarm.reset(TUNING)
+    swarm.state.eta[0, 0, :2] = swarm.course.waypoints[0, 0, 1] + (3.0, 0.0)
+    percept = swarm.observe()
+    led, goal = policy.led(percept), percept["reference"].astype(float)
+    np.testing.assert_array_equal(led["reference"][0, 0], percept["reference"][0, 0])
+    assert (led["reference_velocity"][0, 0] == 0.0).all()
+    for i in range(1, 40):
+        at, moves, to = led["reference"][0, i], led["reference_velocity"][0, i], goal[0, i]
+        np.testing.assert_allclose([np.hypot(*at), np.hypot(*moves)], [6.0, 3.0], rtol=1e-5)
+        aside = (to[0] * at[1] - to[1] * at[0]) / np.hypot(*to) / 6.0  # sine of the angle to starboard
+        np.testing.assert_allclose(aside, 7.0 / np.hypot(7.0, np.hypot(*to)), rtol=1e-4)

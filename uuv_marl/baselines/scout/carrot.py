@@ -1,0 +1,90 @@
+"""``carrot``: ``scout`` to a goal at rest at a set speed, to starboard of its way, or in its turn.
+
+Afar from a goal at rest ``scout`` pulls so hard that pushes from neighbours count for nothing. A carrot is a reference
+a little ahead on the way, with a velocity. To keep to starboard is rule 9 of the COLREGs (in a narrow channel) and
+rule 14 (who meet head-on pass port to port).
+"""
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from uuv_marl.baselines.safety.barrier import Barrier
+from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.scout.law import Scout
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.types import Bool, Float32
+
+
+class Carrot(Scout):
+    """``scout`` behind a carrot on the straight way to a goal at rest; a reference that moves is followed as ever.
+
+    Args:
+        speed: of the carrot [m/s]. Found with the preset ``gap``, as are the next two.
+        ahead_m: how far ahead it is [m]; nearer to the goal there is none.
+        right_m: how far to starboard of the point that it leads to [m].
+        preset: as for ``scout``, and so are ``gains`` and ``barrier``.
+    """
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, speed: float = 2.9, ahead_m: float = 5.75,
+        right_m: float = 4.08, preset: str = "gap", gains: ScoutGains | None = None,
+        barrier: Barrier | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(scenario, num_worlds, preset=preset, gains=gains, barrier=barrier)
+        self.speed, self.ahead_m, self.right_m = speed, ahead_m, right_m
+
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Remember a percept whose reference is the carrot."""
+        super().remember(self.led(percept), worlds)
+
+    def led(self, percept: Percept) -> Percept:
+        """The percept with the carrot in the place of a goal at rest."""
+        led, (to, left) = dataclasses.replace(percept, flat=percept.flat.copy()), self._way(percept)
+        far = (left > self.ahead_m) & (percept["reference_velocity"] == 0.0).all(axis=-1)
+        to += np.float32(self.right_m) * _unit(np.stack([-to[..., 1], to[..., 0]], axis=-1))
+        along = _unit(to)[far]
+        led["reference"][far], led["reference_velocity"][far] = self.ahead_m * along, self.speed * along
+        return led
+
+    def _way(self, percept: Percept) -> tuple[Float32, Float32]:
+        """A vector to lead along [m], shape (world, vehicle, 2), and how far it is to the goal."""
+        goal = percept["reference"].copy()
+        return goal, np.hypot(goal[..., 0], goal[..., 1])
+
+
+class CarrotInformed(Carrot):
+    """``carrot`` on a free way that it is told: for tasks with the channel ``way``.
+
+    Args:
+        waits: whether to stay until it is one's turn, where the task has turns.
+        speed: of the carrot [m/s]: that of l(t) in the paper, as nothing has to be found out.
+    """
+
+    channels: ClassVar[tuple[str, ...]] = ("way",)
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, waits: bool = False, speed: float = 4.0,
+        right_m: float = 0.0, preset: str = "gap",
+    ) -> None:  # fmt: skip
+        super().__init__(scenario, num_worlds, speed=speed, right_m=right_m, preset=preset)
+        self.waits = waits and "way_turn" in self.layout.starts
+
+    def led(self, percept: Percept) -> Percept:
+        """Likewise; who waits has a reference at rest where it is."""
+        led = super().led(percept)
+        if self.waits:
+            stays = percept["way_turn"][..., 0] == 0.0
+            led["reference"][stays] = led["reference_velocity"][stays] = 0.0
+        return led
+
+    def _way(self, percept: Percept) -> tuple[Float32, Float32]:
+        return percept["way"].copy(), percept["way_length"][..., 0]
+
+
+def _unit(vectors: Float32) -> Float32:
+    """Their directions, shape (..., 2)."""
+    length = np.maximum(np.hypot(vectors[..., 0], vectors[..., 1]), 1e-6)
+    return (vectors / length[..., None]).astype(np.float32)
