@@ -7,6 +7,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.envs.core import BatchedEnv
+from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import FewInformed
 
@@ -26,6 +27,7 @@ def test_so_many_are_informed_and_each_episode_draws_who(k):
     informed = swarm.course.informed.copy()
     assert (informed.sum(axis=1) == min(k, N)).all()
     np.testing.assert_array_equal(swarm.percept["informed"][..., 0], informed)
+    np.testing.assert_array_equal(global_state(swarm, state_layout(swarm.scenario))[:, -N:], informed)
     assert k > N or len({row.tobytes() for row in informed}) == 6
     swarm.reset(0)
     np.testing.assert_array_equal(swarm.course.informed, informed)

@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, Kind, PerceptField, PerceptLayout
+from uuv_marl.percept import (
+    DIRECTION,
+    FLAG,
+    LENGTH,
+    POSITION,
+    SPEED,
+    YAW_RATE,
+    Kind,
+    PerceptField,
+    PerceptLayout,
+    Table,
+)
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
@@ -14,6 +25,8 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     """The fields in order. Positions are relative to l(t), north and east; vehicles come in the order of agents."""
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
     speed = PerceptField("obstacle_velocity", (m, 2), SPEED, "per obstacle that moves: its velocity, north and east")
+    rows: Table = scenario.task_class.observed
+    told = (row._replace(shape=(n, *row.shape), meaning=f"per vehicle: {row.meaning}") for row in rows)
     groups = scenario.task_class.sizes(scenario).get("group", 1)
     return (
         PerceptField("alive", (n,), FLAG, "per vehicle: 1, or 0 once it is lost"),
@@ -28,6 +41,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
         PerceptField("obstacle_position", (m, 2), POSITION, "per obstacle: centre relative to l(t), north and east"),
         PerceptField("obstacle_radius", (m,), LENGTH, "per obstacle: radius"),
         *([speed] if scenario.traffic.moves else []),
+        *told,
     )
 
 
@@ -57,6 +71,7 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
         (obstacles[:, :, :2] - origin) * present,
         obstacles[:, :, 2:] * present,
         *([course.obstacle_velocity[:, :m]] if swarm.scenario.traffic.moves else []),
+        *(swarm.percept[row.name] for row in swarm.scenario.task_class.observed),
     )
     rows = [np.reshape(field, (swarm.num_worlds, -1)) for field in fields]
     flat = np.concatenate(rows, axis=1, dtype=np.float32, casting="same_kind")
