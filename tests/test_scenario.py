@@ -193,7 +193,7 @@ def test_bad_values_name_field_value_and_remedy(overrides, message):
         ({"scenario": "single_obstcle"}, "did you mean 'single_obstacle'"),
         (
             {"scenario": "mycourse"},
-            "scenario 'mycourse' is unknown; give one of hard_water, .* or a path",
+            "scenario 'mycourse' is unknown; give one of few_informed, .* or a path",
         ),
         ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
         ({"num_vehicles": True}, "swarm.num_vehicles must be a whole number, got True"),
