@@ -130,7 +130,6 @@ def test_there_is_at_the_end_once_the_reference_rests_and_who_touched_something_
     assert not result.over.any()
     expected = {"untouched_share": 1 - 4 / N, "whole": 0.0, "uninformed_share": 1 - 3 / (N - K)}
     assert batch.task.metrics(0) == pytest.approx(expected)
-    assert len(task.marks(0)) == K
     while not batch.over.all():
         result = batch.step(np.zeros((1, N, 2)))
     assert result.world_truncated.all()

@@ -2,18 +2,7 @@
 
 import numpy as np
 
-from uuv_marl.percept import (
-    DIRECTION,
-    FLAG,
-    LENGTH,
-    POSITION,
-    SPEED,
-    YAW_RATE,
-    Kind,
-    PerceptField,
-    PerceptLayout,
-    Table,
-)
+from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, Kind, PerceptField, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
@@ -25,8 +14,8 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     """The fields in order. Positions are relative to l(t), north and east; vehicles come in the order of agents."""
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
     speed = PerceptField("obstacle_velocity", (m, 2), SPEED, "per obstacle that moves: its velocity, north and east")
-    rows: Table = scenario.task_class.observed
-    told = (row._replace(shape=(n, *row.shape), meaning=f"per vehicle: {row.meaning}") for row in rows)
+    observed = scenario.task_class.observed
+    told = (row._replace(shape=(n, *row.shape), meaning=f"per vehicle: {row.meaning}") for row in observed)
     groups = scenario.task_class.sizes(scenario).get("group", 1)
     return (
         PerceptField("alive", (n,), FLAG, "per vehicle: 1, or 0 once it is lost"),

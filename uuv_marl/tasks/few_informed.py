@@ -75,8 +75,3 @@ class FewInformed(Reach):
         uninformed = ~self.swarm.course.informed[world]
         share = float(self.succeeded()[world, uninformed].mean()) if uninformed.any() else None
         return {**super().metrics(world), "uninformed_share": share}
-
-    def marks(self, world: int) -> Float64:
-        """A circle around each informed vehicle."""
-        places = self.swarm.state.eta[world, self.swarm.course.informed[world], :2]
-        return np.column_stack([places, np.full(len(places), 3.0)])
