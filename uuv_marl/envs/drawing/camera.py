@@ -16,7 +16,7 @@ _MARGIN = 0.12
 _LEAST_M = 80.0
 """What a camera that follows shows at least."""
 _STRAY = 3.0
-"""Vehicles this many s_l from l(t) may leave the view of a camera that follows."""
+"""Vehicles this many s_l from l(t), and from the swarm's middle, may leave the view of a camera that follows."""
 
 
 class Camera(NamedTuple):
@@ -70,8 +70,10 @@ def _around(points: Float, size: tuple[int, int], least_m: float = 1.0) -> Camer
 
 
 def _swarm(scene: Scene) -> Float:
-    away = np.hypot(*(scene.position - scene.reference).T)
-    shown = scene.position[scene.alive & (away < _STRAY * scene.scenario.constraints.s_l_m)]
+    living = scene.position[scene.alive]
+    middle = np.median(living, axis=0) if len(living) else scene.reference
+    away = np.minimum(*(np.hypot(*(living - centre).T) for centre in (scene.reference, middle)))
+    shown = living[away < _STRAY * scene.scenario.constraints.s_l_m]
     return np.concatenate([shown, scene.reference[None]])
 
 
