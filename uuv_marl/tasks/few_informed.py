@@ -12,7 +12,7 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Task, Terms
-from uuv_marl.types import Bool, Float64
+from uuv_marl.types import Bool
 
 
 class FewInformedNumbers(ReachNumbers):
