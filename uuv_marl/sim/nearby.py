@@ -31,6 +31,14 @@ def load_obstacles(w: int, course: Course, room: Unnamed) -> None:
 
 
 @compiled_inline
+def load_places(w: int, course: Course, room: Unnamed) -> None:
+    """The columns of where world w's obstacles are, once they may have moved."""
+    obstacles = named(room)
+    for k in range(course.num_obstacles[w]):
+        obstacles.x[k], obstacles.y[k] = course.obstacles[w, k, 0], course.obstacles[w, k, 1]
+
+
+@compiled_inline
 def choose(num: int, x: float, y: float, reach: float, cone: Edges, obstacles: Obstacles) -> int:
     """Choose those of the obstacles that meet a cone from (x, y) within a reach [m]; how many. A few more, at its rim.
 

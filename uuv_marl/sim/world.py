@@ -12,7 +12,7 @@ from uuv_marl.sim.compiled import compiled_inner
 from uuv_marl.sim.hearing import hear, hear_nobody
 from uuv_marl.sim.model import Model, Rules
 from uuv_marl.sim.motion import apply_actuators, integrate, load_action, load_one, load_state
-from uuv_marl.sim.nearby import load_obstacles, remember_nearby
+from uuv_marl.sim.nearby import load_obstacles, load_places, remember_nearby
 from uuv_marl.sim.perception import write_percept
 from uuv_marl.sim.sea.actuation import is_lost_to_fault
 from uuv_marl.sim.sea.sea import Sea, begin_sea, drift, integrate_at_sea, know, reads, take_readings
@@ -22,7 +22,7 @@ from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields, sea_fields
-from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Unnamed, Workspace, named
+from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace
 from uuv_marl.types import Float32, Float64
 
 RUNAWAY = 1000.0
@@ -81,9 +81,8 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 
 @compiled_inner
-def move_obstacles(w: int, tick: int, course: Course, hold_s: float, room: Unnamed) -> None:
-    """Obstacles go on, those that move, for one control hold; ``tick`` counts it. Their columns are written, too."""
-    obstacles = named(room)
+def move_obstacles(w: int, tick: int, course: Course, hold_s: float) -> None:
+    """Obstacles go on, those that move, for one control hold; ``tick`` counts it."""
     for k in range(course.num_obstacles[w]):
         if course.swing_holds[w, k] > 0:
             ahead = triangle(tick, course.swing_holds[w, k])
@@ -94,7 +93,6 @@ def move_obstacles(w: int, tick: int, course: Course, hold_s: float, room: Unnam
         elif course.obstacle_velocity[w, k, 0] != 0.0 or course.obstacle_velocity[w, k, 1] != 0.0:
             course.obstacles[w, k, 0] += course.obstacle_velocity[w, k, 0] * hold_s
             course.obstacles[w, k, 1] += course.obstacle_velocity[w, k, 1] * hold_s
-        obstacles.x[k], obstacles.y[k] = course.obstacles[w, k, 0], course.obstacles[w, k, 1]
 
 
 @compiled_inner
@@ -252,7 +250,8 @@ def step_hold(w: int, first: bool, world: World, model: Model, workspace: Worksp
     control_hold(w, first, world, model, workspace.now, sea)
     world.state.tick[w] += 1
     apply_losses(w, world, model.rules, sea)
-    move_obstacles(w, world.state.tick[w], world.course, model.rules.hold_s, workspace.obstacles)
+    move_obstacles(w, world.state.tick[w], world.course, model.rules.hold_s)
+    load_places(w, world.course, workspace.obstacles)
     if model.rules.contact_stops:
         stop_hulls(w, world, model.rules, model.plant, workspace, sea)
     grid = sort_into_cells(w, world, model, workspace)

@@ -13,8 +13,8 @@ from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import Walls, WallsMemory, update_walls, wall_planes
 from uuv_marl.baselines.bug.ways import RAYS, choose_ways, rays
 from uuv_marl.baselines.memory import Surroundings, update_memory
-from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.safety.barrier import Barrier, neighbour_planes, steer_safely
+from uuv_marl.baselines.policy import Limits, tuned
+from uuv_marl.baselines.safety.barrier import Barrier, neighbour_planes, steer_safely, with_numbers
 from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -28,8 +28,8 @@ class TangentBug(Filtered):
     Made for goals at rest: then the vector to the goal tells a vehicle's place, up to its heading.
 
     Args:
-        gains: of the way and of the wished velocity.
-        barrier: margins and rates of the filter.
+        gains: of the way and of the wished velocity, instead of the tuned ones.
+        barrier: margins and rates of the filter, instead of the tuned ones.
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
@@ -38,8 +38,9 @@ class TangentBug(Filtered):
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, gains: BugGains | None = None, barrier: Barrier | None = None
     ) -> None:
-        super().__init__(scenario, num_worlds, barrier or BUG_BARRIER)
-        self.gains = gains or BugGains()
+        found, safe = with_numbers(tuned("tangent_bug"), BugGains(), BUG_BARRIER)
+        super().__init__(scenario, num_worlds, barrier or safe)
+        self.gains = gains or found
         split = len(Surroundings._fields)
         self._kept, self._walls = Surroundings(*self.memory[:split]), Walls(*self.memory[split:])
         self.planes: Float64 = np.zeros((self._walls.echoes.shape[2] + scenario.sonar.num_sectors, 3))
