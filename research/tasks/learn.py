@@ -1,5 +1,8 @@
 """``python -m research.tasks.learn``: Stable-Baselines3's PPO, from the sonar alone, in fifteen minutes."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownParameterType=false
+# Stable-Baselines3 leaves the types of observations and spaces open.
+
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -47,14 +50,14 @@ class Sighted(VecEnvWrapper):
 
     def reset(self) -> Float32:
         """The first observations."""
-        return self.venv.reset() * self._seen
+        return np.asarray(self.venv.reset()) * self._seen
 
     def step_wait(self) -> tuple[Float32, Float32, Bool, list[dict[str, object]]]:
         """Also the last observation of an episode is multiplied."""
         observation, reward, done, infos = self.venv.step_wait()
         for row in np.flatnonzero(done):
             infos[row]["terminal_observation"] = infos[row]["terminal_observation"] * self._seen
-        return observation * self._seen, reward, done, infos
+        return np.asarray(observation) * self._seen, reward, done, infos
 
 
 def judged(model: PPO, scenario: Scenario, seen: Float32, first: int, episodes: int) -> Float64:

@@ -65,7 +65,7 @@ def _shares(found: Found, policies: Sequence[str], columns: Columns) -> str:
 
 def _whole(found: Found, policies: Sequence[str], columns: Columns) -> str:
     """Share of the vehicles and of whole swarms; contacts of a vehicle; time of those that are there."""
-    table = []
+    table: list[tuple[str, ...]] = []
     for policy in policies:
         if cells := _cells(found, policy, columns):
             every = [rows for mine in cells for rows in mine]

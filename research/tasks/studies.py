@@ -40,15 +40,15 @@ def _study(told: dict[str, Any]) -> Study:
         for scenario in run["scenarios"]:
             for kind in run.get("kinds", [""]):
                 name = set_name(scenario, kind, n)
-                own = {"task.kinds": [kind]} if kind else {}
-                changes[name] = scenario, own | ({"swarm.num_vehicles": n} if n else {})
+                own: dict[str, object] = {"task.kinds": [kind]} if kind else {}
+                changes[name] = scenario, (own | {"swarm.num_vehicles": n} if n else own)
                 policies.setdefault(name, {}).update(dict.fromkeys(_TOLD["policies"][run["policies"]], range(SEEDS)))
     sets = {name: EpisodeSet(name, scenario, policies[name], own) for name, (scenario, own) in changes.items()}
     judged = tuple(name for name in sets if name.startswith(told["judged"]) and not name.endswith("-54"))
     return Study(sets, told["learns"], told["worlds"], judged)
 
 
-STUDIES = {name: _study(told) for name, told in _TOLD.items() if isinstance(told, dict) and "runs" in told}
+STUDIES = {name: _study(_TOLD[name]) for name in ("hard_water", "two_swarms")}
 """By task."""
 SETS = tuple(each for study in STUDIES.values() for each in study.sets.values())
 """All of them."""
