@@ -156,8 +156,9 @@ def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
 
 @pytest.mark.parametrize("name", ["mappo", "ppo"])
 def test_weights_of_the_first_version_run_on_every_shipped_scenario(name):
-    for scenario in scenario_names():
-        make(name, granted(name, load_scenario(scenario)))
+    for scenario in map(load_scenario, scenario_names()):
+        if not scenario.task_class.observed:  # rows of a task's own are another percept
+            make(name, granted(name, scenario))
 
 
 def changed(k=0, name="weight", value=None, at=None):
