@@ -15,7 +15,7 @@ from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
 from uuv_marl.cli import app
-from uuv_marl.percept import Percept, PerceptLayout
+from uuv_marl.percept import Percept
 
 BOW = {"name": "bow", "kind": "active", "mounting_deg": 0.0, "aperture_deg": 90.0, "range_m": 80.0, "sub_sectors": 5}
 RING = {
@@ -25,13 +25,13 @@ RING = {
 
 def saved(folder, scenario, scale, **changes):
     """A checkpoint of three layers with random weights."""
-    layout, rng = PerceptLayout.of(scenario), np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     size = 11 + 4 * scenario.sonar.num_sectors + 4 * scenario.sonar.num_active_sectors
     layers = [
         Layer(*(scale * rng.standard_normal(shape, np.float32) for shape in ((a, b), b)))
         for a, b in itertools.pairwise((size, 32, 32, 2))
     ]
-    save_checkpoint(folder / WEIGHTS_FILE, Card(percept=card_rows(layout), **changes), layers)
+    save_checkpoint(folder / WEIGHTS_FILE, Card(percept=card_rows(scenario), **changes), layers)
     return str(folder)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
+from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import SAME_M
 from uuv_marl.sim.swarm import Swarm
 
@@ -25,10 +26,10 @@ def water(walls, surface=False, side=1.0):
     return load_scenario("starter", num_vehicles=1, overrides=changes)
 
 
-def fly(name, scenario, side=1.0, steps=300):
+def fly(name, scenario, side=1.0, steps=300, **parameters):
     """The swarm, the policy, and places [m], shape (decision, 2), until the vehicle is there."""
     scenario = granted(name, scenario)
-    swarm, policy = Swarm(scenario), make(name, scenario)
+    swarm, policy = Swarm(scenario), make(name, scenario, **parameters)
     swarm.reset(10_000)
     swarm.state.eta[0, 0], swarm.state.nu[0, 0] = (5.0, 4.0 * side, 0.0), 0.0
     policy.reset(0)
@@ -61,7 +62,7 @@ def test_in_mirrored_water_it_goes_the_mirrored_way():
 @pytest.mark.parametrize("surface", [False, True], ids=["centres", "surfaces"])
 def test_dead_reckoning_remembers_walls_where_they_are(surface):
     """After a way round them; the map's origin is the goal, and its first axis the bow at the start."""
-    swarm, policy, places = fly("tangent_bug", water(POCKET, surface))
+    swarm, policy, places = fly("tangent_bug", water(POCKET, surface), gains=BugGains(), barrier=BUG_BARRIER)
     walls = policy.memory.echoes[0, 0, : int(policy.memory.num[0, 0])] + (GOAL_M, 0.0, 0.0)
     away = np.hypot(*(walls[:, None, :2] - swarm.course.obstacles[0, None, :, :2]).transpose(2, 0, 1))
     if surface:
@@ -70,7 +71,7 @@ def test_dead_reckoning_remembers_walls_where_they_are(surface):
     else:
         assert away.min(axis=1).max() < 1.0
         np.testing.assert_allclose(walls[:, 2], 7.0, atol=1.0)
-    assert np.hypot(*np.diff(places, axis=0).T).sum() > 1.1 * GOAL_M
+    assert np.hypot(*np.diff(places, axis=0).T).sum() > 1.2 * GOAL_M
     apart = np.abs(walls[:, None, :2] - walls[None, :, :2]).max(axis=2) + 9.0 * np.eye(len(walls))
     assert surface or apart.min() >= SAME_M
 

@@ -15,6 +15,7 @@ from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.tasks.maps import KINDS
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
+LEARNED = Path(learn.__file__).resolve().parent
 STUDY = STUDIES["hard_water"]
 
 
@@ -78,5 +79,5 @@ def test_a_blind_learner_sees_no_echo_and_its_budget_ends():
 @pytest.mark.docs
 @pytest.mark.parametrize("task", [task for task in STUDIES if (DOCS / f"{task}.csv.gz").exists()])
 def test_the_shipped_page_is_made_of_the_shipped_rows(task):
-    made = report(task, read_rows(DOCS / f"{task}.csv.gz"), read_rows(DOCS / f"{task}_learners.csv.gz"))
+    made = report(task, read_rows(DOCS / f"{task}.csv.gz"), read_rows(LEARNED / f"learned_{task}.csv.gz"))
     assert (DOCS / f"{task}.md").read_text() == made

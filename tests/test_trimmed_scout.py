@@ -17,7 +17,6 @@ from uuv_marl.baselines.memory.doubt import doubt, trim_weights
 from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.trims import softened, wary
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.percept import PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
 FEW = {"swarm.num_vehicles": 12, "timing.decision_period_s": 0.2, "sonar.echo_reports": "surface"}
@@ -41,7 +40,7 @@ def actor(scale, seed=0):
 @pytest.fixture
 def saved(tmp_path):
     def save(scale, **changes):
-        card = Card(percept=card_rows(PerceptLayout.of(load_scenario("tracking"))), features="memory", **changes)
+        card = Card(percept=card_rows(load_scenario("tracking")), features="memory", **changes)
         save_checkpoint(tmp_path / f"{scale}" / WEIGHTS_FILE, card, actor(scale))
         return str(tmp_path / f"{scale}")
 

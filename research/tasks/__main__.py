@@ -57,8 +57,8 @@ def _write(task: str, output: Path, rows: Sequence[Row]) -> None:
     episodes = [row for folder in trainings for row in read_rows(folder / "episodes.csv")]
     curves = [{"learner": folder.name, **row} for folder in trainings for row in read_rows(folder / "curve.csv")]
     write_rows(output / f"{task}.csv.gz", rows)
-    write_rows(output / f"{task}_learners.csv.gz", episodes)
-    write_rows(output / f"{task}_curves.csv", curves)
+    write_rows(output / f"learned_{task}.csv.gz", episodes)
+    write_rows(output / f"curves_{task}.csv", curves)
     write_text(output / f"{task}.md", report(task, rows, episodes))
     draw_curves(curves, output / "figures" / f"{task}_curves.png")
 

@@ -29,7 +29,7 @@ def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
     Args:
         task: a name of ``STUDIES``.
         rows: episodes of policies, as ``TASK.csv.gz`` holds them.
-        episodes: episodes of learners, as ``TASK_learners.csv.gz`` holds them.
+        episodes: episodes of learners, as ``learned_TASK.csv.gz`` holds them.
     """
     found: dict[tuple[str, str], list[Row]] = {}
     for row in rows:

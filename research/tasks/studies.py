@@ -13,6 +13,9 @@ METRICS = ("untouched_share", "whole", "time_ratio", "collisions", "min_obstacle
 """What is kept of an episode."""
 
 
+SIZE = "swarm.num_vehicles"
+
+
 class Study(NamedTuple):
     """What is run for a task."""
 
@@ -23,7 +26,7 @@ class Study(NamedTuple):
     worlds: int
     """How many it trains in."""
     judged: tuple[str, ...]
-    """Names of the sets that it is judged on."""
+    """Names of the sets that it is judged on, of the scenario's own size."""
 
 
 def set_name(scenario: str, kind: str = "", num_vehicles: int = 0) -> str:
@@ -41,10 +44,10 @@ def _study(told: dict[str, Any]) -> Study:
             for kind in run.get("kinds", [""]):
                 name = set_name(scenario, kind, n)
                 own: dict[str, object] = {"task.kinds": [kind]} if kind else {}
-                changes[name] = scenario, (own | {"swarm.num_vehicles": n} if n else own)
+                changes[name] = scenario, (own | {SIZE: n} if n else own)
                 policies.setdefault(name, {}).update(dict.fromkeys(_TOLD["policies"][run["policies"]], range(SEEDS)))
     sets = {name: EpisodeSet(name, scenario, policies[name], own) for name, (scenario, own) in changes.items()}
-    judged = tuple(name for name in sets if name.startswith(told["judged"]) and not name.endswith("-54"))
+    judged = tuple(name for name, (_, own) in changes.items() if name.startswith(told["judged"]) and SIZE not in own)
     return Study(sets, told["learns"], told["worlds"], judged)
 
 

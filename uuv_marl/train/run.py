@@ -22,7 +22,6 @@ from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.errors import ResultsError, TrainingError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
-from uuv_marl.percept import PerceptLayout
 from uuv_marl.scenario import conditions
 from uuv_marl.train.env import EpisodeStats
 from uuv_marl.train.folder import Record, Say, TrainingFolder, opened, quiet, versions
@@ -154,7 +153,7 @@ class Trainer:
         training = self.training
         scenario = training.loaded
         card = Card(
-            percept=card_rows(PerceptLayout.of(scenario)),
+            percept=card_rows(scenario),
             yaw_damping_nms=scenario.actuators.yaw_damping_nms,
             channels=scenario.sonar.channels,
             features=training.sees,

@@ -90,7 +90,7 @@ def save_sb3(model: PPO, path: UserPath) -> None:
         raise PolicyError(f"a checkpoint's network has tanh layers, got {hidden}; leave activation_fn out")
     scenario = env.scenario
     card = Card(
-        percept=card_rows(PerceptLayout.of(scenario)),
+        percept=card_rows(scenario),
         yaw_damping_nms=scenario.actuators.yaw_damping_nms,
         channels=scenario.sonar.channels,
         vehicle=vehicle_of(scenario),

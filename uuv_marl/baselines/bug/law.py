@@ -16,6 +16,7 @@ from uuv_marl.baselines.memory import Surroundings, update_memory
 from uuv_marl.baselines.policy import Limits, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, neighbour_planes, steer_safely, with_numbers
 from uuv_marl.baselines.safety.remembering import Filtered
+from uuv_marl.baselines.scout.law import pushed
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -68,14 +69,7 @@ def _wished(w: int, i: int, g: BugGains, kept: Surroundings, walls: Walls) -> tu
     """The velocity that a vehicle wishes, in its map [m/s]."""
     pose, goal = kept.pose[w, i], kept.reference[w, i]
     speed = min(g.cruise, g.pull * math.hypot(goal[0] - pose[0], goal[1] - pose[1]))
-    w_x, w_y = speed * walls.way[w, i, 0], speed * walls.way[w, i, 1]
-    for k in range(kept.known.shape[2]):
-        away = max(kept.away[w, i, k], 1e-6)
-        if away < g.push_range:
-            share = g.push * (1.0 / away - 1.0 / g.push_range)
-            w_x += share * (pose[0] - kept.place[w, i, k, 0])
-            w_y += share * (pose[1] - kept.place[w, i, k, 1])
-    return w_x, w_y
+    return pushed(speed * walls.way[w, i, 0], speed * walls.way[w, i, 1], w, i, g.push, g.push_range, kept)
 
 
 @compiled

@@ -25,7 +25,7 @@ from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.trims import ALL_TRIMS, Trim
 from uuv_marl.paths import UserPath, user_path
-from uuv_marl.percept import PerceptLayout
+from uuv_marl.percept import percept_table
 from uuv_marl.scenario import Scenario, load_vehicle
 from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.types import Float32
@@ -138,9 +138,11 @@ class Checkpoint(NamedTuple):
     """First 16 hexadecimal digits of the whole file's SHA-256."""
 
 
-def card_rows(layout: PerceptLayout) -> tuple[Row, ...]:
-    """A percept's table as a card keeps it."""
-    return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in layout.table)
+def card_rows(scenario: Scenario) -> tuple[Row, ...]:
+    """What a scenario's sensors tell, as a card keeps it; no network reads the rows that a task adds."""
+    sonar = scenario.sonar
+    table = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
+    return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in table)
 
 
 def is_checkpoint(name: str) -> bool:

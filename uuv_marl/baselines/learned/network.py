@@ -26,7 +26,7 @@ def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
         PolicyError: the percept, the vehicle or the decision period differs.
     """
     scenario, name = policy.scenario, policy.name
-    then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, card_rows(policy.layout)))
+    then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, card_rows(scenario)))
     pairs: list[tuple[str, Mapping[str, object], Mapping[str, object], str]] = [
         ("percept", then, now, "use a scenario with the sonar suite of its training")
     ]
