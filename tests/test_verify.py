@@ -99,6 +99,7 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
         ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),
         ({"policy": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
         ({"policy": "runs/best"}, "policy 'runs/best' is not part of the package"),
+        ({"policy": "own_clock:evil:Law"}, "policy 'own_clock:evil:Law' is not part of the package"),
     ],
 )
 def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, changes, reason):
@@ -115,7 +116,7 @@ def test_every_kind_of_shipped_row_knows_what_it_is_made_of():
     """One row of each file for every policy, set, axis, vehicle and parameter set that is named there."""
     rows, others = check.find([DOCS])
     assert not others
-    assert len({row.file for row in rows}) == 4
+    assert len({row.file for row in rows}) == 5
     some = {(row.file, key, row.cells[key]): row for row in rows for key in row.kind.keys if key != "seed"}
     for row in {row.where: row for row in some.values()}.values():
         assert row.kind.source(row.cells).policy, row.where

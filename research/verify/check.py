@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 from research.verify.rows import NoEpisodesError, Row, rows_of
 from uuv_marl.baselines import granted
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
-from uuv_marl.baselines.registry import GUARDED
+from uuv_marl.baselines.registry import GUARDED, OWN
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.benchmark.results import FILE
 from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
@@ -124,7 +124,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
 
 
 def _need_trust(policy: str, allowed: Collection[str]) -> None:
-    plain = policy.removeprefix(GUARDED)
+    plain = policy.removeprefix(OWN).removeprefix(GUARDED)
     if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
         raise PolicyError(f"policy {policy!r} is not part of the package; if you trust it, give --policy {policy}")
 
