@@ -80,12 +80,17 @@ class Budget(BaseCallback):
         super().__init__()
         self.curve: list[Row] = []
         self._minutes, self._measure, self._report, self._apart = minutes, measure, report, 0.0
+        self._start = time.process_time()
 
     def _on_training_start(self) -> None:
         self._start = time.process_time()
 
     def _spent(self) -> float:
         return (time.process_time() - self._start - self._apart) / 60.0
+
+    def left(self) -> float:
+        """The share of the time that is left."""
+        return max(1.0 - self._spent() / self._minutes, 0.0)
 
     def _on_step(self) -> bool:
         return self._spent() < self._minutes
@@ -108,12 +113,12 @@ def learn(task: str, seed: int, blind: bool, minutes: float, report: Callable[[f
     study = STUDIES[task]
     scenario = load_scenario(study.learns)
     seen = sight(scenario, blind)
-    model = PPO(
-        "MlpPolicy", Sighted(SwarmVecEnv(scenario, study.worlds, observe=OBSERVE), seen), learning_rate=1e-3,
-        n_steps=STEPS, batch_size=4096, n_epochs=4, policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.7},
-        seed=TRAINING_SEEDS + 1000 * seed, device="cpu",
-    )  # fmt: skip
     budget = Budget(minutes, lambda model: judged(model, scenario, seen, VALIDATION_SEEDS, VALIDATED), report)
+    model = PPO(
+        "MlpPolicy", Sighted(SwarmVecEnv(scenario, study.worlds, observe=OBSERVE), seen),
+        learning_rate=lambda _: 1e-3 * budget.left(), n_steps=STEPS, batch_size=4096, n_epochs=4,
+        policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.7}, seed=TRAINING_SEEDS + 1000 * seed, device="cpu",
+    )  # fmt: skip
     return model.learn(10**9, callback=budget), budget.curve
 
 

@@ -29,9 +29,9 @@ MOST_TRIES = 1000
 """Maps that are drawn before the numbers are refused."""
 FAR_M = 5000.0
 """Length of a way where there is none [m]."""
-QUEUE_S = 0.4
+QUEUE_S = 0.8
 """Time [s] that each vehicle of a swarm adds to the way's in the time limit: at a gap they pass one by one. Assumed:
-two hulls that follow each other at 5 m/s."""
+they follow each other at s_u, 4 m, and 5 m/s."""
 _DEAR_M, _DEAR, _NARROW = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0), 0.5, 20.0
 """Nearer to a surface than each of these [m], a way that leads (``lead``) costs so much more, and nearer than the
 clearance that each map has, so much. Tried by hand."""
