@@ -8,7 +8,8 @@ import pytest
 from research.episodes import read_rows
 from research.tasks import learn
 from research.tasks.page import report
-from research.tasks.studies import METRICS, STUDIES, set_name
+from research.tasks.learner import OBSERVE, sight
+from research.tasks.studies import STUDIES, set_name
 from uuv_marl import load_scenario
 from uuv_marl.envs.observation import observation_layout
 from uuv_marl.envs.sb3 import SwarmVecEnv
@@ -20,13 +21,14 @@ STUDY = STUDIES["hard_water"]
 
 
 def rows(policy, share):
-    told = dict.fromkeys(METRICS, "1.000") | {"untouched_share": f"{share:.3f}", "whole": "0.000"}
+    told = dict.fromkeys(STUDY.metrics, "1.000") | {"untouched_share": f"{share:.3f}", "whole": "0.000"}
     return [{"set": name, "policy": policy, "seed": str(seed), **told} for name in STUDY.sets for seed in range(3)]
 
 
 def episodes(name, share):
     return [
-        {"learner": name, "set": each, "seed": str(seed), "untouched_share": f"{share:.3f}"}
+        {"learner": name, "set": each, "seed": str(seed), **dict.fromkeys(STUDY.metrics, "1.000")}
+        | {"untouched_share": f"{share:.3f}"}
         for each in STUDY.judged
         for seed in range(3)
     ]
@@ -39,8 +41,8 @@ def test_reported_episodes_count_from_zero_and_every_set_is_what_its_name_says()
             case = each.cases(None)[0]
             scenario = case.load()
             kind, n = getattr(scenario.task_numbers, "kinds", [""])[0], scenario.swarm.num_vehicles
-            usual = load_scenario(scenario.name).swarm.num_vehicles
-            assert name == set_name(scenario.name, kind, 0 if n == usual else n)
+            usual, informed = load_scenario(scenario.name), case.overrides.get("task.informed", 0)
+            assert name == set_name(scenario.name, kind, informed or (0 if n == usual.swarm.num_vehicles else n))
             assert case.seeds == range(100)
     assert [*STUDY.judged] == [set_name("hard_water", kind) for kind in KINDS]
 
@@ -52,7 +54,8 @@ def test_the_page_by_hand():
     assert "| scout | .50 [.50, .50], .00 | .50 [.50, .50], .00 | .50 [.50, .50], .00 |" in text
     assert "| oracle | 1.00, .00 | 1.00, .00 |" in text
     assert (
-        "| scout | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | 0.02 | 1.00 |" in text
+        "| scout | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | 1.00 | 0.10 | 1.0 m | 1.0 m |"
+        in text
     )
     assert "| PPO, trained with echoes zeroed | .25 |" in text
     assert "| the best law: scout | .50 |" in text
@@ -61,11 +64,11 @@ def test_the_page_by_hand():
 
 def test_a_blind_learner_sees_no_echo_and_its_budget_ends():
     scenario = load_scenario("hard_water")
-    blind, layout = learn.sight(scenario, True), observation_layout(scenario, learn.OBSERVE)
+    blind, layout = sight(scenario, True), observation_layout(scenario, OBSERVE)
     echoes = [f.name for f in layout.table if blind[layout.starts[f.name]] == 0.0]
     assert echoes == [f.name for f in layout.table if f.name.startswith("echo")]
-    assert learn.sight(scenario, False).all()
-    env = learn.Sighted(SwarmVecEnv(scenario, 2, observe=learn.OBSERVE, max_cycles=3), blind)
+    assert sight(scenario, False).all()
+    env = learn.Sighted(SwarmVecEnv(scenario, 2, observe=OBSERVE, max_cycles=3), blind)
     assert not env.reset()[:, blind == 0.0].any()
     for _ in range(4):
         observation, _, done, infos = env.step(np.zeros((env.num_envs, 2), np.float32))

@@ -11,7 +11,7 @@ from research.episodes import Row, read_rows, write_rows
 from research.sets import run
 from research.tasks.figures import draw_curves
 from research.tasks.page import report
-from research.tasks.studies import METRICS, STUDIES
+from research.tasks.studies import STUDIES
 from uuv_marl.atomic import locked, write_text
 from uuv_marl.benchmark.style import house_style
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
@@ -22,7 +22,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def main(
-    task: Annotated[str, typer.Argument(help="hard_water or two_swarms.")],
+    task: Annotated[str, typer.Argument(help=f"One of {', '.join(STUDIES)}.")],
     only: Annotated[
         list[str] | None, typer.Option(help="Run only this set, such as hard_water-gate. Repeat it for several sets.")
     ] = None,
@@ -41,7 +41,9 @@ def main(
             raise ResultsError(f"task must be one of {', '.join(STUDIES)}, got {task!r}")
         with working(f"The finished episodes are in {output}") as bar:
             told, sets = progress_line(bar, task), list(STUDIES[task].sets.values())
-            rows = run(output, sets, only or [], seeds, METRICS, lambda what, share: told(share, what[-60:]))
+            rows = run(
+                output, sets, only or [], seeds, STUDIES[task].metrics, lambda what, share: told(share, what[-60:])
+            )
             told(1.0)
         if not only:
             with locked(output, wait_s=60.0), house_style():
@@ -60,7 +62,7 @@ def _write(task: str, output: Path, rows: Sequence[Row]) -> None:
     write_rows(output / f"learned_{task}.csv.gz", episodes)
     write_rows(output / f"curves_{task}.csv", curves)
     write_text(output / f"{task}.md", report(task, rows, episodes))
-    draw_curves(curves, output / "figures" / f"{task}_curves.png")
+    draw_curves(curves, STUDIES[task].headline, output / "figures" / f"{task}_curves.png")
 
 
 if __name__ == "__main__":

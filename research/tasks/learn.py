@@ -1,44 +1,38 @@
-"""``python -m research.tasks.learn``: Stable-Baselines3's PPO, from the sonar alone, in fifteen minutes."""
+"""``python -m research.tasks.learn``: Stable-Baselines3's PPO, plain or recurrent, from the sonar alone."""
 
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownParameterType=false
 # Stable-Baselines3 leaves the types of observations and spaces open.
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import torch
 import typer
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from research import FOLDER
-from research.episodes import Row, write_rows
+from research.episodes import Row, cells, measured, write_rows
+from research.sets import DIGITS
+from research.tasks.learner import OBSERVE, sight
 from research.tasks.studies import SEEDS, STUDIES
+from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
-from uuv_marl.envs.core import make_batched_env
-from uuv_marl.envs.observation import Observe, observation_layout
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.types import Bool, Float32, Float64
+from uuv_marl.types import Bool, Float32
 
-OBSERVE: Observe = "closeness"
-TRAINING_SEEDS, VALIDATION_SEEDS, VALIDATED = 100_000, 900_000, 32
-"""First seed of a training, first seed on which its curve is measured, and how many."""
+TRAINING_SEEDS, VALIDATION_SEEDS = 100_000, range(900_000, 900_032)
+"""First seed of a training, and seeds on which its curve is measured."""
 STEPS = 64
 """Decisions of each world between two updates."""
 app = typer.Typer(add_completion=False)
-
-
-def sight(scenario: Scenario, blind: bool) -> Float32:
-    """Factors of an observation's entries: 0 for those of echoes, if blind, else 1; shape (entry,)."""
-    layout = observation_layout(scenario, OBSERVE)
-    names = np.repeat([field.name.startswith("echo") for field in layout.table], [f.size for f in layout.table])
-    return np.where(names & blind, 0.0, 1.0).astype(np.float32)
 
 
 class Sighted(VecEnvWrapper):
@@ -60,23 +54,17 @@ class Sighted(VecEnvWrapper):
         return np.asarray(observation) * self._seen, reward, done, infos
 
 
-def judged(model: PPO, scenario: Scenario, seen: Float32, first: int, episodes: int) -> Float64:
-    """Share of the vehicles that succeed, shape (episode,), over seeds from ``first`` on, without noise."""
-    env = make_batched_env(scenario, episodes, observe=OBSERVE, keep_terms=False)
-    observation, share = env.reset(first), np.zeros(episodes)
-    while not env.over.all():
-        running = ~env.over
-        action, _ = model.predict((observation * seen).reshape(-1, len(seen)), deterministic=True)
-        observation = env.step(action.reshape(episodes, -1, 2)).observation
-        ended = running & env.over
-        share[ended] = env.task.succeeded()[ended].mean(axis=1)
-    return share
+def judged(model: Any, scenario: Scenario, blind: bool, seeds: Sequence[int]) -> Iterator[Run]:
+    """Episodes of a model, without noise."""
+    for event in evaluate(scenario, "research.tasks.learner:Learner", seeds, model=model, blind=blind):
+        if isinstance(event, Run):
+            yield event
 
 
 class Budget(BaseCallback):
     """Ends a training after so many minutes of processor time, and measures it fifteen times on the way."""
 
-    def __init__(self, minutes: float, measure: Callable[[PPO], Float64], report: Callable[[float], None]) -> None:
+    def __init__(self, minutes: float, measure: Callable[[Any], Row], report: Callable[[float], None]) -> None:
         super().__init__()
         self.curve: list[Row] = []
         self._minutes, self._measure, self._report, self._apart = minutes, measure, report, 0.0
@@ -99,38 +87,43 @@ class Budget(BaseCallback):
         self._report(self._spent() / self._minutes)
         if self._spent() >= self._minutes * len(self.curve) / 15:
             begin, spent = time.process_time(), self._spent()
-            share = self._measure(self.model)  # pyright: ignore[reportArgumentType]
+            row = {"minutes": f"{spent:.2f}", "agent_steps": str(self.num_timesteps)}
+            self.curve.append({**row, **self._measure(self.model)})
             self._apart += time.process_time() - begin
-            self.curve.append({
-                "minutes": f"{spent:.2f}", "agent_steps": str(self.num_timesteps),
-                "untouched_share": f"{share.mean():.4f}", "whole": f"{(share == 1.0).mean():.4f}",
-            })  # fmt: skip
 
 
-def learn(task: str, seed: int, blind: bool, minutes: float, report: Callable[[float], None]) -> tuple[PPO, list[Row]]:
+def learn(task: str, seed: int, blind: bool, minutes: float, report: Callable[[float], None]) -> tuple[Any, list[Row]]:
     """A model trained on a task, and its curve."""
     torch.set_num_threads(1)
     study = STUDIES[task]
     scenario = load_scenario(study.learns)
-    seen = sight(scenario, blind)
-    budget = Budget(minutes, lambda model: judged(model, scenario, seen, VALIDATION_SEEDS, VALIDATED), report)
-    model = PPO(
-        "MlpPolicy", Sighted(SwarmVecEnv(scenario, study.worlds, observe=OBSERVE), seen),
-        learning_rate=lambda _: 1e-3 * budget.left(), n_steps=STEPS, batch_size=4096, n_epochs=4,
-        policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.7}, seed=TRAINING_SEEDS + 1000 * seed, device="cpu",
+
+    def measure(model: Any) -> Row:
+        """The headline on maps of validation."""
+        rows = [cells(run.metrics, study.metrics, DIGITS) for run in judged(model, scenario, blind, VALIDATION_SEEDS)]
+        return {name: f"{np.mean(measured(rows, name)):.4f}" for name in (study.headline, "whole")}
+
+    budget = Budget(minutes, measure, report)
+    env = Sighted(SwarmVecEnv(scenario, study.worlds, observe=OBSERVE), sight(scenario, blind))
+    kind, policy = (RecurrentPPO, "MlpLstmPolicy") if study.memory else (PPO, "MlpPolicy")
+    own = {"lstm_hidden_size": 64, "enable_critic_lstm": False, "shared_lstm": True} if study.memory else {}
+    model = kind(
+        policy, env, learning_rate=lambda _: 1e-3 * budget.left(), n_steps=STEPS, batch_size=4096, n_epochs=4,
+        policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.7, **own}, seed=TRAINING_SEEDS + 1000 * seed,
+        device="cpu",
     )  # fmt: skip
     return model.learn(10**9, callback=budget), budget.curve
 
 
 @app.command()
 def main(
-    task: Annotated[str, typer.Argument(help="hard_water or two_swarms.")],
+    task: Annotated[str, typer.Argument(help=f"One of {', '.join(STUDIES)}.")],
     seed: Annotated[int, typer.Option(min=0, help="Of the training.")] = 0,
     blind: Annotated[bool, typer.Option("--blind", help="Train with all echoes zeroed.")] = False,
     minutes: Annotated[float, typer.Option(min=0.1, help="Processor time of the training.")] = 15.0,
     output: Annotated[Path, path_option("Folder that research.tasks writes to.")] = Path("results/tasks"),
 ) -> None:
-    """Train PPO on a task's scenario, and run it in the episodes of the tables.
+    """Train PPO on a task's scenario, or RecurrentPPO, and run it in the episodes of the tables.
 
     A sighted model is also run with its echoes zeroed. The time of a training is the processor's, and its measuring
     does not count. OUTPUT/learned/TASK gets a folder with model.zip, curve.csv and episodes.csv.
@@ -151,13 +144,13 @@ def main(
         console.print(f"  {folder}", highlight=False)
 
 
-def _rows(model: PPO, task: str, name: str, unseen: bool) -> Iterator[Row]:
+def _rows(model: Any, task: str, name: str, blind: bool) -> Iterator[Row]:
     """Episodes of a model on the sets that it is judged on."""
     study = STUDIES[task]
     for each in study.judged:
         scenario = load_scenario(study.sets[each].scenario, overrides=study.sets[each].overrides)
-        for seed, share in enumerate(judged(model, scenario, sight(scenario, unseen), 0, SEEDS)):
-            yield {"learner": name, "set": each, "seed": str(seed), "untouched_share": f"{share:.3f}"}
+        for run in judged(model, scenario, blind, range(SEEDS)):
+            yield {"learner": name, "set": each, "seed": str(run.seed), **cells(run.metrics, study.metrics, DIGITS)}
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
 """The page of a task, written from the rows of its episodes alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from string import Template
 
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, measured
-from research.tasks.studies import STUDIES, set_name
+from research.episodes import Row, measured, select
+from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.types import Float64
@@ -18,9 +18,15 @@ Columns = Mapping[str, Sequence[str]]
 """Sets by the head of their column."""
 _RESAMPLES = 2000
 _NO_LAWS = ("oracle", "carrot_informed", "random", "idle")
-_LEARNERS = {
-    "sighted": "PPO", "zeroed": "PPO, its echoes zeroed in these episodes", "blind": "PPO, trained with echoes zeroed",
-}  # fmt: skip
+_MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
+    "untouched_share": ("untouched", lambda values, _: _short(float(np.mean(values)))),
+    "collisions": ("contacts", lambda values, n: f"{np.mean(values) / n:.2f}"),
+    "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
+    "whole_ratio": ("time of the last", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
+    "min_obstacle_distance_m": ("to obstacles", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
+    "min_spacing_m": ("to others", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
+}
+"""Heads and cells of measures, from an episode's values and the number of vehicles."""
 
 
 def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
@@ -34,15 +40,26 @@ def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
     found: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         found.setdefault((row["policy"], row["set"]), []).append(row)
-    policies = list(dict.fromkeys(policy for policy, _ in found))
-    kinds = [name.split("-")[1] for name in STUDIES[task].judged if "-" in name]
+    names = _learners(task)
+    for row in episodes:
+        found.setdefault((names[row["learner"].split("-")[0]], row["set"]), []).append(row)
+    study, sets = STUDIES[task], STUDIES[task].judged
+    kinds = {name.split("-")[1]: [name] for name in sets if "-" in name}
     return Template(read_text("tasks", "stories", f"{task}.md")).substitute(
         episodes=f"{len(rows):,}",
-        tiers=_shares(found, policies, _tiers(task)),
-        kinds=_whole(found, policies, {kind: [set_name(task, kind)] for kind in kinds}),
-        many=_whole(found, policies, {kind: [set_name(task, kind, 54)] for kind in kinds}),
-        learners=_learners(found, policies, episodes, task),
+        tiers=_shares(found, study, _tiers(task)),
+        kinds=_measures(found, study, kinds),
+        measures=_measures(found, study, {}),
+        many=_measures(found, study, {kind: [set_name(task, kind, 54)] for kind in kinds}),
+        learners=_compared(found, task, {each.removeprefix(f"{task}-"): [each] for each in sets}),
+        informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}),
     )
+
+
+def _learners(task: str) -> dict[str, str]:
+    """What the trainings of a task are called in its tables, by the first word of their folders."""
+    name = "RecurrentPPO" if STUDIES[task].memory else "PPO"
+    return {"sighted": name, "zeroed": f"{name}, echoes zeroed here", "blind": f"{name}, trained with echoes zeroed"}
 
 
 def _tiers(task: str) -> Columns:
@@ -53,29 +70,44 @@ def _tiers(task: str) -> Columns:
     }
 
 
-def _shares(found: Found, policies: Sequence[str], columns: Columns) -> str:
-    """Share of the vehicles with its interval, and of whole swarms: a row for each policy that ran on all sets."""
+def _shares(found: Found, study: Study, columns: Columns) -> str:
+    """The headline with its interval, and the share of whole swarms: a row for each policy that ran on all sets."""
     table = [
-        (policy, *(f"{_with_interval(_values(mine, 'untouched_share'))}, {_mean(mine, 'whole')}" for mine in cells))
-        for policy in policies
+        (policy, *(f"{_with_interval(_values(mine, study.headline))}, {_mean(mine, 'whole')}" for mine in cells))
+        for policy in _policies(found)
         if (cells := _cells(found, policy, columns))
     ]
     return markdown_table(("policy", *columns), table)
 
 
-def _whole(found: Found, policies: Sequence[str], columns: Columns) -> str:
-    """Share of the vehicles and of whole swarms; contacts of a vehicle; time of those that are there."""
+def _measures(found: Found, study: Study, columns: Columns) -> str:
+    """The headline and the share of whole swarms in each column, or all together in two, and the other measures."""
     table: list[tuple[str, ...]] = []
-    for policy in policies:
-        if cells := _cells(found, policy, columns):
-            every = [rows for mine in cells for rows in mine]
-            n = load_scenario(every[0][0]["set"].split("-")[0]).swarm.num_vehicles
-            n = int(every[0][0]["set"].split("-")[2]) if every[0][0]["set"].count("-") == 2 else n
-            contacts = np.mean([value for rows in every for value in measured(rows, "collisions")]) / n
-            ratio = [value for rows in every for value in measured(rows, "time_ratio")]
-            shares = (f"{_mean(mine, 'untouched_share')}, {_mean(mine, 'whole')}" for mine in cells)
-            table.append((policy, *shares, f"{contacts:.2f}", f"{np.mean(ratio):.2f}" if ratio else "–"))
-    return markdown_table(("policy", *columns, "contacts", "time"), table)
+    for policy in _policies(found):
+        if cells := _cells(found, policy, columns or {"": [study.learns]}):
+            every = [row for mine in cells for rows in mine for row in rows]
+            shares = [[_mean(mine, name) for name in (study.headline, "whole")] for mine in cells]
+            own = [", ".join(two) for two in shares] if columns else shares[0]
+            table.append((policy, *own, *(_MEASURES[name][1](measured(every, name), _size(every[0]))
+                                          for name in _shown(study))))  # fmt: skip
+    heads = (*columns,) if columns else (study.headline.replace("_", " "), "whole")
+    return markdown_table(("policy", *heads, *(_MEASURES[name][0] for name in _shown(study))), table)
+
+
+def _shown(study: Study) -> list[str]:
+    """The other measures that have a column."""
+    return [name for name in study.metrics[1:] if name in _MEASURES]
+
+
+def _size(row: Row) -> int:
+    """How many vehicles there were."""
+    scenario, _, rest = row["set"].partition("-")
+    last = rest.split("-")[-1]
+    return int(last) if last.isdigit() else load_scenario(scenario).swarm.num_vehicles
+
+
+def _policies(found: Found) -> list[str]:
+    return list(dict.fromkeys(policy for policy, _ in found))
 
 
 def _cells(found: Found, policy: str, columns: Columns) -> list[list[Sequence[Row]]]:
@@ -85,46 +117,42 @@ def _cells(found: Found, policy: str, columns: Columns) -> list[list[Sequence[Ro
 
 
 def _values(mine: Sequence[Sequence[Row]], name: str) -> list[Float64]:
-    return [np.array(measured(rows, name)) for rows in mine]
+    """Of each set, shape (training, episode); a policy that was not trained here has one training."""
+    return [
+        np.array([measured(select(rows, learner=who) if who else rows, name) for who in _trainings(rows)])
+        for rows in mine
+    ]
+
+
+def _trainings(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row.get("learner", "") for row in rows))
 
 
 def _mean(mine: Sequence[Sequence[Row]], name: str) -> str:
     return _short(float(np.mean([values.mean() for values in _values(mine, name)])))
 
 
-def _learners(found: Found, policies: Sequence[str], episodes: Sequence[Row], task: str) -> str:
-    """Share of the vehicles: all trainings of a kind together, on each set, and the best law beside."""
-    judged, mixed = STUDIES[task].judged, _tiers(task)[STUDIES[task].learns]
-    columns = {name.removeprefix(f"{task}-"): [name] for name in judged}
-    laws = {
-        policy: {name: np.array([measured(found[policy, name], "untouched_share")]) for name in judged}
-        for policy in policies
-        if not policy.startswith(_NO_LAWS) and "_informed" not in policy and _cells(found, policy, columns)
-    }
-    best = max(laws, key=lambda policy: float(np.mean([laws[policy][name].mean() for name in mixed])))
-    learned = {words: _learned(episodes, name, judged) for name, words in _LEARNERS.items()}
-    rows = {words: shares for words, shares in learned.items() if shares} | {f"the best law: {best}": laws[best]}
+def _compared(found: Found, task: str, columns: Columns) -> str:
+    """The headline of trainings on each set, beside the best law that is told no more, and by how much they differ."""
+    study, names = STUDIES[task], _learners(task)
+    mixed = _tiers(task)[study.learns]
+    laws = [
+        policy
+        for policy in _policies(found)
+        if not policy.startswith(_NO_LAWS) and "_informed" not in policy and policy not in names.values()
+    ]
+    shares = {policy: _values(cells[0], study.headline) for policy in (*laws, *names.values())
+              if (cells := _cells(found, policy, {"": mixed}))}  # fmt: skip
+    best = max((law for law in laws if law in shares), key=lambda law: float(np.mean([v.mean() for v in shares[law]])))
+    called = {words: words for words in names.values() if words in shares} | {best: f"the best law: {best}"}
     table = [
-        (words, *(_short(float(shares[name].mean())) for name in judged),
-         _with_interval([shares[name] for name in mixed]))
-        for words, shares in rows.items()
+        (words, *(_mean(mine, study.headline) for mine in _cells(found, policy, columns)),
+         _with_interval(shares[policy]))
+        for policy, words in called.items()
     ]  # fmt: skip
-    gain = [learned["PPO"][name] - laws[best][name] for name in mixed]
-    table.append(("PPO above the best law", *[""] * len(judged), _with_interval(gain)))
-    return markdown_table(("", *columns, f"mean of {STUDIES[task].learns}"), table)
-
-
-def _learned(episodes: Sequence[Row], name: str, judged: Sequence[str]) -> dict[str, Float64]:
-    """Shares by set, shape (training, episode); nothing where there was no such training."""
-    learners = dict.fromkeys(row["learner"] for row in episodes if row["learner"].startswith(name))
-    by_set = {
-        each: [
-            measured([r for r in episodes if r["learner"] == learner and r["set"] == each], "untouched_share")
-            for learner in learners
-        ]
-        for each in judged
-    }
-    return {each: np.array(values) for each, values in by_set.items()} if learners else {}
+    gain = [own - law for own, law in zip(shares[names["sighted"]], shares[best], strict=True)]
+    table.append((f"{names['sighted']} above the best law", *[""] * len(columns), _with_interval(gain)))
+    return markdown_table(("", *columns, f"mean of {study.learns}"), table)
 
 
 def _with_interval(sets: Sequence[Float64]) -> str:

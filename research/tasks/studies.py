@@ -9,11 +9,7 @@ from research.sets import EpisodeSet
 _TOLD: dict[str, Any] = read_toml("tasks", "studies.toml")
 SEEDS: int = _TOLD["seeds"]
 """Episodes of each policy on each set, from seed 0 on."""
-METRICS = ("untouched_share", "whole", "time_ratio", "collisions", "min_obstacle_distance_m", "min_spacing_m")
-"""What is kept of an episode."""
-
-
-SIZE = "swarm.num_vehicles"
+SIZE, INFORMED = "swarm.num_vehicles", "task.informed"
 
 
 class Study(NamedTuple):
@@ -25,13 +21,22 @@ class Study(NamedTuple):
     """The scenario that a plain learner trains on."""
     worlds: int
     """How many it trains in."""
+    memory: bool
+    """Whether it has a memory."""
     judged: tuple[str, ...]
-    """Names of the sets that it is judged on, of the scenario's own size."""
+    """Names of the sets that it is judged on, which are the scenario's own in all but the kind of map."""
+    metrics: tuple[str, ...]
+    """What is kept of an episode."""
+
+    @property
+    def headline(self) -> str:
+        """What policies are compared by."""
+        return self.metrics[0]
 
 
-def set_name(scenario: str, kind: str = "", num_vehicles: int = 0) -> str:
-    """``two_swarms_easy``, ``hard_water-gate``, ``hard_water-gate-54``."""
-    return "-".join([scenario, *([kind] if kind else []), *([str(num_vehicles)] if num_vehicles else [])])
+def set_name(scenario: str, kind: str = "", number: int = 0) -> str:
+    """``two_swarms_easy``, ``hard_water-gate``, ``hard_water-gate-54``: the number of vehicles, or of the informed."""
+    return "-".join([scenario, *([kind] if kind else []), *([str(number)] if number else [])])
 
 
 def _study(told: dict[str, Any]) -> Study:
@@ -39,19 +44,20 @@ def _study(told: dict[str, Any]) -> Study:
     changes: dict[str, tuple[str, dict[str, object]]] = {}
     policies: dict[str, dict[str, range]] = {}
     for run in told["runs"]:
-        n = run.get("num_vehicles", 0)
+        own = {field: run[key] for field, key in ((SIZE, "num_vehicles"), (INFORMED, "informed")) if key in run}
         for scenario in run["scenarios"]:
             for kind in run.get("kinds", [""]):
-                name = set_name(scenario, kind, n)
-                own: dict[str, object] = {"task.kinds": [kind]} if kind else {}
-                changes[name] = scenario, (own | {SIZE: n} if n else own)
+                name = set_name(scenario, kind, *own.values())
+                changes[name] = scenario, ({"task.kinds": [kind], **own} if kind else own)
                 policies.setdefault(name, {}).update(dict.fromkeys(_TOLD["policies"][run["policies"]], range(SEEDS)))
     sets = {name: EpisodeSet(name, scenario, policies[name], own) for name, (scenario, own) in changes.items()}
-    judged = tuple(name for name, (_, own) in changes.items() if name.startswith(told["judged"]) and SIZE not in own)
-    return Study(sets, told["learns"], told["worlds"], judged)
+    judged = (each for each in sets if each.startswith(told["judged"]) and not {SIZE, INFORMED} & {*changes[each][1]})
+    return Study(sets, told["learns"], told["worlds"], told.get("memory", False), tuple(judged), tuple(told["metrics"]))
 
 
-STUDIES = {name: _study(_TOLD[name]) for name in ("hard_water", "two_swarms")}
+STUDIES = {name: _study(_TOLD[name]) for name in ("hard_water", "two_swarms", "few_informed")}
 """By task."""
 SETS = tuple(each for study in STUDIES.values() for each in study.sets.values())
 """All of them."""
+METRICS = frozenset(name for study in STUDIES.values() for name in study.metrics)
+"""All that are kept of some of them."""

@@ -318,16 +318,19 @@ def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
         out[0], out[1] = a_x, a_y
 
 
-def tuned(name: str) -> Mapping[str, float]:
+def tuned(name: str, what: str = "") -> Mapping[str, float]:
     """The best parameters that tuning found for a policy; all trials are in the CSV file beside them.
 
     Args:
-        name: the policy's name; ``POLICY.VEHICLE`` for parameters that were found in a vehicle's scale.
+        name: the policy's name.
+        what: a vehicle, for parameters that were found in its scale, or a task; "" for the paper's vehicle and task, or
+            the task that the policy is made for.
 
     Raises:
         PolicyError: the policy was not tuned.
     """
     folder = resources.files("uuv_marl.baselines").joinpath("tuned")
+    name = f"{name}.{what}" if what else name
     file = folder.joinpath(f"{name}.json")
     if not file.is_file():
         known = sorted(each.name.removesuffix(".json") for each in folder.iterdir() if each.name.endswith(".json"))

@@ -28,10 +28,10 @@ SEEDS = (10_000, 10_001, 10_002, 10_003)
 SCENARIO = "single_obstacle"
 SCALED = "sea_trial"
 """Where policies are tuned in the scale of a vehicle."""
-WALLS, FEW = "hard_water", "few_informed"
-"""Where policies are tuned that keep to the safety filter."""
+WALLS, GAP, FEW = "hard_water", "two_swarms", "few_informed"
+"""Tasks that policies are tuned for."""
 MAPS = tuple(range(10_000, 10_024))
-"""Seeds there: each draws another map."""
+"""Seeds there, each of which draws another map; for ``GAP``, with four times the vehicles, the first eight."""
 _FAILURE_COST_S = 1000.0
 _COLLISION_COST_S = 50.0
 _CLEARANCE_COST_S_PER_M = 20.0
@@ -73,11 +73,12 @@ class Space(NamedTuple):
     """The safety filter, whose numbers may be free, too; None for a policy without."""
 
     def parameters(self, drawn: dict[str, float]) -> dict[str, object]:
-        """The policy's keyword arguments."""
+        """The policy's keyword arguments: gains, safety filter, and what belongs to neither."""
         if self.barrier is None:
             return {"gains": self.gains(**drawn)}
         gains, barrier = with_numbers(drawn, self.gains(), self.barrier)
-        return {"gains": gains, "barrier": barrier}
+        own = {name: value for name, value in drawn.items() if name not in (*gains._fields, *barrier._fields)}
+        return {"gains": gains, "barrier": barrier, **own}
 
 
 SPACES: dict[str, Space] = {
@@ -92,13 +93,17 @@ SPACES: dict[str, Space] = {
     "olfati_saber": Space(_RANGES["olfati_saber"], olfati_saber.OlfatiSaberGains),
     "olfati_saber_informed": Space(_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.OlfatiSaberGains),
     "orca_informed": Space(_RANGES["orca"], orca.OrcaGains),
+    "apf.two_swarms": Space(_RANGES["apf"], apf.ApfGains, GAP),
+    "orca_informed.two_swarms": Space(_RANGES["orca"] | _RANGES["orca_at_a_gap"], orca.OrcaGains, GAP),
+    "carrot": Space(_RANGES["carrot"] | _RANGES["filter_at_a_gap"], ScoutGains, GAP, Barrier()),
     "scout": Space(_RANGES["scout"] | _RANGES["filter"] | _RANGES["gaps"], ScoutGains, WALLS, Barrier()),
     "tangent_bug": Space(_RANGES["tangent_bug"] | _RANGES["filter"], BugGains, WALLS, BUG_BARRIER),
     "leader_follower": Space(
         _RANGES["leader_follower"] | _RANGES["filter"], leader_follower.LeaderFollowerGains, FEW, Barrier()
     ),
 }
-"""Free parameters of every tuned policy, and how they become its gains."""
+"""Free parameters of every tuned policy, and how they become its gains. ``POLICY.TASK`` are numbers for a task, which
+``tuned_for`` chooses."""
 
 
 def tuning_cost(run: Run, scenario: Scenario) -> float:
@@ -174,7 +179,7 @@ def tune(
     journal beside them, which Optuna unpickles: continue only a journal that you trust.
 
     Args:
-        policy: name of one of ``SPACES``.
+        policy: a name of ``SPACES``.
         output: folder of the files.
         trials: to reach in all, those before an interruption included.
         report: called with the number of trials done and the best cost [s].
@@ -184,10 +189,11 @@ def tune(
     import optuna  # noqa: PLC0415 - an extra
 
     output = user_path(output)
-    space = SPACES[policy]
+    space, name, policy = SPACES[policy], policy, policy.partition(".")[0]
     where, changes = (space.scenario, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
-    scenario, name = granted(policy, load_scenario(where, overrides=changes)), policy
-    seeds = MAPS if where in (WALLS, FEW) else SEEDS
+    scenario = granted(policy, load_scenario(where, overrides=changes))
+    own_task = where not in (SCENARIO, SCALED)
+    seeds = SEEDS if not own_task else MAPS[:8] if where == GAP else MAPS
     if vehicle is not None:
         name = f"{policy}.{vehicle}"
 
@@ -203,7 +209,7 @@ def tune(
     best = min(finished, key=lambda trial: trial.values)
     result = {
         "policy": policy,
-        "objective": OBJECTIVES[seeds == MAPS],
+        "objective": OBJECTIVES[own_task],
         "scenario": where,
         **({} if vehicle is None else {"vehicle": vehicle}),
         "seeds": list(seeds),

@@ -131,7 +131,7 @@ def tune_command(
 ) -> None:
     """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
 
-    This needs the extra "tune" and takes ten to fifteen minutes per policy. Ctrl-C keeps the finished trials, and the
+    This needs the extra "tune" and takes ten to forty minutes per policy. Ctrl-C keeps the finished trials, and the
     same command continues. The shipped results are in uuv_marl/baselines/tuned. The trials' journal may hold pickled
     data, which can run code: continue only a journal that you trust.
     """

@@ -38,14 +38,21 @@ class ApfGains(NamedTuple):
 
 
 class Apf(Policy):
-    """Artificial potential field: a well at l(t), hills at neighbours, and at obstacles weighted by the way to l(t)."""
+    """Artificial potential field: a well at l(t), hills at neighbours, and at obstacles weighted by the way to l(t).
+
+    Args:
+        tuned_for: ``two_swarms``, or "" for the paper's scenarios.
+        gains: instead of the tuned ones.
+    """
 
     wishes_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: ApfGains | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: ApfGains | None = None
+    ) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or ApfGains(**tuned("apf"))
+        self.gains = gains or ApfGains(**tuned("apf", tuned_for))
         self._centres = scenario.sonar.echo_reports == "centre"
 
     def decide(self, percept: Percept) -> Float32:

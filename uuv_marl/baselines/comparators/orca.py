@@ -42,15 +42,22 @@ class OrcaGains(NamedTuple):
 
 
 class OrcaInformed(Policy):
-    """Reciprocal velocity obstacles: half-planes of velocity from neighbours' velocities and from echoes."""
+    """Reciprocal velocity obstacles: half-planes of velocity from neighbours' velocities and from echoes.
+
+    Args:
+        tuned_for: ``two_swarms``, or "" for the paper's scenarios.
+        gains: instead of the tuned ones.
+    """
 
     wishes_force: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = ("link",)
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OrcaGains | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: OrcaGains | None = None
+    ) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or OrcaGains(**tuned("orca_informed"))
+        self.gains = gains or OrcaGains(**tuned("orca_informed", tuned_for))
         self._speed = full_speed(self.limits)
         self._follow = velocity_gain(scenario)
         self._centres = scenario.sonar.echo_reports == "centre"

@@ -80,7 +80,7 @@ class BioInspiredPlus(BioInspired):
 
     Args:
         gains: those that were tuned by default.
-        tuned_for: a vehicle of the catalogue, in whose scale they were tuned; ``literature_185`` by default.
+        tuned_for: a vehicle of the catalogue, in whose scale they were tuned; "" for the paper's.
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
@@ -91,12 +91,10 @@ class BioInspiredPlus(BioInspired):
         num_worlds: int = 1,
         *,
         gains: BioInspiredGains | None = None,
-        tuned_for: str | None = None,
+        tuned_for: str = "",
     ) -> None:
-        name = "bio_inspired_plus" if tuned_for is None else f"bio_inspired_plus.{tuned_for}"
-        super().__init__(
-            scenario, num_worlds, gains=gains or BioInspiredGains(**tuned(name), feed_forward=FEED_FORWARD)
-        )
+        found = gains or BioInspiredGains(**tuned("bio_inspired_plus", tuned_for), feed_forward=FEED_FORWARD)
+        super().__init__(scenario, num_worlds, gains=found)
 
 
 @compiled

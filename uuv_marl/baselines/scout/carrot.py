@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from uuv_marl.baselines.policy import tuned
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.law import Scout
@@ -17,21 +18,23 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Bool, Float32
 
+_TUNED = tuned("carrot")
+
 
 class Carrot(Scout):
     """``scout`` behind a carrot on the straight way to a goal at rest; a reference that moves is followed as ever.
 
     Args:
-        speed: of the carrot [m/s]. Found with the preset ``gap``, as are the next two.
+        speed: of the carrot [m/s]. Tuned with the preset ``gap``, as are the next two.
         ahead_m: how far ahead it is [m]; nearer to the goal there is none.
         right_m: how far to starboard of the point that it leads to [m].
         preset: as for ``scout``, and so are ``gains`` and ``barrier``.
     """
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, speed: float = 2.9, ahead_m: float = 5.75,
-        right_m: float = 4.08, preset: str = "gap", gains: ScoutGains | None = None,
-        barrier: Barrier | None = None,
+        self, scenario: Scenario, num_worlds: int = 1, *, speed: float = _TUNED["speed"],
+        ahead_m: float = _TUNED["ahead_m"], right_m: float = _TUNED["right_m"], preset: str = "gap",
+        gains: ScoutGains | None = None, barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
         super().__init__(scenario, num_worlds, preset=preset, gains=gains, barrier=barrier)
         self.speed, self.ahead_m, self.right_m = speed, ahead_m, right_m
