@@ -137,7 +137,7 @@ def main(
         with working(f"Nothing is kept of a training that did not end; {folder} stays as it was") as bar:
             model, curve = learn(task, seed, blind, minutes, progress_line(bar, folder.name))
         write_rows(folder / "curve.csv", curve)
-        model.save(folder / "model")
+        model.save(folder / "model", exclude=["learning_rate", "lr_schedule"])  # which know the clock
         names = {folder.name: blind, **({} if blind else {f"zeroed-{seed}": True})}
         episodes = [row for name, unseen in names.items() for row in _rows(model, task, name, unseen)]
         write_rows(folder / "episodes.csv", episodes)
