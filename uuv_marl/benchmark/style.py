@@ -56,9 +56,11 @@ def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> Figure
 
 def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | None = None) -> None:
     """Trajectory, its goal (one waypoint: that alone) in a team's colour, and obstacles (across, up, radius) [m]."""
-    name, size = ("trajectory of l(t)", 11) if len(waypoints) > 1 else ("", 6)
+    name, size = ("trajectory of l(t)", 11) if len(waypoints) > 1 else ("", 5)
     ax.plot(*waypoints.T, "--", color=team or BLACK, linewidth=1.0, zorder=3, label=name)
-    ax.plot(*waypoints[-1], "*", color=team or AMBER, mec=BLACK, mew=0.6, ms=size, zorder=5, ls="", label="goal")
+    ax.plot(
+        *waypoints[-1], "*", color=team or AMBER, mec=team or BLACK, mew=0.6, ms=size, zorder=5, ls="", label="goal"
+    )
     for k, (across, up, radius) in enumerate(obstacles):
         ax.add_patch(Circle((across, up), radius, color="0.45", zorder=2, label="" if k else "obstacle"))
     ax.set_aspect("equal")

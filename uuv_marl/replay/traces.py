@@ -1,6 +1,5 @@
 """Recordings of what a benchmark has saved: less than a simulation shows, but at once and without the policy."""
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -19,6 +18,7 @@ from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Recording, Water
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.files import frozen
 from uuv_marl.sim.sea.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import reference
@@ -166,7 +166,7 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
 def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
     """The scenario that was run, with what the policy was granted."""
     try:
-        scenario = Scenario.model_validate_json(json.dumps(saved.content["scenarios"][name]))
+        scenario = Scenario.model_validate(frozen(saved.content["scenarios"][name]))
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(map(str, first["loc"]))
