@@ -50,7 +50,9 @@ def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
         tiers=_shares(found, study, _tiers(task)),
         kinds=_measures(found, study, kinds),
         measures=_measures(found, study, {}),
-        many=_measures(found, study, {kind: [set_name(task, kind, 54)] for kind in kinds}),
+        many=_measures(
+            found, study, {kind: sets for kind in kinds if (sets := [set_name(task, kind, 54)])[0] in study.sets}
+        ),
         learners=_compared(found, task, {each.removeprefix(f"{task}-"): [each] for each in sets}),
         informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}),
     )
