@@ -98,7 +98,7 @@ def walk(
     for w in range(kept.speed.shape[0]):
         for k in range(kept.speed.shape[1] if worlds[w] else 0):
             while kept.turns[w, k] < kept.turn_at.shape[2] and kept.turn_at[w, k, kept.turns[w, k]] <= time_s[w]:
-                kept.to_turn[w, k] += kept.turn_by[w, k, kept.turns[w, k]]
+                kept.to_turn[w, k] = kept.turn_by[w, k, kept.turns[w, k]]
                 kept.turns[w, k] += 1
             turn = min(max(kept.to_turn[w, k], -rate * period), rate * period)
             kept.to_turn[w, k] -= turn

@@ -172,7 +172,7 @@ def follow(
             own = math.hypot(goal[0] - pose[0], goal[1] - pose[1])
             if track.heard_s[w, i] > 0.0 and claimed(w, i, goal[0], goal[1], own, g.claim_m, kept):
                 track.heard_s[w, i] = 0.0
-            _turn_back(w, i, see, box, g, track)
+            _turn_back(w, i, flat.shape[1], see, box, g, track)
 
 
 @compiled
@@ -184,26 +184,29 @@ def place_in_box(w: int, i: int, see: Fields, box: Float32) -> tuple[float, floa
 
 
 @compiled
-def _turn_back(w: int, i: int, see: Fields, box: Float32, g: Seeking, track: Track) -> None:
-    """Begin a search, along the bow or the lane, and mirror it where it comes to the box's side."""
+def _turn_back(w: int, i: int, num: int, see: Fields, box: Float32, g: Seeking, track: Track) -> None:
+    """Begin a search, along the bow or the lane, and turn it at the box's side: mirrored, or into another lane."""
     way, most = track.search[w, i], g.half_m - g.edge_m
     if way[0] == 0.0 and way[1] == 0.0:
         way[0], way[1] = float(box[w, i, 0]), float(box[w, i, 1])
         if g.lanes:
-            way[0], way[1] = (1.0 if i % 2 == 0 else -1.0), 0.0
+            way[0], way[1] = (1.0 if i % 2 == 0 else -1.0), i + 0.5
     place = place_in_box(w, i, see, box)
-    for k in range(2):
+    for k in range(1 if g.lanes else 2):
         if abs(place[k]) > most and place[k] * way[k] > 0.0:
             way[k] = -way[k]
+            if g.lanes:
+                way[1] = (way[1] + 1.0) % num
 
 
 @compiled
-def _searching(w: int, i: int, num: int, see: Fields, box: Float32, g: Seeking, kept: Surroundings, track: Track
-) -> tuple[float, float]:  # fmt: skip
+def _searching(
+    w: int, i: int, num: int, see: Fields, box: Float32, g: Seeking, kept: Surroundings, track: Track
+) -> tuple[float, float]:
     """The velocity that a search wishes, in the map [m/s]; ``num`` vehicles have lanes."""
     x, y = track.search[w, i, 0], track.search[w, i, 1]
     if g.lanes:
-        off = (2.0 * (i + 0.5) / num - 1.0) * g.half_m - place_in_box(w, i, see, box)[1]
+        off = (2.0 * y / num - 1.0) * g.half_m - place_in_box(w, i, see, box)[1]
         far = math.hypot(_AHEAD_M, off)
         x, y = x * _AHEAD_M / far, off / far
     c, s = float(box[w, i, 0]), float(box[w, i, 1])
