@@ -19,7 +19,7 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, tell_walls
-from uuv_marl.tasks.maps.walls import Range
+from uuv_marl.tasks.maps.walls import Range, between
 from uuv_marl.tasks.reach import Reach
 from uuv_marl.tasks.task import Task, Terms
 from uuv_marl.types import Bool, Float64, Int64
@@ -172,18 +172,19 @@ class SilentTargets(Reach):
         numbers, scenario, memory = self.numbers, self.swarm.scenario, self.memory
         length, _ = scenario.start.sides(self.swarm.num_vehicles)
         eta, nu = start_state(scenario, np.array([[0.5 * length, 0.0], [length, 0.0]]), rng)
-        m, n, full = numbers.targets, len(eta), top_speed(scenario.vehicle, scenario.actuators)
+        (m, turns), n, full = memory.turn_at.shape[1:], len(eta), top_speed(scenario.vehicle, scenario.actuators)
         discs = np.full((m, 3), scenario.contact.hull_radius_m)
         discs[:, :2] = [self._place(rng) for _ in range(m)]
-        memory.speed[world] = full * rng.uniform(*numbers.speed_share, m)
+        memory.speed[world] = [full * between(rng, numbers.speed_share) for _ in range(m)]
         memory.course[world] = rng.uniform(-math.pi, math.pi, m)
-        shape = memory.turn_at.shape[1:]
-        memory.turn_at[world] = np.cumsum(rng.uniform(*numbers.turn_s, shape), axis=1)
-        memory.turn_by[world] = rng.uniform(-math.pi, math.pi, shape)
+        spans = np.array([[between(rng, numbers.turn_s) for _ in range(turns)] for _ in range(m)])
+        memory.turn_at[world] = np.cumsum(spans, axis=1)
+        memory.turn_by[world] = rng.uniform(-math.pi, math.pi, (m, turns))
         memory.found_s[world] = math.inf
+        middle = np.array([[-1.0, 0.0], [0.0, 0.0]])
         return Draw(
-            (np.array([[-1.0, 0.0], [0.0, 0.0]]),), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64),
-            informed=np.ones(n, np.bool_), duration_s=self.longest_s(scenario),
+            (middle,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
+            duration_s=self.longest_s(scenario),
         )  # fmt: skip
 
     def _place(self, rng: np.random.Generator) -> Float64:
@@ -196,7 +197,7 @@ class SilentTargets(Reach):
 
     def begin(self, world: int) -> None:
         """How far targets are."""
-        self.memory.left[world] = self._left(self.away())[world]
+        self.memory.left[world] = self._left()[world]
 
     def move(self, running: Bool) -> None:
         """Before a step: where targets go."""
@@ -212,31 +213,32 @@ class SilentTargets(Reach):
         x, y = np.moveaxis(targets[:, None, :, :2] - state.eta[:, :, None, :2], -1, 0)
         return np.where(state.alive[:, :, None], np.sqrt(x * x + y * y), math.inf)
 
-    def _left(self, away: Float64) -> Float64:
-        """Distance to the nearest target that no other vehicle holds [m], 0 where there is none."""
-        near = away <= self.numbers.held_m
-        taken = near.sum(axis=1, keepdims=True) > near
-        nearest = np.where(taken, math.inf, away).min(axis=2)
-        return np.where(np.isfinite(nearest), nearest, 0.0)
+    def near(self) -> Bool:
+        """Who holds which target, shape (world, vehicle, target)."""
+        held_m: float = self.numbers.held_m
+        return self.away() <= held_m
 
-    def held(self) -> Bool:
-        """Targets that are held, shape (world, target)."""
-        return (self.away() <= self.numbers.held_m).any(axis=1)
+    def _left(self) -> Float64:
+        """Distance to the nearest target that no other vehicle holds [m], 0 where there is none."""
+        near = self.near()
+        taken = near.sum(axis=1, keepdims=True) > near
+        nearest = np.where(taken, math.inf, self.away()).min(axis=2)
+        return np.where(np.isfinite(nearest), nearest, 0.0)
 
     def there(self) -> Bool:
         """Vehicles that hold a target."""
-        return (self.away() <= self.numbers.held_m).any(axis=2)
+        return self.near().any(axis=2)
 
     def update(self, running: Bool) -> None:
-        """Who is held, and how far the others are."""
+        """Which targets are held, and how far the others are."""
         super().update(running)
-        memory, time_s = self.memory, self.swarm.facts.time_s
-        held, late = self.held(), running & (time_s > 0.5 * self.swarm.time_limit_s)
+        memory, time_s, held = self.memory, self.swarm.facts.time_s, self.near().any(axis=1)
+        late = running & (time_s > 0.5 * self.swarm.time_limit_s)
         memory.held[late] += held[late]
         memory.judged[late] += 1.0
         found = running[:, None] & held
         memory.found_s[found] = np.minimum(memory.found_s, time_s[:, None])[found]
-        memory.was[running], memory.left[running] = memory.left[running], self._left(self.away())[running]
+        memory.was[running], memory.left[running] = memory.left[running], self._left()[running]
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The heading in the box, which echoes are targets', and where it is granted the way to one's own."""
@@ -263,7 +265,11 @@ class SilentTargets(Reach):
 
     def reward(self, running: Bool) -> Terms:
         """Also what is held."""
-        share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s * self.held().mean(axis=1)
+        share = (
+            self.swarm.scenario.timing.decision_period_s
+            / self.swarm.time_limit_s
+            * self.near().any(axis=1).mean(axis=1)
+        )
         held = self._weight.arrival * share[:, None]
         return {**super().reward(running), "held": np.broadcast_to(held, self.swarm.state.alive.shape)}
 

@@ -51,7 +51,9 @@ class Track(NamedTuple):
 
     target: Annotated[Float64, "world vehicle 4", "Place [m] and velocity [m/s] of its target."]
     heard_s: Annotated[Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."]
-    search: Annotated[Float64, "world vehicle 2", "Direction of its search in the box's axes; zeros before."]
+    search: Annotated[
+        Float64, "world vehicle 2", "Direction of its search in the box, or in lanes that of x, and the lane."
+    ]
 
 
 SeekerMemory = with_surroundings("SeekerMemory", Track)
@@ -59,10 +61,8 @@ _ALPHA, _BETA = 0.8, 0.5
 """Gains by which an echo corrects a target's place and velocity [1]. Assumed."""
 _GATE_M, _GATE_MPS = 8.0, 4.0
 """An echo so near to where the target is expected is its own, and farther by this for the time unheard. Assumed."""
-_KEEP_M, _RATE = 6.0, 0.8
-"""Distance kept from every target's surface [m], and how fast what is left is closed [1/s]. Assumed."""
-_TURNS_S = 1.2
-_GOES_MPS = 0.5
+_SILENT_S, _GOES_MPS = 1.2, 0.5
+"""Unheard for so long, a target is turned to; slower than this, one stays this side of it, not behind it. Assumed."""
 _AHEAD_M = 40.0
 """Who is beside its lane comes back to it so far ahead [m]. Assumed."""
 
@@ -86,53 +86,65 @@ class NearestTarget(Scout):
         super().__init__(scenario, num_worlds, preset=preset, gains=gains, barrier=barrier)
         self._seeks = "target" in self.layout.starts
         half = 0.5 * scenario.task_numbers.side_m if self._seeks else 0.0
-        self.seeking = Seeking(*map(float, (speed, rate, stay_m, claim_m, lost_s, edge_m, half)), bool(lanes))
+        self.seeking = Seeking(
+            float(speed), float(rate), float(stay_m), float(claim_m), float(lost_s), float(edge_m), half, bool(lanes)
+        )
         split = len(Surroundings._fields)
         self._kept, self._track = Surroundings(*self.memory[:split]), Track(*self.memory[split:])
-        self.planes: Float64 = np.zeros((len(self.planes) + scenario.sonar.num_active_sectors, 3))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Remember a percept without the targets, which are no obstacles to go round, and the targets."""
-        if not self._seeks:
-            self._remember(percept, worlds)
-            return
-        hidden = dataclasses.replace(percept, flat=percept.flat.copy())
-        targets = percept["target"] > 0.0
-        for name in ("echo", "echo_range", "echo_position"):
-            hidden[name][targets] = 0.0
-        self._remember(hidden, worlds)
-        follow(self.flat(percept), self.at, worlds, percept["target"], percept["box"], self.model.own.period_s,
-               self.seeking, self._kept, self._track)  # fmt: skip
-
-    def _remember(self, percept: Percept, worlds: Bool) -> None:
-        update_memory(self.flat(percept), self.layout.offsets, worlds, self.model, self.kept_s, self._kept)
+        """Remember the targets, and a percept without them, since they are nothing to go round."""
+        seen, period = dataclasses.replace(percept, flat=percept.flat.copy()), self.model.own.period_s
+        for name in ("echo", "echo_range", "echo_position") if self._seeks else ():
+            seen[name][percept["target"] > 0.0] = 0.0
+        update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.kept_s, self._kept)
+        if self._seeks:
+            flat, targets, box = self.flat(percept), percept["target"], percept["box"]
+            follow(flat, self.layout.offsets, worlds, targets, box, period, self.seeking, self._kept, self._track)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        action = np.zeros((*self._track.heard_s.shape, 2), np.float32)
+        action, period, g = np.zeros((*self._track.heard_s.shape, 2), np.float32), self.model.own.period_s, self.grown()
         if self._seeks:
             seek(
-                self.flat(percept), self.at, self.active, percept["target"], percept["box"], self.model.own.period_s,
-                self.seeking, self.grown(), self.barrier, self.limits, self.gain, self._kept, self._track, self.planes,
-                action,
+                self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self.seeking, g,
+                self.barrier, self.limits, self.gain, self._kept, self._track, self.planes, action,
             )  # fmt: skip
         else:
             decide_all(
-                self.active, self.model.own.period_s, self.grown(), self.barrier, self.limits, self.gain, self._kept,
-                self.planes, self._trims, action,
+                self.active, period, g, self.barrier, self.limits, self.gain, self._kept, self.planes, self._trims,
+                action,
             )  # fmt: skip
         return action
 
 
 @compiled
-def claimed(w: int, i: int, x: float, y: float, own: float, claim_m: float, kept: Surroundings) -> bool:
-    """Whether another vehicle is nearer to a target at (x, y) in the map than ``own`` [m], and near enough."""
+def claimed(w: int, i: int, x: float, y: float, claim_m: float, kept: Surroundings) -> bool:
+    """Whether another vehicle is nearer to a target at (x, y) in the map, and near enough."""
+    least = min(math.hypot(kept.pose[w, i, 0] - x, kept.pose[w, i, 1] - y), claim_m)
     for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] > 0.0:
-            away = math.hypot(kept.place[w, i, k, 0] - x, kept.place[w, i, k, 1] - y)
-            if away < own and away < claim_m:
-                return True
+        if kept.known[w, i, k] > 0.0 and math.hypot(kept.place[w, i, k, 0] - x, kept.place[w, i, k, 1] - y) < least:
+            return True
     return False
+
+
+@compiled
+def _heard(
+    w: int, i: int, gate: float, see: Fields, targets: Float32, g: Seeking, kept: Surroundings, track: Track
+) -> tuple[float, float, bool]:
+    """Place in the map of the target heard that a vehicle follows, or is to follow now [m], and whether there is one.
+
+    ``gate``: how far it may be from where it is expected [m]; infinite where nothing is followed.
+    """
+    pose, (x, y, found), best = kept.pose[w, i], (0.0, 0.0, False), gate
+    from_x, from_y = (pose[0], pose[1]) if gate == math.inf else (track.target[w, i, 0], track.target[w, i, 1])
+    for a in range(see.echo.shape[2]):
+        if targets[w, i, a] > 0.0:
+            p_x, p_y = to_map(see.echo_position[w, i, a, 0], see.echo_position[w, i, a, 1], pose)
+            far = math.hypot(p_x - from_x, p_y - from_y)
+            if far < best and not claimed(w, i, p_x, p_y, g.claim_m, kept):
+                best, x, y, found = far, p_x, p_y, True
+    return x, y, found
 
 
 @compiled
@@ -146,31 +158,21 @@ def follow(
         for i in range(flat.shape[1] if worlds[w] else 0):
             if kept.begun[w, i] == 0.0:
                 continue
-            goal, pose = track.target[w, i], kept.pose[w, i]
-            track.heard_s[w, i] -= period
+            goal = track.target[w, i]
             goal[0], goal[1] = goal[0] + period * goal[2], goal[1] + period * goal[3]
-            follows = track.heard_s[w, i] > 0.0
-            gate = _GATE_M + _GATE_MPS * (g.lost_s - track.heard_s[w, i])
-            best, p_x, p_y = gate if follows else math.inf, 0.0, 0.0
-            for a in range(see.echo.shape[2]):
-                if targets[w, i, a] == 0.0:
-                    continue
-                x, y = to_map(float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1]), pose)
-                own = math.hypot(x - pose[0], y - pose[1])
-                far = math.hypot(x - goal[0], y - goal[1]) if follows else own
-                if far < best and (follows or not claimed(w, i, x, y, own, g.claim_m, kept)):
-                    best, p_x, p_y = far, x, y
-            if best < (gate if follows else math.inf):
-                d_x, d_y = p_x - goal[0], p_y - goal[1]
-                since = g.lost_s - track.heard_s[w, i]
-                if follows:
-                    goal[0], goal[1] = goal[0] + _ALPHA * d_x, goal[1] + _ALPHA * d_y
-                    goal[2], goal[3] = goal[2] + _BETA * d_x / since, goal[3] + _BETA * d_y / since
-                else:
-                    goal[0], goal[1], goal[2], goal[3] = p_x, p_y, 0.0, 0.0
+            track.heard_s[w, i] -= period
+            since, follows = g.lost_s - track.heard_s[w, i], track.heard_s[w, i] > 0.0
+            gate = _GATE_M + _GATE_MPS * since if follows else math.inf
+            x, y, found = _heard(w, i, gate, see, targets, g, kept, track)
+            if found and follows:
+                d_x, d_y = x - goal[0], y - goal[1]
+                goal[0], goal[1] = goal[0] + _ALPHA * d_x, goal[1] + _ALPHA * d_y
+                goal[2], goal[3] = goal[2] + _BETA * d_x / since, goal[3] + _BETA * d_y / since
+            elif found:
+                goal[0], goal[1], goal[2], goal[3] = x, y, 0.0, 0.0
+            if found:
                 track.heard_s[w, i] = g.lost_s
-            own = math.hypot(goal[0] - pose[0], goal[1] - pose[1])
-            if track.heard_s[w, i] > 0.0 and claimed(w, i, goal[0], goal[1], own, g.claim_m, kept):
+            elif follows and claimed(w, i, goal[0], goal[1], g.claim_m, kept):
                 track.heard_s[w, i] = 0.0
             _turn_back(w, i, flat.shape[1], see, box, g, track)
 
@@ -215,38 +217,19 @@ def _searching(
 
 @compiled
 def _keeping(w: int, i: int, g: Seeking, kept: Surroundings, track: Track) -> tuple[float, float]:
-    """The velocity that keeps a vehicle near its target, in the map [m/s]."""
+    """The velocity that keeps a vehicle behind its target, or leads to one that isn't heard, in the map [m/s]."""
     goal, pose = track.target[w, i], kept.pose[w, i]
-    x, y = goal[0] - pose[0], goal[1] - pose[1]
-    away, speed = max(math.hypot(x, y), 1e-6), math.hypot(goal[2], goal[3])
-    if track.heard_s[w, i] < g.lost_s - _TURNS_S:
-        return g.rate * x + goal[2], g.rate * y + goal[3]
-    behind = min(speed / _GOES_MPS, 1.0) / max(speed, 1e-6)
-    b_x, b_y = behind * goal[2] + (1.0 - behind * speed) * x / away, behind * goal[3] + (1.0 - behind * speed) * y / away
-    return goal[2] + g.rate * (x - g.stay_m * b_x), goal[3] + g.rate * (y - g.stay_m * b_y)
-
-
-@compiled
-def target_planes(
-    w: int, i: int, num: int, targets: Float32, see: Fields, kept: Surroundings, planes: Float64
-) -> int:  # fmt: skip
-    """Add half-planes that keep a velocity from targets to the first ``num``, and say how many there are then."""
-    for a in range(see.echo.shape[2]):
-        if targets[w, i, a] > 0.0:
-            x, y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
-            away = max(math.hypot(x, y), 1e-6)
-            n_x, n_y = to_map_axes(x / away, y / away, kept.pose[w, i])
-            planes[num, 0], planes[num, 1] = n_x, n_y
-            planes[num, 2] = _RATE * (see.echo_range[w, i, a] - _KEEP_M)
-            num += 1
-    return num
+    x, y, v_x, v_y = goal[0] - pose[0], goal[1] - pose[1], goal[2], goal[3]
+    b_x, b_y = (v_x, v_y) if math.hypot(v_x, v_y) > _GOES_MPS else (x, y)
+    stay = g.stay_m if track.heard_s[w, i] > g.lost_s - _SILENT_S else 0.0
+    stay /= max(math.hypot(b_x, b_y), 1e-6)
+    return v_x + g.rate * (x - stay * b_x), v_y + g.rate * (y - stay * b_y)
 
 
 @compiled
 def seek(
-    flat: Float32, at: Starts, worlds: Bool, targets: Float32, box: Float32, period: float, g: Seeking,
-    scout: ScoutGains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, track: Track,
-    planes: Float64, action: Float32,
+    flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, g: Seeking, scout: ScoutGains,
+    barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, track: Track, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle."""
     see, n = fields(flat, at), flat.shape[1]
@@ -260,5 +243,4 @@ def seek(
                 w_x, w_y = pushed(w_x, w_y, w, i, scout.push, scout.push_range, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, barrier, kept, planes)
-                num = target_planes(w, i, num, targets, see, kept, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain * scout.steering, limits, kept, action)
