@@ -215,8 +215,7 @@ class SilentTargets(Reach):
 
     def near(self) -> Bool:
         """Who holds which target, shape (world, vehicle, target)."""
-        held_m: float = self.numbers.held_m
-        return self.away() <= held_m
+        return np.asarray(self.away() <= self.numbers.held_m, np.bool_)
 
     def _left(self) -> Float64:
         """Distance to the nearest target that no other vehicle holds [m], 0 where there is none."""
