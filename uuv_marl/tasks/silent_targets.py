@@ -213,25 +213,25 @@ class SilentTargets(Reach):
         x, y = np.moveaxis(targets[:, None, :, :2] - state.eta[:, :, None, :2], -1, 0)
         return np.where(state.alive[:, :, None], np.sqrt(x * x + y * y), math.inf)
 
-    def near(self) -> Bool:
-        """Who holds which target, shape (world, vehicle, target)."""
-        return np.asarray(self.away() <= self.numbers.held_m, np.bool_)
+    def held(self) -> Bool:
+        """Targets that are held, shape (world, target)."""
+        return self.away().min(axis=1) <= self.numbers.held_m
 
     def _left(self) -> Float64:
         """Distance to the nearest target that no other vehicle holds [m], 0 where there is none."""
-        near = self.near()
-        taken = near.sum(axis=1, keepdims=True) > near
-        nearest = np.where(taken, math.inf, self.away()).min(axis=2)
+        away = self.away()
+        near = away <= self.numbers.held_m
+        nearest = np.where(near.sum(axis=1, keepdims=True) > near, math.inf, away).min(axis=2)
         return np.where(np.isfinite(nearest), nearest, 0.0)
 
     def there(self) -> Bool:
         """Vehicles that hold a target."""
-        return self.near().any(axis=2)
+        return self.away().min(axis=2) <= self.numbers.held_m
 
     def update(self, running: Bool) -> None:
         """Which targets are held, and how far the others are."""
         super().update(running)
-        memory, time_s, held = self.memory, self.swarm.facts.time_s, self.near().any(axis=1)
+        memory, time_s, held = self.memory, self.swarm.facts.time_s, self.held()
         late = running & (time_s > 0.5 * self.swarm.time_limit_s)
         memory.held[late] += held[late]
         memory.judged[late] += 1.0
@@ -267,7 +267,7 @@ class SilentTargets(Reach):
         share = (
             self.swarm.scenario.timing.decision_period_s
             / self.swarm.time_limit_s
-            * self.near().any(axis=1).mean(axis=1)
+            * self.held().mean(axis=1)
         )
         held = self._weight.arrival * share[:, None]
         return {**super().reward(running), "held": np.broadcast_to(held, self.swarm.state.alive.shape)}
