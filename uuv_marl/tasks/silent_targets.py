@@ -264,11 +264,7 @@ class SilentTargets(Reach):
 
     def reward(self, running: Bool) -> Terms:
         """Also what is held."""
-        share = (
-            self.swarm.scenario.timing.decision_period_s
-            / self.swarm.time_limit_s
-            * self.held().mean(axis=1)
-        )
+        share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s * self.held().mean(axis=1)
         held = self._weight.arrival * share[:, None]
         return {**super().reward(running), "held": np.broadcast_to(held, self.swarm.state.alive.shape)}
 
