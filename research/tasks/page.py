@@ -19,6 +19,8 @@ Columns = Mapping[str, Sequence[str]]
 _RESAMPLES = 2000
 _NO_LAWS = ("oracle", "carrot_informed", "random", "idle")
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
+    "found_share": ("found", lambda values, _: _short(float(np.mean(values)))),
+    "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
     "untouched_share": ("untouched", lambda values, _: _short(float(np.mean(values)))),
     "collisions": ("contacts", lambda values, n: f"{np.mean(values) / n:.2f}"),
     "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
