@@ -129,7 +129,7 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
 def told_rows(scenario: Scenario) -> Table:
     """Rows that a scenario's task tells: those it always does, and those of its own channels that are granted."""
     kind, granted = scenario.task_class, scenario.sonar.channels
-    rows: Table = kind.rows(scenario)
+    rows: Table = kind.observed
     return sum((own for name, own in kind.channels.items() if name in granted), rows)
 
 

@@ -123,7 +123,7 @@ def main(
     minutes: Annotated[float, typer.Option(min=0.1, help="Processor time of the training.")] = 15.0,
     output: Annotated[Path, path_option("Folder that research.tasks writes to.")] = Path("results/tasks"),
 ) -> None:
-    """Train PPO on a task's scenario, or RecurrentPPO, and run it in the episodes of the tables.
+    """Train PPO on a task's scenario, or RecurrentPPO where the study has a memory, and run it in the tables' episodes.
 
     A sighted model is also run with its echoes zeroed. The time of a training is the processor's, and its measuring
     does not count. OUTPUT/learned/TASK gets a folder with model.zip, curve.csv and episodes.csv.

@@ -14,7 +14,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     """The fields in order. Positions are relative to l(t), north and east; vehicles come in the order of agents."""
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
     speed = PerceptField("obstacle_velocity", (m, 2), SPEED, "per obstacle that moves: its velocity, north and east")
-    observed = scenario.task_class.rows(scenario)
+    observed = scenario.task_class.observed
     told = (row._replace(shape=(n, *row.shape), meaning=f"per vehicle: {row.meaning}") for row in observed)
     groups = scenario.task_class.sizes(scenario).get("group", 1)
     return (
@@ -60,7 +60,7 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
         (obstacles[:, :, :2] - origin) * present,
         obstacles[:, :, 2:] * present,
         *([course.obstacle_velocity[:, :m]] if swarm.scenario.traffic.moves else []),
-        *(swarm.percept[row.name] for row in swarm.scenario.task_class.rows(swarm.scenario)),
+        *(swarm.percept[row.name] for row in swarm.scenario.task_class.observed),
     )
     rows = [np.reshape(field, (swarm.num_worlds, -1)) for field in fields]
     flat = np.concatenate(rows, axis=1, dtype=np.float32, casting="same_kind")

@@ -82,7 +82,8 @@ class _Tape:
         seen = list(self._inspect)
         percept = swarm.percept
         self._add("time_s", facts.time_s[0])
-        self._groups = groups_of(swarm)
+        if action is None:
+            self._groups = groups_of(swarm)
         self._add("references", facts.reference[0, :, :2])
         self._add("marks", swarm.task.marks(0))
         self._add("traffic", swarm.course.obstacles[0, : swarm.course.num_obstacles[0], :2])

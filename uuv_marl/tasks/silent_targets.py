@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import DIRECTION, FLAG, PerceptField, Table
+from uuv_marl.percept import DIRECTION, PerceptField, Table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Positive, Section, within
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -115,7 +115,8 @@ def walk(
 class SilentTargets(Reach):
     """Find targets that move in a box and make no sound, only echoes, and keep within ``held_m`` of them.
 
-    All obstacles are targets; they are as large as a vehicle's hull. The reference is the middle of the box, at rest.
+    All obstacles are targets, as large as a vehicle's hull, so that every echo is one's. The reference is the middle of
+    the box, at rest.
     The headline is ``held_share``; a vehicle succeeds that touches nothing.
     """
 
@@ -155,12 +156,6 @@ class SilentTargets(Reach):
         numbers, limit = scenario.task_numbers, scenario.time_limit.of(cls.longest_s(scenario))
         turns = math.ceil(limit / numbers.turn_s[0])
         return {"point": 2, "obstacle": numbers.targets, "target": numbers.targets, "turn": turns}
-
-    @classmethod
-    def rows(cls, scenario: Scenario) -> Table:
-        """Also which echoes are a target's."""
-        meaning = "per active sub-sector: 1 if the obstacle that returns an echo is a target, else 0"
-        return (*cls.observed, PerceptField("target", (scenario.sonar.num_active_sectors,), FLAG, meaning))
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
@@ -240,9 +235,9 @@ class SilentTargets(Reach):
         memory.was[running], memory.left[running] = memory.left[running], self._left()[running]
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
-        """The heading in the box, which echoes are targets', and where it is granted the way to one's own."""
+        """The heading in the box, and where it is granted the way to one's own target."""
         swarm = self.swarm
-        told = {"box": swarm.heading, "target": swarm.percept["echo"].astype(np.float64)}
+        told = {"box": swarm.heading}
         return told | self._ways() if "way" in swarm.scenario.sonar.channels else told
 
     def _ways(self) -> dict[str, Float64]:

@@ -104,11 +104,6 @@ class Task:
         """Lengths of axes: ``group``, ``point`` (corners), ``obstacle`` where unusual, and of those of ``Memory``."""
         return {}
 
-    @classmethod
-    def rows(cls, scenario: Scenario) -> Table:  # noqa: ARG003 - for those whose rows have a scenario's shape
-        """The rows ``observed``."""
-        return cls.observed
-
     # What an episode starts from, and what moves.
 
     @classmethod

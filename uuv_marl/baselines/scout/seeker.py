@@ -2,7 +2,7 @@
 
 It has one target, which it remembers for a while as it was heard last, moving on. Without one it searches: straight on
 and mirrored at the sides of the box, or to and fro in lanes, one for each vehicle. Pushes among near neighbours and the
-safety filter are those of ``scout``.
+safety filter are as in ``scout``.
 """
 
 import dataclasses
@@ -14,10 +14,9 @@ import numpy as np
 from uuv_marl.baselines.memory import Surroundings, update_memory
 from uuv_marl.baselines.memory.pose import to_map, to_map_axes
 from uuv_marl.baselines.memory.table import with_surroundings
-from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely
-from uuv_marl.baselines.scout.gains import ScoutGains
-from uuv_marl.baselines.scout.law import Scout, decide_all, modulated, pushed
+from uuv_marl.baselines.policy import Limits, tuned
+from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
+from uuv_marl.baselines.scout.law import Scout, decide_all, pushed
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -25,25 +24,27 @@ from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Bool, Float32, Float64
 
 
-class Seeking(NamedTuple):
-    """Free parameters beside those of ``scout``."""
+class SeekerGains(NamedTuple):
+    """Free parameters. Those by default were found by hand; the policy has tuned ones."""
 
-    speed: float
+    speed: float = 5.0
     """Of a search [m/s]."""
-    rate: float
+    rate: float = 0.5
     """Speed towards the target, beside its own, over the distance to where one stays behind it [1/s]."""
-    stay_m: float
+    stay_m: float = 12.0
     """Distance to stay from the target [m]."""
-    claim_m: float
+    claim_m: float = 45.0
     """A target is another's if that one is nearer to it, and so near [m]."""
-    lost_s: float
+    lost_s: float = 8.0
     """For how long a target is followed that is heard no more [s]."""
-    edge_m: float
+    edge_m: float = 60.0
     """A search turns back so far from the box's side [m]."""
-    half_m: float
-    """Half of the box's side [m]."""
-    lanes: bool
-    """Whether the search is in lanes."""
+    push: float = 10.0
+    """Away from a neighbour at no distance [m/s]."""
+    push_range: float = 12.0
+    """Where pushes end [m]."""
+    steering: float = 1.0
+    """Factor of the force that follows the wished velocity [1]."""
 
 
 class Sighted(NamedTuple):
@@ -68,27 +69,26 @@ _AHEAD_M = 40.0
 
 
 class NearestTarget(Scout):
-    """Search, then keep near the nearest target heard that no other is nearer to; without targets it is ``scout``.
+    """Search, then keep near the nearest target heard that no other is nearer to; in other tasks it is ``scout``.
 
     Args:
         lanes: whether to search in lanes across the box, one for each vehicle, instead of straight on.
-        speed: of a search [m/s], and so on as in ``Seeking``; found by hand on tuning seeds.
-        preset: as for ``scout``, and so are ``gains`` and ``barrier``: for pushes and the filter.
+        gains: free parameters, instead of those that were tuned for this search.
+        barrier: margins and rates of the filter, instead of the tuned ones.
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, speed: float = 5.0, rate: float = 0.5,
-        stay_m: float = 12.0, claim_m: float = 45.0, lost_s: float = 8.0, edge_m: float = 60.0, preset: str = "gap",
-        gains: ScoutGains | None = None, barrier: Barrier | None = None,
+        self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
+        barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
-        super().__init__(scenario, num_worlds, preset=preset, gains=gains, barrier=barrier)
-        self._seeks = "target" in self.layout.starts
-        half = 0.5 * scenario.task_numbers.side_m if self._seeks else 0.0
-        self.seeking = Seeking(
-            float(speed), float(rate), float(stay_m), float(claim_m), float(lost_s), float(edge_m), half, bool(lanes)
-        )
+        found, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
+        super().__init__(scenario, num_worlds, barrier=barrier or safe)
+        self.seeker = SeekerGains(*map(float, gains or found))
+        self._seeks = "box" in self.layout.starts
+        self._half_m = 0.5 * scenario.task_numbers.side_m if self._seeks else 0.0
+        self._lanes = scenario.swarm.num_vehicles if lanes else 0
         split = len(Surroundings._fields)
         self._kept, self._track = Surroundings(*self.memory[:split]), Sighted(*self.memory[split:])
 
@@ -96,24 +96,26 @@ class NearestTarget(Scout):
         """Remember the targets, and a percept without them, since they are nothing to go round."""
         seen, period = dataclasses.replace(percept, flat=percept.flat.copy()), self.model.own.period_s
         for name in ("echo", "echo_range", "echo_position") if self._seeks else ():
-            seen[name][percept["target"] > 0.0] = 0.0
+            seen[name][:] = 0.0
         update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.kept_s, self._kept)
         if self._seeks:
-            flat, targets, box = self.flat(percept), percept["target"], percept["box"]
-            stay_behind(flat, self.layout.offsets, worlds, targets, box, period, self.seeking, self._kept, self._track)
+            stay_behind(
+                self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
+                self.seeker, self._kept, self._track,
+            )  # fmt: skip
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        action, period, g = np.zeros((*self._track.heard_s.shape, 2), np.float32), self.model.own.period_s, self.grown()
+        action, period = np.zeros((*self._track.heard_s.shape, 2), np.float32), self.model.own.period_s
         if self._seeks:
             seek(
-                self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self.seeking, g,
-                self.barrier, self.limits, self.gain, self._kept, self._track, self.planes, action,
+                self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self._half_m, self._lanes,
+                self.seeker, self.barrier, self.limits, self.gain, self._kept, self._track, self.planes, action,
             )  # fmt: skip
         else:
             decide_all(
-                self.active, period, g, self.barrier, self.limits, self.gain, self._kept, self.planes, self._trims,
-                action,
+                self.active, period, self.grown(), self.barrier, self.limits, self.gain, self._kept, self.planes,
+                self._trims, action,
             )  # fmt: skip
         return action
 
@@ -130,7 +132,7 @@ def claimed(w: int, i: int, x: float, y: float, claim_m: float, kept: Surroundin
 
 @compiled
 def _heard(
-    w: int, i: int, gate: float, see: Fields, targets: Float32, g: Seeking, kept: Surroundings, track: Sighted
+    w: int, i: int, gate: float, see: Fields, g: SeekerGains, kept: Surroundings, track: Sighted
 ) -> tuple[float, float, bool]:
     """Place in the map of the target heard that a vehicle follows, or is to follow now [m], and whether there is one.
 
@@ -139,7 +141,7 @@ def _heard(
     pose, (x, y, found), best = kept.pose[w, i], (0.0, 0.0, False), gate
     from_x, from_y = (pose[0], pose[1]) if gate == math.inf else (track.target[w, i, 0], track.target[w, i, 1])
     for a in range(see.echo.shape[2]):
-        if targets[w, i, a] > 0.0:
+        if see.echo[w, i, a] > 0.0:
             p_x, p_y = to_map(see.echo_position[w, i, a, 0], see.echo_position[w, i, a, 1], pose)
             far = math.hypot(p_x - from_x, p_y - from_y)
             if far < best and not claimed(w, i, p_x, p_y, g.claim_m, kept):
@@ -149,10 +151,10 @@ def _heard(
 
 @compiled
 def stay_behind(
-    flat: Float32, at: Starts, worlds: Bool, targets: Float32, box: Float32, period: float, g: Seeking,
+    flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
     kept: Surroundings, track: Sighted,
 ) -> None:  # fmt: skip
-    """Take the echoes of targets, flagged in ``targets``, into what vehicles follow; and turn searches back."""
+    """Take the echoes, all of which are targets', into what vehicles follow; and turn searches back."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
@@ -163,7 +165,7 @@ def stay_behind(
             track.heard_s[w, i] -= period
             since, follows = g.lost_s - track.heard_s[w, i], track.heard_s[w, i] > 0.0
             gate = _GATE_M + _GATE_MPS * since if follows else math.inf
-            x, y, found = _heard(w, i, gate, see, targets, g, kept, track)
+            x, y, found = _heard(w, i, gate, see, g, kept, track)
             if found and follows:
                 d_x, d_y = x - goal[0], y - goal[1]
                 goal[0], goal[1] = goal[0] + _ALPHA * d_x, goal[1] + _ALPHA * d_y
@@ -174,7 +176,7 @@ def stay_behind(
                 track.heard_s[w, i] = g.lost_s
             elif follows and claimed(w, i, goal[0], goal[1], g.claim_m, kept):
                 track.heard_s[w, i] = 0.0
-            _turn_back(w, i, flat.shape[1], see, box, g, track)
+            _turn_back(w, i, half_m - g.edge_m, lanes, see, box, track)
 
 
 @compiled
@@ -186,37 +188,38 @@ def place_in_box(w: int, i: int, see: Fields, box: Float32) -> tuple[float, floa
 
 
 @compiled
-def _turn_back(w: int, i: int, num: int, see: Fields, box: Float32, g: Seeking, track: Sighted) -> None:
-    """Begin a search, along the bow or the lane, and turn it at the box's side: mirrored, or into another lane."""
-    way, most = track.search[w, i], g.half_m - g.edge_m
+def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float32, track: Sighted) -> None:
+    """Begin a search, along the bow or the lane; ``most`` from the middle [m] mirror it, or take another lane."""
+    way = track.search[w, i]
     if way[0] == 0.0 and way[1] == 0.0:
         way[0], way[1] = float(box[w, i, 0]), float(box[w, i, 1])
-        if g.lanes:
+        if lanes:
             way[0], way[1] = (1.0 if i % 2 == 0 else -1.0), i + 0.5
     place = place_in_box(w, i, see, box)
-    for k in range(1 if g.lanes else 2):
+    for k in range(1 if lanes else 2):
         if abs(place[k]) > most and place[k] * way[k] > 0.0:
             way[k] = -way[k]
-            if g.lanes:
-                way[1] = (way[1] + 1.0) % num
+            if lanes:
+                way[1] = (way[1] + 1.0) % lanes
 
 
 @compiled
 def _searching(
-    w: int, i: int, num: int, see: Fields, box: Float32, g: Seeking, kept: Surroundings, track: Sighted
-) -> tuple[float, float]:
-    """The velocity that a search wishes, in the map [m/s]; ``num`` vehicles have lanes."""
+    w: int, i: int, half_m: float, lanes: int, see: Fields, box: Float32, speed: float, kept: Surroundings,
+    track: Sighted,
+) -> tuple[float, float]:  # fmt: skip
+    """The velocity that a search wishes, in the map [m/s]."""
     x, y = track.search[w, i, 0], track.search[w, i, 1]
-    if g.lanes:
-        off = (2.0 * y / num - 1.0) * g.half_m - place_in_box(w, i, see, box)[1]
+    if lanes:
+        off = (2.0 * y / lanes - 1.0) * half_m - place_in_box(w, i, see, box)[1]
         far = math.hypot(_AHEAD_M, off)
         x, y = x * _AHEAD_M / far, off / far
     c, s = float(box[w, i, 0]), float(box[w, i, 1])
-    return to_map_axes(g.speed * (c * x + s * y), g.speed * (c * y - s * x), kept.pose[w, i])
+    return to_map_axes(speed * (c * x + s * y), speed * (c * y - s * x), kept.pose[w, i])
 
 
 @compiled
-def _keeping(w: int, i: int, g: Seeking, kept: Surroundings, track: Sighted) -> tuple[float, float]:
+def _keeping(w: int, i: int, g: SeekerGains, kept: Surroundings, track: Sighted) -> tuple[float, float]:
     """The velocity that keeps a vehicle behind its target, or leads to one that isn't heard, in the map [m/s]."""
     goal, pose = track.target[w, i], kept.pose[w, i]
     x, y, v_x, v_y = goal[0] - pose[0], goal[1] - pose[1], goal[2], goal[3]
@@ -228,19 +231,18 @@ def _keeping(w: int, i: int, g: Seeking, kept: Surroundings, track: Sighted) -> 
 
 @compiled
 def seek(
-    flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, g: Seeking, scout: ScoutGains,
+    flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
     barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, track: Sighted, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle."""
-    see, n = fields(flat, at), flat.shape[1]
+    see = fields(flat, at)
     for w in range(flat.shape[0]):
-        for i in range(n):
+        for i in range(flat.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
                 if track.heard_s[w, i] > 0.0:
                     w_x, w_y = _keeping(w, i, g, kept, track)
                 else:
-                    w_x, w_y = _searching(w, i, n, see, box, g, kept, track)
-                w_x, w_y = pushed(w_x, w_y, w, i, scout.push, scout.push_range, kept)
-                w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
+                    w_x, w_y = _searching(w, i, half_m, lanes, see, box, g.speed, kept, track)
+                w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, kept)
                 num = planes_of(w, i, period, barrier, kept, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain * scout.steering, limits, kept, action)
+                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, kept, action)
