@@ -164,6 +164,10 @@ class Task:
 
     # What is measured and drawn.
 
+    def way_m(self) -> Float64:
+        """Length of the way that each vehicle has still to go [m], shape (world, vehicle): what a critic may know."""
+        return self.swarm.facts.away
+
     def metrics(self, world: int) -> dict[str, float | None]:
         """Measures of an episode that ends now, numbers by name; VMAS: ``info``.
 
