@@ -183,7 +183,7 @@ def rows_for(training, seed=0):
 
 def test_rows_of_mixed_sizes_end_and_start_anew():
     brief = {"time_limit.factor": 0.001, "time_limit.extra_s": 1.9}
-    env = rows_for(Training(scenario="starter", sizes=[(1, 2), (3, 2)], overrides=brief))
+    env = rows_for(Training(scenario="starter", sizes=[(1, 2), (3, 2)], overrides=brief, ppo=TINY))
     assert env.observation.shape == (8, env.features + PRIVILEGED_SIZE)
     idle = np.zeros((8, 2), np.float32)
     for _ in range(3):
@@ -198,7 +198,7 @@ def test_rows_of_mixed_sizes_end_and_start_anew():
 
 
 def test_a_critic_that_sees_its_own_alone_has_the_actors_input():
-    env = rows_for(Training(scenario="starter", sizes=[(3, 2)], critic="own"))
+    env = rows_for(Training(scenario="starter", sizes=[(3, 2)], critic="own", ppo=TINY))
     assert env.size == env.features == env.observation.shape[1]
 
 
@@ -534,7 +534,7 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp' or 'sectors', got 'cnn'"),
         ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
-        ({"sizes": [(1, 2)]}, "ppo.minibatches must be at most the number of vehicles in all sizes, got 4"),
+        ({"sizes": [(1, 2)]}, "ppo.minibatches must be at most the number of vehicles in all sizes, got 10"),
         ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
     ],

@@ -1,8 +1,8 @@
 """PPO for all vehicles at once, which share one actor (Yu et al. 2022): MAPPO, or IPPO, by what the critic sees.
 
-The actor is that of ``uuv_marl.baselines.learned.layers`` in torch, and so runs without torch. A minibatch is the whole
-horizon of a part of the vehicles, so that a memory is trained through time; its state at the horizon's start is the one
-that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for bit. Needs
+The actor is that of ``uuv_marl.baselines.learned.layers`` in torch, and so runs without torch. With a memory a minibatch
+is the whole horizon of a part of the vehicles, so that it is trained through time; its state at the horizon's start is
+the one that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for bit. Needs
 ``train``.
 """
 
@@ -210,6 +210,9 @@ class Learner:
         self._follow(batch.returns.double())
         spread = batch.advantage.std() + 1e-8
         batch = batch._replace(advantage=(batch.advantage - batch.advantage.mean()) / spread)
+        if not self.actor.units:  # moments stand for themselves, and are mixed
+            flat = [array.reshape(1, -1, *array.shape[2:]) for array in batch[:6]]
+            batch = Rollout(*flat, torch.zeros(flat[0].shape[1], 0))
         (mean, std), kl = self._scale(), 0.0
         batch = batch._replace(returns=(batch.returns - mean) / std)
         for _ in range(self.by.epochs):

@@ -51,8 +51,8 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Weight of longer returns in advantages [1]."""
     horizon: Count = 64
     """Decisions between updates; a memory is trained through so many."""
-    minibatches: Count = 4
-    """Gradient steps of an epoch, each on the whole horizon of a part of the vehicles."""
+    minibatches: Count = 10
+    """Gradient steps of an epoch; with a memory each is on the whole horizon of a part of the vehicles."""
     epochs: Count = 4
     """Passes over a batch, at most."""
     clip: Positive = 0.2
