@@ -13,10 +13,10 @@ def privileged(swarm: Swarm) -> Float32:
     """What the critic sees beyond an observation, shape (world, vehicle, ``PRIVILEGED_SIZE``), body frame.
 
     Means and extremes over the world's vehicles, however many: where the centre is and how it moves, how far the swarm
-    spreads, its smallest distances, the vehicle's own in all directions, its way to go, whether it has been paid for its
-    arrival (else leaving the goal looks as if that were still to come, and a policy learns to leave), and for how long
-    l(t) still moves. Not how long until the limit: who does not see it acts as if there were none, and no sample from
-    beyond holds such a value.
+    spreads, its smallest distances, the vehicle's own in all directions, its way to go, whether it has been paid for
+    its arrival (else leaving the goal looks as if that were still to come, and a policy learns to leave), and for how
+    long l(t) still moves. Not how long until the limit: who does not see it acts as if there were none, and no sample
+    from beyond holds such a value.
     """
     state, facts = swarm.state, swarm.facts
     c, s = np.moveaxis(swarm.heading, -1, 0)

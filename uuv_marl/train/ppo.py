@@ -1,9 +1,9 @@
 """PPO for all vehicles at once, which share one actor (Yu et al. 2022): MAPPO, or IPPO, by what the critic sees.
 
-The actor is that of ``uuv_marl.baselines.learned.layers`` in torch, and so runs without torch. With a memory a minibatch
-is the whole horizon of a part of the vehicles, so that it is trained through time; its state at the horizon's start is
-the one that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for bit. Needs
-``train``.
+The actor is that of ``uuv_marl.baselines.learned.layers`` in torch, and so runs without torch. With a memory a
+minibatch is the whole horizon of a part of the vehicles, so that it is trained through time; its state at the horizon's
+start is the one that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for
+bit. Needs ``train``.
 """
 
 import itertools
@@ -90,9 +90,9 @@ class TorchOps:
         return x.chunk(3, 1)
 
     @staticmethod
-    def mean(x: Tensor) -> Tensor:
-        """Mean over the middle axis."""
-        return x.mean(1)
+    def total(x: Tensor) -> Tensor:
+        """Sum over the middle axis."""
+        return x.sum(1)
 
 
 class Actor:
@@ -101,7 +101,7 @@ class Actor:
     def __init__(self, made: Architecture, sizes: Sizes, rng: np.random.Generator) -> None:
         last = f"{len(made.hidden)}.weight"
         self.tensors = {
-            name: started(shape, rng, 0.01 if name == last else math.sqrt(2.0) if name[0].isdigit() else 1.0)
+            name: started(shape, rng, 0.01 if name == last else 1.0 if name.startswith("gru") else math.sqrt(2.0))
             for name, shape in shapes(made, sizes).items()
         }
         self.units = made.hidden[-1] if made.memory else 0

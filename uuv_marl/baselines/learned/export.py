@@ -155,9 +155,9 @@ class Graph:
         """At least 0."""
         return self("Relu", x)
 
-    def mean(self, x: "Value") -> "Value":
-        """Mean over the middle axis, which goes."""
-        return self("ReduceMean", x, np.array([1]), keepdims=0)
+    def total(self, x: "Value") -> "Value":
+        """Sum over the middle axis, which goes."""
+        return self("ReduceSum", x, np.array([1]), keepdims=0)
 
     def fresh(self, stem: str) -> str:
         """A name that nothing has."""

@@ -25,7 +25,7 @@ class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
 
     kind: Literal["mlp", "sectors"] = "mlp"
     """How it reads an observation: ``mlp``, as it is; ``sectors``, by one encoder that all sub-sectors share, and the
-    mean over them."""
+    sum over them."""
     memory: bool = False
     """Whether a recurrent layer (GRU) stands between; what follows sees its state beside what it saw."""
     hidden: Annotated[tuple[pydantic.PositiveInt, ...], pydantic.Field(min_length=1)] = (64, 64)
@@ -84,7 +84,7 @@ class Network:
         sizes: rows of an observation.
         tensors: by name, as ``shapes`` has them.
         ops: operations on these tensors: ``dense``, ``take``, ``shaped``, ``joined``, ``parts``, ``tanh``, ``sigmoid``,
-            ``relu``, and ``mean`` over the middle axis; see ``NumpyOps``.
+            ``relu``, and ``total`` over the middle axis; see ``NumpyOps``.
     """
 
     def __init__(self, made: Architecture, sizes: Sizes, tensors: Mapping[str, Any], ops: Any) -> None:
@@ -100,7 +100,7 @@ class Network:
             num, size = entries.shape
             seen = ops.shaped(ops.take(x, entries.reshape(-1)), (-1, size))
             code = ops.shaped(ops.dense(seen, self._tensors[f"{kind}.weight"]), (-1, num, ENCODED))
-            parts.append(ops.mean(ops.relu(code + self._tensors[f"{kind}.place"])))
+            parts.append(ops.total(ops.relu(code + self._tensors[f"{kind}.place"])))
         return ops.joined(parts)
 
     def gates(self, z: Any) -> Any:
@@ -164,9 +164,9 @@ class NumpyOps:
         return np.maximum(x, np.float32(0.0))
 
     @staticmethod
-    def mean(x: Float32) -> Float32:
-        """Mean over the middle axis."""
-        return x.mean(axis=1)
+    def total(x: Float32) -> Float32:
+        """Sum over the middle axis."""
+        return x.sum(axis=1)
 
 
 @compiled
