@@ -534,7 +534,6 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp' or 'sectors', got 'cnn'"),
         ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
-        ({"sizes": [(1, 2)]}, "ppo.minibatches must be at most the number of vehicles in all sizes, got 10"),
         ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
     ],

@@ -26,7 +26,7 @@ def privileged(swarm: Swarm) -> Float32:
     error = facts.centre - swarm.mean_reference[:, :2]
     size = np.hypot(*error.T)[:, None]
     way, away, came = swarm.task.way_m(), facts.away, swarm.task.came().astype(np.float64)
-    moves = swarm.mean_reference[:, 2:].any(axis=1)
+    moves = np.abs(swarm.mean_reference[:, 2:]).max(axis=1) > 0.0
     left = np.where(moves, swarm.duration_s - facts.time_s, 0.0)
     columns = [
         *_turned(np.clip(facts.centre[:, None] - state.eta[:, :, :2], -256.0, 256.0) / 64.0, c, s),

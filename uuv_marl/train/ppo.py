@@ -211,8 +211,8 @@ class Learner:
         spread = batch.advantage.std() + 1e-8
         batch = batch._replace(advantage=(batch.advantage - batch.advantage.mean()) / spread)
         if not self.actor.units:  # moments stand for themselves, and are mixed
-            flat = [array.reshape(1, -1, *array.shape[2:]) for array in batch[:6]]
-            batch = Rollout(*flat, torch.zeros(flat[0].shape[1], 0))
+            mixed = {name: x.reshape(1, -1, *x.shape[2:]) for name, x in batch._asdict().items() if name != "state"}
+            batch = Rollout(**mixed, state=torch.zeros(batch.action[..., 0].numel(), 0))
         (mean, std), kl = self._scale(), 0.0
         batch = batch._replace(returns=(batch.returns - mean) / std)
         for _ in range(self.by.epochs):

@@ -52,7 +52,7 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     horizon: Count = 64
     """Decisions between updates; a memory is trained through so many."""
     minibatches: Count = 10
-    """Gradient steps of an epoch; with a memory each is on the whole horizon of a part of the vehicles."""
+    """Gradient steps of an epoch, at most; with a memory each is on the whole horizon of a part of the vehicles."""
     epochs: Count = 4
     """Passes over a batch, at most."""
     clip: Positive = 0.2
@@ -129,10 +129,6 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
         if self.minutes is None and self.steps is None:
             object.__setattr__(self, "minutes", 5.0)
         object.__setattr__(self, "sizes", self.sizes or swarms_of([self.loaded.swarm.num_vehicles]))
-        if sum(worlds * n for n, worlds in self.sizes) < self.ppo.minibatches:
-            raise TrainingError(
-                f"ppo.minibatches must be at most the number of vehicles in all sizes, got {self.ppo.minibatches}"
-            )
         known = (*self.loaded.task_class.rewards, "team")
         if self.reward is not None and ":" not in self.reward and self.reward not in known:
             raise TrainingError(
