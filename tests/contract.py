@@ -136,6 +136,7 @@ def cases():
         Case("closeness", "random_field", BRIEF, options={"observe": "closeness"}),
         Case("reach", "starter", TIMES_OUT, options={"task": "reach"}),
         Case("two_swarms", "two_swarms", TIMES_OUT),
+        Case("silent_targets", "silent_targets", TIMES_OUT),
         Case("few_informed", "starter", TIMES_OUT, options={"task": {"name": "few_informed", "informed": 1}}),
         Case("own_task", "starter", TIMES_OUT, options={"task": OWN_TASK}),
         Case("own_task-arrives", "starter", {}, steps=5, options={"task": {"name": OWN_TASK, "near_m": 5000.0}}),

@@ -15,6 +15,8 @@ const read = (episode, time) => ({
   ...episode.numbers(time),
   poses: [...episode.poses(time)],
   discs: [...episode.discs(time)],
+  references: episode.ways.map((_, way) => episode.reference(time, way)),
+  marks: [...episode.marks(time)],
   flow: episode.current && flow(episode, episode.sampleAt(time), episode.poses(time)),
   hearing: episode.inspected.map((_, rank) => hearing(episode, rank, episode.sampleAt(time))),
 });

@@ -34,7 +34,7 @@ def test_a_scene_is_the_sample_of_its_time(starter):
     assert scene.time_s == pytest.approx(30.0)
     np.testing.assert_array_equal(scene.position, recording.position[k])
     np.testing.assert_array_equal(scene.heading, recording.heading[k])
-    np.testing.assert_array_equal(scene.reference, recording.reference[k])
+    np.testing.assert_array_equal(scene.references, recording.references[k])
     assert scene.min_spacing_m == recording.series["min_spacing_m"][k]
     assert scene.clearance_m == recording.series["obstacle_clearance_m"][k]
     assert len(scene.trail) == TRAIL_S

@@ -47,7 +47,7 @@ def test_everything_is_drawn_where_it_is(kind):
     picture = pixels(painter.paint(scene, camera))
     assert picture.shape == (500, 600, 3)
     seen = camera.pixels(scene.position)
-    away = np.hypot(*(scene.position - scene.reference).T) * camera.scale > 40
+    away = np.hypot(*(scene.position - scene.references[0]).T) * camera.scale > 40
     hulls = np.array([colour(picture, at) for at in seen[away]], float)
     assert (np.abs(hulls - ink.BLUE).max(axis=1) < 110).mean() > 0.9
     assert (np.abs(hulls - ink.WATER).max(axis=1) > 60).all()
@@ -55,7 +55,7 @@ def test_everything_is_drawn_where_it_is(kind):
     if kind == "map":
         assert colour(picture, beside) == ink.DISC
         assert np.abs(np.subtract(colour(picture, camera.pixels(scene.waypoints[-1])), ink.AMBER)).max() < 20
-    ring = camera.pixels(scene.reference) + np.array([12.0, 0.0])
+    ring = camera.pixels(scene.references[0]) + np.array([12.0, 0.0])
     assert min(np.abs(np.subtract(colour(picture, (ring[0] + d, ring[1])), ink.GREEN)).max() for d in (-2, -1, 0)) < 60
 
 
@@ -63,7 +63,7 @@ def test_the_bow_points_where_the_vehicle_heads():
     scene, _, _ = played(seconds=0.0)
     heading = np.array([0.0, np.pi / 2, np.pi, -np.pi / 2, 0.7])
     place = np.array([[0.0, -60.0], [0.0, -30.0], [0.0, 0.0], [0.0, 30.0], [0.0, 60.0]])
-    scene = scene._replace(position=place, heading=heading, trail=np.zeros((0, 5, 2)), reference=place[0] + 90.0)
+    scene = scene._replace(position=place, heading=heading, trail=np.zeros((0, 5, 2)), references=place[:1] + 90.0)
     camera = Camera(np.zeros(2), 4.0, SIZE)
     blue = np.abs(pixels(Painter(SIZE, grid=False).paint(scene, camera)).astype(int) - ink.BLUE).max(axis=2) < 40
     for at, psi in zip(camera.pixels(place), heading, strict=True):
@@ -80,7 +80,7 @@ def test_cameras_show_what_they_promise(scenario):
     inside = lambda camera, points: ((camera.pixels(points) >= 0) & (camera.pixels(points) <= SIZE)).all()  # noqa: E731
     follow, whole = aim("follow", [scene], SIZE), aim("map", [scene], SIZE)
     assert inside(follow, scene.position)
-    assert inside(follow, scene.reference)
+    assert inside(follow, scene.references[0])
     assert inside(whole, scene.waypoints)
     assert inside(whole, scene.obstacles[:, :2])
     assert inside(whole, scene.position)

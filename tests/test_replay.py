@@ -65,7 +65,7 @@ def test_a_recording_is_the_benchmarks_run():
     np.testing.assert_allclose((recording.force**2).mean(axis=1), run.series["effort"], rtol=1e-5, atol=1e-7)
     assert recording.force.max() <= 1.0 + 1e-6
     centre = recording.position.mean(axis=1)
-    error = np.hypot(*(centre - recording.reference).T)
+    error = np.hypot(*(centre - recording.references[:, 0]).T)
     np.testing.assert_allclose(recording.series["centre_error_m"], error, atol=1e-3)
 
 
@@ -182,7 +182,8 @@ def test_a_browser_reads_the_recording(tmp_path):
             np.testing.assert_array_equal(arrays[name], getattr(recording, name))
         for name, values in recording.series.items():
             np.testing.assert_array_equal(arrays[name], values)
-        for name in ("reference", "position", "speed", "force", "spacing"):
+        assert_coded("reference", arrays["reference"], recording.references[:, 0])
+        for name in ("position", "speed", "force", "spacing"):
             assert_coded(name, arrays[name], getattr(recording, name))
         if recording.traffic is not None:
             assert_coded("traffic", arrays["traffic"], recording.traffic)
@@ -213,7 +214,7 @@ def test_a_saved_trace_is_shown_as_far_as_it_goes(tmp_path):
     assert recording.metrics == whole.metrics
     assert recording.scenario == whole.scenario
     at = np.searchsorted(whole.time_s, recording.time_s)
-    for name in ("time_s", "position", "heading", "reference"):
+    for name in ("time_s", "position", "heading", "references"):
         np.testing.assert_array_equal(getattr(recording, name), getattr(whole, name)[at])
     np.testing.assert_allclose(recording.speed, whole.speed[at], rtol=1e-5, atol=1e-6)
     assert recording.force is None

@@ -114,6 +114,17 @@ def test_the_page_hears_what_the_engine_recorded(read, recordings):
 
 
 @needs_node
+def test_the_page_knows_each_groups_goal_and_the_circles_of_a_task(tmp_path):
+    short = {"time_limit.factor": 0.02, "time_limit.extra_s": 4.0}
+    recording = record(load_scenario("two_swarms", overrides=short), "idle", 0)
+    write_page([recording], tmp_path / "replay.html")
+    shown = json.loads(node(HERE / "page_numbers.mjs", tmp_path / "replay.html", 2.0))["numbers"][0][0]
+    goals = np.array([way[-1] for _, way in recording.groups.ways.values()])
+    np.testing.assert_allclose(shown["references"], goals, atol=0.02)
+    np.testing.assert_array_equal(np.array(shown["marks"]).reshape(-1, 3), recording.marks[4])
+
+
+@needs_node
 def test_inlined_scripts_are_one_valid_module(page, tmp_path):
     scripts = re.findall(r'<script type="module">(.*?)</script>', page.read_text(), flags=re.S)
     (tmp_path / "page.mjs").write_text(scripts[0])

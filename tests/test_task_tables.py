@@ -53,10 +53,7 @@ def test_the_page_by_hand():
     text = report("hard_water", done, learned)
     assert "| scout | .50 [.50, .50], .00 | .50 [.50, .50], .00 | .50 [.50, .50], .00 |" in text
     assert "| oracle | 1.00, .00 | 1.00, .00 |" in text
-    assert (
-        "| scout | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | .50, .00 | 1.00 | 0.10 | 1.0 m | 1.0 m |"
-        in text
-    )
+    assert "| scout |" + " .50, .00 |" * 7 + " 1.00 | 0.10 | 1.0 m | 1.0 m |" in text
     assert "| PPO, trained with echoes zeroed | .25 |" in text
     assert "| the best law: scout | .50 |" in text
     assert "| PPO above the best law |  |  |  |  |  |  |  | .25 [.25, .25] |" in text

@@ -123,7 +123,7 @@ def main(
     minutes: Annotated[float, typer.Option(min=0.1, help="Processor time of the training.")] = 15.0,
     output: Annotated[Path, path_option("Folder that research.tasks writes to.")] = Path("results/tasks"),
 ) -> None:
-    """Train PPO on a task's scenario, or RecurrentPPO, and run it in the episodes of the tables.
+    """Train PPO on a task's scenario, or RecurrentPPO where the study has a memory, and run it in the tables' episodes.
 
     A sighted model is also run with its echoes zeroed. The time of a training is the processor's, and its measuring
     does not count. OUTPUT/learned/TASK gets a folder with model.zip, curve.csv and episodes.csv.
@@ -137,7 +137,7 @@ def main(
         with working(f"Nothing is kept of a training that did not end; {folder} stays as it was") as bar:
             model, curve = learn(task, seed, blind, minutes, progress_line(bar, folder.name))
         write_rows(folder / "curve.csv", curve)
-        model.save(folder / "model")
+        model.save(folder / "model", exclude=["learning_rate", "lr_schedule"])  # which know the clock
         names = {folder.name: blind, **({} if blind else {f"zeroed-{seed}": True})}
         episodes = [row for name, unseen in names.items() for row in _rows(model, task, name, unseen)]
         write_rows(folder / "episodes.csv", episodes)

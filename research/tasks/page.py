@@ -19,6 +19,8 @@ Columns = Mapping[str, Sequence[str]]
 _RESAMPLES = 2000
 _NO_LAWS = ("oracle", "carrot_informed", "random", "idle")
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
+    "found_share": ("found", lambda values, _: _short(float(np.mean(values)))),
+    "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
     "untouched_share": ("untouched", lambda values, _: _short(float(np.mean(values)))),
     "collisions": ("contacts", lambda values, n: f"{np.mean(values) / n:.2f}"),
     "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
@@ -41,7 +43,7 @@ def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
     for row in rows:
         found.setdefault((row["policy"], row["set"]), []).append(row)
     names = _learners(task)
-    for row in episodes:
+    for row in sorted(episodes, key=lambda row: [*names].index(row["learner"].split("-")[0])):
         found.setdefault((names[row["learner"].split("-")[0]], row["set"]), []).append(row)
     study, sets = STUDIES[task], STUDIES[task].judged
     kinds = {name.split("-")[1]: [name] for name in sets if "-" in name}
@@ -50,7 +52,9 @@ def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
         tiers=_shares(found, study, _tiers(task)),
         kinds=_measures(found, study, kinds),
         measures=_measures(found, study, {}),
-        many=_measures(found, study, {kind: [set_name(task, kind, 54)] for kind in kinds}),
+        many=_measures(
+            found, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
+        ),
         learners=_compared(found, task, {each.removeprefix(f"{task}-"): [each] for each in sets}),
         informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}),
     )
@@ -81,15 +85,15 @@ def _shares(found: Found, study: Study, columns: Columns) -> str:
 
 
 def _measures(found: Found, study: Study, columns: Columns) -> str:
-    """The headline and the share of whole swarms in each column, or all together in two, and the other measures."""
+    """The headline and the share of whole swarms in each column, or of the tier that is learned, and other measures."""
     table: list[tuple[str, ...]] = []
     for policy in _policies(found):
-        if cells := _cells(found, policy, columns or {"": [study.learns]}):
-            every = [row for mine in cells for rows in mine for row in rows]
-            shares = [[_mean(mine, name) for name in (study.headline, "whole")] for mine in cells]
+        cells = [found.get((policy, name), ()) for names in ([*columns.values()] or [[study.learns]]) for name in names]
+        if every := [row for rows in cells for row in rows]:
+            shares = [[_mean([rows], name) for name in (study.headline, "whole")] if rows else ["–"] for rows in cells]
             own = [", ".join(two) for two in shares] if columns else shares[0]
-            table.append((policy, *own, *(_MEASURES[name][1](measured(every, name), _size(every[0]))
-                                          for name in _shown(study))))  # fmt: skip
+            rest = (_MEASURES[name][1](measured(every, name), _size(every[0])) for name in _shown(study))
+            table.append((policy, *own, *rest))
     heads = (*columns,) if columns else (study.headline.replace("_", " "), "whole")
     return markdown_table(("policy", *heads, *(_MEASURES[name][0] for name in _shown(study))), table)
 

@@ -55,7 +55,7 @@ def _study(told: dict[str, Any]) -> Study:
     return Study(sets, told["learns"], told["worlds"], told.get("memory", False), tuple(judged), tuple(told["metrics"]))
 
 
-STUDIES = {name: _study(_TOLD[name]) for name in ("hard_water", "two_swarms", "few_informed")}
+STUDIES = {name: _study(_TOLD[name]) for name in ("hard_water", "two_swarms", "few_informed", "silent_targets")}
 """By task."""
 SETS = tuple(each for study in STUDIES.values() for each in study.sets.values())
 """All of them."""

@@ -81,7 +81,7 @@ def test_every_scenario_is_a_task_or_refused(tmp_path):
         made = task.get_from_yaml()
         env = made.get_env_fun(2, continuous_actions=True, seed=0, device="cpu")()
         assert env.scenario.name == task.name.lower()
-        entries = 99 if env.scenario.task.name == "few_informed" else 98  # the flag of who is informed
+        entries = 98 + {"few_informed": 1, "silent_targets": 2}.get(env.scenario.task.name, 0)  # what tasks tell
         assert env.reset()["uuv", "observation"].shape == (2, env.scenario.swarm.num_vehicles, entries)
     lossy = SwarmTask.TRACKING.get_task({**SMALL, "scenario": "lossy", "num_vehicles": 8})
     with pytest.raises(ScenarioError, match="BenchMARL can't show that a vehicle is lost"):

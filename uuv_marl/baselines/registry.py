@@ -28,6 +28,7 @@ from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.baselines.scout.carrot import Carrot, CarrotInformed
 from uuv_marl.baselines.scout.law import Scout
+from uuv_marl.baselines.scout.seeker import NearestTarget
 from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
@@ -46,6 +47,7 @@ POLICIES: dict[str, Kind] = {
     "scout": Scout,
     "carrot": Carrot,
     "carrot_informed": CarrotInformed,
+    "nearest_target": NearestTarget,
     "sff": Sff,
     "sdc": Sdc,
     "sff_informed": SffInformed,

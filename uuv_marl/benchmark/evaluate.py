@@ -49,8 +49,6 @@ class Run(NamedTuple):
     """Centre north, east and radius [m], at the end, shape (obstacle, 3)."""
     waypoints: Float32
     """Corners of the trajectory [m], shape (point, 2)."""
-    marks: Float32
-    """What the task draws at the end: centre north, east and radius of circles [m], shape (mark, 3)."""
 
 
 class Progress(NamedTuple):
@@ -145,7 +143,6 @@ def _batch(
                 routes=_routes(swarm, samples, w),
                 obstacles=course.obstacles[w, :discs].astype(np.float32),
                 waypoints=course.waypoints[w, 0, : int(course.last[w, 0]) + 1].astype(np.float32),
-                marks=swarm.task.marks(w).astype(np.float32),
             )
         active &= ~ended
         actor.active[:] = active

@@ -4,6 +4,7 @@
 # Matplotlib leaves the types of its keyword arguments open.
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,14 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from uuv_marl.benchmark.results import Results
-from uuv_marl.benchmark.style import BLACK, BLUE, ORANGE, draw_course, house_style, legend, panels, save
+from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, PINK, draw_course, house_style, legend, panels, save
 from uuv_marl.scenario import Scenario, conditions, disturbances
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.groups import groups_of
 from uuv_marl.types import Float32, Float64
 
 Trace = dict[str, Float32]
+_TEAMS = (BLUE, GREEN, PINK, BLACK)
 _GRID_S = 0.5
 _ROUTE_S = 2.0
 _TICKS_M = (-20, -10, -5, 0, 5, 10, 20, 50, 100, 200)
@@ -78,29 +82,42 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
     hull_m = results.scenarios[scenario].contact.hull_radius_m
     traces = [results.trace(scenario, policy, 0) for policy in policies]
     longest = max(float(trace["route_time_s"][-1]) for trace in traces)
-    lines: LineCollection | None = None
+    swarm, lines = Swarm(results.scenarios[scenario]), None
+    swarm.reset(0)
+    groups = groups_of(swarm)
+    colours = _TEAMS[: int(groups.team.max()) + 1] if groups.team.any() else (BLACK,)
     for ax, policy, trace in zip(axes, policies, traces, strict=False):
         every = max(1, round(_ROUTE_S / float(np.diff(trace["route_time_s"][:2])[0])))
         position = trace["route_position"][::every, :, ::-1]
         legs = np.stack([position[:-1], position[1:]], axis=2)
         lines = LineCollection(legs.reshape(-1, 2, 2).tolist(), cmap="viridis", linewidths=0.5)
-        lines.set_array(np.repeat(trace["route_time_s"][::every][:-1], legs.shape[1]))
-        lines.set_clim(0.0, longest)
+        if len(colours) > 1:
+            lines.set(color=[colours[k] for k in groups.team] * len(legs))
+        else:
+            lines.set_array(np.repeat(trace["route_time_s"][::every][:-1], legs.shape[1]))
+            lines.set_clim(0.0, longest)
+        if not groups.informed.all():
+            lines.set_linewidth(np.where(groups.informed, 1.5, 0.5).tolist() * len(legs))
+            ax.plot([], [], color=BLACK, linewidth=1.5, label="thick: perceives l(t)")
         ax.add_collection(lines)
-        draw_course(ax, trace["waypoints"][:, ::-1], trace["obstacles"][:, [1, 0, 2]])
-        ends = {"start": (trace["route_position"][0], "o"), "end": (trace["route_position"][-1], ".")}
-        for label, (place, mark) in ends.items():
-            ax.plot(*place.T[::-1], mark, color=BLACK, mfc="none" if mark == "o" else BLACK, ms=3, mew=0.5, label=label)
+        for k, (team, way) in enumerate(groups.ways.values()):
+            discs = trace["obstacles"][: 0 if k else None, [1, 0, 2]]
+            draw_course(ax, way[:, ::-1], discs, None if team is None else colours[team])
+        for (label, k, mark), (team, colour) in product((("start", 0, "o"), ("end", -1, ".")), enumerate(colours)):
+            place, fill = trace["route_position"][k, groups.team == team], "none" if mark == "o" else colour
+            name = label if len(colours) == 1 else f"{label} of group {team + 1}"
+            ax.plot(*place.T[::-1], mark, color=colour, mfc=fill, ms=3, mew=0.5, label=name)
         contacts = _contacts(trace, hull_m)
         ax.plot(*contacts.T[::-1], "x", color=ORANGE, ms=8, mew=2.0, zorder=6, label="collision")
         ax.set_title(f"{policy[-28:]}\n{_outcome(results.select(scenario, policy, [0])[0].metrics)}")
     figure.supxlabel("east [m]")
     figure.supylabel("north [m]")
     figure.suptitle(f"Routes of each policy: {_where(results.scenarios[scenario], 'seed 0')}")
-    if lines is not None:
+    if lines is not None and len(colours) == 1:
         bar = axes[-1].inset_axes((0.1, 0.12, 0.8, 0.05))
         figure.colorbar(lines, cax=bar, orientation="horizontal", label="colour of routes: time [s]")
-    axes[-1].legend(*axes[0].get_legend_handles_labels(), loc="upper center", fontsize=9)
+    named = dict(zip(*axes[0].get_legend_handles_labels()[::-1], strict=True))
+    axes[-1].legend(named.values(), named.keys(), loc="upper center", fontsize=9)
     return figure
 
 

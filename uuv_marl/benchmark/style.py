@@ -3,7 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -54,10 +54,13 @@ def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> Figure
     return figure
 
 
-def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Sequence[Sequence[float]] | NDArray[Any]) -> None:
-    """Trajectory with its goal, and obstacles (across, up, radius), in the picture's own coordinates [m]."""
-    ax.plot(*waypoints.T, "--", color=BLACK, linewidth=1.0, zorder=3, label="trajectory of l(t)")
-    ax.plot(*waypoints[-1], "*", color=AMBER, mec=BLACK, mew=0.6, markersize=11, zorder=5, ls="", label="goal")
+def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | None = None) -> None:
+    """Trajectory, its goal (one waypoint: that alone) in a team's colour, and obstacles (across, up, radius) [m]."""
+    name, size = ("trajectory of l(t)", 11) if len(waypoints) > 1 else ("", 5)
+    ax.plot(*waypoints.T, "--", color=team or BLACK, linewidth=1.0, zorder=3, label=name)
+    ax.plot(
+        *waypoints[-1], "*", color=team or AMBER, mec=team or BLACK, mew=0.6, ms=size, zorder=5, ls="", label="goal"
+    )
     for k, (across, up, radius) in enumerate(obstacles):
         ax.add_patch(Circle((across, up), radius, color="0.45", zorder=2, label="" if k else "obstacle"))
     ax.set_aspect("equal")

@@ -5,7 +5,7 @@ import json
 import logging
 import tomllib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.comparators import apf, leader_follower, olfati_saber, orca
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
+from uuv_marl.baselines.scout import seeker
 from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.extras import silenced
@@ -28,18 +29,21 @@ SEEDS = (10_000, 10_001, 10_002, 10_003)
 SCENARIO = "single_obstacle"
 SCALED = "sea_trial"
 """Where policies are tuned in the scale of a vehicle."""
-WALLS, GAP, FEW = "hard_water", "two_swarms", "few_informed"
+WALLS, GAP, FEW, SILENT = "hard_water", "two_swarms", "few_informed", "silent_targets"
 """Tasks that policies are tuned for."""
 MAPS = tuple(range(10_000, 10_024))
-"""Seeds there, each of which draws another map; for ``GAP``, with four times the vehicles, the first eight."""
+"""Seeds there, each of which draws another map."""
+FEWER = {GAP: 4, SILENT: 8}
+"""How many of them for tasks with more vehicles or longer episodes."""
 _FAILURE_COST_S = 1000.0
 _COLLISION_COST_S = 50.0
 _CLEARANCE_COST_S_PER_M = 20.0
 OBJECTIVES = (
     "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
     "mean time [s] over seeds, plus 1000 s for the share of vehicles that touched or did not come to the goal",
+    "mean over seeds of 1000 s for the share of the last half in which targets are not held",
 )
-"""What is minimised, in the paper's task and in others."""
+"""What is minimised, in the paper's task, in those with goals, and in that with targets."""
 
 
 class Range(NamedTuple):
@@ -71,6 +75,8 @@ class Space(NamedTuple):
     scenario: str = SCENARIO
     barrier: Barrier | None = None
     """The safety filter, whose numbers may be free, too; None for a policy without."""
+    chosen: Mapping[str, object] = {}
+    """Keyword arguments of the policy that are not free."""
 
     def parameters(self, drawn: dict[str, float]) -> dict[str, object]:
         """The policy's keyword arguments: gains, safety filter, and what belongs to neither."""
@@ -78,7 +84,7 @@ class Space(NamedTuple):
             return {"gains": self.gains(**drawn)}
         gains, barrier = with_numbers(drawn, self.gains(), self.barrier)
         own = {name: value for name, value in drawn.items() if name not in (*gains._fields, *barrier._fields)}
-        return {"gains": gains, "barrier": barrier, **own}
+        return {"gains": gains, "barrier": barrier, **own, **self.chosen}
 
 
 SPACES: dict[str, Space] = {
@@ -98,6 +104,9 @@ SPACES: dict[str, Space] = {
     "carrot": Space(_RANGES["carrot"] | _RANGES["filter_at_a_gap"], ScoutGains, GAP, Barrier()),
     "scout": Space(_RANGES["scout"] | _RANGES["filter"] | _RANGES["gaps"], ScoutGains, WALLS, Barrier()),
     "tangent_bug": Space(_RANGES["tangent_bug"] | _RANGES["filter"], BugGains, WALLS, BUG_BARRIER),
+    "tangent_bug.two_swarms": Space(_RANGES["tangent_bug"] | _RANGES["filter_at_a_gap"], BugGains, GAP, BUG_BARRIER),
+    "nearest_target": Space(_RANGES["nearest_target"], seeker.SeekerGains, SILENT, Barrier()),
+    "nearest_target.lanes": Space(_RANGES["nearest_target"], seeker.SeekerGains, SILENT, Barrier(), {"lanes": True}),
     "leader_follower": Space(
         _RANGES["leader_follower"] | _RANGES["filter"], leader_follower.LeaderFollowerGains, FEW, Barrier()
     ),
@@ -111,11 +120,15 @@ def tuning_cost(run: Run, scenario: Scenario) -> float:
 
     A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. On a
     scenario in a vehicle's scale these seconds and metres are those of its scale. In a task of its own it is the
-    episode's time, and 1000 s for the share of vehicles that touched something or did not come to the goal.
+    episode's time, and 1000 s for the share of vehicles that touched something or did not come to the goal; where
+    targets are to be held, 1000 s for the share that is not.
     """
     unit = scenario.scale.units
     metrics = run.metrics
-    if (share := metrics.get("task", {}).get("untouched_share")) is not None:
+    own = metrics.get("task", {})
+    if (share := own.get("held_share")) is not None:
+        return _FAILURE_COST_S * (1.0 - share)
+    if (share := own.get("untouched_share")) is not None:
         return float(run.routes.time_s[-1]) / unit.time + _FAILURE_COST_S * (1.0 - share)
     time, clearance = metrics["task_time_s"], metrics["min_obstacle_distance_m"]
     if time is None:
@@ -193,7 +206,7 @@ def tune(
     where, changes = (space.scenario, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
     scenario = granted(policy, load_scenario(where, overrides=changes))
     own_task = where not in (SCENARIO, SCALED)
-    seeds = SEEDS if not own_task else MAPS[:8] if where == GAP else MAPS
+    seeds = SEEDS if not own_task else MAPS[: FEWER.get(where, len(MAPS))]
     if vehicle is not None:
         name = f"{policy}.{vehicle}"
 
@@ -209,7 +222,7 @@ def tune(
     best = min(finished, key=lambda trial: trial.values)
     result = {
         "policy": policy,
-        "objective": OBJECTIVES[own_task],
+        "objective": OBJECTIVES[own_task + (where == SILENT)],
         "scenario": where,
         **({} if vehicle is None else {"vehicle": vehicle}),
         "seeds": list(seeds),

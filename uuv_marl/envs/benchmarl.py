@@ -102,6 +102,9 @@ class SwarmTask(Task):
     TWO_SWARMS_EASY = None
     TWO_SWARMS = None
     TWO_SWARMS_HARD = None
+    SILENT_TARGETS = None
+    SILENT_TARGETS_EASY = None
+    SILENT_TARGETS_HARD = None
     FEW_INFORMED_EASY = None
     FEW_INFORMED = None
     FEW_INFORMED_HARD = None

@@ -68,7 +68,7 @@ def payload(recordings: Sequence[Recording]) -> dict[str, Any]:
 
 
 def _episode(recording: Recording) -> dict[str, Any]:
-    scenario = recording.scenario
+    scenario, groups = recording.scenario, recording.groups
     arrival, limits = scenario.arrival, scenario.constraints
     return {
         "scenario": scenario.name,
@@ -87,6 +87,9 @@ def _episode(recording: Recording) -> dict[str, Any]:
         },
         "conditions": conditions(scenario),
         "current": None if recording.water is None else _current(scenario),
+        "ways": [{"team": team, "corners": way.round(2).ravel().tolist()} for team, way in groups.ways.values()],
+        "team": groups.team.tolist(),
+        "uninformed": np.flatnonzero(~groups.informed).tolist(),
         "sonar": _sonar(scenario),
         "events": [event._asdict() for event in recording.events],
         "inspected": list(recording.inspections),
@@ -120,7 +123,7 @@ def _sonar(scenario: Scenario) -> list[dict[str, Any]]:
 def _arrays(recording: Recording) -> dict[str, Any]:
     tick_s = recording.scenario.timing.control_hold_s
     smooth = {
-        "reference": recording.reference,
+        "reference": np.concatenate([recording.references[:, g] for g in recording.groups.ways], axis=1),
         "position": recording.position,
         "heading": unwrapped(recording.heading),
         "speed": recording.speed,

@@ -13,6 +13,7 @@ from uuv_marl.replay.events import arrival, contacts, losses, near_misses
 from uuv_marl.replay.recording import Event, Inspection, Recording, Water
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.groups import Groups, groups_of
 from uuv_marl.types import Float32
 
 MOST_INSPECTED = 8
@@ -73,6 +74,7 @@ class _Tape:
         self._eddies = np.zeros((0, 3))
         self._samples: dict[str, list[NDArray[Any]]] = {}
         self._actions: list[Float32] = []
+        self._groups: Groups
 
     def __call__(self, swarm: Swarm, action: Float32 | None) -> None:
         """Keep the state of world 0, as ``evaluate``'s watch."""
@@ -80,7 +82,10 @@ class _Tape:
         seen = list(self._inspect)
         percept = swarm.percept
         self._add("time_s", facts.time_s[0])
-        self._add("reference", facts.reference[0, 0, :2])
+        if action is None:
+            self._groups = groups_of(swarm)
+        self._add("references", facts.reference[0, :, :2])
+        self._add("marks", swarm.task.marks(0))
         self._add("traffic", swarm.course.obstacles[0, : swarm.course.num_obstacles[0], :2])
         self._add("drift", swarm.flow_field().drift)
         self._eddies = swarm.flow_field().eddies
@@ -105,6 +110,8 @@ class _Tape:
 
     def recording(self, scenario: Scenario, policy: str, run: Run) -> Recording:
         """The recording of the run that was watched."""
+        marks = self._samples.pop("marks")
+        most = max(map(len, marks))
         tape = {name: np.array(values) for name, values in self._samples.items()}
         alive = tape["alive"]
         return Recording(
@@ -115,9 +122,10 @@ class _Tape:
             waypoints=run.waypoints,
             obstacles=run.obstacles,
             traffic=tape["traffic"] if np.ptp(tape["traffic"], axis=0).any() else None,
-            marks=run.marks,
+            groups=self._groups,
+            marks=np.array([np.pad(circles, ((0, most - len(circles)), (0, 0))) for circles in marks]),
             time_s=tape["time_s"],
-            reference=tape["reference"],
+            references=tape["references"],
             position=_where(alive, tape["position"]),
             heading=_where(alive, tape["heading"]),
             speed=_where(alive, tape["speed"]),

@@ -6,6 +6,7 @@ import numpy as np
 
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import Scenario
+from uuv_marl.tasks.groups import Groups
 from uuv_marl.types import Float32, Float64, Int32
 
 
@@ -60,17 +61,19 @@ class Recording(NamedTuple):
     seed: int
     metrics: Metrics
     waypoints: Float32
-    """Corners of the trajectory, shape (point, 2)."""
+    """Corners of the first group's trajectory, shape (point, 2)."""
+    groups: Groups
+    """Who goes where, and who knows of it."""
     obstacles: Float32
     """Centre north, east and radius, at the end, shape (obstacle, 3)."""
     traffic: Float32 | None
     """Their centres at every sample, shape (time, obstacle, 2); None where none moves."""
     marks: Float32
-    """What the task draws: centre north, east and radius of circles, at the end, shape (mark, 3)."""
+    """What the task draws: centre north, east and radius of circles, 0 for none, shape (time, mark, 3)."""
     time_s: Float32
     """Shape (time,)."""
-    reference: Float32
-    """Position of l(t), shape (time, 2)."""
+    references: Float32
+    """Position of each group's l(t), shape (time, group, 2)."""
     position: Float32
     """Shape (time, vehicle, 2)."""
     heading: Float32

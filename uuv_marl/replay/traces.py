@@ -1,6 +1,5 @@
 """Recordings of what a benchmark has saved: less than a simulation shows, but at once and without the policy."""
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -19,10 +18,12 @@ from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Recording, Water
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.files import frozen
 from uuv_marl.sim.sea.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.trajectory import arrival_times, reference
+from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.world import move_obstacles
+from uuv_marl.tasks.groups import groups_of
 from uuv_marl.types import Float32, Float64
 
 _ELSE = "give the folder of a benchmark or a file of its folder traces, or simulate with --scenario and --policy"
@@ -132,7 +133,8 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
     since = np.concatenate([[0], at[:-1] + 1])
     spacing = np.minimum.reduceat(trace["min_spacing_m"], since)
     clearance = np.minimum.reduceat(trace["obstacle_distance_m"].min(axis=1, initial=np.inf), since)
-    velocity = trace["route_velocity"]
+    velocity, swarm = trace["route_velocity"], Swarm(scenario)
+    swarm.reset(seed)  # which decides alone who goes where, and how traffic and water move
     return Recording(
         scenario=scenario,
         policy=policy,
@@ -140,10 +142,11 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
         metrics=metrics,
         waypoints=trace["waypoints"],
         obstacles=trace["obstacles"],
-        traffic=_traffic(scenario, seed, trace["route_time_s"]),
-        marks=np.zeros((0, 3), np.float32),
+        groups=groups_of(swarm),
+        traffic=_traffic(swarm, trace["route_time_s"]),
+        marks=np.zeros((len(velocity), 0, 3), np.float32),
         time_s=trace["route_time_s"],
-        reference=_reference(trace["waypoints"], scenario, trace["route_time_s"]),
+        references=_references(swarm, trace["route_time_s"]),
         position=trace["route_position"],
         heading=trace["route_heading"],
         speed=np.hypot(velocity[:, :, 0], velocity[:, :, 1]),
@@ -156,14 +159,14 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
         force=None,
         spacing=None,
         inspections={},
-        water=_water(scenario, seed, trace["route_time_s"]),
+        water=_water(swarm, trace["route_time_s"]),
     )
 
 
 def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
     """The scenario that was run, with what the policy was granted."""
     try:
-        scenario = Scenario.model_validate_json(json.dumps(saved.content["scenarios"][name]))
+        scenario = Scenario.model_validate(frozen(saved.content["scenarios"][name]))
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(map(str, first["loc"]))
@@ -189,12 +192,12 @@ def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:
         raise ReplayError(f"{path}: route_time_s must be times of time_s; run the benchmark again")
 
 
-def _water(scenario: Scenario, seed: int, time_s: Float32) -> Water | None:
-    """How the water moved, which the seed decides alone."""
+def _water(swarm: Swarm, time_s: Float32) -> Water | None:
+    """How the water moved since the reset."""
+    scenario = swarm.scenario
     if not scenario.current.flows:
         return None
-    swarm, numbers, tick = Swarm(scenario), water(scenario), 0
-    swarm.reset(seed)
+    numbers, tick = water(scenario), 0
     drift = np.zeros((len(time_s), 2), np.float32)
     for k, until in enumerate(np.rint(time_s / scenario.timing.control_hold_s).astype(int).tolist()):
         while tick < until:
@@ -204,24 +207,22 @@ def _water(scenario: Scenario, seed: int, time_s: Float32) -> Water | None:
     return Water(drift, swarm.flow_field().eddies)
 
 
-def _traffic(scenario: Scenario, seed: int, time_s: Float32) -> Float32 | None:
-    """Where the scenario's traffic was, which the seed decides alone."""
-    if not scenario.traffic.moves:
+def _traffic(swarm: Swarm, time_s: Float32) -> Float32 | None:
+    """Where the scenario's traffic was since the reset."""
+    if not swarm.scenario.traffic.moves:
         return None
-    swarm, hold_s = Swarm(scenario), scenario.timing.control_hold_s
-    swarm.reset(seed)
-    places: list[Float64] = []
+    hold_s, places = swarm.scenario.timing.control_hold_s, list[Float64]()
     for tick in np.rint(time_s / hold_s).astype(int).tolist():
         move_obstacles(0, tick, swarm.course, hold_s)
         places.append(swarm.course.obstacles[0, : swarm.course.num_obstacles[0], :2].copy())
     return np.array(places, np.float32)
 
 
-def _reference(waypoints: Float32, scenario: Scenario, time_s: Float32) -> Float32:
-    """Where l(t) was, shape (time, 2)."""
-    corners, passes = waypoints.astype(np.float64), scenario.arrival.by == "passage"
-    times = arrival_times(corners, scenario.trajectory.speed_mps)
-    return np.array([reference(t, corners, times, len(corners) - 1, passes)[:2] for t in time_s.tolist()], np.float32)
+def _references(swarm: Swarm, time_s: Float32) -> Float32:
+    """Where each group's l(t) was, shape (time, group, 2)."""
+    course, passes = swarm.course, swarm.scenario.arrival.by == "passage"
+    ways = list(zip(course.waypoints[0], course.times[0], course.last[0].tolist(), strict=True))
+    return np.array([[reference(t, *way, passes)[:2] for way in ways] for t in time_s.tolist()], np.float32)
 
 
 def _events(scenario: Scenario, trace: dict[str, Float32], metrics: Metrics) -> list[Event]:

@@ -81,7 +81,7 @@ def load_scenario(
             assign(data, field, value)
         if num_vehicles is not None:
             assign(data, "swarm.num_vehicles", plain(num_vehicles))
-        return Scenario.model_validate(_frozen(data))
+        return Scenario.model_validate(frozen(data))
     except ValidationError as error:
         raise ScenarioError("\n".join(explain(dict(e), data) for e in error.errors()[:10])) from None
     except RecursionError:
@@ -223,9 +223,10 @@ def _of_vehicle(data: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-def _frozen(value: Any) -> Any:
+def frozen(value: Any) -> Any:
+    """A document's value with tuples in place of lists, as a scenario takes it."""
     if isinstance(value, dict):
-        return {key: _frozen(entry) for key, entry in cast(dict[str, Any], value).items()}
+        return {key: frozen(entry) for key, entry in cast(dict[str, Any], value).items()}
     if isinstance(value, (list, tuple)):
-        return tuple(_frozen(entry) for entry in cast(Sequence[Any], value))
+        return tuple(frozen(entry) for entry in cast(Sequence[Any], value))
     return value

@@ -29,6 +29,11 @@ def parse_override(text: str) -> tuple[str, object]:
     try:
         return field.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
+        if value.strip().startswith(("[", "{")):
+            raise ScenarioError(
+                f"--set {shown(field.strip())} is no list or table of TOML, got {shown(value.strip())}; texts in it "
+                'need quotes: \'task.kinds=["pocket", "bar"]\''
+            ) from None
         return field.strip(), value.strip()
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"--set {shown(field.strip())} can't be read: {error}; give a plain value") from None

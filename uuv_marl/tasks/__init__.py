@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from uuv_marl.tasks.follow import Follow
     from uuv_marl.tasks.hard_water import HardWater
     from uuv_marl.tasks.reach import Reach
+    from uuv_marl.tasks.silent_targets import SilentTargets
     from uuv_marl.tasks.task import Task
     from uuv_marl.tasks.two_swarms import TwoSwarms
 
-__all__ = ["TASKS", "FewInformed", "Follow", "HardWater", "Reach", "Task", "TwoSwarms"]
+__all__ = ["TASKS", "FewInformed", "Follow", "HardWater", "Reach", "SilentTargets", "Task", "TwoSwarms"]
 
 TASKS = {
     "follow": "uuv_marl.tasks.follow:Follow",
@@ -22,6 +23,7 @@ TASKS = {
     "hard_water": "uuv_marl.tasks.hard_water:HardWater",
     "two_swarms": "uuv_marl.tasks.two_swarms:TwoSwarms",
     "few_informed": "uuv_marl.tasks.few_informed:FewInformed",
+    "silent_targets": "uuv_marl.tasks.silent_targets:SilentTargets",
 }
 """Every task that ships with the package: where its class is, imported when a swarm is to do it."""
 

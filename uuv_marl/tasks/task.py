@@ -14,7 +14,7 @@ from uuv_marl.sim.draw import Draw, usual_draw
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
-from uuv_marl.types import Bool, Float64
+from uuv_marl.types import Bool, Float64, Int64
 
 Terms = Mapping[str, NDArray[np.floating[Any]]]
 """Arrays by name."""
@@ -180,6 +180,10 @@ class Task:
         """
         share = float(self.succeeded()[world].mean())
         return {"untouched_share": share, "whole": float(share == 1.0)}
+
+    def teams(self, world: int) -> Int64:
+        """Number of each vehicle's team, from 0 on, which pictures show in one colour, shape (vehicle,)."""
+        return self.swarm.course.group[world]
 
     def marks(self, world: int) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Circles to draw of the task: centre north, east and radius [m], shape (mark, 3); VMAS: ``extra_render``."""

@@ -20,7 +20,7 @@ from uuv_marl.tasks.maps.lead import AHEAD_M, NUM_WALLS, WAY, tell_walls
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Range, banks, between, joined, wall
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Terms
-from uuv_marl.types import Bool, Float64
+from uuv_marl.types import Bool, Float64, Int64
 
 _BEFORE_M = 5.0
 """How far from the wall's surface a way turns to the gap [m]."""
@@ -177,6 +177,10 @@ class TwoSwarms(Reach):
             **super().metrics(world), "time_ratio": ratio,
             "whole_ratio": float(took.max() / best.max()) if came.all() else None,
         }  # fmt: skip
+
+    def teams(self, world: int) -> Int64:
+        """The two groups, though each vehicle has its own goal."""
+        return (self.memory.side[world] < 0.0).astype(np.int64)
 
     def marks(self, world: int) -> NDArray[np.floating[Any]]:
         """The goals."""

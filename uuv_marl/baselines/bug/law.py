@@ -29,6 +29,7 @@ class TangentBug(Filtered):
     Made for goals at rest: then the vector to the goal tells a vehicle's place, up to its heading.
 
     Args:
+        tuned_for: ``two_swarms``, or "" for hard water.
         gains: of the way and of the wished velocity, instead of the tuned ones.
         barrier: margins and rates of the filter, instead of the tuned ones.
     """
@@ -37,9 +38,10 @@ class TangentBug(Filtered):
     Memory: ClassVar[type[Any] | None] = WallsMemory
 
     def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: BugGains | None = None, barrier: Barrier | None = None
-    ) -> None:
-        found, safe = with_numbers(tuned("tangent_bug"), BugGains(), BUG_BARRIER)
+        self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: BugGains | None = None,
+        barrier: Barrier | None = None,
+    ) -> None:  # fmt: skip
+        found, safe = with_numbers(tuned("tangent_bug", tuned_for), BugGains(), BUG_BARRIER)
         super().__init__(scenario, num_worlds, barrier or safe)
         self.gains = gains or found
         split = len(Surroundings._fields)

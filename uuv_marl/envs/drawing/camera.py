@@ -71,10 +71,11 @@ def _around(points: Float, size: tuple[int, int], least_m: float = 1.0) -> Camer
 
 def _swarm(scene: Scene) -> Float:
     living = scene.position[scene.alive]
-    middle = np.median(living, axis=0) if len(living) else scene.reference
-    away = np.minimum(*(np.hypot(*(living - centre).T) for centre in (scene.reference, middle)))
+    references = scene.references[list(scene.groups.ways)]
+    centres = [*references, np.median(living, axis=0) if len(living) else references[0]]
+    away = np.min([np.hypot(*(living - centre).T) for centre in centres], axis=0)
     shown = living[away < _STRAY * scene.scenario.constraints.s_l_m]
-    return np.concatenate([shown, scene.reference[None]])
+    return np.concatenate([shown, references])
 
 
 def _course(scene: Scene) -> Float:
@@ -87,5 +88,5 @@ def _course(scene: Scene) -> Float:
     corners = scene.waypoints[0] + np.array([behind + aside, behind - aside, aside, -aside])
     room = 0.3 * start.spacing_m * math.sqrt(n)
     discs, radius = scene.obstacles[:, :2], scene.obstacles[:, 2:]
-    ways = np.concatenate([scene.waypoints - room, scene.waypoints + room])
+    ways = np.concatenate([way + side for _, way in scene.groups.ways.values() for side in (-room, room)])
     return np.concatenate([corners, ways, discs - radius, discs + radius])

@@ -118,7 +118,7 @@ def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
         ("vehicles", "vehicles", f"{alive}" if alive == n else f"{alive} of {n}", ink.TEXT),
         ("collisions", "collisions", f"{scene.collisions}", ink.ORANGE if scene.collisions else ink.TEXT),
         ("swarm's centre to l(t)", "to l(t)", _metres(scene.centre_error_m), ink.TEXT),
-    ]
+    ][: 6 if scene.leads else 5]
 
 
 def _metres(value: float) -> str:

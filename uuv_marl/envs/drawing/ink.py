@@ -4,6 +4,7 @@ import functools
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
 
 from uuv_marl.extras import extra
 
@@ -22,6 +23,10 @@ CURRENT = (146, 155, 163)
 DISC, KEEP_OUT, LOST = (115, 115, 115), (165, 165, 165), (140, 140, 140)
 TRAILS: tuple[Colour, ...] = ((222, 234, 243), (200, 221, 236), (174, 207, 228), (145, 190, 219))
 """Colours of trails, from the oldest to the newest part."""
+TEAMS: dict[int | None, Colour] = {0: BLUE, 1: GREEN, 2: PINK, 3: TEXT}
+_SHARES = np.array([0.11, 0.2, 0.31, 0.43])[:, None]
+TEAM_TRAILS = [TRAILS, *(np.rint(WATER + _SHARES * np.subtract(TEAMS[k], WATER)).tolist() for k in (1, 2, 3))]
+"""Colours of teams, and of their trails."""
 
 
 def palette() -> list[Colour]:

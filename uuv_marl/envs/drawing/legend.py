@@ -7,7 +7,7 @@ import numpy as np
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import shown_speed
 from uuv_marl.envs.drawing.current import ARROW, arrow
-from uuv_marl.envs.drawing.painter import DART, FINE, diagonal_cross
+from uuv_marl.envs.drawing.painter import DART, FINE, diagonal_cross, star
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene
 from uuv_marl.extras import extra
 from uuv_marl.scenario import conditions, disturbances
@@ -22,7 +22,12 @@ WIDE, HIGH = 24, 16
 
 def _water(scene: Scene) -> list[tuple[str, Sign]]:
     limits = scene.scenario.constraints
-    found = [("vehicle", _dart(ink.BLUE)), ("l(t), to follow", _target)]
+    teams, all_know = np.unique(scene.groups.team).tolist(), scene.groups.informed.all()
+    alone = "vehicle" if all_know else "perceives l(t)"
+    found = [(f"group {k + 1}" if len(teams) > 1 else alone, _dart(ink.TEAMS[k])) for k in teams]
+    if not all_know:
+        found.append(("does not perceive l(t)", lambda *on: (_dart(ink.BLUE)(*on), _dart(ink.WHITE, 7.5)(*on))))
+    found.append(("l(t), to follow", _target) if scene.leads else ("goal of a vehicle", _goal))
     if scene.trail.size:
         found.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
@@ -95,8 +100,12 @@ def _drawn(sign: Sign, unit: float) -> pygame.Surface:
     return pygame.transform.smoothscale(fine, (round(WIDE * unit), round(HIGH * unit)))
 
 
-def _dart(colour: ink.Colour) -> Sign:
-    return lambda fine, unit: pygame.draw.polygon(fine, colour, (([10.0, 8.0] + 15.0 * DART) * unit).tolist())
+def _dart(colour: ink.Colour, size: float = 15.0) -> Sign:
+    return lambda fine, unit: pygame.draw.polygon(fine, colour, (([10.0, 8.0] + size * DART) * unit).tolist())
+
+
+def _goal(fine: pygame.Surface, unit: float) -> None:
+    star(fine, np.array([12.0, 8.0]) * unit, 6.0 * unit, ink.QUIET)
 
 
 def _trail(fine: pygame.Surface, unit: float) -> None:

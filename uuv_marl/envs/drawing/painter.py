@@ -53,7 +53,7 @@ class Painter:
             paint_heard(self._fine, scene, scene.sonar, view, self._unit)
         self._vehicles(scene, view)
         self._hits(scene, view)
-        self._reference(scene, view)
+        self._references(scene, view)
         self._bar(view, cell)
         pygame.transform.smoothscale(self._fine, self.size, self._shown)
         self._words(scene, camera, cell)
@@ -64,11 +64,14 @@ class Painter:
         view = camera.magnified(FINE)
         self._fine.fill(ink.WATER)
         self._discs(scene, view)
-        pygame.draw.lines(self._fine, ink.TRACK, False, view.pixels(scene.waypoints).tolist(), FINE)
-        for place in view.pixels(scene.position[scene.alive]).tolist():
-            pygame.draw.circle(self._fine, ink.BLUE, place, FINE)
-        self._goal(view.pixels(scene.waypoints[-1]), 5.0 * FINE)
-        pygame.draw.circle(self._fine, ink.GREEN, view.pixels(scene.reference).tolist(), 2.5 * FINE)
+        for team, way, _ in scene.leads:
+            pygame.draw.lines(self._fine, ink.TEAMS.get(team, ink.TRACK), False, view.pixels(way).tolist(), FINE)
+        for i in np.flatnonzero(scene.alive):
+            at, colour = view.pixels(scene.position[i]).tolist(), ink.TEAMS[scene.groups.team[i]]
+            pygame.draw.circle(self._fine, colour, at, FINE)
+        self._goals(scene, view, 5.0 * FINE)
+        for team, _, at in scene.leads:
+            pygame.draw.circle(self._fine, ink.TEAMS.get(team, ink.GREEN), view.pixels(at).tolist(), 2.5 * FINE)
         high, low = view.pixels(seen.centre + seen.reach), view.pixels(seen.centre - seen.reach)
         rectangle = pygame.Rect(low[0], high[1], high[0] - low[0], low[1] - high[1])
         pygame.draw.rect(self._fine, ink.TEXT, rectangle, FINE)
@@ -85,25 +88,26 @@ class Painter:
                 self._fine.fill(ink.GRID, (0, at, width, FINE) if axis == 0 else (at, 0, FINE, height))
 
     def _course(self, scene: Scene, view: Camera) -> None:
-        """Obstacles, the trajectory with its direction, start and goal."""
+        """Obstacles, each group's trajectory with its direction and start, goals."""
         self._discs(scene, view)
-        points, unit = view.pixels(scene.waypoints), self._unit
-        pygame.draw.lines(self._fine, ink.TRACK, False, points.tolist(), round(1.8 * unit))
+        unit = self._unit
         spacing = nice(_CHEVRON_PX * unit / view.scale) * view.scale
-        passed = 0.0
-        for start, end in pairwise(points):
-            length = math.hypot(*(end - start))
-            along = (end - start) / length
-            across = np.array([-along[1], along[0]])
-            for at in np.arange(spacing / 2 - passed % spacing, length, spacing):
-                tip = start + max(at, 0.0) * along
-                wings = [tip - 8.0 * unit * (along - side * across) for side in (0.6, -0.6)]
-                if -20 < tip[0] < view.size[0] + 20 and -20 < tip[1] < view.size[1] + 20:
-                    pygame.draw.polygon(self._fine, ink.TRACK, [tip.tolist(), *(wing.tolist() for wing in wings)])
-            passed += length
-        pygame.draw.circle(self._fine, ink.WHITE, points[0].tolist(), 5.0 * unit)
-        pygame.draw.circle(self._fine, ink.TRACK, points[0].tolist(), 5.0 * unit, round(1.5 * unit))
-        self._goal(points[-1], 11.0 * unit)
+        for team, way, _ in scene.leads:
+            points, colour, passed = view.pixels(way), ink.TEAMS.get(team, ink.TRACK), 0.0
+            pygame.draw.lines(self._fine, colour, False, points.tolist(), round(1.8 * unit))
+            for start, end in pairwise(points):
+                length = math.hypot(*(end - start))
+                along = (end - start) / length
+                across = np.array([-along[1], along[0]])
+                for at in np.arange(spacing / 2 - passed % spacing, length, spacing):
+                    tip = start + max(at, 0.0) * along
+                    wings = [tip - 8.0 * unit * (along - side * across) for side in (0.6, -0.6)]
+                    if -20 < tip[0] < view.size[0] + 20 and -20 < tip[1] < view.size[1] + 20:
+                        pygame.draw.polygon(self._fine, colour, [tip.tolist(), *(wing.tolist() for wing in wings)])
+                passed += length
+            pygame.draw.circle(self._fine, ink.WHITE, points[0].tolist(), 5.0 * unit)
+            pygame.draw.circle(self._fine, colour, points[0].tolist(), 5.0 * unit, round(1.5 * unit))
+        self._goals(scene, view, 11.0 * unit)
 
     def _discs(self, scene: Scene, view: Camera) -> None:
         for middle, radius in zip(view.pixels(scene.obstacles[:, :2]).tolist(), scene.obstacles[:, 2], strict=True):
@@ -113,21 +117,19 @@ class Painter:
         for middle, radius in zip(view.pixels(scene.marks[:, :2]).tolist(), scene.marks[:, 2], strict=True):
             pygame.draw.circle(self._fine, ink.AMBER, middle, float(radius) * view.scale, FINE)
 
-    def _goal(self, at: Float, size: float) -> None:
-        angles = np.arange(10) * math.pi / 5.0
-        radii = np.where(np.arange(10) % 2, 0.42, 1.0)[:, None] * size
-        star = (at + radii * np.stack([np.sin(angles), -np.cos(angles)], axis=1)).tolist()
-        pygame.draw.polygon(self._fine, ink.AMBER, star)
-        pygame.draw.polygon(self._fine, ink.TEXT, star, max(1, round(size / 12)))
+    def _goals(self, scene: Scene, view: Camera, size: float) -> None:
+        for team, way in scene.groups.ways.values():
+            star(self._fine, view.pixels(way[-1]), size if len(way) > 1 else size / 2.0, ink.TEAMS.get(team, ink.AMBER))
 
     def _trails(self, scene: Scene, view: Camera) -> None:
         places = view.pixels(np.concatenate([scene.trail, scene.position[None]])[:, scene.alive])
-        for part, colour in zip(np.array_split(np.arange(len(places) - 1), len(ink.TRAILS)), ink.TRAILS, strict=True):
-            for line in places[part[0] : part[-1] + 2].swapaxes(0, 1).tolist() if part.size else ():
-                pygame.draw.lines(self._fine, colour, False, line, FINE)
+        for k, part in enumerate(np.array_split(np.arange(len(places) - 1), len(ink.TRAILS))):
+            lines = places[part[0] : part[-1] + 2].swapaxes(0, 1).tolist() if part.size else []
+            for line, team in zip(lines, scene.groups.team[scene.alive], strict=False):
+                pygame.draw.lines(self._fine, ink.TEAM_TRAILS[team][k], False, line, FINE)
 
     def _vehicles(self, scene: Scene, view: Camera) -> None:
-        """Darts as long as s_u, so that two that overlap are too near; longer where they would be specks."""
+        """Darts as long as s_u: two that overlap are too near; longer where else specks, hollow for the uninformed."""
         unit, apart = self._unit, scene.scenario.start.spacing_m * view.scale
         least = max(min(6.0 * unit, 0.75 * apart), 3.0 * unit)
         length = min(max(scene.scenario.constraints.s_u_m * view.scale, least), 22.0 * unit)
@@ -135,11 +137,13 @@ class Painter:
         ahead, aside = turned, np.stack([-turned[:, 1], turned[:, 0]], axis=-1)
         places = view.pixels(scene.position)
         darts = places[:, None] + length * (DART[:, :1] * ahead[:, None] + DART[:, 1:] * aside[:, None])
-        colours = np.where(scene.near[:, None], ink.AMBER, ink.BLUE).tolist()
+        colours = np.where(scene.near[:, None], ink.AMBER, [ink.TEAMS[k] for k in scene.groups.team]).tolist()
         for i in np.flatnonzero(~scene.alive):
             diagonal_cross(self._fine, places[i], 3.5 * unit, ink.LOST, round(1.6 * unit))
         for i in np.flatnonzero(scene.alive):
             pygame.draw.polygon(self._fine, colours[i], darts[i].tolist())
+        for i in np.flatnonzero(scene.alive & ~scene.groups.informed):
+            pygame.draw.polygon(self._fine, ink.WHITE, ((darts[i] + places[i]) / 2.0).tolist())
         if scene.sonar:
             i = scene.sonar.vehicle
             pygame.draw.polygon(self._fine, ink.PINK, darts[i].tolist())
@@ -153,11 +157,13 @@ class Painter:
             if scene.time_s - when < FRESH_S:
                 pygame.draw.circle(self._fine, ink.ORANGE, place.tolist(), 13.0 * unit, round(2.5 * unit))
 
-    def _reference(self, scene: Scene, view: Camera) -> None:
-        at, unit = view.pixels(scene.reference).tolist(), self._unit
-        for colour, wider in ((ink.WHITE, 1.2), (ink.GREEN, 0.0)):
-            pygame.draw.circle(self._fine, colour, at, (12.0 + wider) * unit, round((2.6 + 2.0 * wider) * unit))
-            pygame.draw.circle(self._fine, colour, at, (2.4 + wider) * unit)
+    def _references(self, scene: Scene, view: Camera) -> None:
+        unit = self._unit
+        for team, _, reference in scene.leads:
+            at = view.pixels(reference).tolist()
+            for colour, wider in ((ink.WHITE, 1.2), (ink.TEAMS.get(team, ink.GREEN), 0.0)):
+                pygame.draw.circle(self._fine, colour, at, (12.0 + wider) * unit, round((2.6 + 2.0 * wider) * unit))
+                pygame.draw.circle(self._fine, colour, at, (2.4 + wider) * unit)
 
     def _bar(self, view: Camera, cell: float) -> None:
         """The scale bar, as long as a cell of the grid, and beside it the arrow to the north."""
@@ -172,17 +178,27 @@ class Painter:
     def _words(self, scene: Scene, camera: Camera, cell: float) -> None:
         unit = self._unit / FINE
         height = round(12 * unit)
-        for words, point in (("start", scene.waypoints[0]), ("goal", scene.waypoints[-1])):
-            x, y = camera.pixels(point).tolist()
-            left = x - ink.text(words, height, bold=True).get_width() / 2
-            ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)
-        x, y = camera.pixels(scene.reference).tolist()
-        ink.write(self._shown, "l(t)", (x + 15 * unit, y - 7 * unit), height, ink.GREEN, bold=True, halo=True)
+        for team, way, reference in scene.leads:
+            for words, point in (("start", way[0]), ("goal", way[-1])):
+                x, y = camera.pixels(point).tolist()
+                left = x - ink.text(words, height, bold=True).get_width() / 2
+                ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)
+            (x, y), colour = camera.pixels(reference).tolist(), ink.TEAMS.get(team, ink.GREEN)
+            ink.write(self._shown, "l(t)", (x + 15 * unit, y - 7 * unit), height, colour, bold=True, halo=True)
         right, low = self.size[0], self.size[1] - 9 * unit - height
         words = f"{cell:g} m"
         left = right - 34 * unit - (cell * camera.scale + ink.text(words, height).get_width()) / 2
         ink.write(self._shown, words, (left, low - 5 * unit), height, halo=True)
         ink.write(self._shown, "N", (right - 19 * unit, low), height, bold=True, halo=True)
+
+
+def star(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour) -> None:
+    """A star with five points at this distance [px], with an edge if it is amber."""
+    angles = np.arange(10) * math.pi / 5.0
+    radii = np.where(np.arange(10) % 2, 0.42, 1.0)[:, None] * size
+    points = (at + radii * np.stack([np.sin(angles), -np.cos(angles)], axis=1)).tolist()
+    pygame.draw.polygon(surface, colour, points)
+    pygame.draw.polygon(surface, ink.TEXT if colour == ink.AMBER else colour, points, max(1, round(size / 12)))
 
 
 def diagonal_cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:

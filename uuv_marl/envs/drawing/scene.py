@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.sea.current import FlowField
+from uuv_marl.tasks.groups import Groups, groups_of
 from uuv_marl.types import Bool
 
 Float = NDArray[np.floating]
@@ -32,14 +33,16 @@ class Scene(NamedTuple):
 
     scenario: Scenario
     waypoints: Float
-    """Corners of the trajectory, shape (point, 2)."""
+    """Corners of the first group's trajectory, shape (point, 2)."""
+    groups: Groups
+    """Who goes where, and who knows of it."""
     obstacles: Float
     """Centre north, east and radius, shape (obstacle, 3)."""
     marks: Float
     """Circles that the task draws: centre north, east and radius, shape (mark, 3)."""
     time_s: float
-    reference: Float
-    """Position of l(t), shape (2,)."""
+    references: Float
+    """Position of each group's l(t), shape (group, 2)."""
     position: Float
     """Position of every vehicle; a lost one stays where it was lost, shape (vehicle, 2)."""
     heading: Float
@@ -65,6 +68,11 @@ class Scene(NamedTuple):
     sonar: SonarView | None
     water: FlowField | None
     """How it moves; None where the scenario's water is still."""
+
+    @property
+    def leads(self) -> list[tuple[int | None, Float, Float]]:
+        """Team, corners and l(t) of each group, but for goals at rest of several groups."""
+        return [(team, way, self.references[g]) for g, (team, way) in self.groups.ways.items() if len(way) > 1]
 
 
 class SceneHistory:
@@ -104,9 +112,10 @@ class SceneHistory:
             scenario=swarm.scenario,
             waypoints=course.waypoints[w, 0, : course.last[w, 0] + 1].copy(),
             obstacles=course.obstacles[w, : course.num_obstacles[w]].copy(),
+            groups=groups_of(swarm, w),
             marks=batch.task.marks(w),
             time_s=float(facts.time_s[w]),
-            reference=facts.reference[w, 0, :2].copy(),
+            references=facts.reference[w, :, :2].copy(),
             position=position,
             heading=state.eta[w, :, 2].copy(),
             alive=alive,

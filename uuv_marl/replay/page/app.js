@@ -29,6 +29,7 @@ class App {
     this.selected = episodes[0].inspected[0] ?? null;
     this.selectedEpisode = 0;
     this.quantities = shownQuantities(episodes);
+    if (episodes.some((episode) => episode.hasTeams)) this.quantities.unshift("");
     this.camera = new Camera(episodes);
     this.timeline = new Timeline(episodes, (time) => this.seek(time));
     this.plots = new Plots(episodes, (time) => this.seek(time));
@@ -94,8 +95,9 @@ class App {
     this.render();
   }
 
-  /** Colour by `spacing`, `speed` or `force`. */
+  /** Colour by `spacing`, `speed` or `force`; by group without a quantity. */
   setColour(quantity) {
+    at("legend").style.visibility = quantity ? "" : "hidden";
     this.scale = quantity ? new Scale(quantity, this.episodes) : null;
     at("colour").value = quantity ?? "";
     this.#legend();
@@ -180,9 +182,10 @@ class App {
     at("title").textContent = `${first.scenario}: ${names.join(", ")}`;
     at("subtitle").textContent =
       `${first.vehicles} vehicles, seed ${first.seed}, scenario version ${first.version}, ${first.conditions}`;
+    if (first.uninformed.length) at("subtitle").prepend("filled: perceives l(t), hollow: does not; ");
     at("waters").dataset.episodes = this.episodes.length;
     at("waters").append(...this.panels.map((panel) => panel.element));
-    at("colour").append(...this.quantities.map((name) => new Option(QUANTITIES[name].label, name)));
+    at("colour").append(...this.quantities.map((name) => new Option(QUANTITIES[name]?.label ?? "Group", name)));
     at("speed").append(...SPEEDS.map((speed) => new Option(`${speed}×`, speed)));
     this.setSpeed(this.speed);
   }

@@ -69,7 +69,7 @@ function bounds(episodes) {
     });
   };
   for (const episode of episodes) {
-    const corners = episode.values("waypoints");
+    const corners = episode.ways.flatMap((way) => way.corners);
     const discs = episode.values("obstacles");
     const start = episode.poses(0);
     for (let k = 0; k < corners.length; k += 2) hold(corners[k], corners[k + 1], 40);

@@ -14,7 +14,7 @@ export function shownQuantities(episodes) {
   return Object.keys(QUANTITIES).filter((name) => episodes.every((episode) => episode.values(name)));
 }
 
-/** The page's colours as the browser resolves them now, by the name of their CSS variable; `scale` has all steps. */
+/** The page's colours as the browser resolves them now, by the name of their CSS variable; `scale` has all steps, `teams` a colour each. */
 export function resolvePalette(names) {
   const probe = document.body.appendChild(document.createElement("i"));
   const resolve = (name) => {
@@ -23,8 +23,9 @@ export function resolvePalette(names) {
   };
   const palette = Object.fromEntries(names.map((name) => [name, resolve(name)]));
   const stops = [0, 1, 2, 3, 4].map((k) => resolve(`scale-${k}`).match(/[\d.]+/g).map(Number));
+  const teams = ["series-0", "series-2", "series-3", "ink"].map(resolve);
   probe.remove();
-  return { ...palette, scale: Array.from({ length: STEPS }, (_, k) => mix(stops, k / (STEPS - 1))) };
+  return { ...palette, teams, scale: Array.from({ length: STEPS }, (_, k) => mix(stops, k / (STEPS - 1))) };
 }
 
 /** How a quantity becomes a step of the scale: `low` and `high` [its unit] bound it, for all episodes alike. */

@@ -27,21 +27,22 @@ function roundStep(number) {
   return power * [1, 2, 5, 10].find((step) => step * power >= number * 0.999);
 }
 
-/** Trajectory with start and goal, arrival radius, obstacles with their keep-out ring. */
+/** Each group's trajectory with start and goal, arrival radius, obstacles with their keep-out ring. */
 export function drawCourse(context, episode, time, view, palette, weight) {
-  const corners = episode.values("waypoints");
   const discs = episode.discs(time);
-  const [goal_x, goal_y] = [view.x(corners.at(-1)), view.y(corners.at(-2))];
+  const leads = episode.ways.filter(({ corners }) => corners.length > 2);
   context.lineWidth = 1.5 * weight;
-  context.strokeStyle = palette.track;
-  context.setLineDash([7 * weight, 6 * weight]);
-  context.beginPath();
-  for (let k = 0; k < corners.length; k += 2) context.lineTo(view.x(corners[k + 1]), view.y(corners[k]));
-  context.stroke();
-  context.setLineDash([2, 4]);
-  context.beginPath();
-  circle(context, goal_x, goal_y, episode.arrival.spread_m * view.scale);
-  context.stroke();
+  for (const { team, corners } of leads) {
+    context.strokeStyle = palette.teams[team] ?? palette.track;
+    context.setLineDash([7 * weight, 6 * weight]);
+    context.beginPath();
+    for (let k = 0; k < corners.length; k += 2) context.lineTo(view.x(corners[k + 1]), view.y(corners[k]));
+    context.stroke();
+    context.setLineDash([2, 4]);
+    context.beginPath();
+    circle(context, view.x(corners.at(-1)), view.y(corners.at(-2)), episode.arrival.spread_m * view.scale);
+    context.stroke();
+  }
   context.setLineDash([]);
 
   context.beginPath();
@@ -60,26 +61,29 @@ export function drawCourse(context, episode, time, view, palette, weight) {
   context.stroke();
   context.setLineDash([]);
   context.beginPath();
-  const marks = episode.values("marks");
+  const marks = episode.marks(time);
   for (let k = 0; k < marks.length; k += 3) {
     circle(context, view.x(marks[k + 1]), view.y(marks[k]), marks[k + 2] * view.scale);
   }
   context.strokeStyle = palette.goal;
   context.stroke();
 
-  context.beginPath();
-  circle(context, view.x(corners[1]), view.y(corners[0]), 5 * weight);
-  context.fillStyle = palette.water;
-  context.fill();
-  context.strokeStyle = palette.track;
-  context.stroke();
-  context.fillStyle = context.strokeStyle = palette.goal;
-  if (weight === 1) {
+  for (const { team, corners } of leads) {
     context.beginPath();
-    circle(context, goal_x, goal_y, episode.arrival.radius_m * view.scale);
+    circle(context, view.x(corners[1]), view.y(corners[0]), 5 * weight);
+    context.fillStyle = palette.water;
+    context.fill();
+    context.strokeStyle = palette.teams[team] ?? palette.track;
     context.stroke();
   }
-  star(context, goal_x, goal_y, 9 * weight);
+  for (const { team, corners } of episode.ways) {
+    const [x, y, led] = [view.x(corners.at(-1)), view.y(corners.at(-2)), corners.length > 2];
+    context.fillStyle = context.strokeStyle = palette.teams[team] ?? palette.goal;
+    context.beginPath();
+    if (led && weight === 1) circle(context, x, y, episode.arrival.radius_m * view.scale);
+    context.stroke();
+    star(context, x, y, (led ? 9 : 5) * weight);
+  }
 }
 
 /** A length that one reads off, and where north is. */
@@ -119,9 +123,9 @@ export function drawMap(context, episode, time, poses, view, look) {
   context.globalAlpha = 1;
   context.clip();
   drawCourse(context, episode, time, map, look.palette, 0.5);
-  context.fillStyle = look.palette.scale[8];
   const dot = episode.vehicles > 200 ? 1 : 1.8;
   for (let i = 0; i < episode.vehicles; i++) {
+    context.fillStyle = episode.hasTeams ? look.palette.teams[episode.team[i]] : look.palette.scale[8];
     context.fillRect(map.x(poses[3 * i + 1]) - dot / 2, map.y(poses[3 * i]) - dot / 2, dot, dot);
   }
   const [north, east] = [view.height / 2 / view.scale, view.width / 2 / view.scale];

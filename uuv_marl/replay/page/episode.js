@@ -5,6 +5,7 @@ export class Episode {
     Object.assign(this, decoded);
     this.time = this.values("time_s");
     this.end = this.time.at(-1);
+    this.hasTeams = this.team.some((team) => team > 0);
     this.lastSeen = this.#lastSeen();
     this.lowestSpacing = lowestSoFar(this.values("min_spacing_m"));
     this.lowestClearance = lowestSoFar(this.values("obstacle_clearance_m"));
@@ -68,11 +69,18 @@ export class Episode {
     return poses;
   }
 
-  /** North and east of l(t) [m]. */
-  reference(time) {
+  /** North and east of a way's l(t) [m]. */
+  reference(time, way = 0) {
     const [sample, next, share] = this.#between(time);
     const at = this.values("reference");
-    return [0, 1].map((axis) => at[2 * sample + axis] + share * (at[2 * next + axis] - at[2 * sample + axis]));
+    const [from, to] = [sample, next].map((k) => 2 * (k * this.ways.length + way));
+    return [0, 1].map((axis) => at[from + axis] + share * (at[to + axis] - at[from + axis]));
+  }
+
+  /** Centre north, east and radius [m] of the circles that the task draws, one after the other. */
+  marks(time) {
+    const row = 3 * this.arrays.marks.shape[1];
+    return this.values("marks").subarray(row * this.sampleAt(time), row * (this.sampleAt(time) + 1));
   }
 
   /** Centre north, east and radius [m] of the obstacles, one after the other. */

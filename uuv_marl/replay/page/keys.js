@@ -34,7 +34,7 @@ function actions(app, shift) {
     "-": () => app.magnify(0.8),
     f: () => app.follow(next(FOLLOW, app.camera.follow)),
     t: () => app.setTrails(!app.trails),
-    c: () => app.setColour(next(app.quantities, app.scale?.quantity)),
+    c: () => app.setColour(next(app.quantities, app.scale?.quantity ?? "")),
     n: () => app.jump(true),
     p: () => app.jump(false),
     Escape: () => app.select(app.selectedEpisode, null),

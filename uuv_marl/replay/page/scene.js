@@ -29,7 +29,10 @@ export function drawScene(context, episode, time, poses, view, look) {
   if (shown >= 0 && shown !== false) drawSonar(context, episode, shown, sample, poses, view, look.palette);
   drawVehicles(context, episode, sample, poses, view, size, look);
   drawMarks(context, episode, poses, view, size, look);
-  drawReference(context, episode.reference(time), view, look.palette);
+  episode.ways.forEach(({ team, corners }, way) => {
+    const colour = look.palette.teams[team] ?? look.palette.reference;
+    if (corners.length > 2) drawReference(context, episode.reference(time, way), view, look.palette, colour);
+  });
   drawFlashes(context, episode, time, poses, view, size, look.palette);
   drawScaleBar(context, view, look.palette);
   if (episode.current) drawCurrentKey(context, episode, view, look.palette);
@@ -83,7 +86,7 @@ function drawVehicles(context, episode, sample, poses, view, size, look) {
       continue;
     }
     const value = values ? values[sample * episode.vehicles + i] : NaN;
-    const colour = look.palette.scale[look.scale?.step(value) ?? 0];
+    const colour = look.scale ? look.palette.scale[look.scale.step(value)] : look.palette.teams[episode.team[i]];
     if (!paths.has(colour)) paths.set(colour, []);
     paths.get(colour).push(i);
   }
@@ -91,11 +94,14 @@ function drawVehicles(context, episode, sample, poses, view, size, look) {
   context.strokeStyle = look.palette.lost;
   context.stroke();
   for (const [colour, vehicles] of paths) {
-    context.fillStyle = colour;
+    context.strokeStyle = colour;
     for (const i of vehicles) {
       context.beginPath();
       dart(context, view.x(poses[3 * i + 1]), view.y(poses[3 * i]), poses[3 * i + 2], size);
+      const hollow = episode.uninformed.includes(i);
+      context.fillStyle = hollow ? look.palette.water : colour;
       context.fill();
+      if (hollow) context.stroke();
     }
   }
 }
@@ -116,7 +122,7 @@ function drawMarks(context, episode, poses, view, size, look) {
   context.globalAlpha = 1;
 }
 
-function drawReference(context, [north, east], view, palette) {
+function drawReference(context, [north, east], view, palette, colour) {
   const [x, y] = [view.x(east), view.y(north)];
   context.beginPath();
   circle(context, x, y, 7);
@@ -125,7 +131,7 @@ function drawReference(context, [north, east], view, palette) {
   context.strokeStyle = palette.water;
   context.stroke();
   context.lineWidth = 2;
-  context.strokeStyle = palette.reference;
+  context.strokeStyle = colour;
   context.stroke();
 }
 

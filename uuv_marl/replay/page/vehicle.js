@@ -39,6 +39,8 @@ function details(episode, vehicle, sample) {
     ["spacing", value("spacing", 1, "m")],
     ["force", value("force", 0, "%", 100)],
   ];
+  if (episode.hasTeams) rows.unshift(["group", episode.team[vehicle] + 1]);
+  if (episode.uninformed.includes(vehicle)) rows.push(["l(t)", "not perceived"]);
   const list = make("dl", {}, ...rows.flatMap(([name, text]) => [make("dt", {}, name), make("dd", {}, text)]));
   const inspected = episode.inspected.indexOf(vehicle);
   if (inspected < 0) return [list, make("p", {}, `Its sonar was not recorded; --inspect ${vehicle} records it.`)];

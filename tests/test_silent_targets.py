@@ -1,0 +1,190 @@
+"""Silent targets: they walk by the seed alone, stay in their box, are heard by the bow alone, and can be held."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import granted, make
+from uuv_marl.envs.core import BatchedEnv
+from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario.vehicle_checks import top_speed
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks import SilentTargets
+
+TIERS = ("silent_targets_easy", "silent_targets", "silent_targets_hard")
+TUNING = 10_100
+
+
+def water(worlds=1, scenario="silent_targets", **changes):
+    return Swarm(load_scenario(scenario, overrides=changes), worlds)
+
+
+def drift(swarm, steps=1):
+    for _ in range(steps):
+        swarm.step(np.zeros((swarm.num_worlds, swarm.num_vehicles, 2)))
+
+
+def alone(swarm, away=400.0):
+    """The vehicles apart from all targets, at rest, bows north, outside the box."""
+    n, half = swarm.num_vehicles, 0.5 * swarm.task.numbers.side_m
+    swarm.state.eta[:, :, 0] = half + away
+    swarm.state.eta[:, :, 1] = 20.0 * np.arange(n)
+    swarm.state.eta[:, :, 2] = 0.0
+    swarm.state.nu[:] = 0.0
+
+
+def test_targets_depend_on_their_seed_alone_and_not_on_what_vehicles_do():
+    batch, rng = water(3), np.random.default_rng(0)
+    batch.reset(TUNING)
+    drift(batch, 60)
+    for w in range(3):
+        single = water()
+        single.reset(TUNING + w)
+        for _ in range(60):
+            single.step(0.3 * rng.uniform(-1.0, 1.0, (1, single.num_vehicles, 2)))
+        np.testing.assert_array_equal(single.course.obstacles[0], batch.course.obstacles[w])
+    assert len(np.unique(batch.course.obstacles[:, :, 0])) == 24
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_targets_stay_in_the_box_keep_their_speed_and_turn_smoothly(tier):
+    swarm = water(2, tier)
+    swarm.reset(TUNING)
+    numbers, scenario, memory = swarm.task.numbers, swarm.scenario, swarm.task.memory
+    full, period = top_speed(scenario.vehicle, scenario.actuators), scenario.timing.decision_period_s
+    low, high = numbers.speed_share
+    assert ((memory.speed >= low * full) & (memory.speed <= high * full)).all()
+    turned, before = [], None
+    for _ in range(300):
+        at = swarm.course.obstacles[:, :, :2].copy()
+        drift(swarm)
+        moved = swarm.course.obstacles[:, :, :2] - at
+        np.testing.assert_allclose(np.hypot(*np.moveaxis(moved, -1, 0)), memory.speed * period, rtol=1e-9)
+        assert np.abs(swarm.course.obstacles[:, :, :2]).max() <= 0.5 * numbers.side_m + 1e-9
+        way = np.arctan2(moved[..., 1], moved[..., 0])
+        if before is not None:
+            turned.append(np.abs((way - before + np.pi) % (2.0 * np.pi) - np.pi))
+        before = way
+    smooth = np.array(turned) <= np.radians(numbers.turn_dps) * period + 1e-6
+    assert smooth.mean() > 0.98  # all but those at the box's side
+    assert (np.array(turned) > 1e-3).mean() > 0.02
+
+
+def test_nothing_but_the_bow_hears_a_target():
+    swarm = water(**{"task.targets": 1})
+    swarm.reset(TUNING)
+    swarm.course.obstacles[0, 0, :2] = 0.0
+    for bearing, away, heard in ((0, 99, 1), (59, 60, 1), (-59, 60, 1), (75, 60, 0), (180, 20, 0), (0, 102, 0)):
+        alone(swarm)
+        angle = np.radians(bearing)
+        swarm.state.eta[0, 0, :2] = -away * np.cos(angle), -away * np.sin(angle)
+        percept = swarm.observe()
+        assert percept["echo"][0, 0].any() == heard, bearing
+        assert (percept["heard"][0, 0] == water_without(swarm)["heard"][0, 0]).all()
+        assert not percept["echo"][0, 1:].any()
+
+
+def water_without(swarm):
+    """What is perceived where the targets are far away."""
+    before = swarm.snapshot()
+    swarm.course.obstacles[:, :, :2] = 1e5
+    seen = swarm.observe().flat.copy()
+    swarm.restore(before)
+    return dataclasses.replace(swarm.percept, flat=seen)
+
+
+def test_a_vehicle_knows_where_it_is_in_the_box():
+    swarm = water(2)
+    percept = swarm.reset(TUNING)
+    c, s = np.moveaxis(percept["box"].astype(float), -1, 0)
+    x, y = np.moveaxis(percept["reference"].astype(float), -1, 0)
+    place = -np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    np.testing.assert_allclose(place, swarm.state.eta[:, :, :2], atol=1e-3)
+    assert np.hypot(*np.moveaxis(swarm.course.obstacles[:, :, :2], -1, 0)).min() > swarm.task.numbers.clear_m
+
+
+def test_the_held_share_is_that_of_the_last_half():
+    """Of four targets one is held all along, one from three quarters on, one in the first half, one never."""
+    batch = BatchedEnv(load_scenario("silent_targets_easy"))
+    batch.reset(TUNING)
+    swarm, task = batch.swarm, batch.task
+    limit = swarm.time_limit_s[0]
+    while not batch.over.all():
+        time_s = swarm.facts.time_s[0]
+        alone(swarm)
+        holds = {0: True, 1: time_s > 0.75 * limit - 0.6, 2: time_s < 0.5 * limit - 0.6, 3: False}
+        swarm.course.obstacles[0, :4, :2] = 150.0 * np.arange(4)[:, None] - 250.0
+        for k, held in holds.items():
+            if held:
+                swarm.state.eta[0, k, :2] = swarm.course.obstacles[0, k, :2] + (0.0, 20.0)
+        result = batch.step(np.zeros((1, 8, 2)))
+        assert result.terms["held"][0, 5] == pytest.approx(20.0 * 0.5 / limit * sum(holds.values()) / 4.0)
+    measured = task.metrics(0)
+    assert measured["held_share"] == pytest.approx((1.0 + 0.5) / 4.0, abs=0.01)
+    assert (measured["found_share"], measured["whole"]) == (0.75, 0.0)
+    assert measured["found_s"] == pytest.approx((0.5 + 0.75 * limit + 0.5 + limit) / 4.0, abs=1.0)
+    assert not task.success(0)
+    assert task.success(0, 5) != bool(swarm.state.touched[0, 5])
+
+
+def test_progress_counts_the_nearest_target_that_no_other_holds():
+    swarm = water(**{"task.targets": 2})
+    swarm.reset(TUNING)
+    alone(swarm)
+    swarm.course.obstacles[0, :2, :2] = (0.0, 0.0), (200.0, 0.0)
+    swarm.state.eta[0, 0, :2], swarm.state.eta[0, 1, :2] = (0.0, 10.0), (0.0, 50.0)
+    swarm.observe()
+    left = swarm.task._left()[0]
+    assert left[0] == pytest.approx(10.0)  # its own
+    assert left[1] == pytest.approx(np.hypot(200.0, 50.0))
+    swarm.state.eta[0, 2, :2] = (200.0, 5.0)
+    assert swarm.task._left()[0, 1] == 0.0  # none is left
+
+
+def test_a_run_goes_on_alike_from_a_snapshot():
+    swarm = water()
+    swarm.reset(TUNING)
+    drift(swarm, 50)
+    before = swarm.snapshot()
+    drift(swarm, 50)
+    first = swarm.snapshot()
+    swarm.restore(before)
+    drift(swarm, 50)
+    for name, array in swarm.snapshot().items():
+        np.testing.assert_array_equal(array, first[name], err_msg=name)
+
+
+def shares(name, tier, worlds=4):
+    scenario = granted(name, load_scenario(tier))
+    batch, policy = BatchedEnv(scenario, worlds), make(name, scenario, worlds)
+    batch.reset(TUNING)
+    policy.reset(TUNING)
+    total = np.zeros(worlds)
+    while not batch.over.all():
+        policy.active[:] = ~batch.over
+        result = batch.step(policy.act(batch.swarm.percept))
+        assert list(result.terms) == list(SilentTargets.terms)
+        total += result.world_reward
+    return np.mean([batch.task.metrics(w)["held_share"] for w in range(worlds)]), total.mean()
+
+
+def test_the_oracle_holds_all_and_the_guide_beats_the_floors():
+    held, _ = shares("oracle", "silent_targets_easy")
+    assert held >= 0.95
+    found = {name: shares(name, "silent_targets_easy") for name in (SilentTargets.guide, "idle", "random")}
+    assert found[SilentTargets.guide][0] > 0.3
+    assert found[SilentTargets.guide][1] > max(found["idle"][1], found["random"][1])
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"task.speed_share": [0.5, 1.5]}, r"task.speed_share must be at most 1, .* got \[0.5, 1.5\]; lower it"),
+    ({"task.turn_s": [20.0, 10.0]}, r"task.turn_s must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
+    ({"task.clear_m": 700.0}, "task.clear_m must be at most half of task.side_m = 1200, got 700; lower it"),
+    ({"task.targets": 0}, "task.targets must lie within 1 to 1,024, got 0"),
+    ({"start.width_m": 200.0}, "task.clear_m must hold the start, two times 40 x 200 m, got 110; raise it"),
+])  # fmt: skip
+def test_numbers_that_can_not_be_are_refused(changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        water(**changes)

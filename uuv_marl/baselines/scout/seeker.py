@@ -1,0 +1,248 @@
+"""``nearest_target``: searches a box for silent targets, and keeps near the nearest that no other vehicle is nearer to.
+
+It has one target, which it remembers for a while as it was heard last, moving on. Without one it searches: straight on
+and mirrored at the sides of the box, or to and fro in lanes, one for each vehicle. Pushes among near neighbours and the
+safety filter are as in ``scout``.
+"""
+
+import dataclasses
+import math
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from uuv_marl.baselines.memory import Surroundings, update_memory
+from uuv_marl.baselines.memory.pose import to_map, to_map_axes
+from uuv_marl.baselines.memory.table import with_surroundings
+from uuv_marl.baselines.policy import Limits, tuned
+from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
+from uuv_marl.baselines.scout.law import Scout, decide_all, pushed
+from uuv_marl.percept import Percept, Starts
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.views import Fields, fields
+from uuv_marl.types import Bool, Float32, Float64
+
+
+class SeekerGains(NamedTuple):
+    """Free parameters. Those by default were found by hand; the policy has tuned ones."""
+
+    speed: float = 5.0
+    """Of a search [m/s]."""
+    rate: float = 0.5
+    """Speed towards the target, beside its own, over the distance to where one stays behind it [1/s]."""
+    stay_m: float = 12.0
+    """Distance to stay from the target [m]."""
+    claim_m: float = 45.0
+    """A target is another's if that one is nearer to it, and so near [m]."""
+    lost_s: float = 8.0
+    """For how long a target is followed that is heard no more [s]."""
+    edge_m: float = 60.0
+    """A search turns back so far from the box's side [m]."""
+    push: float = 10.0
+    """Away from a neighbour at no distance [m/s]."""
+    push_range: float = 12.0
+    """Where pushes end [m]."""
+    steering: float = 1.0
+    """Factor of the force that follows the wished velocity [1]."""
+
+
+class Sighted(NamedTuple):
+    """The target that a vehicle follows, in its map, and how it searches."""
+
+    target: Annotated[Float64, "world vehicle 4", "Place [m] and velocity [m/s] of its target."]
+    heard_s: Annotated[Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."]
+    search: Annotated[
+        Float64, "world vehicle 2", "Direction of its search in the box, or in lanes that of x, and the lane."
+    ]
+
+
+SeekerMemory = with_surroundings("SeekerMemory", Sighted)
+_ALPHA, _BETA = 0.8, 0.5
+"""Gains by which an echo corrects a target's place and velocity [1]. Assumed."""
+_GATE_M, _GATE_MPS = 8.0, 4.0
+"""An echo so near to where the target is expected is its own, and farther by this for the time unheard. Assumed."""
+_SILENT_S, _GOES_MPS = 1.2, 0.5
+"""Unheard for so long, a target is turned to; slower than this, one stays this side of it, not behind it. Assumed."""
+_AHEAD_M = 40.0
+"""Who is beside its lane comes back to it so far ahead [m]. Assumed."""
+
+
+class NearestTarget(Scout):
+    """Search, then keep near the nearest target heard that no other is nearer to; in other tasks it is ``scout``.
+
+    Args:
+        lanes: whether to search in lanes across the box, one for each vehicle, instead of straight on.
+        gains: free parameters, instead of those that were tuned for this search.
+        barrier: margins and rates of the filter, instead of the tuned ones.
+    """
+
+    Memory: ClassVar[type[Any] | None] = SeekerMemory
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
+        barrier: Barrier | None = None,
+    ) -> None:  # fmt: skip
+        found, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
+        super().__init__(scenario, num_worlds, barrier=barrier or safe)
+        self.seeker = SeekerGains(*map(float, gains or found))
+        self._seeks = "box" in self.layout.starts
+        self._half_m = 0.5 * scenario.task_numbers.side_m if self._seeks else 0.0
+        self._lanes = scenario.swarm.num_vehicles if lanes else 0
+        split = len(Surroundings._fields)
+        self._kept, self._track = Surroundings(*self.memory[:split]), Sighted(*self.memory[split:])
+
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Remember the targets, and a percept without them, since they are nothing to go round."""
+        seen, period = dataclasses.replace(percept, flat=percept.flat.copy()), self.model.own.period_s
+        for name in ("echo", "echo_range", "echo_position") if self._seeks else ():
+            seen[name][:] = 0.0
+        update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.kept_s, self._kept)
+        if self._seeks:
+            stay_behind(
+                self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
+                self.seeker, self._kept, self._track,
+            )  # fmt: skip
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        action, period = np.zeros((*self._track.heard_s.shape, 2), np.float32), self.model.own.period_s
+        if self._seeks:
+            seek(
+                self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self._half_m, self._lanes,
+                self.seeker, self.barrier, self.limits, self.gain, self._kept, self._track, self.planes, action,
+            )  # fmt: skip
+        else:
+            decide_all(
+                self.active, period, self.grown(), self.barrier, self.limits, self.gain, self._kept, self.planes,
+                self._trims, action,
+            )  # fmt: skip
+        return action
+
+
+@compiled
+def claimed(w: int, i: int, x: float, y: float, claim_m: float, kept: Surroundings) -> bool:
+    """Whether another vehicle is nearer to a target at (x, y) in the map, and near enough."""
+    least = min(math.hypot(kept.pose[w, i, 0] - x, kept.pose[w, i, 1] - y), claim_m)
+    for k in range(kept.known.shape[2]):
+        if kept.known[w, i, k] > 0.0 and math.hypot(kept.place[w, i, k, 0] - x, kept.place[w, i, k, 1] - y) < least:
+            return True
+    return False
+
+
+@compiled
+def _heard(
+    w: int, i: int, gate: float, see: Fields, g: SeekerGains, kept: Surroundings, track: Sighted
+) -> tuple[float, float, bool]:
+    """Place in the map of the target heard that a vehicle follows, or is to follow now [m], and whether there is one.
+
+    ``gate``: how far it may be from where it is expected [m]; infinite where nothing is followed.
+    """
+    pose, (x, y, found), best = kept.pose[w, i], (0.0, 0.0, False), gate
+    from_x, from_y = (pose[0], pose[1]) if gate == math.inf else (track.target[w, i, 0], track.target[w, i, 1])
+    for a in range(see.echo.shape[2]):
+        if see.echo[w, i, a] > 0.0:
+            p_x, p_y = to_map(see.echo_position[w, i, a, 0], see.echo_position[w, i, a, 1], pose)
+            far = math.hypot(p_x - from_x, p_y - from_y)
+            if far < best and not claimed(w, i, p_x, p_y, g.claim_m, kept):
+                best, x, y, found = far, p_x, p_y, True
+    return x, y, found
+
+
+@compiled
+def stay_behind(
+    flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
+    kept: Surroundings, track: Sighted,
+) -> None:  # fmt: skip
+    """Take the echoes, all of which are targets', into what vehicles follow; and turn searches back."""
+    see = fields(flat, at)
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1] if worlds[w] else 0):
+            if kept.begun[w, i] == 0.0:
+                continue
+            goal = track.target[w, i]
+            goal[0], goal[1] = goal[0] + period * goal[2], goal[1] + period * goal[3]
+            track.heard_s[w, i] -= period
+            since, follows = g.lost_s - track.heard_s[w, i], track.heard_s[w, i] > 0.0
+            gate = _GATE_M + _GATE_MPS * since if follows else math.inf
+            x, y, found = _heard(w, i, gate, see, g, kept, track)
+            if found and follows:
+                d_x, d_y = x - goal[0], y - goal[1]
+                goal[0], goal[1] = goal[0] + _ALPHA * d_x, goal[1] + _ALPHA * d_y
+                goal[2], goal[3] = goal[2] + _BETA * d_x / since, goal[3] + _BETA * d_y / since
+            elif found:
+                goal[0], goal[1], goal[2], goal[3] = x, y, 0.0, 0.0
+            if found:
+                track.heard_s[w, i] = g.lost_s
+            elif follows and claimed(w, i, goal[0], goal[1], g.claim_m, kept):
+                track.heard_s[w, i] = 0.0
+            _turn_back(w, i, half_m - g.edge_m, lanes, see, box, track)
+
+
+@compiled
+def place_in_box(w: int, i: int, see: Fields, box: Float32) -> tuple[float, float]:
+    """Where a vehicle is in the box, from its middle, which is the reference [m]."""
+    c, s = float(box[w, i, 0]), float(box[w, i, 1])
+    x, y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
+    return s * y - c * x, -s * x - c * y
+
+
+@compiled
+def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float32, track: Sighted) -> None:
+    """Begin a search, along the bow or the lane; ``most`` from the middle [m] mirror it, or take another lane."""
+    way = track.search[w, i]
+    if way[0] == 0.0 and way[1] == 0.0:
+        way[0], way[1] = float(box[w, i, 0]), float(box[w, i, 1])
+        if lanes:
+            way[0], way[1] = (1.0 if i % 2 == 0 else -1.0), i + 0.5
+    place = place_in_box(w, i, see, box)
+    for k in range(1 if lanes else 2):
+        if abs(place[k]) > most and place[k] * way[k] > 0.0:
+            way[k] = -way[k]
+            if lanes:
+                way[1] = (way[1] + 1.0) % lanes
+
+
+@compiled
+def _searching(
+    w: int, i: int, half_m: float, lanes: int, see: Fields, box: Float32, speed: float, kept: Surroundings,
+    track: Sighted,
+) -> tuple[float, float]:  # fmt: skip
+    """The velocity that a search wishes, in the map [m/s]."""
+    x, y = track.search[w, i, 0], track.search[w, i, 1]
+    if lanes:
+        off = (2.0 * y / lanes - 1.0) * half_m - place_in_box(w, i, see, box)[1]
+        far = math.hypot(_AHEAD_M, off)
+        x, y = x * _AHEAD_M / far, off / far
+    c, s = float(box[w, i, 0]), float(box[w, i, 1])
+    return to_map_axes(speed * (c * x + s * y), speed * (c * y - s * x), kept.pose[w, i])
+
+
+@compiled
+def _keeping(w: int, i: int, g: SeekerGains, kept: Surroundings, track: Sighted) -> tuple[float, float]:
+    """The velocity that keeps a vehicle behind its target, or leads to one that isn't heard, in the map [m/s]."""
+    goal, pose = track.target[w, i], kept.pose[w, i]
+    x, y, v_x, v_y = goal[0] - pose[0], goal[1] - pose[1], goal[2], goal[3]
+    b_x, b_y = (v_x, v_y) if math.hypot(v_x, v_y) > _GOES_MPS else (x, y)
+    stay = g.stay_m if track.heard_s[w, i] > g.lost_s - _SILENT_S else 0.0
+    stay /= max(math.hypot(b_x, b_y), 1e-6)
+    return v_x + g.rate * (x - stay * b_x), v_y + g.rate * (y - stay * b_y)
+
+
+@compiled
+def seek(
+    flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
+    barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, track: Sighted, planes: Float64, action: Float32,
+) -> None:  # fmt: skip
+    """The law for every vehicle."""
+    see = fields(flat, at)
+    for w in range(flat.shape[0]):
+        for i in range(flat.shape[1]):
+            if worlds[w] and kept.begun[w, i] > 0.0:
+                if track.heard_s[w, i] > 0.0:
+                    w_x, w_y = _keeping(w, i, g, kept, track)
+                else:
+                    w_x, w_y = _searching(w, i, half_m, lanes, see, box, g.speed, kept, track)
+                w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, kept)
+                num = planes_of(w, i, period, barrier, kept, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, kept, action)

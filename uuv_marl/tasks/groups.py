@@ -1,0 +1,30 @@
+"""Who goes where in an episode, and who knows of it, for pictures."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.types import Bool, Float64, Int64
+
+
+class Groups(NamedTuple):
+    """The groups of an episode that have vehicles."""
+
+    team: Int64
+    """Team of each vehicle, which pictures show in one of four colours, 0 to 3, shape (vehicle,)."""
+    informed: Bool
+    """Whether a vehicle perceives its reference, shape (vehicle,)."""
+    ways: dict[int, tuple[int | None, Float64]]
+    """By the group's index its team, None for one group alone, and the corners of its trajectory, north and east [m],
+    shape (point, 2); of several groups, only the goal where it rests."""
+
+
+def groups_of(swarm: Swarm, w: int = 0) -> Groups:
+    """The groups of a world as it was drawn."""
+    course, team, ways = swarm.course, np.asarray(swarm.task.teams(w), np.int64) % 4, {}
+    found, first = np.unique(course.group[w], return_index=True)
+    for g, i in zip(found.tolist(), first.tolist(), strict=True):
+        corners, rests = course.waypoints[w, g, : course.last[w, g] + 1].copy(), not course.times[w, g].any()
+        ways[g] = (int(team[i]), corners[-1:] if rests else corners) if len(found) > 1 else (None, corners)
+    return Groups(team, course.informed[w].copy(), ways)

@@ -1,0 +1,298 @@
+"""``silent_targets``: targets move in a box and make no sound; who finds one by its echo is to keep near it."""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from uuv_marl.errors import ScenarioError
+from uuv_marl.percept import DIRECTION, PerceptField, Table
+from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.fields import Positive, Section, within
+from uuv_marl.scenario.vehicle_checks import top_speed
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.start import start_state
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, tell_walls
+from uuv_marl.tasks.maps.walls import Range, between
+from uuv_marl.tasks.reach import Reach
+from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.types import Bool, Float64, Int64
+
+LEAD_S = 2.0
+"""The channel ``way`` leads to where a target is in so long [s]. Assumed: as piloted with ``oracle``."""
+
+
+class SilentTargetsNumbers(Section):
+    """Numbers of ``silent_targets``; the scenario's file has their sources."""
+
+    targets: Annotated[int, within(1, 1024)]
+    """How many there are."""
+    side_m: Positive
+    """Side of the square box in which they stay."""
+    speed_share: Range
+    """Their speed, as a share of a vehicle's at full force; each draws its own."""
+    turn_s: tuple[Positive, Positive]
+    """Shortest and longest time between two of a target's turns, each by any angle."""
+    turn_dps: Positive
+    """How fast they turn [deg/s]."""
+    held_m: Positive
+    """A target is held while a vehicle is so near."""
+    clear_m: Positive
+    """No target starts nearer to the middle of the box, where the vehicles start."""
+
+    def _check(self) -> None:
+        if self.speed_share[1] > 1.0:
+            raise ValueError(
+                "task.speed_share must be at most 1, the vehicles' full speed, or nobody holds a target, got "
+                f"{list(self.speed_share)}; lower it"
+            )
+        if self.turn_s[0] > self.turn_s[1]:
+            raise ValueError(f"task.turn_s must be [low, high] with low <= high, got {list(self.turn_s)}")
+        if self.clear_m > 0.5 * self.side_m:
+            raise ValueError(
+                f"task.clear_m must be at most half of task.side_m = {self.side_m:g}, got {self.clear_m:g}; "
+                "lower it, or widen the box"
+            )
+
+
+class SilentTargetsMemory(NamedTuple):
+    """What ``silent_targets`` remembers."""
+
+    there_s: Annotated[Float64, "world vehicle", "When the vehicle held a target first [s]; 0 before."]
+    left: Annotated[Float64, "world vehicle", "Distance to the nearest target that no other vehicle holds, or 0 [m]."]
+    was: Annotated[Float64, "world vehicle", "The same before the step."]
+    speed: Annotated[Float64, "world target", "Speed of the target [m/s]."]
+    course: Annotated[Float64, "world target", "Where it goes, clockwise from north [rad]."]
+    to_turn: Annotated[Float64, "world target", "How far it is yet to turn, clockwise [rad]."]
+    turn_at: Annotated[Float64, "world target turn", "When it begins to turn [s]."]
+    turn_by: Annotated[Float64, "world target turn", "By which angle [rad]."]
+    turns: Annotated[Int64, "world target", "Turns that it has begun."]
+    found_s: Annotated[Float64, "world target", "When the target was held first [s]; infinite before."]
+    held: Annotated[Float64, "world target", "Decisions of the last half at which it was held."]
+    judged: Annotated[Float64, "world", "Decisions of the last half."]
+
+
+@compiled
+def walk(
+    worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64, kept: SilentTargetsMemory,
+    velocity: Float64,
+) -> None:  # fmt: skip
+    """Fill the targets' velocities for the coming step; who would leave the box is mirrored at its side.
+
+    Args:
+        worlds: those that are about to step, shape (world,).
+        time_s: since the reset, shape (world,).
+        period: time of a step [s].
+        half: half of the box's side [m].
+        rate: how fast targets turn [rad/s].
+        places: north and east, shape (world, target, at least 2).
+        kept: the task's memory, which is changed.
+        velocity: north and east, shape (world, target, 2).
+    """
+    for w in range(kept.speed.shape[0]):
+        for k in range(kept.speed.shape[1] if worlds[w] else 0):
+            while kept.turns[w, k] < kept.turn_at.shape[2] and kept.turn_at[w, k, kept.turns[w, k]] <= time_s[w]:
+                kept.to_turn[w, k] = kept.turn_by[w, k, kept.turns[w, k]]
+                kept.turns[w, k] += 1
+            turn = min(max(kept.to_turn[w, k], -rate * period), rate * period)
+            kept.to_turn[w, k] -= turn
+            kept.course[w, k] += turn
+            c, s = cos_sin(kept.course[w, k])
+            way = kept.speed[w, k] * period
+            if abs(places[w, k, 0] + way * c) > half:
+                c, kept.course[w, k], kept.to_turn[w, k] = -c, math.pi - kept.course[w, k], -kept.to_turn[w, k]
+            if abs(places[w, k, 1] + way * s) > half:
+                s, kept.course[w, k], kept.to_turn[w, k] = -s, -kept.course[w, k], -kept.to_turn[w, k]
+            velocity[w, k, 0], velocity[w, k, 1] = kept.speed[w, k] * c, kept.speed[w, k] * s
+
+
+class SilentTargets(Reach):
+    """Find targets that move in a box and make no sound, only echoes, and keep within ``held_m`` of them.
+
+    All obstacles are targets, as large as a vehicle's hull, so that every echo is one's. The reference is the middle of
+    the box, at rest.
+    The headline is ``held_share``; a vehicle succeeds that touches nothing.
+    """
+
+    Numbers = SilentTargetsNumbers
+    Memory: ClassVar[type[Any] | None] = SilentTargetsMemory
+    observed: ClassVar[Table] = (
+        PerceptField("box", (2,), DIRECTION, "cosine and sine of the heading from the first axis of the targets' box"),
+    )
+    channels: ClassVar[Mapping[str, Table]] = {"way": WAY}
+    terms: ClassVar[Mapping[str, str]] = {
+        **Reach.terms,
+        "arrival": "+w once, when the vehicle is first within held_m of a target",
+        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no other "
+        "vehicle holds, 0 if there is none, D: progress_far_m, c: progress_m",
+        "held": "+w_arrival · dt/T · (share of the targets that are held), to everybody; T: the time limit",
+    }
+    traffic: ClassVar[bool] = False
+    columns: ClassVar[Mapping[str, str]] = {
+        "held_share": "share of the last half of the episode in which targets are held, mean over targets [1]",
+        "found_share": "share of the targets that were ever held [1]",
+        "found_s": "mean over targets of the time until they were held, the time limit if never [s]",
+    }
+    guide: ClassVar[str] = "nearest_target"
+
+    def __init__(self, swarm: Swarm) -> None:
+        super().__init__(swarm)
+        length, width = swarm.scenario.start.sides(swarm.num_vehicles)
+        if math.hypot(0.5 * length, width + 0.5 * swarm.scenario.start.gap_m) > self.numbers.clear_m:
+            raise ScenarioError(
+                f"task.clear_m must hold the start, two times {length:g} x {width:g} m, got {self.numbers.clear_m:g}; "
+                "raise it, or shrink start"
+            )
+
+    @classmethod
+    def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
+        """An obstacle per target, and room for all turns of an episode."""
+        numbers, limit = scenario.task_numbers, scenario.time_limit.of(cls.longest_s(scenario))
+        turns = math.ceil(limit / numbers.turn_s[0])
+        return {"point": 2, "obstacle": numbers.targets, "target": numbers.targets, "turn": turns}
+
+    @classmethod
+    def longest_s(cls, scenario: Scenario) -> float:
+        """The way along the box's side at full speed."""
+        return scenario.task_numbers.side_m / top_speed(scenario.vehicle, scenario.actuators)
+
+    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+        """The scenario's start in the middle of the box, and targets anywhere but there, with all their turns."""
+        numbers, scenario, memory = self.numbers, self.swarm.scenario, self.memory
+        length, _ = scenario.start.sides(self.swarm.num_vehicles)
+        eta, nu = start_state(scenario, np.array([[0.5 * length, 0.0], [length, 0.0]]), rng)
+        (m, turns), n, full = memory.turn_at.shape[1:], len(eta), top_speed(scenario.vehicle, scenario.actuators)
+        discs = np.full((m, 3), scenario.contact.hull_radius_m)
+        discs[:, :2] = [self._place(rng) for _ in range(m)]
+        memory.speed[world] = [full * between(rng, numbers.speed_share) for _ in range(m)]
+        memory.course[world] = rng.uniform(-math.pi, math.pi, m)
+        spans = np.array([[between(rng, numbers.turn_s) for _ in range(turns)] for _ in range(m)])
+        memory.turn_at[world] = np.cumsum(spans, axis=1)
+        memory.turn_by[world] = rng.uniform(-math.pi, math.pi, (m, turns))
+        memory.found_s[world] = math.inf
+        middle = np.array([[-1.0, 0.0], [0.0, 0.0]])
+        return Draw(
+            (middle,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
+            duration_s=self.longest_s(scenario),
+        )  # fmt: skip
+
+    def _place(self, rng: np.random.Generator) -> Float64:
+        """Where a target starts."""
+        half, clear = 0.5 * self.numbers.side_m, self.numbers.clear_m
+        while True:
+            place = rng.uniform(-half, half, 2)
+            if place @ place > clear * clear:
+                return place
+
+    def begin(self, world: int) -> None:
+        """How far targets are."""
+        self.memory.left[world] = self._left()[world]
+
+    def move(self, running: Bool) -> None:
+        """Before a step: where targets go."""
+        numbers, course = self.numbers, self.swarm.course
+        walk(
+            running, self.swarm.facts.time_s, self.swarm.scenario.timing.decision_period_s, 0.5 * numbers.side_m,
+            math.radians(numbers.turn_dps), course.obstacles, self.memory, course.obstacle_velocity,
+        )  # fmt: skip
+
+    def away(self) -> Float64:
+        """Distance of every vehicle from every target [m], infinite for the lost; shape (world, vehicle, target)."""
+        state, targets = self.swarm.state, self.swarm.course.obstacles
+        x, y = np.moveaxis(targets[:, None, :, :2] - state.eta[:, :, None, :2], -1, 0)
+        return np.where(state.alive[:, :, None], np.sqrt(x * x + y * y), math.inf)
+
+    def held(self) -> Bool:
+        """Targets that are held, shape (world, target)."""
+        return self.away().min(axis=1) <= self.numbers.held_m
+
+    def _left(self) -> Float64:
+        """Distance to the nearest target that no other vehicle holds [m], 0 where there is none."""
+        away = self.away()
+        near = away <= self.numbers.held_m
+        nearest = np.where(near.sum(axis=1, keepdims=True) > near, math.inf, away).min(axis=2)
+        return np.where(np.isfinite(nearest), nearest, 0.0)
+
+    def there(self) -> Bool:
+        """Vehicles that hold a target."""
+        return self.away().min(axis=2) <= self.numbers.held_m
+
+    def update(self, running: Bool) -> None:
+        """Which targets are held, and how far the others are."""
+        super().update(running)
+        memory, time_s, held = self.memory, self.swarm.facts.time_s, self.held()
+        late = running & (time_s > 0.5 * self.swarm.time_limit_s)
+        memory.held[late] += held[late]
+        memory.judged[late] += 1.0
+        found = running[:, None] & held
+        memory.found_s[found] = np.minimum(memory.found_s, time_s[:, None])[found]
+        memory.was[running], memory.left[running] = memory.left[running], self._left()[running]
+
+    def observe(self, running: Bool) -> Terms:  # noqa: ARG002
+        """The heading in the box, and where it is granted the way to one's own target."""
+        swarm = self.swarm
+        told = {"box": swarm.heading}
+        return told | self._ways() if "way" in swarm.scenario.sonar.channels else told
+
+    def _ways(self) -> dict[str, Float64]:
+        """The rows of ``way``: to where one's own target is soon, of an assignment with the shortest ways in all."""
+        swarm = self.swarm
+        course, away = swarm.course, self.away()
+        way, walls = np.zeros((*away.shape[:2], 2)), np.zeros((*away.shape[:2], NUM_WALLS, 2))
+        soon = course.obstacles[:, :, :2] + LEAD_S * course.obstacle_velocity
+        for w in range(len(away)):
+            vehicle, target = linear_sum_assignment(np.minimum(away[w], 1e9))
+            way[w, vehicle] = soon[w, target] - swarm.state.eta[w, vehicle, :2]
+        (x, y), (c, s) = np.moveaxis(way, -1, 0), np.moveaxis(swarm.heading, -1, 0)
+        tell_walls(swarm.state, course, swarm.heading, walls)
+        return {
+            "way": np.stack([c * x + s * y, c * y - s * x], axis=-1),
+            "way_length": np.sqrt(x * x + y * y)[:, :, None],
+            "way_walls": walls,
+        }
+
+    def reward(self, running: Bool) -> Terms:
+        """Also what is held."""
+        share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s * self.held().mean(axis=1)
+        held = self._weight.arrival * share[:, None]
+        return {**super().reward(running), "held": np.broadcast_to(held, self.swarm.state.alive.shape)}
+
+    def left(self) -> tuple[Float64, Float64]:
+        """How far vehicles are from the nearest target that no other holds, and were before the step [m]."""
+        return self.memory.left, self.memory.was
+
+    def done(self) -> Bool:
+        """No world: the time limit ends the episode."""
+        return Task.done(self)
+
+    def succeeded(self) -> Bool:
+        """Vehicles that live and have touched nothing."""
+        return self.swarm.state.alive & ~self.swarm.state.touched
+
+    def success(self, world: int, vehicle: int | None = None) -> bool:
+        """Of a vehicle, whether it has touched nothing; of all, whether all targets were held all of the last half."""
+        return self.held_share(world) == 1.0 if vehicle is None else super().success(world, vehicle)
+
+    def held_share(self, world: int) -> float:
+        """Share of the last half so far in which targets were held; 0 before it."""
+        return float(self.memory.held[world].mean() / max(self.memory.judged[world], 1.0))
+
+    def metrics(self, world: int) -> dict[str, float | None]:
+        """Also the headline; ``whole`` is 1 if all targets were held all of the last half."""
+        found, share = self.memory.found_s[world], self.held_share(world)
+        return {
+            **super().metrics(world), "whole": float(share == 1.0), "held_share": share,
+            "found_share": float(np.isfinite(found).mean()),
+            "found_s": float(np.minimum(found, self.swarm.time_limit_s[world]).mean()),
+        }  # fmt: skip
+
+    def marks(self, world: int) -> NDArray[np.floating[Any]]:
+        """Circles in which targets are held."""
+        targets = self.swarm.course.obstacles[world, :, :2]
+        return np.column_stack([targets, np.full(len(targets), self.numbers.held_m)])
