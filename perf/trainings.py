@@ -18,8 +18,8 @@ HIDDEN, EPOCHS, LEARNING_RATE, GAMMA, GAE_LAMBDA, CLIP = (64, 64), 4, 1.5e-3, 0.
 MINIBATCH = 2304
 """A factor of the rows, so that no gradient step has fewer."""
 OURS: dict[str, Any] = {
-    "hidden": HIDDEN, "gamma": GAMMA, "gae_lambda": GAE_LAMBDA, "horizon": DECISIONS, "minibatch": MINIBATCH,
-    "clip": CLIP, "kl_stop": 1e9, "learning_rate": (LEARNING_RATE, LEARNING_RATE),
+    "gamma": GAMMA, "gae_lambda": GAE_LAMBDA, "horizon": DECISIONS, "clip": CLIP, "kl_stop": 1e9,
+    "learning_rate": (LEARNING_RATE, LEARNING_RATE),
 }  # fmt: skip
 END = ExitStack()
 """What is to be done when all is measured."""
@@ -31,12 +31,15 @@ def scenario(agents: int) -> Scenario:
 
 
 def mappo(agents: int, worlds: int) -> Case:
-    from uuv_marl.train.mappo import Mappo
+    from uuv_marl.train.folder import Record
+    from uuv_marl.train.run import Trainer
     from uuv_marl.train.training import Training
 
-    by = {**OURS, "actor_epochs": EPOCHS, "critic_epochs": EPOCHS}
-    training = Mappo(Training(scenario=SCENARIO, sizes=[(agents, worlds)], mappo=by, seed=SEED))
-    return repeated(lambda _: training.iterate(0.0), training.agent_steps)
+    rows = agents * worlds
+    by = {**OURS, "minibatches": max(1, round(rows * DECISIONS / MINIBATCH)), "epochs": EPOCHS}
+    told = {"sizes": [(agents, worlds)], "ppo": by, "network": {"hidden": HIDDEN}, "seed": SEED, "steps": 10**9}
+    training = Trainer(Training(scenario=SCENARIO, **told))
+    return repeated(lambda _: training.iterate(Record()), rows * DECISIONS)
 
 
 def sb3_ppo(env: Any, seed: int | None) -> Case:

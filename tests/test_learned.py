@@ -1,6 +1,5 @@
 """Learned policies from checkpoints: what they see, what they refuse, and that every path gives one run."""
 
-import itertools
 import json
 from pathlib import Path
 
@@ -8,18 +7,11 @@ import numpy as np
 import pytest
 import safetensors.numpy
 
+from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.learned.checkpoint import (
-    WEIGHTS_FILE,
-    Card,
-    Layer,
-    card_rows,
-    load_checkpoint,
-    save_checkpoint,
-    vehicle_of,
-)
-from uuv_marl.baselines.learned.network import forward
+from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint, vehicle_of
+from uuv_marl.baselines.learned.layers import ENCODED, Architecture, Network, NumpyOps, columns, shapes
 from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -28,59 +20,99 @@ from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.swarm import Swarm
 
 SHORT = {"trajectory.waypoints_m": [[0.0, 0.0], [40.0, 0.0]], "time_limit.extra_s": 1.0, "time_limit.factor": 1.0}
+KINDS = [("mlp", False), ("sectors", False), ("mlp", True), ("sectors", True)]
+"""What networks are made of."""
 
 
-def actor(scale=0.3, seed=0, hidden=16, features=11 + 4 * 28):
-    rng, sizes = np.random.default_rng(seed), (features, hidden, 2)
-    return [
-        Layer(scale * rng.standard_normal((a, b), np.float32), scale * rng.standard_normal(b, np.float32))
-        for a, b in itertools.pairwise(sizes)
-    ]
-
-
-def card(**changes):
-    return Card(**{"percept": card_rows(load_scenario("tracking")), **changes})
-
-
-@pytest.fixture
-def best(tmp_path):
-    save_checkpoint(tmp_path / "best" / WEIGHTS_FILE, card(training={"seed": 3}), actor())
-    return str(tmp_path / "best")
-
-
-def test_a_checkpoint_comes_back_as_it_was_written(best):
-    loaded = load_checkpoint(Path(best))
-    assert loaded.card == card(training={"seed": 3})
-    for mine, theirs in zip(loaded.layers, actor(), strict=True):
-        np.testing.assert_array_equal(mine.weight, theirs.weight)
-        np.testing.assert_array_equal(mine.bias, theirs.bias)
-
-
-def test_the_network_is_the_textbooks(best):
-    x = np.random.default_rng(1).standard_normal((50, 123), np.float32)
-    one, two = actor()
-    np.testing.assert_allclose(
-        forward((one, two), x), np.tanh(x @ one.weight + one.bias) @ two.weight + two.bias, atol=2e-5
-    )
-
-
-def test_no_wish_leaves_the_barrier_of_the_papers_law(best):
-    """With zero weights the action is Eq. 20-21's, which ``bio_inspired`` computes with the barrier's gains."""
-    zero = [Layer(0 * layer.weight, 0 * layer.bias) for layer in actor()]
-    save_checkpoint(learned_file(best), card(yaw_damping_nms=0.0), zero)
-    scenario = granted(best, load_scenario("single_obstacle"))
-    swarm = Swarm(scenario, 2)
-    percept = swarm.reset(5)
-    law = make("bio_inspired", scenario, 2, gains=BARRIER)
-    np.testing.assert_allclose(make(best, scenario, 2).act(percept), law.act(percept), atol=1e-6)
+def water(**overrides):
+    return load_scenario("tracking", overrides={"actuators.yaw_damping_nms": 600.0, **overrides})
 
 
 def learned_file(folder):
     return Path(folder) / WEIGHTS_FILE
 
 
-@pytest.mark.parametrize("n", [1, 54])
-def test_a_run_depends_on_its_seed_alone(best, n):
+@pytest.fixture
+def best(tmp_path):
+    return saved(tmp_path / "best", water(), training={"seed": 3})
+
+
+def test_a_checkpoint_comes_back_as_it_was_written(best):
+    loaded = load_checkpoint(Path(best))
+    assert loaded.card == card_for(water(), training={"seed": 3})
+    for name, tensor in tensors(loaded.card).items():
+        np.testing.assert_array_equal(loaded.tensors[name], tensor)
+
+
+def test_the_networks_are_the_textbooks():
+    made, sizes = Architecture(memory=True, hidden=(5, 4)), [("velocity", 3)]
+    rng = np.random.default_rng(1)
+    t = {name: rng.standard_normal(shape).astype(np.float32) for name, shape in shapes(made, sizes).items()}
+    network, x, h = Network(made, sizes, t, NumpyOps), rng.standard_normal((9, 3)), rng.standard_normal((9, 4))
+    x, h = x.astype(np.float32), h.astype(np.float32)
+    gates, own = x @ t["gru.weight"] + t["gru.bias"], h @ t["gru.state_weight"] + t["gru.state_bias"]
+    r, z = (1 / (1 + np.exp(-(gates[:, k : k + 4] + own[:, k : k + 4]))) for k in (0, 4))
+    after = (1 - z) * np.tanh(gates[:, 8:] + r * own[:, 8:]) + z * h
+    np.testing.assert_allclose(network.step(network.gates(x), h), after, atol=1e-5)
+    y = np.concatenate([x, after], axis=1)
+    for k in range(2):
+        y = np.tanh(y @ t[f"{k}.weight"] + t[f"{k}.bias"])
+    np.testing.assert_allclose(network.output(x, after.astype(np.float32)), y @ t["2.weight"] + t["2.bias"], atol=2e-5)
+
+
+def test_an_encoder_reads_sub_sectors_in_any_order_with_their_places():
+    """And what it makes of them has one width for any number of sub-sectors."""
+    made, rng = Architecture(kind="sectors"), np.random.default_rng(0)
+    widths = set()
+    for num in (3, 7):
+        sizes = [("velocity", 2), ("closeness", num), ("neighbour_direction", 2 * num), ("echo_closeness", 2),
+                 ("echo_direction", 4)]  # fmt: skip
+        where, t = columns(sizes), {}
+        for name, shape in shapes(made, sizes).items():
+            t[name] = rng.standard_normal(shape).astype(np.float32)
+        x, order = rng.standard_normal((4, 8 + 3 * num)).astype(np.float32), rng.permutation(num)
+        turned = x.copy()
+        turned[:, where.sectors["heard"].ravel()] = x[:, where.sectors["heard"][order].ravel()]
+        seen = Network(made, sizes, t, NumpyOps).features(x)
+        again = Network(made, sizes, {**t, "heard.place": t["heard.place"][order]}, NumpyOps).features(turned)
+        np.testing.assert_allclose(seen, again, atol=1e-6)
+        assert np.abs(Network(made, sizes, t, NumpyOps).features(turned) - seen).max() > 1e-3
+        widths.add(seen.shape[1])
+    assert widths == {2 + 2 * ENCODED}
+
+
+@pytest.mark.needs("torch")
+@pytest.mark.parametrize(("kind", "memory"), KINDS)
+def test_torch_and_numpy_give_the_same(kind, memory):
+    import torch
+
+    from uuv_marl.train.ppo import Actor
+
+    card, rng = card_for(water(), kind=kind, memory=memory), np.random.default_rng(0)
+    actor = Actor(card.network, card.sizes, rng)
+    for tensor in actor.tensors.values():
+        tensor.data += 0.2 * torch.from_numpy(rng.standard_normal(tensor.shape).astype(np.float32))
+    t = {name: x.detach().numpy() for name, x in actor.tensors.items()}
+    network = Network(card.network, card.sizes, t, NumpyOps)
+    x = rng.uniform(-1, 1, (6, 10, sum(size for _, size in card.sizes))).astype(np.float32)
+    begins = torch.ones(6, 10)
+    begins[3, 4:] = 0.0
+    state = torch.from_numpy(rng.uniform(-1, 1, (10, 16 * memory)).astype(np.float32))
+    through, states = actor.through(torch.from_numpy(x), state, begins)
+    mine = state.numpy()
+    for k in range(6):
+        z = network.features(x[k])
+        if memory:
+            mine = network.step(network.gates(z), mine * begins[k].numpy()[:, None])
+            np.testing.assert_allclose(states.detach().numpy()[10 * k : 10 * k + 10], mine, atol=1e-5)
+        told = network.output(z, mine if memory else None)
+        np.testing.assert_allclose(through.detach().numpy()[10 * k : 10 * k + 10], told, atol=1e-5)
+
+
+@pytest.mark.parametrize("n", [1, 20])
+@pytest.mark.parametrize(("kind", "memory"), KINDS)
+def test_a_run_depends_on_its_seed_alone(kind, memory, n, tmp_path):
+    best = saved(tmp_path, water(), kind=kind, memory=memory)
     scenario = granted(best, load_scenario("tracking", num_vehicles=n, overrides=SHORT))
     together = {e.seed: e for e in evaluate(scenario, best, [4, 5, 6]) if isinstance(e, Run)}
     (alone,) = (e for e in evaluate(scenario, best, [5]) if isinstance(e, Run))
@@ -88,12 +120,62 @@ def test_a_run_depends_on_its_seed_alone(best, n):
     np.testing.assert_array_equal(together[5].routes.position, alone.routes.position)
 
 
-def test_it_works_for_any_size_and_declares_what_it_needs(best):
-    assert knowledge(best) == {
-        "channels": [],
-        "yaw_damping_nms": 600.0,
-        "source": load_checkpoint(learned_file(best)).digest,
+def test_a_memory_can_be_kept_and_is_forgotten_at_a_reset(tmp_path):
+    best = saved(tmp_path, water(), memory=True)
+    scenario = granted(best, load_scenario("tracking", num_vehicles=4))
+    swarm, policy = Swarm(scenario, 2), make(best, scenario, 2)
+    percept = swarm.reset([1, 2])
+    first = policy.act(percept).copy()
+    for _ in range(5):
+        percept = swarm.step(policy.act(percept))
+    kept, action = policy.snapshot(), policy.act(percept).copy()
+    other = make(best, scenario, 2)
+    other.restore(kept)
+    np.testing.assert_array_equal(other.act(percept), action)
+    forgetful = make(best, scenario, 2).act(percept)
+    assert np.abs(forgetful - action).max() > 1e-3
+    np.testing.assert_array_equal(policy.act(swarm.reset([1, 2])), first)
+
+
+@pytest.mark.parametrize(
+    ("beside", "told"),
+    [({}, "end to end"), ({"filter": True}, "end to end + filter"), ({"around": "scout"}, "around a law")],
+)
+def test_what_decides_beside_a_network_is_told_and_acts(beside, told, tmp_path):
+    """A network that says nothing leaves the law, or a filter around a vehicle at rest."""
+    scenario = load_scenario("starter")
+    best = saved(tmp_path, scenario, scale=0.0, **beside)
+    assert load_checkpoint(best).card.policy_class == told
+    policy, swarm = make(best, scenario), Swarm(scenario)
+    law = make(beside.get("around", "guarded:idle" if beside else "idle"), scenario)
+    percept = swarm.reset(3)
+    for _ in range(30):
+        action = policy.act(percept)
+        np.testing.assert_allclose(action, law.act(percept), atol=1e-6)
+        percept = swarm.step(action)
+
+
+def test_first_policies_have_their_class():
+    assert {POLICIES[name].checkpoint.card.policy_class for name in ("mappo", "ppo", "trimmed_scout")} == {
+        "around a law"
     }
+
+
+def test_no_wish_of_a_first_network_leaves_the_barrier_of_the_papers_law(tmp_path):
+    """With zero weights the action is Eq. 20-21's, which ``bio_inspired`` computes with the barrier's gains."""
+    shipped = POLICIES["mappo"].checkpoint
+    zero = {name: 0.0 * tensor for name, tensor in shipped.tensors.items()}
+    save_checkpoint(tmp_path / WEIGHTS_FILE, shipped.card.model_copy(update={"yaw_damping_nms": 0.0}), zero)
+    scenario = granted(str(tmp_path), load_scenario("single_obstacle"))
+    percept = Swarm(scenario, 2).reset(5)
+    law = make("bio_inspired", scenario, 2, gains=BARRIER)
+    np.testing.assert_allclose(make(str(tmp_path), scenario, 2).act(percept), law.act(percept), atol=1e-6)
+
+
+def test_it_works_for_any_size_and_declares_what_it_needs(best):
+    digest = load_checkpoint(learned_file(best)).digest
+    known = {"channels": [], "yaw_damping_nms": 600.0, "source": digest, "policy_class": "end to end"}
+    assert knowledge(best) == known
     for n in (1, 200):
         scenario = granted(best, load_scenario("tracking", num_vehicles=n))
         assert make(best, scenario).act(Swarm(scenario).reset(0)).shape == (1, n, 2)
@@ -102,13 +184,12 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
 
 
 def test_another_percept_or_period_is_refused_with_the_remedy(best):
-    other = granted(best, load_scenario("tracking", overrides={"sonar.arrays.bow.sub_sectors": 5}))
-    with pytest.raises(
-        PolicyError, match=r"another percept.*was .'heard', 21, '1', 1.0. in .* is .'heard', 19, '1', 1.0. here; use"
-    ):
+    other = granted(best, water(**{"sonar.arrays.bow.sub_sectors": 5}))
+    message = r"another percept.*was .'closeness', 21, '1', 1.0. in .* is .'closeness', 19, '1', 1.0. here; use"
+    with pytest.raises(PolicyError, match=message):
         make(best, other)
-    slow = granted(best, load_scenario("tracking", overrides={"timing.decision_period_s": 1.0}))
-    with pytest.raises(PolicyError, match="every 0.1 to 0.5 s.*override timing.decision_period_s"):
+    slow = granted(best, water(**{"timing.decision_period_s": 0.5}))
+    with pytest.raises(PolicyError, match=r"decides every 0.1 s.*every 0.5 s; override timing.decision_period_s=0.1"):
         make(best, slow)
 
 
@@ -127,7 +208,7 @@ def test_what_is_no_checkpoint_is_explained(best, tmp_path):
 
 def test_a_rewritten_checkpoint_is_loaded_anew(best):
     assert policy_class(best).yaw_damping_nms == 600.0
-    save_checkpoint(learned_file(best), card(yaw_damping_nms=100.0), actor())
+    saved(Path(best), water(**{"actuators.yaw_damping_nms": 100.0}))
     assert policy_class(best).yaw_damping_nms == 100.0
 
 
@@ -146,8 +227,8 @@ def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
 
 
 def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
-    heavy = load_scenario("tracking", overrides={"vehicle.m_kg": 600.0})
-    save_checkpoint(learned_file(best), card(vehicle=vehicle_of(heavy)), actor())
+    heavy = water(**{"vehicle.m_kg": 600.0})
+    saved(Path(best), heavy)
     make(best, granted(best, heavy))
     with pytest.raises(PolicyError, match=r"vehicle.m_kg was 600.0 in the training and is 185.0"):
         make(best, granted(best, load_scenario("tracking")))
@@ -159,30 +240,33 @@ def test_weights_of_the_first_version_run_on_every_shipped_scenario(name):
         make(name, granted(name, load_scenario(scenario)))
 
 
-def changed(k=0, name="weight", value=None, at=None):
-    """The actor with one array replaced, or one entry of it."""
-    layers = actor()
-    array = layers[k]._asdict()[name] if value is None or at is not None else np.asarray(value, np.float32)
+def changed(name, value=None, at=None, **more):
+    """Tensors with one replaced, or one entry of it, or missing."""
+    made = tensors(card_for(water(), **more))
     if at is not None:
-        array[at] = value
-    layers[k] = layers[k]._replace(**{name: array})
-    return layers
+        made[name][at] = value
+    elif value is None:
+        del made[name]
+    else:
+        made[name] = np.asarray(value, np.float32)
+    return made, more
 
 
 @pytest.mark.parametrize(
-    ("layers", "message"),
+    ("made", "message"),
     [
-        (actor(features=100), r"0.weight is float32 \(100, 16\), expected float32 \(123, 16\)"),
-        (changed(at=(0, 0), value=np.nan), "0.weight must hold finite numbers"),
-        (changed(at=(3, 1), value=1e38), "0.weight must hold finite numbers of at most 1e"),
-        (changed(value=np.zeros((123, 16, 2))), r"0.weight is float32 \(123, 16, 2\), expected"),
-        (changed(0, "bias", 0.0), r"0.bias is float32 \(1,\), expected"),
-        (changed(1, value=np.zeros((16, 3))), r"1.weight is float32 \(16, 3\), expected float32 \(16, 2\)"),
-        ([], "0.weight is missing"),
+        (changed("0.weight", np.zeros((100, 16))), r"0.weight is float32 \(100, 16\), expected float32 \(93, 16\)"),
+        (changed("0.weight", np.nan, (0, 0)), "0.weight must hold finite numbers"),
+        (changed("0.weight", 1e38, (3, 1)), "0.weight must hold finite numbers of at most 1e"),
+        (changed("0.bias", 0.0), r"0.bias is float32 \(1,\), expected"),
+        (changed("2.weight", np.zeros((16, 3))), r"2.weight is float32 \(16, 3\), expected float32 \(16, 2\)"),
+        (changed("gru.bias", memory=True), "gru.bias is missing"),
+        (changed("echo.place", np.zeros((6, 32)), kind="sectors"), r"echo.place is float32 \(6, 32\), expected"),
     ],
 )
-def test_weights_that_cannot_run_are_refused(layers, message, tmp_path):
-    save_checkpoint(tmp_path / "bad", card(), layers)
+def test_weights_that_cannot_run_are_refused(made, message, tmp_path):
+    own, more = made
+    save_checkpoint(tmp_path / "bad", card_for(water(), **more), own)
     with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .{message}"):
         make(str(tmp_path / "bad"), load_scenario("tracking"))
 
@@ -190,8 +274,8 @@ def test_weights_that_cannot_run_are_refused(layers, message, tmp_path):
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("barrier", [1.0]),
-        ("barrier", [0.0, 0.8, float("nan"), 0.3, 140.0, 0.0]),
+        ("network", {"hidden": []}),
+        ("network", {"hidden": [0, 4]}),
         ("decision_period_s", [0.5, 0.1]),
         ("decision_period_s", [0.0, 0.1]),
         ("yaw_damping_nms", float("nan")),
@@ -201,8 +285,8 @@ def test_weights_that_cannot_run_are_refused(layers, message, tmp_path):
     ],
 )
 def test_cards_that_say_nothing_sensible_are_refused(field, value, tmp_path):
-    tensors = {f"{k}.{name}": a for k, layer in enumerate(actor()) for name, a in layer._asdict().items()}
-    said = json.dumps({**card().model_dump(mode="json"), field: value})
-    (tmp_path / "bad").write_bytes(safetensors.numpy.save(tensors, {"uuv_marl": said}))
+    card = card_for(water())
+    said = json.dumps({**card.model_dump(mode="json"), field: value})
+    (tmp_path / "bad").write_bytes(safetensors.numpy.save(tensors(card), {"uuv_marl": said}))
     with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .its card's {field}"):
         make(str(tmp_path / "bad"), load_scenario("tracking"))

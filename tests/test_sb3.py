@@ -18,9 +18,8 @@ from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMoni
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
-from uuv_marl.percept import Percept
 from uuv_marl.train import run
-from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
+from uuv_marl.train.sb3 import save_sb3
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
 QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
@@ -145,33 +144,27 @@ def test_a_monitor_finds_its_keys_where_a_wrapper_ends_the_episode():
     assert info["episode"]["is_success"] is False
 
 
-def actors(**overrides):
+def actors(**more):
     damped = {"actuators.yaw_damping_nms": 600.0, "time_limit.factor": 0.02, "time_limit.extra_s": 2.0}
-    return ActorVecEnv(swarm(overrides=damped | overrides))
+    return swarm(overrides=damped, observe="closeness", **more)
 
 
 def test_a_checkpoint_acts_as_the_model_does(tmp_path):
-    """In NumPy, from the observations of the environment: the model's mean action and the barrier, at each decision."""
+    """In NumPy, from the percepts of the swarm: the model's mean action within its bounds, at each decision."""
     env = actors()
     model = learn(VecNormalize(env, norm_obs=False))
     save_sb3(model, tmp_path / "policy.safetensors")
-    rows = env.venv
-    policy = make(str(tmp_path), rows.scenario, 2)
-    features, observation = env.reset(), rows.swarm.percept.to_observation()
+    policy, observation = make(str(tmp_path), env.scenario, 2), env.reset()
     for _ in range(20):
-        wish = model.predict(features, deterministic=True)[0] + env.barrier
-        wish /= np.maximum(1.0, np.linalg.norm(wish, axis=1, keepdims=True))
-        action = policy.act(Percept.from_observation(observation, rows.swarm.layout))
-        np.testing.assert_allclose(action.reshape(-1, 2), wish, atol=1e-5)
-        features, *_ = env.step(model.predict(features, deterministic=True)[0])
-        observation = rows.swarm.percept.to_observation()
+        wish = model.predict(observation, deterministic=True)[0]
+        within = wish / np.maximum(1.0, np.linalg.norm(wish, axis=1, keepdims=True))
+        np.testing.assert_allclose(policy.act(env.swarm.percept).reshape(-1, 2), within, atol=1e-5)
+        observation, *_ = env.step(wish)
 
 
 def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
-    for env, message in (
-        (swarm(), r"train on ActorVecEnv\(SwarmVecEnv"), (VecNormalize(actors()), "train on ActorVecEnv"),
-    ):  # fmt: skip
-        with pytest.raises(PolicyError, match=message):
+    for env in (swarm(), VecNormalize(actors())):
+        with pytest.raises(PolicyError, match="train on SwarmVecEnv.*observe='closeness'"):
             save_sb3(PPO("MlpPolicy", env, device="cpu"), tmp_path / "a")
     relu = PPO("MlpPolicy", actors(), policy_kwargs={"activation_fn": torch.nn.ReLU}, device="cpu")
     with pytest.raises(PolicyError, match="tanh layers, got .*leave activation_fn out"):

@@ -8,7 +8,8 @@ import pytest
 from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, granted, make
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, Layer, card_rows, save_checkpoint
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
+from uuv_marl.baselines.learned.layers import shapes
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -109,8 +110,9 @@ def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
     assert granted("sff", sea).sonar.channels == ("modem",)
     assert granted("tests.test_sea_modem:Both", sea).sonar.channels == ("link", "modem")
     linked = load_scenario(STARTER, overrides={"sonar.channels": ["link"]})
-    card = Card(percept=card_rows(linked), channels=("link",))
-    save_checkpoint(tmp_path / WEIGHTS_FILE, card, [Layer(np.zeros((123, 2), np.float32), np.zeros(2, np.float32))])
+    card = card_of(linked)
+    zeros = {name: np.zeros(shape) for name, shape in shapes(card.network, card.sizes).items()}
+    save_checkpoint(tmp_path / WEIGHTS_FILE, card, zeros)
     assert granted(str(tmp_path), sea).sonar.channels == ("link",)
 
 

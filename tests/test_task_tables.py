@@ -11,8 +11,8 @@ from research.tasks.learner import OBSERVE, sight
 from research.tasks.page import report
 from research.tasks.studies import STUDIES, set_name
 from uuv_marl import load_scenario
-from uuv_marl.envs.observation import observation_layout
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.sim.observation import observation_layout
 from uuv_marl.tasks.maps import KINDS
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"

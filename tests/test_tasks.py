@@ -239,7 +239,7 @@ def test_a_users_task_is_trained_and_the_policy_runs(tmp_path):
     from uuv_marl.train.run import train
     from uuv_marl.train.training import Training
 
-    few = {"validation": ((5, 2),), "mappo": {"hidden": (16, 16), "horizon": 16, "minibatch": 256}}
+    few = {"validation_episodes": 2, "validations": 1, "network": {"hidden": (16, 16)}, "ppo": {"horizon": 16}}
     training = Training(scenario="starter", overrides={"task": EXAMPLE}, sizes=((5, 20),), steps=20_000, **few)
     rewards = [record.reward for record in train(tmp_path / "a", training)]
     assert len(rewards) == 13

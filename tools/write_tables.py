@@ -12,10 +12,10 @@ from research.heldout import page as heldout
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
-from uuv_marl.envs.observation import closeness_table
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
 from uuv_marl.scenario.task import task_class
+from uuv_marl.sim.observation import closeness_table
 from uuv_marl.tasks import TASKS, Follow, Reach
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -12,15 +12,15 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.paths import user_path
-from uuv_marl.train.sb3 import ActorVecEnv, save_sb3
+from uuv_marl.train.sb3 import save_sb3
 
 TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
 
 
 def make_env(scenario: str, num_worlds: int) -> VecNormalize:
     """Worlds in which every vehicle is a row."""
-    # Features of nearness instead of positions, and a short-range barrier: what checkpoints are made for.
-    return VecNormalize(ActorVecEnv(SwarmVecEnv(scenario, num_worlds)), norm_obs=False)
+    # Closeness instead of positions: what checkpoints read. Rewards are put into one scale, observations are in one.
+    return VecNormalize(SwarmVecEnv(scenario, num_worlds, observe="closeness"), norm_obs=False)
 
 
 def train(scenario: str, steps: int, num_worlds: int, seed: int) -> PPO:

@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from uuv_marl.baselines import Policy
-from uuv_marl.envs.observation import Observe, observation_layout, observer
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike
+from uuv_marl.sim.observation import Observe, observation_layout, observer
 from uuv_marl.types import Float32
 
 OBSERVE: Observe = "closeness"

@@ -27,8 +27,8 @@ from uuv_marl.train.run import resume, train
 from uuv_marl.train.training import Training
 shorter = {"time_limit.extra_s": 5.0, "time_limit.factor": 0.2}
 training = Training(
-    scenario="starter", overrides=shorter, sizes=((5, 2),), steps=480, checkpoint_every=1, validate_every=2,
-    validation=((5, 1),), mappo={"horizon": 12, "minibatch": 60, "hidden": (8, 8)},
+    scenario="starter", overrides=shorter, sizes=((5, 2),), steps=480, checkpoint_every=1, validations=2,
+    validation_episodes=1, ppo={"horizon": 12}, network={"hidden": (8, 8), "memory": True},
 )
 for _ in resume(folder) if (folder / "config.json").exists() else train(folder, training):
     pass
@@ -99,7 +99,7 @@ def campaign(share=1.0, seed=13):
     """Rows of a table: program, where it was stopped, how often, lost, could not go on, differs."""
     rng, rows = np.random.default_rng(seed), []
     with tempfile.TemporaryDirectory() as made:
-        for name, program, points, kills in (("benchmark", BENCHMARK, 20, 8), ("train mappo", TRAINING, 14, 6)):
+        for name, program, points, kills in (("benchmark", BENCHMARK, 20, 8), ("train", TRAINING, 14, 6)):
             whole = Path(made) / f"{name} whole"
             process = started(program, whole)
             told = process.communicate(timeout=600)[0]

@@ -116,6 +116,8 @@ class Policy:
     """Table of what is remembered (``uuv_marl.sim.tables``): a NamedTuple of arrays over world, vehicle, sector and
     active sub-sector. Zero is nothing: so it starts, and so it is forgotten. An array ``action``, of shape (world,
     vehicle, 2), is filled with the actions that were taken."""
+    axes: Mapping[str, int] = {}
+    """Lengths of further axes of ``Memory``."""
     channels: ClassVar[tuple[str, ...]] = ()
     """Channels needed beyond the percept, of ``uuv_marl.percept.CHANNELS``. ``modem`` can stand in for ``link``: then
     the link's fields lie where ``at`` says, and ``percept["link_velocity"]`` is not there."""
@@ -165,6 +167,7 @@ class Policy:
             "vehicle": scenario.swarm.num_vehicles,
             "sector": sonar.num_sectors,
             "active": sonar.num_active_sectors,
+            **self.axes,
         }
         self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
         """What is remembered, the arrays of ``Memory``."""

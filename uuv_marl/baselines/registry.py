@@ -16,7 +16,8 @@ from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaber
 from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
 from uuv_marl.baselines.comparators.pull import Pull
-from uuv_marl.baselines.learned.checkpoint import is_checkpoint
+from uuv_marl.baselines.learned.around import Around
+from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained, shipped
 from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.paper.sdc import Sdc, SdcInformed
@@ -212,7 +213,7 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
     """A policy by name.
 
     Args:
-        name: one of ``POLICIES``, the path of a checkpoint (``runs/mappo/best``), or ``module:Class``; parameters and
+        name: one of ``POLICIES``, the path of a checkpoint (``runs/starter/best``), or ``module:Class``; parameters and
             gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``; ``guarded:`` before it
             puts the policy inside the safety filter.
         target: a scenario, for a policy that maps ``Percept`` to actions; or our parallel environment, wrapped or not,
@@ -274,12 +275,30 @@ def _alone(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameter
         raise PolicyError(f"policy {name!r}: gains are written one by one, such as bio_inspired,zeta_n=0.5")
     values = {key: _value(value) for key, value in parameters.items()}
     policy: Policy = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
+    if isinstance(kind, Trained):
+        policy = beside(policy, kind.checkpoint.card)
     policy.name = name
     if values:
         gains: Any = getattr(policy, "gains", None)
         changed = {key: _gain(name, key, value, gains, known) for key, value in values.items()}
         policy.gains = gains._replace(**changed)  # pyright: ignore[reportAttributeAccessIssue] - it has gains
     return policy
+
+
+def beside(network: Policy, card: Card) -> Policy:
+    """A network with what its card says decides beside it: a law, to whose actions its own are added; the filter.
+
+    Args:
+        network: or what stands in its place in training.
+        card: says what.
+
+    Raises:
+        PolicyError: there is no such law, or it has not what it needs.
+    """
+    scenario, num_worlds = network.scenario, network.num_worlds
+    if card.around:
+        network = Around(scenario, num_worlds, law=make(card.around, scenario, num_worlds), inner=network)
+    return Guarded(scenario, num_worlds, inner=network) if card.filter else network
 
 
 def _gain(name: str, key: str, value: object, gains: Any, known: Sequence[str]) -> object:

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Container, Iterable
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, NotRequired
 from urllib.parse import quote
 
 import numpy as np
@@ -57,6 +57,8 @@ class Knowledge(TypedDict):
     yaw_damping_nms: float
     """The policy's inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
     source: str | None
+    policy_class: NotRequired[str]
+    """What decides beside a network: ``end to end``, ``end to end + filter``, ``around a law``."""
 
 
 class Content(TypedDict):
@@ -252,7 +254,10 @@ def knowledge(policy: str) -> Knowledge:
         file = inspect.getsourcefile(made)
         source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
     damping = made.yaw_damping_nms * (Policy.full_torque_nm / made.full_torque_nm)
-    return Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
+    known = Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
+    if isinstance(made, Trained) and made.checkpoint.card.features == "closeness":
+        known["policy_class"] = made.checkpoint.card.policy_class
+    return known
 
 
 def origin(policy: str) -> dict[str, str | None]:

@@ -214,7 +214,8 @@ def counted(number: int, what: str) -> str:
 
 def _knows(scenario: Scenario, policy: str, known: Knowledge) -> str:
     """What a policy has beyond the percept on a scenario, and beyond what all others have there."""
-    told = list(known["channels"] if is_trained(policy) else channels_in(scenario, known["channels"]))
+    told = [known["policy_class"]] if "policy_class" in known else []
+    told += known["channels"] if is_trained(policy) else channels_in(scenario, known["channels"])
     own = policy.startswith(OWN)
     if scenario.timing.fixed and own:
         told.append(f"a decision every {scenario.timing.control_hold_s:g} s")

@@ -31,7 +31,7 @@ _NEXT = (
     'extra "analysis".'
 )
 _TRAIN = """Train a policy for this scenario, and compare it with --policy runs/mine/best:
-  uuv-marl train mappo --scenario {scenario} --steps 2e6 --output runs/mine"""
+  uuv-marl train {scenario} --minutes 5 --output runs/mine"""
 
 
 def benchmark(
@@ -41,7 +41,7 @@ def benchmark(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, checkpoint (runs/mappo/best) or module:Class, whose module is looked for in the current folder "
+            help="Name, checkpoint (runs/mine/best) or module:Class, whose module is looked for in the current folder "
             "too, after all installed ones; repeat for several. "
             "Default: bio_inspired, sff, sdc, scout, mappo, ppo and trimmed_scout."
         ),

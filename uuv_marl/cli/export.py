@@ -9,19 +9,18 @@ from uuv_marl.cli.console import console, explained, extra, path_argument
 
 
 def export(
-    policy: Annotated[
-        str, typer.Argument(help="Checkpoint of a training without memory (file or folder), or a name: mappo, ppo.")
-    ],
+    policy: Annotated[str, typer.Argument(help="Checkpoint of a training without filter and law, file or folder.")],
     output: Annotated[Path, path_argument("ONNX file.")],
     scenario: Annotated[
-        str, typer.Option(help="Name or TOML file; the model keeps its sonar suite and vehicle.")
-    ] = "random_field",
+        str, typer.Option(help="Name or TOML file of a scenario like that of the training.")
+    ] = "starter",
 ) -> None:
-    """Write a network as an ONNX model, from an agent's observation to its action. Needs the extra "onnx".
+    """Write a network as an ONNX model, from an agent's observation as closeness to its action. Needs the extra "onnx".
 
-    Laws, guarded: and networks around a law are not exported: they remember.
+    A network with a memory takes its state and gives the next one. Laws, filters and what is around a law are not
+    exported.
 
-    Example: uuv-marl export runs/mappo/best policy.onnx
+    Example: uuv-marl export runs/starter/best policy.onnx
     """
     with explained():
         with extra("onnx", "export to ONNX"):

@@ -40,7 +40,7 @@ def replay(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, checkpoint (runs/mappo/best) or module:Class. Repeat it for up to four side by side. "
+            help="Name, checkpoint (runs/starter/best) or module:Class. Repeat it for up to four side by side. "
             f"Default: {_POLICY}, or the folder's only policy."
         ),
     ] = None,

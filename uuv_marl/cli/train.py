@@ -1,8 +1,8 @@
-"""``uuv-marl train``: from a recipe and what differs from it to a policy."""
+"""``uuv-marl train``: from a scenario, or a file, and what differs from it to a policy."""
 
 import re
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,6 +20,8 @@ from uuv_marl.cli.console import (
     progress_line,
 )
 
+_TOLD = "swarms whole {whole:.0%}, vehicles {share:.0%}, contacts {contacts:.1f} an episode"
+
 
 def _whole_number(text: str) -> int:
     """A number such as 3000000 or 3e6."""
@@ -30,96 +32,103 @@ def _whole_number(text: str) -> int:
 
 def train_command(
     context: typer.Context,
-    recipe: Annotated[
+    scenario: Annotated[
         str,
-        typer.Argument(help="mappo, trimmed_scout, or a TOML file with fields of uuv_marl.train.training.Training."),
-    ] = "mappo",
-    scenario: Annotated[str | None, typer.Option(help="Name or TOML file, in place of the recipe's.")] = None,
+        typer.Argument(
+            help="Name or TOML file of a scenario, or a file with fields of uuv_marl.train.training.Training."
+        ),
+    ] = "starter",
     overrides: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             metavar="FIELD=VALUE",
-            help="Change a field of the training, such as `sizes=[5,10]`, `reward=mine:reward` or `mappo.gamma=0.99`, "
-            "or of the scenario, such as `sonar.echo_reports=surface`.",
+            help="Change a field of the training, such as `network.memory=true`, `sizes=[5,10]`, `critic=own` or "
+            "`reward=mine:reward`, or of the scenario, such as `sonar.echo_reports=surface`.",
         ),
+    ] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="Processor time in all, validations apart. Default: 5.")
     ] = None,
     steps: Annotated[
         int | None,
         typer.Option(
             parser=_whole_number,
             metavar="NUMBER",
-            help="Agent-steps in all, such as 3e6: decisions times vehicles. With --resume, more prolong the training.",
+            help="In its place, agent-steps in all, such as 3e6: decisions times vehicles.",
         ),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of worlds, weights and noise. It fixes the training.")
-    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of worlds, weights and noise.")] = None,
     output: Annotated[Path, path_option("Folder for the training's description, progress and checkpoints.")] = Path(
         "runs/train"
     ),
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on from the folder's last checkpoint; only --steps may stand beside.")
+        bool,
+        typer.Option(
+            "--resume", help="Go on from the folder's last checkpoint, with more --minutes or --steps or not."
+        ),
     ] = False,
 ) -> None:
-    """Train one policy for all vehicles with MAPPO, on one core.
+    """Train one policy for all vehicles with PPO (MAPPO or IPPO), on one core.
 
-    The recipe says all of a training; the options change it. Vehicles decide every 0.5 s, with yaw damping, unless you
-    set other values. This needs the extra "train". It writes config.json (the training, versions), progress.csv (a row
-    per iteration), checkpoints/, tensorboard/ and best/: the policy that was best on validation seeds, or the last if
-    the recipe says so. Compare it with uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops the training after the
-    current iteration, with a checkpoint; with --resume it continues exactly. A killed training leaves its last
-    checkpoint, which is written every 20 iterations. With --resume and more --steps a finished training continues with
-    its last noise and rates.
+    Where the scenario does not fix it, vehicles decide every 0.5 s, with yaw damping. This needs the extra "train". It
+    writes config.json (the training, versions), progress.csv (a row per iteration), curve.png, checkpoints/ and best/:
+    the policy that was best on validation seeds. Compare it with uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops
+    the training after the current iteration, with a checkpoint; with --resume it continues. With --steps a seed fixes a
+    training on one machine, stopped and continued or not.
 
-    Example: uuv-marl train --scenario starter --steps 2e6 --output runs/starter
+    Example: uuv-marl train starter --minutes 1 --output runs/starter
     """
     with explained():
         with extra("train", "training"):
             from uuv_marl.train import run
         from uuv_marl.train.folder import TrainingFolder
-        from uuv_marl.train.training import Training, changed_fields, read_recipe
+        from uuv_marl.train.training import Training, changed_fields, told_by
 
-        find_modules([scenario or "", recipe, *(overrides or [])])
+        find_modules([scenario, *(overrides or [])])
+        named = {"minutes": minutes, "steps": steps, "seed": seed}
+        changes = {name: value for name, value in named.items() if value is not None}
         if resume:
             _alone(context)
             folder = TrainingFolder(output, None)
-            training, until = folder.training, steps or folder.until
+            training, until = folder.training, folder.budget_with(minutes, steps)
         else:
-            named = {"scenario": scenario, "steps": steps, "seed": seed}
-            changes = {name: value for name, value in named.items() if value is not None}
-            training = Training(**changed_fields(read_recipe(recipe), {**changes_of(overrides or []), **changes}))
-            until = training.steps
-        texts = {
-            "reward": "reward {reward:.3f}",
-            "score": "validation: score {score:z.3f} (best {best:z.3f}), arrived {arrived:.0%}, "
-            "collisions {collisions}",
-        }
+            told = told_by(scenario)
+            for name in {"minutes", "steps"} & changes.keys():
+                told.pop("steps" if name == "minutes" else "minutes", None)
+            training = Training(**changed_fields(told, {**changes_of(overrides or []), **changes}))
+            until = training.budget
         with _stoppable(output) as stop:
-            told: Any = {"say": console.print, "stop": stop}
-            records = run.resume(output, until, **told) if resume else run.train(output, training, **told)
-            last = _follow(records, until, texts)
-        console.print(f"Done: {last}. Policy: {output}/best   progress: {output}/progress.csv")
+            how: Any = {"say": console.print, "stop": stop}
+            records = run.resume(output, until, **how) if resume else run.train(output, training, **how)
+            last = _follow(records, training, until)
+        console.print(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png")
+        if (output / "best").is_dir():
+            console.print("The worst episode of its validation:")
+            console.print(f"  {run.worst_replay(output)}", highlight=False, soft_wrap=True)
 
 
 def _alone(context: typer.Context) -> None:
     """Refuse what the folder says already."""
     for name, value in context.params.items():
         source = context.get_parameter_source(name)
-        if name not in ("resume", "output", "steps") and source is not None and source.name == "COMMANDLINE":
+        told = source is not None and source.name == "COMMANDLINE"
+        if told and name not in ("resume", "output", "steps", "minutes"):
             raise typer.BadParameter(f"--resume goes on with the training that the folder holds; leave out {value}")
 
 
-def _follow(records: Iterator[Any], steps: int, texts: Mapping[str, str]) -> str:
-    """Show a training in a bar, with a text for each field that was known so far; how it stood at last."""
-    last, known = "no iteration was needed, because all --steps are done already", {}
+def _follow(records: Iterator[Any], training: Any, until: float) -> str:
+    """Show a training in a bar, and a line for each validation; how it stood at last."""
+    last, judged = "nothing was to be done, because the whole budget is spent already", "no validation yet"
     with progress_bar() as bar:
-        report = progress_line(bar, "starting", steps)
+        report = progress_line(bar, "starting", until)
         for record in records:
-            known |= {name: value for name, value in record._asdict().items() if value is not None}
-            told = [text.format(**known) for name, text in texts.items() if name in known]
-            last = ", ".join([f"{record.agent_steps / record.seconds:,.0f} agent-steps/s", *told])
-            report(record.agent_steps, last)
+            if record.whole is not None:
+                judged = _TOLD.format(**record._asdict())
+                time = "" if record.time_s is None else f", {record.time_s:.0f} s"
+                console.print(f"  {record.seconds / 60.0:5.1f} min  {judged}{time}", highlight=False)
+            last = f"{judged}, {record.agent_steps / max(record.seconds, 1e-9):,.0f} agent-steps/s"
+            report(record.spent(training), f"reward {record.reward:.3f}, {last}")
     return last
 
 

@@ -8,12 +8,12 @@ from typing import Literal, NamedTuple, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.envs.observation import Observe, observation_layout, observer
 from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.sim.arguments import SeedLike, whole_number
+from uuv_marl.sim.observation import Observe, observation_layout, observer
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.task import Payment, Task, paid
 from uuv_marl.types import Bool, Float32, Float64
@@ -71,7 +71,7 @@ class BatchedEnv:
             ``dense`` over all vehicles; a lost vehicle also pays its own loss), or a function from the swarm to an
             array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
-        observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
+        observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
         keep_terms: whether steps tell the reward's terms, which takes time in large batches.
     """
 
@@ -274,7 +274,7 @@ def make_batched_env(
         num_worlds: worlds stepped together.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         reward: ``dense``, ``sparse``, ``team``, ``geodesic`` or a function from the swarm to an array (world, vehicle).
-        observe: ``positions`` or ``closeness``, see ``uuv_marl.envs.observation``.
+        observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
         keep_terms: whether steps tell the reward's terms.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
     """

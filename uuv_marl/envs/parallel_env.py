@@ -15,8 +15,8 @@ from uuv_marl.envs.core import BatchedEnv, Reward, ScenarioLike, StepResult, mak
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
-from uuv_marl.envs.observation import Observe
 from uuv_marl.sim.arguments import action_array, world_seeds
+from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32, Int64
 
 Infos = dict[str, dict[str, Any]]

@@ -12,9 +12,9 @@ from uuv_marl.envs.core import Changes, Reward, ScenarioLike, StepResult, change
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
-from uuv_marl.envs.observation import Observe
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
+from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32
 
 

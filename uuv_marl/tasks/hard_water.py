@@ -239,6 +239,10 @@ class HardWater(Reach):
         if self.paying == "geodesic":
             self._was = self.ways()
 
+    def way_m(self) -> Float64:
+        """The free way."""
+        return self.ways()
+
     def left(self) -> tuple[Float64, Float64]:
         """With the reward ``geodesic``, which knows the map, the free way; else the distance."""
         return (self.ways(), self._was) if self.paying == "geodesic" else super().left()

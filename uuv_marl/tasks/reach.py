@@ -82,6 +82,10 @@ class Reach(Task):
         """What progress counts: how far vehicles are from their goals, and were before the step [m]."""
         return self.swarm.facts.away, self.swarm.facts.was_away
 
+    def came(self) -> Bool:
+        """Vehicles that have been there."""
+        return self.memory.there_s > 0.0
+
     def done(self) -> Bool:
         """Worlds in which all living vehicles are there."""
         alive = self.swarm.state.alive

@@ -164,6 +164,14 @@ class Task:
 
     # What is measured and drawn.
 
+    def way_m(self) -> Float64:
+        """Length of the way that each vehicle has still to go [m], shape (world, vehicle): what a critic may know."""
+        return self.swarm.facts.away
+
+    def came(self) -> Bool:
+        """Vehicles that have been paid for their arrival, shape (world, vehicle), likewise."""
+        return np.zeros_like(self.swarm.state.alive)
+
     def metrics(self, world: int) -> dict[str, float | None]:
         """Measures of an episode that ends now, numbers by name; VMAS: ``info``.
 

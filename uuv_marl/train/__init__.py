@@ -1,1 +1,1 @@
-"""Training: each module is named after the library that it trains with, an extra of its own."""
+"""Training: one description, PPO on it, and what a run writes."""

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 
 from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
-from uuv_marl.errors import ResultsError
+from uuv_marl.errors import ResultsError, TrainingError
 from uuv_marl.train.training import Training
 
 _MADE_HERE = re.compile(r"\d{6,}(\.partial)?")
@@ -26,6 +26,10 @@ Say = Callable[[str], object]
 """Tells whoever started a training how it goes on."""
 
 
+Stop = Callable[[], bool]
+"""Asked after every iteration; where it says so, the training ends with a checkpoint."""
+
+
 def quiet(_: str) -> None:
     """Says nothing."""
 
@@ -36,7 +40,7 @@ class Record(NamedTuple):
     iteration: int = 0
     agent_steps: int = 0
     seconds: float = 0.0
-    """Spent on training and validation so far."""
+    """Processor time of the training so far, validations apart."""
     reward: float | None = None
     """Mean per decision and vehicle, of this iteration's samples."""
     kl: float | None = None
@@ -45,13 +49,15 @@ class Record(NamedTuple):
     """Share of the returns' variance that the critic explains."""
     best: float | None = None
     """Score of the best validation so far."""
-    score: float | None = None
-    """Score of this iteration's validation, None without one. The fields below are of this validation, too."""
-    arrived: float | None = None
-    collisions: int | None = None
-    lateness_s: float | None = None
-    min_spacing_m: float | None = None
-    min_obstacle_distance_m: float | None = None
+    whole: float | None = None
+    """Of this iteration's validation, as ``validation.Judged`` has them; None without one."""
+    share: float | None = None
+    contacts: float | None = None
+    time_s: float | None = None
+
+    def spent(self, training: Training) -> float:
+        """How much of a training's kind of budget is spent: agent-steps, or seconds."""
+        return self.agent_steps if training.steps else self.seconds
 
 
 class TrainingFolder:
@@ -69,7 +75,8 @@ class TrainingFolder:
 
     def __init__(self, path: Path, training: Training | None) -> None:
         self.path = path
-        self._sessions: list[dict[str, Any]] = []
+        self.until = 0.0
+        """The budget to which the training was to go when it was run last: agent-steps, or seconds."""
         self.record = Record()
         """The last iteration that is kept; iteration 0 where there is none."""
         self.found = ""
@@ -78,7 +85,7 @@ class TrainingFolder:
             self.training = self._read()
             self._find()
             return
-        self.training = training
+        self.training, self.until = training, training.budget
         if path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
             raise ResultsError(f"{path} is not empty; give --resume to continue it, or another --output")
 
@@ -86,7 +93,7 @@ class TrainingFolder:
         """The training that the folder holds."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
-            before, self._sessions = dict(config["scenario"]), list(config["sessions"])
+            before, self.until = dict(config["scenario"]), float(config["until"])
             training = Training(**config["training"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultsError(
@@ -121,10 +128,17 @@ class TrainingFolder:
             raise ResultsError(f"{broken}copy it again as a whole, or delete it to start at the beginning")
         self.found = f"{self.path} holds no checkpoint yet: starting at the beginning"
 
-    @property
-    def until(self) -> int:
-        """Agent-steps to which the training was to go when it was run last."""
-        return int(self._sessions[-1]["steps"]) if self._sessions else self.training.steps
+    def budget_with(self, minutes: float | None, steps: int | None) -> float:
+        """The budget to go on to, more of the training's own kind: agent-steps, or seconds.
+
+        Raises:
+            TrainingError: the training has the other kind.
+        """
+        kind, other = ("steps", "minutes") if self.training.steps else ("minutes", "steps")
+        told = {"minutes": minutes and 60.0 * minutes, "steps": steps}
+        if told[other] is not None:
+            raise TrainingError(f"the training in {self.path} has a budget of {kind}; give --{kind}, not --{other}")
+        return float(told[kind] or self.until)
 
     @property
     def _checkpoints(self) -> Path:
@@ -135,21 +149,19 @@ class TrainingFolder:
         """Where the last iteration's checkpoint is."""
         return self._checkpoints / f"{self.record.iteration:06d}" if self.record.iteration else None
 
-    def begin(self, steps: int) -> None:
-        """Make the folder ready for the next iteration, and note how it comes about: steps to go to, versions."""
-        now = {"agent_steps": self.record.agent_steps, "steps": steps, "versions": versions()}
+    def begin(self, until: float) -> None:
+        """Make the folder ready for the next iteration, and note how it comes about: budget, versions."""
         config = {
             "training": self.training.model_dump(mode="json"),
             "scenario": self.training.loaded.model_dump(mode="json"),
-            "sessions": [*self._sessions, now],
+            "until": until,
+            "versions": versions(),
         }
         write_text(self.path / "config.json", json.dumps(config, indent=1) + "\n")
         with writing(self._checkpoints):
             self._checkpoints.mkdir(exist_ok=True)
-        lines = self._table.read_text(encoding="utf-8", errors="replace").splitlines() if self._table.exists() else []
-        rows = [line.split(",") for line in lines]
         # An iteration whose checkpoint was cut off will come again.
-        kept = [row for row in rows if row[0].isdecimal() and int(row[0]) <= self.record.iteration]
+        kept = [row for row in self.rows() if int(row[0]) <= self.record.iteration]
         write_text(self._table, "".join(map(_line, [Record._fields, *kept])))
 
     def note(self, record: Record) -> None:
@@ -175,6 +187,12 @@ class TrainingFolder:
         for other in self._checkpoints.iterdir():
             if other != folder and _ours(other):
                 shutil.rmtree(other, ignore_errors=True)
+
+    def rows(self) -> list[list[str]]:
+        """Those of ``progress.csv``, without its head and without what is damaged."""
+        lines = self._table.read_text(encoding="utf-8", errors="replace").splitlines() if self._table.exists() else []
+        rows = [line.split(",") for line in lines]
+        return [row for row in rows if len(row) == len(Record._fields) and row[0].isdecimal()]
 
     @property
     def _table(self) -> Path:

@@ -1,13 +1,13 @@
-"""A training at work: iterations, validation, TensorBoard, and files from which it goes on exactly.
+"""A training at work: iterations, validations, and files from which it goes on exactly.
 
 ``config.json``, ``progress.csv`` and ``checkpoints/`` as ``uuv_marl.train.folder`` keeps them; ``best/``, the policy of
-the best validation, or of the last one (``Training.chosen``); ``tensorboard/``. Needs ``train``.
+the best validation; ``curve.png``. Needs ``train``.
 """
 
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,35 +17,31 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, Card, card_rows, save_checkpoint, vehicle_of
-from uuv_marl.baselines.learned.percept_features import BARRIER
-from uuv_marl.errors import ResultsError, TrainingError
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
+from uuv_marl.errors import ResultsError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import conditions
-from uuv_marl.train.env import EpisodeStats
-from uuv_marl.train.folder import Record, Say, TrainingFolder, opened, quiet, versions
-from uuv_marl.train.mappo import Mappo
+from uuv_marl.train.curve import draw_curve
+from uuv_marl.train.folder import Record, Say, Stop, TrainingFolder, opened, quiet, versions
+from uuv_marl.train.ppo import Learner, annealed
+from uuv_marl.train.rows import TRAINING_SEEDS, Rows
 from uuv_marl.train.training import Training
-from uuv_marl.train.validation import ValidationResult, validate
+from uuv_marl.train.validation import Judged, replay_command, validate
 
 with extra("train", "training"):
     import torch
-    from torch.utils.tensorboard.writer import SummaryWriter
 
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
-
-Stop = Callable[[], bool]
-"""Asked after every iteration; where it says so, the training ends with a checkpoint."""
 
 
 def train(
     output: UserPath, training: Training | None = None, *, say: Say = quiet, stop: Stop = lambda: False
 ) -> Iterator[Record]:
-    """Train to ``training.steps``; a record for each iteration.
+    """Train to the end of the budget; a record for each iteration.
 
     Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
-    come without the break, on the CPU bit for bit. Uses two threads of torch: actor and critic learn side by side.
+    come without the break: with a budget of ``steps`` bit for bit. Uses one thread of torch.
 
     Args:
         output: a new or empty folder.
@@ -56,21 +52,20 @@ def train(
     Raises:
         ResultsError: the folder is used, by another process too, or can't be written; the last checkpoint is whole.
         RewardError: the reward can't be imported, or gives what is no reward.
-        TrainingError: torch can't compute on the device.
     """
     with opened(user_path(output), training or Training(), say) as folder:
         yield from _run(folder, folder.until, say, stop)
 
 
 def resume(
-    output: UserPath, steps: int | None = None, *, say: Say = quiet, stop: Stop = lambda: False
+    output: UserPath, until: float | None = None, *, say: Say = quiet, stop: Stop = lambda: False
 ) -> Iterator[Record]:
     """Go on with a training; a record for each iteration.
 
     Args:
         output: the folder of the training.
-        steps: agent-steps in all, those before included; as many as at first if None. Beyond those, noise and rates
-            stay as they were at the end.
+        until: its budget in all, agent-steps or seconds, that before included; as before if None. Beyond the first
+            budget noise and rate stay as they were at its end.
         say: told from where it goes on.
         stop: as for ``train``.
 
@@ -78,63 +73,68 @@ def resume(
         ResultsError: the folder holds no training, or a damaged one, or is in use; the message names the file.
     """
     with opened(user_path(output), None, say) as folder:
-        yield from _run(folder, steps or folder.until, say, stop)
+        yield from _run(folder, until or folder.until, say, stop)
 
 
-def _run(folder: TrainingFolder, until: int, say: Say, stop: Stop) -> Iterator[Record]:
+def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator[Record]:
     """Iterations from where the folder stands, with a checkpoint now and then and at the end."""
     training, record, stopped = folder.training, folder.record, False
-    if record.agent_steps >= until:
+    if record.spent(training) >= until:
         return
     sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in training.sizes)
-    drawn = len(training.conditions)
-    say(f"Training on swarms of {sizes}; {f'{drawn} conditions' if drawn else conditions(training.loaded)}.")
+    say(f"{training.card.policy_class}: swarms of {sizes}; {conditions(training.loaded)}.")
     with one_thread():
         trainer = Trainer(training, folder.checkpoint)
         folder.begin(until)
-        # TensorBoard hides what was written from the purge step on: what a break has left after the checkpoint.
-        board = SummaryWriter(str(folder.path / "tensorboard"), purge_step=record.agent_steps + 1)
-        with writing(folder.path), board:
-            while record.agent_steps < until and not stopped:
-                record = trainer.iterate(record)
-                episodes = trainer.mappo.env.pop_episode_stats()
-                done = record.agent_steps >= until
-                if done or record.iteration % training.validate_every == 0:
+        with writing(folder.path):
+            while record.spent(training) < until and not stopped:
+                before, record = record, trainer.iterate(record)
+                done = record.spent(training) >= until
+                validated = done or _due(before, training) < _due(record, training)
+                if validated:
                     record = _validated(trainer, record, folder.path)
                 folder.note(record)
+                if validated:
+                    draw_curve(folder.rows(), folder.path / "curve.png", training.title or training.loaded.title)
                 stopped = stop()
                 if done or stopped or record.iteration % training.checkpoint_every == 0:
                     folder.keep(record, lambda path, record=record: trainer.save(path, record))
-                _show(board, record, episodes)
                 yield record
 
 
+def _due(record: Record, training: Training) -> int:
+    """How many validations are due by now."""
+    return int(record.spent(training) * training.validations / training.budget)
+
+
 class Trainer:
-    """MAPPO at work, and how it is kept on disk.
+    """A learner with its rows, and how they are kept on disk.
 
     Args:
         training: what is trained, and how.
-        checkpoint: where to go on, see ``restore``; else the training begins, from ``training.start`` if there is one.
+        checkpoint: where to go on, see ``restore``; else the training begins.
     """
 
     def __init__(self, training: Training, checkpoint: Path | None = None) -> None:
-        _need_device(training.device)
-        self.training, self.mappo = training, Mappo(training)
+        self.training, self._rng = training, np.random.default_rng(training.seed)
+        self.rows = Rows(training, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
+        self.learner = Learner(
+            training.network, training.card.sizes, self.rows.size, self.rows.rows, training.ppo, self._rng
+        )  # fmt: skip
         if checkpoint is not None:
             self.restore(checkpoint)
-        elif training.start is not None:
-            remedy = "give a folder best or a checkpoint of the same sizes of network"
-            with _reading(user_path(training.start) / _LEARNER_FILE, remedy) as data:
-                self.mappo.learner.start_from(_learned(data))
 
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
-        started = time.perf_counter()
-        reward, update = self.mappo.iterate(before.agent_steps / self.training.steps)
+        started, by = time.process_time(), self.training.ppo
+        share = before.spent(self.training) / self.training.budget
+        noise = annealed(by.noise, share)
+        batch, reward = self.learner.sample(self.rows, noise)
+        update = self.learner.update(batch, noise, annealed(by.learning_rate, share))
         return Record(
             iteration=before.iteration + 1,
-            agent_steps=before.agent_steps + self.mappo.agent_steps,
-            seconds=before.seconds + time.perf_counter() - started,
+            agent_steps=before.agent_steps + by.horizon * self.rows.rows,
+            seconds=before.seconds + time.process_time() - started,
             reward=reward,
             kl=update.kl,
             explained=update.explained,
@@ -145,48 +145,27 @@ class Trainer:
         """All that ``restore`` needs, and the policy."""
         folder.mkdir(parents=True, exist_ok=True)
         self.save_policy(folder, record)
-        (folder / _WORLDS_FILE).write_bytes(safetensors.numpy.save(self.mappo.env.snapshot()))
-        (folder / _RANDOM_FILE).write_text(json.dumps(self.mappo.random) + "\n", encoding="utf-8")
+        (folder / _LEARNER_FILE).write_bytes(safetensors.numpy.save(self.learner.arrays()))
+        (folder / _WORLDS_FILE).write_bytes(safetensors.numpy.save(self.rows.snapshot()))
+        random = json.dumps(self._rng.bit_generator.state)
+        (folder / _RANDOM_FILE).write_text(random + "\n", encoding="utf-8")
 
-    def save_policy(self, folder: Path, record: Record) -> None:
-        """The policy, and the learner that a later training may start from."""
-        training = self.training
-        scenario = training.loaded
-        card = Card(
-            percept=card_rows(scenario),
-            yaw_damping_nms=scenario.actuators.yaw_damping_nms,
-            channels=scenario.sonar.channels,
-            features=training.sees,
-            barrier=BARRIER,
-            law=training.law,
-            trims=training.trims,
-            safety=training.safety,
-            vehicle=vehicle_of(scenario),
-            training={**training.model_dump(mode="json"), "versions": versions(), "record": record._asdict()},
-        )
-        save_checkpoint(folder / WEIGHTS_FILE, card, self.mappo.learner.layers)
-        (folder / _LEARNER_FILE).write_bytes(safetensors.numpy.save(self.mappo.learner.arrays()))
+    def save_policy(self, folder: Path, record: Record, judged: Judged | None = None) -> None:
+        """The policy, with what is known of it."""
+        told = {**self.training.model_dump(mode="json"), "versions": versions(), "record": record._asdict()}
+        if judged is not None:
+            told["worst"] = judged.worst
+        card = self.training.card.model_copy(update={"training": told})
+        save_checkpoint(folder / WEIGHTS_FILE, card, self.learner.weights)
 
     def restore(self, folder: Path) -> None:
         """Go on from what ``save`` wrote, as if there had been no break. Raises ResultsError naming a damaged file."""
-        remedy = "copy the checkpoint again as a whole, or begin with --set start=BEST and another --output"
-        with _reading(folder / _LEARNER_FILE, remedy) as data:
-            self.mappo.learner.restore(_learned(data))
-        with _reading(folder / _WORLDS_FILE, remedy) as data:
-            self.mappo.env.restore(safetensors.numpy.load(data))
-        with _reading(folder / _RANDOM_FILE, remedy) as data:
-            self.mappo.random = json.loads(data)
-
-
-def _need_device(device: str) -> None:
-    """Refuse what torch can't compute on here."""
-    try:
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError) as error:
-        reason = str(error).splitlines()[0]
-        raise TrainingError(
-            f"device {device!r} can't be used: {reason}; give cpu, or install a torch that can"
-        ) from None
+        with _reading(folder / _LEARNER_FILE) as data:
+            self.learner.restore(_learned(data))
+        with _reading(folder / _WORLDS_FILE) as data:
+            self.rows.restore(safetensors.numpy.load(data))
+        with _reading(folder / _RANDOM_FILE) as data:
+            self._rng.bit_generator.state = json.loads(data)
 
 
 @contextmanager
@@ -201,46 +180,40 @@ def one_thread() -> Iterator[None]:
 
 
 def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
-    """The record with a validation of the policy as it stands, which becomes ``best`` where it is."""
-    started, training = time.perf_counter(), trainer.training
+    """The record with a validation of the policy as it stands, which becomes ``best`` where none was better."""
     candidate, best = output / "candidate", output / "best"
     trainer.save_policy(candidate, record)
-    result: ValidationResult = validate(candidate, training)
-    better = training.chosen == "last" or record.best is None or result.score > record.best
-    record = record._replace(
-        seconds=record.seconds + time.perf_counter() - started,
-        best=result.score if better else record.best,
-        **result._asdict(),
-    )
+    judged = validate(candidate, trainer.training)
+    better = record.best is None or judged.score >= record.best
+    told = {name: value for name, value in judged._asdict().items() if name in Record._fields}
+    record = record._replace(best=judged.score if better else record.best, **told)
     if better:
-        trainer.save_policy(candidate, record)
+        trainer.save_policy(candidate, record, judged)
         best.mkdir(exist_ok=True)
-        for file in (_LEARNER_FILE, WEIGHTS_FILE):
-            (candidate / file).replace(best / file)
+        (candidate / WEIGHTS_FILE).replace(best / WEIGHTS_FILE)
     shutil.rmtree(candidate)
     return record
 
 
-def _show(board: SummaryWriter, record: Record, episodes: EpisodeStats) -> None:
-    """Numbers for TensorBoard; of episodes the means."""
-    numbers = {f"train/{name}": getattr(record, name) for name in ("reward", "kl", "explained")}
-    numbers |= {f"validation/{name}": getattr(record, name) for name in ("best", *ValidationResult._fields)}
-    if episodes.number:
-        names = {"returns": "return", "arrived": "arrived", "collisions": "collisions", "decisions": "decisions"}
-        numbers |= {f"episodes/{tag}": getattr(episodes, name) / episodes.number for name, tag in names.items()}
-    for name, value in numbers.items():
-        if value is not None:
-            board.add_scalar(name, value, record.agent_steps)
+def worst_replay(output: Path) -> str:
+    """The command that shows the worst episode in the validation of a training's best policy."""
+    told = dict(load_checkpoint(output / "best").card.training)
+    n, seed = told["worst"]
+    kept = {name: value for name, value in told.items() if name in Training.model_fields}
+    return replay_command(output / "best", Training(**kept), (n, seed))
 
 
 @contextmanager
-def _reading(path: Path, remedy: str) -> Iterator[bytes]:
+def _reading(path: Path) -> Iterator[bytes]:
     """Turn whatever data from outside can cause into one message that names the file."""
     try:
         yield path.read_bytes()
     except Exception as error:
         reason = " ".join(str(error).split())
-        raise ResultsError(f"{path} can't be used ({type(error).__name__}: {reason}); {remedy}") from error
+        raise ResultsError(
+            f"{path} can't be used ({type(error).__name__}: {reason}); copy the checkpoint again as a whole, or begin "
+            "anew with another --output"
+        ) from error
 
 
 def _learned(data: bytes) -> Mapping[str, NDArray[Any]]:

@@ -1,98 +1,86 @@
-"""How good a checkpoint is: deterministic episodes on validation seeds, through the benchmark's own ``evaluate``."""
+"""How good a policy is: deterministic episodes on validation seeds, through the benchmark's own ``evaluate``."""
 
-from collections.abc import Iterable, Sequence
+import json
+import shlex
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.train.env import TRAINING_SEEDS
-from uuv_marl.train.training import Training
+from uuv_marl.scenario import load_scenario
+from uuv_marl.train.rows import TRAINING_SEEDS
+from uuv_marl.train.training import Training, overrides_for
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
 """The first of the validation seeds: up to 999,999, which no training uses."""
-SAFE_OBSTACLE_M = 13.0
-SAFE_SPACING_M = 6.5
-"""Distances below these cost: a little more than what we want of the worst seed."""
+_EVERY_POLICYS_OWN = ("sonar.channels", "actuators.yaw_damping_nms")
 
 
-class ValidationResult(NamedTuple):
-    """Over all episodes."""
+class Judged(NamedTuple):
+    """Episodes of a validation."""
 
-    score: float
-    """Minus the mean cost, see ``validation_cost``."""
-    arrived: float
-    """Share of episodes."""
-    collisions: int
-    """Contacts."""
-    lateness_s: float | None
-    """Mean over arrivals, of the task time beyond l(t)'s own."""
-    min_spacing_m: float | None
-    """Smallest spacing of the worst episode [m]."""
-    min_obstacle_distance_m: float | None
-    """Smallest distance to an obstacle of the worst episode [m]."""
+    whole: float
+    """Share of episodes in which all vehicles did their task, and nobody touched anything."""
+    share: float
+    """Share of vehicles that did theirs untouched; in ``follow`` the same as ``whole``."""
+    contacts: float
+    """That began, mean over episodes."""
+    time_s: float | None
+    """Mean over whole episodes, of the time until the task was done."""
+    worst: tuple[int, int] = (0, 0)
+    """Vehicles and seed of the worst episode: of the fewest vehicles that did their task, then of the most contacts."""
 
-
-def validate(policy: Path, training: Training) -> ValidationResult:
-    """Run a checkpoint on a training's validation seeds: with each size of swarm, and under each of its conditions."""
-    metrics: list[Metrics] = []
-    scenario = training.loaded_for_validation
-    for n, count in training.validation:
-        seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + count)
-        metrics += _run(policy, load_scenario(scenario, num_vehicles=n), seeds)
-    for k, changes in enumerate(training.validation_conditions):
-        metrics += _run(policy, load_scenario(scenario, overrides=changes), [VALIDATION_SEEDS + 1000 + k])
-    return validation_result(metrics)
+    @property
+    def score(self) -> float:
+        """By which policies are chosen [1]: the mean of both shares."""
+        return (self.whole + self.share) / 2.0
 
 
-def _run(policy: Path, scenario: Scenario, seeds: Sequence[int]) -> list[Metrics]:
-    events = evaluate(granted(str(policy), scenario), str(policy), seeds)
-    return [event.metrics for event in events if isinstance(event, Run)]
-
-
-def validation_result(metrics: Sequence[Metrics]) -> ValidationResult:
-    """The result of these episodes."""
-    times = [late for late in map(lateness, metrics) if late is not None]
-    return ValidationResult(
-        score=-sum(map(validation_cost, metrics)) / len(metrics),
-        arrived=sum(map(succeeded, metrics)) / len(metrics),
-        collisions=sum(m["collisions"] for m in metrics),
-        lateness_s=sum(times) / len(times) if times else None,
-        min_spacing_m=_least(m["min_spacing_m"] for m in metrics),
-        min_obstacle_distance_m=_least(m["min_obstacle_distance_m"] for m in metrics),
+def validate(policy: Path, training: Training) -> Judged:
+    """Run a checkpoint on a training's validation seeds, with each size of swarm."""
+    number = max(1, training.validation_episodes // len(training.sizes))
+    seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + number)
+    found = [
+        (n, run.seed, run.metrics, _end_s(run)) for n, _ in training.sizes for run in _runs(policy, training, n, seeds)
+    ]
+    shares = [share_of(metrics) for _, _, metrics, _ in found]
+    times = [end for (*_, end), share in zip(found, shares, strict=True) if share == 1.0]
+    worst = min(zip(shares, found, strict=True), key=lambda each: (each[0], -each[1][2]["collisions"]))[1]
+    return Judged(
+        whole=len(times) / len(found),
+        share=sum(shares) / len(found),
+        contacts=sum(metrics["collisions"] for _, _, metrics, _ in found) / len(found),
+        time_s=sum(times) / len(times) if times else None,
+        worst=worst[:2],
     )
 
 
-def validation_cost(metrics: Metrics) -> float:
-    """Cost of an episode [1]: lateness in minutes (2 if it never arrives), 2 with a collision, and short distances.
-
-    In a task other than ``follow`` lateness gives way to twice the share of vehicles that failed.
-    """
-    late = lateness(metrics)
-    own = metrics.get("task", {}).get("untouched_share")
-    if own is not None:
-        late = 120.0 * (1.0 - own)
-    total = 2.0 if late is None else min(late / 60.0, 2.0)
-    total += 2.0 * min(metrics["collisions"], 1)
-    distances = metrics["min_obstacle_distance_m"], metrics["min_spacing_m"]
-    for distance, safe in zip(distances, (SAFE_OBSTACLE_M, SAFE_SPACING_M), strict=True):
-        if distance is not None:
-            total += min(max(1.0 - distance / safe, 0.0), 1.0)
-    return total
+def _runs(policy: Path, training: Training, num_vehicles: int, seeds: Sequence[int]) -> Iterator[Run]:
+    scenario = granted(str(policy), load_scenario(training.loaded, num_vehicles=num_vehicles))
+    yield from (event for event in evaluate(scenario, str(policy), seeds) if isinstance(event, Run))
 
 
-def succeeded(metrics: Metrics) -> bool:
-    """Whether an episode was a success: the swarm arrived, or in a task other than ``follow`` ``whole`` is 1."""
-    return metrics["task"].get("whole") == 1.0 if "task" in metrics else metrics["task_time_s"] is not None
+def _end_s(run: Run) -> float:
+    """When an episode's task was done, if it was."""
+    arrived = run.metrics["task_time_s"]
+    return float(run.routes.time_s[-1]) if arrived is None else arrived
 
 
-def lateness(metrics: Metrics) -> float | None:
-    """Task time beyond the time that l(t) takes [s]; None where the swarm never arrived."""
-    time = metrics["task_time_s"]
-    return None if time is None else time - metrics["duration_s"]
+def share_of(metrics: Metrics) -> float:
+    """Share of an episode's vehicles that did their task untouched; in ``follow`` all, if the swarm came well."""
+    if "task" not in metrics:
+        return float(metrics["task_time_s"] is not None and not metrics["collisions"])
+    return float(metrics["task"].get("untouched_share") or 0.0)
 
 
-def _least(values: Iterable[float | None]) -> float | None:
-    return min((value for value in values if value is not None), default=None)
+def replay_command(policy: Path, training: Training, worst: tuple[int, int]) -> str:
+    """The command that shows an episode of a validation, by its number of vehicles and seed."""
+    n, seed = worst
+    changes = {**overrides_for(training.scenario, training.overrides), "swarm.num_vehicles": n}
+    if n == load_scenario(training.scenario).swarm.num_vehicles:
+        del changes["swarm.num_vehicles"]
+    kept = {field: value for field, value in changes.items() if field not in _EVERY_POLICYS_OWN}
+    sets = [f" --set {shlex.quote(f'{field}={json.dumps(value)}')}" for field, value in kept.items()]
+    return f"uuv-marl replay --scenario {training.scenario} --policy {policy} --seed {seed}{''.join(sets)}"

@@ -7,7 +7,7 @@ checkpoint executes no code.
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
@@ -17,6 +17,7 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
+from uuv_marl.baselines.learned.layers import Architecture, Sizes, shapes
 from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES
 from uuv_marl.baselines.learned.percept_features import BARRIER, num_features
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
@@ -28,9 +29,11 @@ from uuv_marl.paths import UserPath, user_path
 from uuv_marl.percept import percept_table
 from uuv_marl.scenario import Scenario, load_vehicle
 from uuv_marl.scenario.hardware import Actuators, Vehicle
+from uuv_marl.sim.observation import observation_layout
 from uuv_marl.types import Float32
 
 Row = tuple[str, int, str, float]
+Features = Literal["closeness", "percept", "memory"]
 
 WEIGHTS_FILE = "policy.safetensors"
 """The checkpoint within a folder."""
@@ -87,11 +90,18 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     format: Literal[1] = 1
     kind: Literal["mlp"] = "mlp"
     """What the tensors are: ``mlp``, tanh layers."""
-    features: Literal["percept", "memory"] = "percept"
-    """What the first layer is given: ``percept``, what ``Features`` make of one percept, and the last gives a force; or
-    ``memory``, what ``fill_memory_features`` makes of what is remembered, and the last trims ``law``."""
+    features: Features = "percept"
+    """What the network is given: ``closeness``, an environment's observation, of which it makes an action; from the
+    first trainer ``percept``, features of one percept of which it makes a force, or ``memory``, features of what is
+    remembered, by which it trims ``law``."""
+    network: Architecture = Architecture()
+    """With ``closeness``: what it is made of."""
+    filter: bool = False
+    """Whether its actions pass the safety filter."""
+    around: str = ""
+    """Name of the law to whose actions its own are added, if any."""
     percept: tuple[Row, ...]
-    """Name, size, unit and scale of every field of the percept."""
+    """Name, size, unit and scale of every field of the percept, or of the observation as ``closeness``."""
     decision_period_s: tuple[float, float] = PERIODS_S
     """Shortest and longest period between decisions that it may be run with [s]."""
     yaw_damping_nms: float = 600.0
@@ -110,6 +120,18 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """Hull and actuators that it was trained on, by field of the scenario."""
     training: dict[str, Any] = {}
     """How it came about: settings, versions, agent-steps, validation."""
+
+    @property
+    def sizes(self) -> Sizes:
+        """Name and entries of every row of ``percept``."""
+        return [(name, size) for name, size, _, _ in self.percept]
+
+    @property
+    def policy_class(self) -> str:
+        """What decides beside the network: nothing, the filter, a law."""
+        if self.around or self.features != "closeness":
+            return "around a law"
+        return "end to end + filter" if self.filter else "end to end"
 
     @property
     def full_torque_nm(self) -> float:
@@ -133,16 +155,36 @@ class Checkpoint(NamedTuple):
     """A file's content."""
 
     card: Card
-    layers: tuple[Layer, ...]
+    tensors: Mapping[str, Float32]
+    """By name, see ``layers.shapes``."""
     digest: str
     """First 16 hexadecimal digits of the whole file's SHA-256."""
 
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """Those of a network of the first trainer."""
+        numbers = range(max(len(self.tensors) // 2, 1))
+        return tuple(Layer(self.tensors[f"{k}.weight"], self.tensors[f"{k}.bias"]) for k in numbers)
 
-def card_rows(scenario: Scenario) -> tuple[Row, ...]:
-    """What a scenario's sensors tell, as a card keeps it; no network reads the rows that a task adds."""
+
+def card_rows(scenario: Scenario, features: Features = "closeness") -> tuple[Row, ...]:
+    """What a network is given in a scenario, as a card keeps it; rows of the task only with ``closeness``."""
     sonar = scenario.sonar
-    table = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
+    if features == "closeness":
+        table = observation_layout(scenario, "closeness").table
+    else:
+        table = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
     return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in table)
+
+
+def card_of(scenario: Scenario, **more: Any) -> Card:
+    """The card of a network that was trained on a scenario; ``more`` are its other fields."""
+    period = scenario.timing.decision_period_s
+    return Card(
+        features="closeness", percept=card_rows(scenario), decision_period_s=(period, period),
+        yaw_damping_nms=scenario.actuators.yaw_damping_nms, channels=scenario.sonar.channels,
+        vehicle=vehicle_of(scenario), **more,
+    )  # fmt: skip
 
 
 def is_checkpoint(name: str) -> bool:
@@ -150,10 +192,9 @@ def is_checkpoint(name: str) -> bool:
     return "/" in name or os.sep in name or (":" not in name and user_path(name).exists())
 
 
-def save_checkpoint(path: UserPath, card: Card, layers: Sequence[Layer]) -> None:
-    """Write a checkpoint file, whole or not at all."""
+def save_checkpoint(path: UserPath, card: Card, tensors: Mapping[str, NDArray[Any]]) -> None:
+    """Write a checkpoint file, whole or not at all; ``tensors`` by name, as ``layers.shapes`` has them."""
     path = user_path(path)
-    tensors = {f"{k}.{name}": array for k, layer in enumerate(layers) for name, array in layer._asdict().items()}
     contiguous = {name: np.ascontiguousarray(array, np.float32) for name, array in tensors.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as partial:
@@ -175,13 +216,13 @@ def load_checkpoint(path: UserPath) -> Checkpoint:
         tensors: dict[str, NDArray[Any]] = safetensors.numpy.load(data)
         header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
         card = Card.model_validate_json(header.get("__metadata__", {}).get(_CARD, "null"))
-        layers = tuple(Layer(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(max(len(tensors) // 2, 1)))
-        _check(card, layers)
+        made = Checkpoint(card, tensors, hashlib.sha256(data).hexdigest()[:16])
+        _check(made)
     except (ValueError, KeyError, safetensors.SafetensorError) as error:
         raise PolicyError(
             f"{file} holds no policy of uuv_marl ({_reason(error)}); give a folder that uuv-marl train wrote"
         ) from None
-    return Checkpoint(card, layers, hashlib.sha256(data).hexdigest()[:16])
+    return made
 
 
 def _reason(error: Exception) -> str:
@@ -193,19 +234,28 @@ def _reason(error: Exception) -> str:
     return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
-def _check(card: Card, layers: Sequence[Layer]) -> None:
+def _check(made: Checkpoint) -> None:
     """Raises ValueError that names what can't be run."""
-    sizes: Mapping[str, int] = {name: size for name, size, _, _ in card.percept}
+    card, tensors = made.card, made.tensors
     if not 0.0 < card.decision_period_s[0] <= card.decision_period_s[1]:
         raise ValueError(f"its card's decision_period_s must be [shortest, longest], got {card.decision_period_s}")
-    remembers = card.features == "memory"
+    expected = shapes(card.network, card.sizes) if card.features == "closeness" else _first_shapes(made)
+    for name, shape in expected.items():
+        array = tensors[name]
+        if array.dtype != np.float32 or array.shape != shape:
+            raise ValueError(f"{name} is {array.dtype} {array.shape}, expected float32 {shape}")
+        if not (np.abs(array) <= _MOST_WEIGHT).all():  # NaN is not either
+            raise ValueError(f"{name} must hold finite numbers of at most {_MOST_WEIGHT:g}")
+
+
+def _first_shapes(made: Checkpoint) -> dict[str, tuple[int, ...]]:
+    """Shapes of the tensors of a network of the first trainer: layers of any width, one after the other."""
+    card, sizes = made.card, dict(made.card.sizes)
+    remembers, found = card.features == "memory", dict[str, tuple[int, ...]]()
     width = NUM_MEMORY_FEATURES if remembers else num_features(sizes["heard"], sizes.get("echo", 0))
-    last = len(card.trims) if remembers else 2
-    for k, (weight, bias) in enumerate(layers):
-        outputs = weight.shape[-1] if weight.ndim == 2 and k < len(layers) - 1 else last
-        for name, array, shape in (("weight", weight, (width, outputs)), ("bias", bias, (outputs,))):
-            if array.dtype != np.float32 or array.shape != shape:
-                raise ValueError(f"{k}.{name} is {array.dtype} {array.shape}, expected float32 {shape}")
-            if not (np.abs(array) <= _MOST_WEIGHT).all():  # NaN is not either
-                raise ValueError(f"{k}.{name} must hold finite numbers of at most {_MOST_WEIGHT:g}")
+    for k, (weight, _) in enumerate(made.layers):
+        inner = weight.ndim == 2 and k < len(made.layers) - 1
+        outputs = weight.shape[-1] if inner else len(card.trims) if remembers else 2
+        found |= {f"{k}.weight": (width, outputs), f"{k}.bias": (outputs,)}
         width = outputs
+    return found

@@ -1,52 +1,19 @@
-"""Learned policies: an actor from a checkpoint, in NumPy, beside a fixed short-range barrier."""
+"""Networks of the first trainer, which `mappo` and `ppo` are: a force from features, beside a fixed barrier."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from uuv_marl.baselines.learned.checkpoint import Card, Checkpoint, Layer, card_rows, vehicle_of
+from uuv_marl.baselines.learned.actor import need_same
+from uuv_marl.baselines.learned.checkpoint import Checkpoint, Layer
+from uuv_marl.baselines.learned.layers import dense
 from uuv_marl.baselines.learned.percept_features import Features
-from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.policy import Policy
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
 from uuv_marl.types import Float32
-
-
-def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
-    """Raise an error for a scenario that differs from the training's.
-
-    Args:
-        policy: made for the scenario.
-        card: of the policy's checkpoint.
-        any_vehicle: whether the policy may run on a vehicle that it was not trained on.
-
-    Raises:
-        PolicyError: the percept, the vehicle or the decision period differs.
-    """
-    scenario, name = policy.scenario, policy.name
-    then, now = ({f"field {k}": row for k, row in enumerate(rows)} for rows in (card.percept, card_rows(scenario)))
-    pairs: list[tuple[str, Mapping[str, object], Mapping[str, object], str]] = [
-        ("percept", then, now, "use a scenario with the sonar suite of its training")
-    ]
-    if not any_vehicle:
-        remedy = "use another policy, allow this vehicle with make(..., any_vehicle=True)"
-        pairs.append(("vehicle", card.vehicle, vehicle_of(scenario), remedy))
-    for what, old, new, remedy in pairs:
-        other = next((field for field in {**old, **new} if old.get(field) != new.get(field)), None)
-        if other:
-            raise PolicyError(
-                f"{name} was trained on another {what} than scenario {scenario.name!r} has: {other} was "
-                f"{old.get(other)} in the training and is {new.get(other)} here; {remedy}, or train on this scenario "
-                "(uuv-marl train mappo --scenario)"
-            )
-    shortest, longest = card.decision_period_s
-    if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
-        raise PolicyError(
-            f"{name} decides every {shortest:g} to {longest:g} s, but scenario {scenario.name!r} has a decision every "
-            f"{scenario.timing.decision_period_s:g} s; override timing.decision_period_s"
-        )
 
 
 class Learned(Policy):
@@ -94,25 +61,9 @@ def forward(layers: Sequence[Layer], x: Float32) -> Float32:
     """
     for k, layer in enumerate(layers):
         y = np.empty((len(x), len(layer.bias)), np.float32)
-        _dense(x, layer.weight, layer.bias, y)
+        dense(x, layer.weight, layer.bias, y)
         x = np.tanh(y) if k < len(layers) - 1 else y
     return x
-
-
-@compiled
-def _dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
-    """A layer without its activation.
-
-    ``x`` (row, in), ``weight`` (in, out), ``bias`` (out,); ``out`` (row, out) is filled.
-    """
-    for i in range(x.shape[0]):
-        for k in range(out.shape[1]):
-            out[i, k] = bias[k]
-        for j in range(x.shape[1]):
-            value = x[i, j]
-            if value != 0.0:  # most sub-sectors hear nobody
-                for k in range(out.shape[1]):
-                    out[i, k] += value * weight[j, k]
 
 
 @compiled

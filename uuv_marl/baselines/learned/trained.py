@@ -1,8 +1,9 @@
-"""Learned policies from their checkpoints, with and without memory."""
+"""Learned policies from their checkpoints."""
 
 import functools
 from pathlib import Path
 
+from uuv_marl.baselines.learned.actor import Actor, Recurrent
 from uuv_marl.baselines.learned.checkpoint import Checkpoint, load_checkpoint
 from uuv_marl.baselines.learned.network import Learned
 from uuv_marl.baselines.learned.trimmed_scout import LearnedScout
@@ -42,9 +43,13 @@ class Trained:
         """Full torque of the training's vehicle [N m]."""
         return self.checkpoint.card.full_torque_nm
 
-    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Learned | LearnedScout:
-        """The policy for a scenario. Raises PolicyError as ``Learned`` does."""
-        kind = LearnedScout if self.checkpoint.card.features == "memory" else Learned
+    def __call__(
+        self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False
+    ) -> Actor | Learned | LearnedScout:
+        """The network for a scenario, without filter or law. Raises PolicyError as ``Actor`` does."""
+        card = self.checkpoint.card
+        own = Recurrent if card.network.memory else Actor
+        kind = {"closeness": own, "percept": Learned, "memory": LearnedScout}[card.features]
         return kind(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)
 
 

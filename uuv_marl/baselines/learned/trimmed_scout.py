@@ -6,9 +6,10 @@ all where they answer at once. If the network gives zeros, the policy is the law
 
 import numpy as np
 
+from uuv_marl.baselines.learned.actor import need_same
 from uuv_marl.baselines.learned.checkpoint import Checkpoint
 from uuv_marl.baselines.learned.memory_features import NUM_MEMORY_FEATURES, fill_memory_features
-from uuv_marl.baselines.learned.network import forward, need_same
+from uuv_marl.baselines.learned.network import forward
 from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.baselines.scout.trims import MOST_TRIM, heeded
 from uuv_marl.percept import Percept

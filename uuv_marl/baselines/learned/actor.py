@@ -1,0 +1,128 @@
+"""``Actor``: a policy whose network reads observations as closeness, in NumPy, with or without a memory."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from uuv_marl.baselines.learned.checkpoint import Card, Checkpoint, card_rows, vehicle_of
+from uuv_marl.baselines.learned.layers import Network, NumpyOps
+from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.observation import observation_layout, observer
+from uuv_marl.sim.vehicle import project
+from uuv_marl.types import Bool, Float32
+
+
+class Remembered(NamedTuple):
+    """What a recurrent network remembers."""
+
+    state: Annotated[Float32, "world vehicle unit", "State of the recurrent layer [1]."]
+
+
+class Actor(Policy):
+    """A checkpoint's network without memory, from what a vehicle perceives to its action. Deterministic.
+
+    Args:
+        name: of the policy in messages.
+        checkpoint: the network, and what it was trained on.
+        any_vehicle: whether it may run on a vehicle that it was not trained on.
+
+    Raises:
+        PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.
+    """
+
+    def __init__(
+        self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False
+    ) -> None:
+        self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
+        self.declare_as(card)
+        self.axes = {"unit": card.network.hidden[-1]}
+        super().__init__(scenario, num_worlds)
+        need_same(self, card, any_vehicle)
+        self._seeing = observation_layout(scenario, "closeness")
+        self._network = Network(card.network, card.sizes, checkpoint.tensors, NumpyOps)
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        z = self._features(percept, self.active)
+        action = self._network.output(z, self._recalled())
+        bound(action)
+        whole = np.zeros((*percept.flat.shape[:2], 2), np.float32)
+        whole[self.active] = action.reshape(-1, *whole.shape[1:])
+        return whole
+
+    def _recalled(self) -> Float32 | None:
+        """What the vehicles of active worlds remember, shape (row, unit)."""
+        return None
+
+    def _features(self, percept: Percept, worlds: Bool) -> Float32:
+        """What the layers see of the vehicles of these worlds, shape (row, entry)."""
+        flat = self.flat(percept)
+        chosen = Percept(flat if worlds.all() else flat[worlds], percept.layout)
+        observation, observe = observer(chosen, self._seeing)
+        observe(0, len(observation))
+        return self._network.features(observation.reshape(-1, self._seeing.size))
+
+
+class Recurrent(Actor):
+    """A checkpoint's network with a memory, made as ``Actor`` is."""
+
+    Memory: ClassVar[type[Any] | None] = Remembered
+
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Take the latest observation into the recurrent layer's state."""
+        z, state = self._features(percept, worlds), self.memory.state
+        before = state[worlds].reshape(-1, state.shape[2])
+        state[worlds] = self._network.step(self._network.gates(z), before).reshape(state[worlds].shape)
+
+    def _recalled(self) -> Float32:
+        """The recurrent layer's state."""
+        return self.memory.state[self.active].reshape(-1, self.axes["unit"])
+
+
+@compiled
+def bound(action: Float32) -> None:
+    """Clip each number of actions (row, 2) to [-1, 1], as trainers do, and project them onto the unit disc."""
+    for i in range(action.shape[0]):
+        a_x, a_y = project(min(max(action[i, 0], -1.0), 1.0), min(max(action[i, 1], -1.0), 1.0))
+        action[i, 0], action[i, 1] = a_x, a_y
+
+
+def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
+    """Raise an error for a scenario that differs from the training's.
+
+    Args:
+        policy: made for the scenario.
+        card: of the policy's checkpoint.
+        any_vehicle: whether the policy may run on a vehicle that it was not trained on.
+
+    Raises:
+        PolicyError: the percept, the vehicle or the decision period differs.
+    """
+    scenario, name = policy.scenario, policy.name
+    rows = card_rows(scenario, card.features)
+    then, now = ({f"field {k}": row for k, row in enumerate(own)} for own in (card.percept, rows))
+    pairs: list[tuple[str, Mapping[str, object], Mapping[str, object], str]] = [
+        ("percept", then, now, "use a scenario with the sonar suite of its training")
+    ]
+    if not any_vehicle:
+        remedy = "use another policy, allow this vehicle with make(..., any_vehicle=True)"
+        pairs.append(("vehicle", card.vehicle, vehicle_of(scenario), remedy))
+    for what, old, new, remedy in pairs:
+        other = next((field for field in {**old, **new} if old.get(field) != new.get(field)), None)
+        if other:
+            raise PolicyError(
+                f"{name} was trained on another {what} than scenario {scenario.name!r} has: {other} was "
+                f"{old.get(other)} in the training and is {new.get(other)} here; {remedy}, or train on this scenario "
+                f"(uuv-marl train {scenario.name})"
+            )
+    shortest, longest = card.decision_period_s
+    if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
+        raise PolicyError(
+            f"{name} decides every {f'{shortest:g} to ' if shortest < longest else ''}{longest:g} s, but scenario "
+            f"{scenario.name!r} has a decision every {scenario.timing.decision_period_s:g} s; override "
+            f"timing.decision_period_s{f'={longest:g}' if shortest == longest else ''}"
+        )

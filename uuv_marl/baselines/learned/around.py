@@ -1,0 +1,62 @@
+"""A network around a law: the law acts, and the network adds a bounded part to what it does."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.learned.actor import bound
+from uuv_marl.baselines.policy import Policy
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import SeedLike
+from uuv_marl.types import Float32
+
+SHARE = 0.5
+"""How much of the full force a network may add to a law's action."""
+
+
+class Around(Policy):
+    """A law's actions, to which those of another policy are added.
+
+    Args:
+        law: whose channels and inner loop the other policy has too.
+        inner: the other policy, made for the same scenario and worlds.
+    """
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, law: Policy, inner: Policy) -> None:
+        self.law, self.inner = law, inner
+        self.name = inner.name
+        self.declare_as(law)
+        super().__init__(scenario, num_worlds)
+
+    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
+        """Reset both."""
+        super().reset(seed, worlds)
+        for each in (self.law, self.inner):
+            each.reset(seed, worlds)
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        said: list[Float32] = []
+        for each in (self.law, self.inner):
+            each.active = self.active
+            each.hear(percept)
+            said.append(each.decide(percept))
+        action: Float32 = (said[0] + np.float32(SHARE) * said[1]).astype(np.float32)
+        bound(action.reshape(-1, 2))
+        self.clamps[...] = self.law.clamps
+        return action
+
+    def _taken(self, action: Float32) -> None:
+        """Both are told."""
+        super()._taken(action)
+        for each in (self.law, self.inner):
+            each._taken(action)
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """Those of both, too."""
+        both = {"law": self.law, "inner": self.inner}
+        theirs = {f"{of}.{name}": array for of, each in both.items() for name, array in each._arrays().items()}
+        return super()._arrays() | theirs

@@ -1,0 +1,185 @@
+"""The networks of learned policies, written once: NumPy, torch and ONNX run the same lines, each by its operations."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+import pydantic
+
+from uuv_marl.sim.compiled import compiled
+from uuv_marl.types import Float32, Int64
+
+ENCODED = 32
+"""Units that describe a sub-sector."""
+_HEARD = (
+    "closeness", "neighbour_direction", "link_identity", "link_velocity", "age", "ranged", "modem_identity",
+    "modem_velocity", "modem_age",
+)  # fmt: skip
+_ECHO = ("echo_closeness", "echo_direction")
+Sizes = Sequence[tuple[str, int]]
+"""Name and entries of every row of an observation, in order."""
+
+
+class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
+    """What a network is made of."""
+
+    kind: Literal["mlp", "sectors"] = "mlp"
+    """How it reads an observation: ``mlp``, as it is; ``sectors``, by one encoder that all sub-sectors share, and the
+    sum over them."""
+    memory: bool = False
+    """Whether a recurrent layer (GRU) stands between; what follows sees its state beside what it saw."""
+    hidden: Annotated[tuple[pydantic.PositiveInt, ...], pydantic.Field(min_length=1)] = (64, 64)
+    """Units of the layers, tanh; those of the recurrent layer as of the last."""
+
+
+class Columns(NamedTuple):
+    """Where the sub-sectors' entries stand in an observation."""
+
+    sectors: dict[str, Int64]
+    """By kind: ``heard`` of all arrays, ``echo`` of active ones; shape (sub-sector, entry)."""
+    rest: Int64
+    """All others."""
+
+
+def columns(sizes: Sizes) -> Columns:
+    """Where the sub-sectors' entries stand in an observation with these rows."""
+    at: dict[str, Int64] = {}
+    sectors: dict[str, Int64] = {}
+    first = 0
+    for name, size in sizes:
+        at[name], first = np.arange(first, first + size), first + size
+    for kind, names in (("heard", _HEARD), ("echo", _ECHO)):
+        num = len(at[names[0]]) if names[0] in at else 0
+        if num:
+            sectors[kind] = np.concatenate([at[name].reshape(num, -1) for name in names if name in at], axis=1)
+    rest = [at[name] for name in at if name not in (*_HEARD, *_ECHO)]
+    return Columns(sectors, np.concatenate(rest))
+
+
+def shapes(made: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...]]:
+    """Shape of each tensor of a network for such observations, by name; weights are (in, out)."""
+    width, found = sum(size for _, size in sizes), dict[str, tuple[int, ...]]()
+    if made.kind == "sectors":
+        where = columns(sizes)
+        width = len(where.rest) + ENCODED * len(where.sectors)
+        for kind, entries in where.sectors.items():
+            num, size = entries.shape
+            found |= {f"{kind}.weight": (size, ENCODED), f"{kind}.place": (num, ENCODED)}
+    if made.memory:
+        units = made.hidden[-1]
+        found |= {"gru.weight": (width, 3 * units), "gru.bias": (3 * units,)}
+        found |= {"gru.state_weight": (units, 3 * units), "gru.state_bias": (3 * units,)}
+        width += units
+    for k, units in enumerate((*made.hidden, 2)):
+        found |= {f"{k}.weight": (width, units), f"{k}.bias": (units,)}
+        width = units
+    return found
+
+
+class Network:
+    """A network on rows of observations.
+
+    Args:
+        made: what it is made of.
+        sizes: rows of an observation.
+        tensors: by name, as ``shapes`` has them.
+        ops: operations on these tensors: ``dense``, ``take``, ``shaped``, ``joined``, ``parts``, ``tanh``, ``sigmoid``,
+            ``relu``, and ``total`` over the middle axis; see ``NumpyOps``.
+    """
+
+    def __init__(self, made: Architecture, sizes: Sizes, tensors: Mapping[str, Any], ops: Any) -> None:
+        self.made, self._tensors, self._ops = made, tensors, ops
+        self._columns = columns(sizes)
+
+    def features(self, x: Any) -> Any:
+        """What the layers see of observations (row, entry): the same, or the rest and the sub-sectors encoded."""
+        if self.made.kind == "mlp":
+            return x
+        ops, parts = self._ops, [self._ops.take(x, self._columns.rest)]
+        for kind, entries in self._columns.sectors.items():
+            num, size = entries.shape
+            seen = ops.shaped(ops.take(x, entries.reshape(-1)), (-1, size))
+            code = ops.shaped(ops.dense(seen, self._tensors[f"{kind}.weight"]), (-1, num, ENCODED))
+            parts.append(ops.total(ops.relu(code + self._tensors[f"{kind}.place"])))
+        return ops.joined(parts)
+
+    def gates(self, z: Any) -> Any:
+        """What features (row, entry) tell the recurrent layer, shape (row, 3 x unit)."""
+        return self._ops.dense(z, self._tensors["gru.weight"], self._tensors["gru.bias"])
+
+    def step(self, gates: Any, state: Any) -> Any:
+        """The recurrent layer's next state, shape (row, unit). Cho et al. 2014, as torch has it."""
+        ops = self._ops
+        own = ops.dense(state, self._tensors["gru.state_weight"], self._tensors["gru.state_bias"])
+        (r, k, n), (own_r, own_k, own_n) = ops.parts(gates), ops.parts(own)
+        kept = ops.sigmoid(k + own_k)
+        new = ops.tanh(n + ops.sigmoid(r + own_r) * own_n)
+        return new + kept * (state - new)
+
+    def output(self, z: Any, state: Any = None) -> Any:
+        """The action before its bounds, shape (row, 2), of features and the recurrent layer's state, if any."""
+        x, last = z if state is None else self._ops.joined([z, state]), len(self.made.hidden)
+        for k in range(last + 1):
+            x = self._ops.dense(x, self._tensors[f"{k}.weight"], self._tensors[f"{k}.bias"])
+            x = self._ops.tanh(x) if k < last else x
+        return x
+
+
+class NumpyOps:
+    """Operations on arrays. A row's result does not depend on the rows beside it, which no BLAS library promises."""
+
+    tanh = staticmethod(np.tanh)
+    shaped = staticmethod(np.reshape)
+
+    @staticmethod
+    def dense(x: Float32, weight: Float32, bias: Float32 | None = None) -> Float32:
+        """A layer without its activation: (row, out) for (row, in)."""
+        out: Float32 = np.empty((len(x), weight.shape[1]), np.float32)
+        dense(x, weight, np.zeros_like(weight[0]) if bias is None else bias, out)
+        return out
+
+    @staticmethod
+    def take(x: Float32, columns: Int64) -> Float32:
+        """Some columns."""
+        return x[:, columns]
+
+    @staticmethod
+    def joined(parts: Sequence[Float32]) -> Float32:
+        """Columns side by side."""
+        return np.concatenate(parts, axis=1)
+
+    @staticmethod
+    def parts(x: Float32) -> list[Float32]:
+        """Thirds of the columns."""
+        return np.split(x, 3, axis=1)
+
+    @staticmethod
+    def sigmoid(x: Float32) -> Float32:
+        """From 0 to 1."""
+        return np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * x)
+
+    @staticmethod
+    def relu(x: Float32) -> Float32:
+        """At least 0."""
+        return np.maximum(x, np.float32(0.0))
+
+    @staticmethod
+    def total(x: Float32) -> Float32:
+        """Sum over the middle axis."""
+        return x.sum(axis=1)
+
+
+@compiled
+def dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
+    """A layer without its activation.
+
+    ``x`` (row, in), ``weight`` (in, out), ``bias`` (out,); ``out`` (row, out) is filled.
+    """
+    for i in range(x.shape[0]):
+        for k in range(out.shape[1]):
+            out[i, k] = bias[k]
+        for j in range(x.shape[1]):
+            value = x[i, j]
+            if value != 0.0:  # most sub-sectors hear nobody
+                for k in range(out.shape[1]):
+                    out[i, k] += value * weight[j, k]

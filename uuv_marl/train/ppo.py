@@ -1,0 +1,322 @@
+"""PPO for all vehicles at once, which share one actor (Yu et al. 2022): MAPPO, or IPPO, by what the critic sees.
+
+The actor is that of ``uuv_marl.baselines.learned.layers`` in torch, and so runs without torch. With a memory a
+minibatch is the whole horizon of a part of the vehicles, so that it is trained through time; its state at the horizon's
+start is the one that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for
+bit. Needs ``train``.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.learned.layers import Architecture, Network, Sizes, shapes
+from uuv_marl.extras import extra
+from uuv_marl.train.rows import Transition
+from uuv_marl.train.training import Ppo
+from uuv_marl.types import Bool, Float32
+
+with extra("train", "training"):
+    import torch
+    from torch import Tensor, nn
+
+_CRITIC = (64, 64)
+"""Units of the critic's layers, tanh."""
+
+
+class Update(NamedTuple):
+    """How an update went."""
+
+    kl: float
+    explained: float
+
+
+class Environment(Protocol):
+    """What sampling needs: ``Rows``, or a problem with a known answer."""
+
+    features: int
+    size: int
+    rows: int
+    observation: Float32
+
+    def step(self, action: Float32) -> Transition:
+        """One decision of every row."""
+        ...
+
+
+class Rollout(NamedTuple):
+    """Samples, shape (time, row, ...)."""
+
+    observation: Tensor
+    action: Tensor
+    mean: Tensor
+    """Mean action of the policy that sampled."""
+    advantage: Tensor
+    returns: Tensor
+    goes_on: Tensor
+    """0 where an episode begins, else 1."""
+    state: Tensor
+    """The memory's before the first decision, shape (row, unit)."""
+
+
+class TorchOps:
+    """Operations of ``layers.Network`` on tensors."""
+
+    tanh, sigmoid, relu = staticmethod(torch.tanh), staticmethod(torch.sigmoid), staticmethod(torch.relu)
+    shaped = staticmethod(torch.reshape)
+
+    @staticmethod
+    def dense(x: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
+        """A layer without its activation: (row, out) for (row, in)."""
+        return x @ weight if bias is None else torch.addmm(bias, x, weight)
+
+    @staticmethod
+    def take(x: Tensor, columns: NDArray[np.int64]) -> Tensor:
+        """Some columns."""
+        return x.index_select(1, torch.from_numpy(columns))
+
+    @staticmethod
+    def joined(parts: Sequence[Tensor]) -> Tensor:
+        """Columns side by side."""
+        return torch.cat(list(parts), 1)
+
+    @staticmethod
+    def parts(x: Tensor) -> tuple[Tensor, ...]:
+        """Thirds of the columns."""
+        return x.chunk(3, 1)
+
+    @staticmethod
+    def total(x: Tensor) -> Tensor:
+        """Sum over the middle axis."""
+        return x.sum(1)
+
+
+class Actor:
+    """The policy's network, and its memory through time."""
+
+    def __init__(self, made: Architecture, sizes: Sizes, rng: np.random.Generator) -> None:
+        last = f"{len(made.hidden)}.weight"
+        self.tensors = {
+            name: started(shape, rng, 0.01 if name == last else 1.0 if name.startswith("gru") else math.sqrt(2.0))
+            for name, shape in shapes(made, sizes).items()
+        }
+        self.units = made.hidden[-1] if made.memory else 0
+        self.network = Network(made, sizes, self.tensors, TorchOps)
+
+    def act(self, x: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Actions (row, 2) for observations (row, entry) and the memory's state, and its next state (row, unit)."""
+        z = self.network.features(x)
+        if not self.units:
+            return self.network.output(z), state
+        state = self.network.step(self.network.gates(z), state)
+        return self.network.output(z, state), state
+
+    def through(self, x: Tensor, state: Tensor, goes_on: Tensor) -> tuple[Tensor, Tensor]:
+        """The same for a horizon: actions (time x row, 2), and the states after each decision (time x row, unit)."""
+        flat = x.reshape(-1, x.shape[2])
+        z = self.network.features(flat)
+        if not self.units:
+            return self.network.output(z), z[:, :0]
+        states: list[Tensor] = []
+        for gates, alike in zip(self.network.gates(z).split(x.shape[1]), goes_on[:, :, None], strict=True):
+            state = self.network.step(gates, state * alike)
+            states.append(state)
+        after = torch.cat(states)
+        return self.network.output(z, after), after
+
+
+class Learner:
+    """Actor, critic, their optimisers, the scale of returns, and what each row remembers.
+
+    Args:
+        made: what the actor is made of.
+        sizes: rows of the actor's observation.
+        size: the critic's inputs, of which the first are the actor's.
+        rows: vehicles that act at once.
+        by: the algorithm's numbers.
+        rng: draws the first weights, noise, and the order of samples.
+    """
+
+    def __init__(
+        self, made: Architecture, sizes: Sizes, size: int, rows: int, by: Ppo, rng: np.random.Generator
+    ) -> None:
+        self.by, self._rng, self._features = by, rng, sum(size for _, size in sizes)
+        self.actor = Actor(made, sizes, rng)
+        wide = (size + self.actor.units, *_CRITIC, 1)
+        self.critic = [started(shape, rng, math.sqrt(2.0) if shape[-1] > 1 else 1.0)
+                       for a, b in itertools.pairwise(wide) for shape in ((a, b), (b,))]  # fmt: skip
+        self._parts = (list(self.actor.tensors.values()), self.critic)
+        self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
+        self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
+        self.state = torch.zeros(rows, self.actor.units)
+
+    def _judged(self, x: Tensor, state: Tensor) -> Tensor:
+        """The critic's output (row,), in the scale of returns, for what it sees (row, entry) and the memory's state."""
+        x = torch.cat([x, state], 1)
+        for k in range(0, len(self.critic), 2):
+            x = torch.addmm(self.critic[k + 1], x, self.critic[k])
+            x = x if k == len(self.critic) - 2 else torch.tanh(x)
+        return x[:, 0]
+
+    @torch.no_grad()
+    def value(self, seen: Tensor, state: Tensor) -> Float32:
+        """What the critic expects of returns, shape (row,)."""
+        mean, std = self._scale()
+        return self._judged(seen, state).numpy() * np.float32(std) + np.float32(mean)
+
+    @torch.no_grad()
+    def act(self, seen: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Actions without noise (row, 2), and the memory's next state, for what the critic sees."""
+        return self.actor.act(seen[:, : self._features], state)
+
+    def sample(self, env: Environment, noise: float) -> tuple[Rollout, float]:
+        """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
+        by, shape = self.by, (self.by.horizon, env.rows)
+        observation = torch.empty((by.horizon + 1, env.rows, env.size))
+        action, mean = torch.empty((2, *shape, 2))
+        states = torch.empty((by.horizon + 1, env.rows, self.actor.units))
+        reward, paid, ended = np.empty(shape, np.float32), 0.0, np.zeros((by.horizon + 1, env.rows), np.bool_)
+        first = self.state
+        for t in range(by.horizon):
+            observation[t] = torch.from_numpy(env.observation)
+            mean[t], states[t] = self.act(observation[t], self.state)
+            drawn = self._rng.standard_normal((env.rows, 2), np.float32)
+            action[t] = mean[t] + noise * torch.from_numpy(drawn)
+            came = env.step(action[t].numpy())
+            paid += float(came.reward.mean()) / by.horizon
+            reward[t], ended[t + 1] = came.reward, came.terminated | came.truncated
+            if len(came.final):
+                seen = torch.from_numpy(came.final)
+                after = self.act(seen, states[t][torch.from_numpy(came.truncated)])[1]
+                reward[t][came.truncated] += np.float32(by.gamma) * self.value(seen, after)
+            self.state = states[t] * torch.from_numpy(~ended[t + 1, :, None])
+        observation[-1] = torch.from_numpy(env.observation)
+        states[-1] = self.act(observation[-1], self.state)[1]
+        rows = observation.flatten(0, 1), states.flatten(0, 1)
+        value = self.value(*rows).reshape(by.horizon + 1, -1)
+        advantage = gae(reward, value, ended[1:], by.gamma, by.gae_lambda)
+        goes_on = torch.from_numpy(~ended[:-1]).float()
+        arrays = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1])
+        return Rollout(observation[:-1], action, mean, *arrays, goes_on, first), paid
+
+    def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
+        """Some epochs of PPO on a batch, and of regression to its returns."""
+        self._optimiser.param_groups[0]["lr"] = learning_rate
+        error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
+        self._follow(batch.returns.double())
+        spread = batch.advantage.std() + 1e-8
+        batch = batch._replace(advantage=(batch.advantage - batch.advantage.mean()) / spread)
+        if not self.actor.units:  # moments stand for themselves, and are mixed
+            mixed = {name: x.reshape(1, -1, *x.shape[2:]) for name, x in batch._asdict().items() if name != "state"}
+            batch = Rollout(**mixed, state=torch.zeros(batch.action[..., 0].numel(), 0))
+        (mean, std), kl = self._scale(), 0.0
+        batch = batch._replace(returns=(batch.returns - mean) / std)
+        for _ in range(self.by.epochs):
+            order = torch.from_numpy(self._rng.permutation(batch.action.shape[1]))
+            found = [self._descend(batch, rows, noise) for rows in order.chunk(self.by.minibatches)]
+            kl = sum(found) / len(found)
+            if kl > self.by.kl_stop:
+                break
+        return Update(kl, 1.0 - error)
+
+    def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
+        """One gradient step on some rows; the divergence from the policy that sampled."""
+        x, action, old, advantage, returns, goes_on = (array.index_select(1, rows) for array in batch[:6])
+        new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], goes_on)
+        action, old, advantage = action.reshape(-1, 2), old.reshape(-1, 2), advantage.reshape(-1)
+        double = 2.0 * noise * noise
+        ratio = (((action - old).square() - (action - new).square()).sum(-1) / double).exp()
+        clipped = ratio.clamp(1.0 - self.by.clip, 1.0 + self.by.clip)
+        loss = -torch.minimum(ratio * advantage, clipped * advantage).mean()
+        judged = self._judged(x.reshape(-1, x.shape[2]), states.detach())
+        self._optimiser.zero_grad()
+        (loss + (judged - returns.reshape(-1)).square().mean()).backward()
+        for part in self._parts:
+            nn.utils.clip_grad_norm_(part, self.by.max_gradient)
+        self._optimiser.step()
+        return (new.detach() - old).square().sum(-1).mean().item() / double
+
+    def _scale(self) -> tuple[float, float]:
+        """Mean and standard deviation of returns; 0 and 1 before the first."""
+        weight, total, squares = self._moments
+        if weight == 0.0:
+            return 0.0, 1.0
+        mean = total / weight
+        return float(mean), math.sqrt(max(squares / weight - mean * mean, 1e-4))
+
+    @torch.no_grad()
+    def _follow(self, returns: Tensor) -> None:
+        """Note these returns, and keep the critic's values where their scale moves (PopArt, Hessel et al. 2019)."""
+        first, (mean, std), decay = not self._moments.any(), self._scale(), self.by.value_decay
+        fresh = np.array([1.0, returns.mean().item(), returns.square().mean().item()])
+        self._moments = decay * self._moments + (1.0 - decay) * fresh
+        new_mean, new_std = self._scale()
+        if not first:
+            self.critic[-2].mul_(std / new_std)
+            self.critic[-1].mul_(std).add_(mean - new_mean).div_(new_std)
+
+    @property
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """The actor's, for a checkpoint."""
+        return {name: x.detach().numpy().copy() for name, x in self.actor.tensors.items()}
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All of it, for ``restore``."""
+        tensors = {"state": self.state, **{f"actor.{name}": x for name, x in self.actor.tensors.items()}}
+        tensors |= {f"critic.{k}": x for k, x in enumerate(self.critic)}
+        for k, moments in self._optimiser.state_dict()["state"].items():
+            tensors |= {f"adam.{k}.{name}": x for name, x in moments.items()}
+        return {"moments": self._moments.copy()} | {name: x.detach().numpy().copy() for name, x in tensors.items()}
+
+    @torch.no_grad()
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on with the ``arrays`` of a learner of the same sizes."""
+        tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
+        self._moments = np.array(arrays["moments"])
+        for name, x in [("state", self.state), *((f"actor.{name}", x) for name, x in self.actor.tensors.items()),
+                        *((f"critic.{k}", x) for k, x in enumerate(self.critic))]:  # fmt: skip
+            if tensors[name].shape != x.shape:
+                raise ValueError(f"{name} must have shape {tuple(x.shape)}, got {tuple(tensors[name].shape)}")
+            x.copy_(tensors[name])
+        state: dict[int, dict[str, Tensor]] = {}
+        for name in (name for name in tensors if name.startswith("adam.")):
+            _, k, key = name.split(".")
+            state.setdefault(int(k), {})[key] = tensors[name]
+        self._optimiser.load_state_dict({**self._optimiser.state_dict(), "state": state})
+
+
+def started(shape: tuple[int, ...], rng: np.random.Generator, gain: float) -> Tensor:
+    """A new weight, orthogonal, or a bias, zero; with no draw from torch's global generator."""
+    tensor = torch.zeros(shape)
+    if len(shape) > 1:
+        generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
+        nn.init.orthogonal_(tensor, gain, generator=generator)
+    return tensor.requires_grad_()
+
+
+def gae(reward: Float32, value: Float32, ended: Bool, gamma: float, lam: float) -> Float32:
+    """Generalised advantages (Schulman et al. 2016, Eq. 16), shape (time, row).
+
+    Args:
+        reward: shape (time, row); where an episode was cut off, plus gamma times the value of where it would go on.
+        value: shape (time + 1, row).
+        ended: the episode ended by this step, and the next value is another episode's; shape (time, row).
+        gamma: discount.
+        lam: weight of longer returns.
+    """
+    advantage = np.zeros_like(reward)
+    ahead = np.zeros_like(reward[0])
+    for t in reversed(range(len(reward))):
+        goes_on = np.float32(gamma) * ~ended[t]
+        ahead = reward[t] + goes_on * value[t + 1] - value[t] + np.float32(lam) * goes_on * ahead
+        advantage[t] = ahead
+    return advantage
+
+
+def annealed(ends: tuple[float, float], share: float) -> float:
+    """A number that goes from the first to the second in equal ratios, as ``share`` goes from 0 to 1."""
+    return ends[0] * (ends[1] / ends[0]) ** min(share, 1.0)

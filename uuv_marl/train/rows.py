@@ -1,0 +1,139 @@
+"""``Rows``: swarms of several sizes, stepped as one flat array of vehicles; worlds that end start anew."""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uuv_marl.baselines.learned.checkpoint import Card
+from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.registry import beside
+from uuv_marl.envs.core import BatchedEnv
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
+from uuv_marl.train.training import Training
+from uuv_marl.types import Bool, Float32
+
+TRAINING_SEEDS = (100_000, 900_000)
+"""Worlds are drawn from these; 900,000-999,999 are for validation."""
+
+Seeds = Callable[[int], Sequence[int] | NDArray[np.integer]]
+"""Seeds for so many worlds that start."""
+
+
+class Transition(NamedTuple):
+    """What came of one action, a row for every vehicle."""
+
+    reward: Float32
+    terminated: Bool
+    """The task is done."""
+    truncated: Bool
+    """The episode was cut off."""
+    final: Float32
+    """What the critic would have seen next, for the truncated rows, in their order."""
+
+
+class Told(Policy):
+    """Does what it is told: it stands where the network will."""
+
+    def __init__(self, scenario: Scenario, num_worlds: int, card: Card) -> None:
+        self.declare_as(card)
+        super().__init__(scenario, num_worlds)
+        self.action = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
+
+    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002
+        """The action, shape (world, vehicle, 2)."""
+        return self.action.copy()
+
+
+class Group:
+    """Worlds of one swarm size, and what decides beside the network, if anything does."""
+
+    def __init__(self, training: Training, num_vehicles: int, num_worlds: int) -> None:
+        scenario, card = load_scenario(training.loaded, num_vehicles=num_vehicles), training.card
+        self.env = BatchedEnv(scenario, num_worlds, training.paid, observe="closeness", keep_terms=False)
+        self._told = Told(scenario, num_worlds, card)
+        self._acting = beside(self._told, card)
+        self._shape, self._state = (num_worlds, num_vehicles), training.critic == "state"
+
+    def seen(self, observation: Float32) -> Float32:
+        """What the critic sees with these observations (world, vehicle, entry), shape (row, entry)."""
+        parts = [observation, privileged(self.env.swarm)] if self._state else [observation]
+        return np.concatenate(parts, axis=2).reshape(self._shape[0] * self._shape[1], -1)
+
+    def step(self, action: Float32, seeds: Seeds) -> tuple[Float32, Bool, Bool, Float32, Float32]:
+        """Reward, done and cut off by row, what the critic sees now, and saw last of rows that were cut off."""
+        env, n = self.env, self._shape[1]
+        action = np.clip(action, -1.0, 1.0).reshape(*self._shape, 2)
+        if self._acting is not self._told:
+            self._told.action[...] = action
+            action = self._acting.act(env.swarm.percept)
+        came = env.step(action)
+        done, cut = np.repeat(came.world_terminated, n), np.repeat(came.world_truncated, n)
+        observation, over = came.observation, np.flatnonzero(came.over)
+        final = self.seen(observation)[cut] if cut.any() else np.zeros((0, 0), np.float32)
+        if len(over):
+            observation = env.reset([int(seed) for seed in seeds(len(over))], over.tolist())
+        return came.reward.reshape(-1).astype(np.float32), done, cut, self.seen(observation), final
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All that ``restore`` needs, but what was observed."""
+        acting = self._acting.snapshot().items()
+        return self.env.swarm.snapshot() | {f"acting.{name}": array for name, array in acting}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot of a group of the same size."""
+        self.env.reset(0)
+        self.env.swarm.restore(snapshot)
+        acting = (name for name in snapshot if name.startswith("acting."))
+        self._acting.restore({name.removeprefix("acting."): snapshot[name] for name in acting})
+
+
+class Rows:
+    """Vehicles of many worlds as rows; ``observation`` (row, ``size``) is what the critic sees of each now.
+
+    The first ``features`` entries are the actor's. Rows run over swarms, their worlds, and vehicles.
+
+    Args:
+        training: says what is trained on.
+        seeds: asked for seeds whenever worlds start; a snapshot and what it draws from determine all that follows.
+    """
+
+    def __init__(self, training: Training, seeds: Seeds) -> None:
+        self._seeds = seeds
+        self.groups = [Group(training, n, worlds) for n, worlds in training.sizes]
+        ends = np.cumsum([0, *(n * worlds for n, worlds in training.sizes)]).tolist()
+        self._rows = [slice(first, end) for first, end in itertools.pairwise(ends)]
+        self.rows: int = ends[-1]
+        self.features = self.groups[0].env.layout.size
+        self.size = self.features + PRIVILEGED_SIZE * (training.critic == "state")
+        self.observation = np.zeros((self.rows, self.size), np.float32)
+        for group, rows in zip(self.groups, self._rows, strict=True):
+            started = group.env.reset([int(seed) for seed in seeds(group.env.swarm.num_worlds)])
+            self.observation[rows] = group.seen(started)
+
+    def step(self, action: Float32) -> Transition:
+        """Act, shape (row, 2)."""
+        reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
+        finals = [np.empty((0, self.size), np.float32)]
+        for group, rows in zip(self.groups, self._rows, strict=True):
+            reward[rows], ended[0, rows], ended[1, rows], seen, final = group.step(action[rows], self._seeds)
+            self.observation[rows] = seen
+            finals += [final] if len(final) else []
+        return Transition(reward, ended[0], ended[1], np.concatenate(finals))
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """All but the generator, for ``restore``."""
+        groups = enumerate(group.snapshot() for group in self.groups)
+        kept = {f"{k}.{name}": array for k, group in groups for name, array in group.items()}
+        return kept | {"observation": self.observation.copy()}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot of rows for the same training."""
+        for k, group in enumerate(self.groups):
+            mine = {name.removeprefix(f"{k}."): array for name, array in snapshot.items() if name.startswith(f"{k}.")}
+            group.restore(mine)
+        self.observation[...] = snapshot["observation"]
