@@ -192,6 +192,23 @@ def test_the_guide_beats_the_floors_and_terms_are_those_documented():
     assert returns[TwoSwarms.guide] > max(returns["idle"], returns["random"])
 
 
+def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
+    """One vehicle is there for ten decisions, then all: in the end who stayed got the share of the time that it was."""
+    batch = BatchedEnv(load_scenario("two_swarms_easy"))
+    batch.reset(TUNING)
+    swarm, paid = batch.swarm, np.zeros(20)
+    limit = swarm.time_limit_s[0]
+    for k in range(11):
+        swarm.state.nu[:] = 0.0
+        there = slice(0, 1) if k < 10 else slice(None)
+        swarm.state.eta[0, there, :2] = swarm.course.waypoints[0, there, 1]
+        result = batch.step(np.zeros((1, 20, 2)))
+        paid += result.terms["stay"][0]
+    assert result.world_terminated[0]
+    np.testing.assert_allclose(paid[0], 20.0)
+    np.testing.assert_allclose(paid[1:], 20.0 * (1.0 - 5.0 / limit))
+
+
 @pytest.mark.parametrize(("changes", "message"), [
     ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
      "task.half_width_m = 120, got 128"),

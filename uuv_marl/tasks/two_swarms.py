@@ -92,11 +92,16 @@ class TwoSwarms(Reach):
     Numbers = TwoSwarmsNumbers
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
     channels: ClassVar[Mapping[str, Table]] = {"way": (*WAY, _TURN)}
+    terms: ClassVar[Mapping[str, str]] = {
+        **Reach.terms,
+        "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "
+        "is left until the limit T",
+    }
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles there, of the time until then over the straight way at full speed [1]",
         "whole_ratio": "the same of the last vehicle, if all came there [1]",
     }
-    guide: ClassVar[str] = "scout"
+    guide: ClassVar[str] = "tangent_bug"
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
@@ -167,6 +172,13 @@ class TwoSwarms(Reach):
             "way_walls": walls,
             "way_turn": ((side > 0.0) | ~to_come.any(axis=1, keepdims=True))[:, :, None].astype(np.float64),
         }
+
+    def reward(self, running: Bool) -> Terms:
+        """Also for staying: so near to its goal a vehicle that leaves it loses hardly any progress."""
+        swarm, period = self.swarm, self.swarm.scenario.timing.decision_period_s
+        left_s = swarm.time_limit_s - swarm.facts.time_s
+        share = np.where(self.done(), left_s + period, period) / swarm.time_limit_s
+        return {**super().reward(running), "stay": self._weight.arrival * share[:, None] * self.there()}
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also how long vehicles took, and the last of them."""
