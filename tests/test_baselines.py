@@ -174,10 +174,11 @@ def test_tuned_gains_come_from_shipped_trials(file):
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
     best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
     assert best == {"cost_s": data["best_cost_s"], **data["best"]}
-    policy = f"{name},tuned_for={what}" if what else "scout,preset=closed" if name == "scout" else name
+    chosen = {"scout": "scout,preset=closed", "nearest_target.lanes": "nearest_target,lanes=true"}
+    policy = chosen.get(file, f"{name},tuned_for={what}" if what else name)
     changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
     made = make(policy, granted(policy, load_scenario("sea_trial" if hull else "tracking", overrides=changes)))
-    numbers = vars(made) | made.gains._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
+    numbers = vars(made) | getattr(made, "seeker", made.gains)._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 
 

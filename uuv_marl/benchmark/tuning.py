@@ -104,7 +104,7 @@ SPACES: dict[str, Space] = {
     "carrot": Space(_RANGES["carrot"] | _RANGES["filter_at_a_gap"], ScoutGains, GAP, Barrier()),
     "scout": Space(_RANGES["scout"] | _RANGES["filter"] | _RANGES["gaps"], ScoutGains, WALLS, Barrier()),
     "tangent_bug": Space(_RANGES["tangent_bug"] | _RANGES["filter"], BugGains, WALLS, BUG_BARRIER),
-    "tangent_bug.two_swarms": Space(_RANGES["tangent_bug"] | _RANGES["filter_at_a_gap"], BugGains, GAP, BUG_BARRIER),
+    "tangent_bug.two_swarms": Space(_RANGES["tangent_bug"] | _RANGES["filter"], BugGains, GAP, BUG_BARRIER),
     "nearest_target": Space(_RANGES["nearest_target"], seeker.SeekerGains, SILENT, Barrier()),
     "nearest_target.lanes": Space(_RANGES["nearest_target"], seeker.SeekerGains, SILENT, Barrier(), {"lanes": True}),
     "leader_follower": Space(
