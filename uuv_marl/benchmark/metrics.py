@@ -131,7 +131,8 @@ class MetricsRecorder:
         all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
         own: dict[str, float | None] = self._swarm.task.metrics(world)
         judged = self._success.metrics(world) if self._success else Success()
-        arrived, within_1_m, within_5_m, within_10_m = (_number(time) for time in facts.arrival_s[world])
+        times = facts.arrival_s[world] if self._swarm.task.leads else np.full(4, np.nan)
+        arrived, within_1_m, within_5_m, within_10_m = map(_number, times)
         made: Metrics = {
             "task_time_s": arrived,
             "time_within_1_m_s": within_1_m,

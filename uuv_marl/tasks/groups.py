@@ -17,7 +17,7 @@ class Groups(NamedTuple):
     """Whether a vehicle perceives its reference, shape (vehicle,)."""
     ways: dict[int, tuple[int | None, Float64]]
     """By the group's index its team, None for one group alone, and the corners of its trajectory, north and east [m],
-    shape (point, 2); of several groups, only the goal where it rests."""
+    shape (point, 2); of several groups, or where the task leads nowhere, only the last where it rests."""
 
 
 def groups_of(swarm: Swarm, w: int = 0) -> Groups:
@@ -26,5 +26,6 @@ def groups_of(swarm: Swarm, w: int = 0) -> Groups:
     found, first = np.unique(course.group[w], return_index=True)
     for g, i in zip(found.tolist(), first.tolist(), strict=True):
         corners, rests = course.waypoints[w, g, : course.last[w, g] + 1].copy(), not course.times[w, g].any()
-        ways[g] = (int(team[i]), corners[-1:] if rests else corners) if len(found) > 1 else (None, corners)
+        short = corners[-1:] if rests and (len(found) > 1 or not swarm.task.leads) else corners
+        ways[g] = (int(team[i]) if len(found) > 1 else None, short)
     return Groups(team, course.informed[w].copy(), ways)

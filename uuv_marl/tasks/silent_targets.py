@@ -134,6 +134,9 @@ class SilentTargets(Reach):
         "held": "+w_arrival · dt/T · (share of the targets that are held), to everybody; T: the time limit",
     }
     traffic: ClassVar[bool] = False
+    leads: ClassVar[bool] = False
+    place: ClassVar[str] = "middle of the box"
+    marked: ClassVar[str] = "where a target is held"
     columns: ClassVar[Mapping[str, str]] = {
         "held_share": "share of the last half of the episode in which targets are held, mean over targets [1]",
         "found_share": "share of the targets that were ever held [1]",

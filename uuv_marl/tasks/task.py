@@ -85,6 +85,12 @@ class Task:
     """The task's own metrics that tables show, with what they are and their unit."""
     traffic: ClassVar[bool] = True
     """Whether the scenario's ``traffic`` may move the obstacles that the task draws."""
+    leads: ClassVar[bool] = True
+    """Whether references say where to go: else no arrival is told, and pictures show a place."""
+    place: ClassVar[str] = "goal of a vehicle"
+    """What the reference at rest of a group is, in a legend's words."""
+    marked: ClassVar[str] = ""
+    """What ``marks`` are, in a legend's words."""
     ending: ClassVar[str] = "done"
     """Name of the ending of an episode that is ``done``."""
     guide: ClassVar[str] = "bio_inspired"

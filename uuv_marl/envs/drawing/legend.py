@@ -27,7 +27,9 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
     found = [(f"group {k + 1}" if len(teams) > 1 else alone, _dart(ink.TEAMS[k])) for k in teams]
     if not all_know:
         found.append(("does not perceive l(t)", lambda *on: (_dart(ink.BLUE)(*on), _dart(ink.WHITE, 7.5)(*on))))
-    found.append(("l(t), to follow", _target) if scene.leads else ("goal of a vehicle", _goal))
+    found.append(("l(t), to follow", _target) if scene.leads else (scene.scenario.task_class.place, _goal))
+    if len(scene.marks):
+        found.append((scene.scenario.task_class.marked or "of the task", _mark))
     if scene.trail.size:
         found.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
@@ -121,6 +123,10 @@ def _disc(fine: pygame.Surface, unit: float) -> None:
 def _target(fine: pygame.Surface, unit: float) -> None:
     pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(2.0 * unit))
     pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 2.0 * unit)
+
+
+def _mark(fine: pygame.Surface, unit: float) -> None:
+    pygame.draw.circle(fine, ink.AMBER, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(unit))
 
 
 def _hit(fine: pygame.Surface, unit: float) -> None:

@@ -124,7 +124,7 @@ class SceneHistory:
                 -1, *position.shape
             ),
             hits=np.array(self._hits[w]).reshape(-1, 3),
-            arrival_s=arrival_s if np.isfinite(arrival_s) else None,
+            arrival_s=arrival_s if np.isfinite(arrival_s) and batch.task.leads else None,
             collisions=int(batch.collisions[w]),
             min_spacing_m=float(facts.min_spacing[w]),
             clearance_m=float(facts.obstacle_clearance[w].min()),
