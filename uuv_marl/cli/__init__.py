@@ -9,7 +9,15 @@ from uuv_marl.cli import benchmark, export, lists, replay, robustness, train
 from uuv_marl.cli.console import console, print_everywhere
 
 app = typer.Typer(
-    help="Swarms of unmanned underwater vehicles: scenarios, controllers and their benchmark.",
+    help="""Swarms of unmanned underwater vehicles: scenarios, controllers and their benchmark.
+
+    Try first:
+
+    - `uuv-marl list`: what there is;
+    - `uuv-marl replay --scenario hard_water --policy tangent_bug`: an episode to watch;
+    - `uuv-marl benchmark --scenario starter`: policies on the same seeds, in a table;
+    - `uuv-marl train starter --minutes 1`: a policy of your own.
+    """,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_show_locals=False,
