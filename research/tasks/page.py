@@ -56,7 +56,7 @@ def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
             found, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
         learners=_compared(found, task, {each.removeprefix(f"{task}-"): [each] for each in sets}),
-        informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}),
+        informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "untouched_share"),
     )
 
 
@@ -74,10 +74,11 @@ def _tiers(task: str) -> Columns:
     }
 
 
-def _shares(found: Found, study: Study, columns: Columns) -> str:
-    """The headline with its interval, and the share of whole swarms: a row for each policy that ran on all sets."""
+def _shares(found: Found, study: Study, columns: Columns, share: str = "") -> str:
+    """The headline, or another ``share``, with its interval, and whole swarms, for policies that ran on all sets."""
+    share = share or study.headline
     table = [
-        (policy, *(f"{_with_interval(_values(mine, study.headline))}, {_mean(mine, 'whole')}" for mine in cells))
+        (policy, *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'whole')}" for mine in cells))
         for policy in _policies(found)
         if (cells := _cells(found, policy, columns))
     ]

@@ -42,6 +42,7 @@ class FewInformed(Reach):
         "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to l(t), perceived or not, D: "
         "progress_far_m, c: progress_m",
     }
+    headline: ClassVar[str] = "uninformed_share"
     columns: ClassVar[Mapping[str, str]] = {"uninformed_share": "share of the uninformed vehicles that succeed [1]"}
     guide: ClassVar[str] = "leader_follower"
 

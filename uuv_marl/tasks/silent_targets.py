@@ -137,6 +137,7 @@ class SilentTargets(Reach):
     leads: ClassVar[bool] = False
     place: ClassVar[str] = "middle of the box"
     marked: ClassVar[str] = "where a target is held"
+    headline: ClassVar[str] = "held_share"
     columns: ClassVar[Mapping[str, str]] = {
         "held_share": "share of the last half of the episode in which targets are held, mean over targets [1]",
         "found_share": "share of the targets that were ever held [1]",

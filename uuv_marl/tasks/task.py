@@ -81,6 +81,8 @@ class Task:
     """Names of the rewards that the task knows; the first is the default."""
     terms: ClassVar[Mapping[str, str]] = {}
     """The terms of the first reward with their formulas, in order."""
+    headline: ClassVar[str] = "untouched_share"
+    """The metric, a share, by which policies are compared and trainings choose."""
     columns: ClassVar[Mapping[str, str]] = {}
     """The task's own metrics that tables show, with what they are and their unit."""
     traffic: ClassVar[bool] = True

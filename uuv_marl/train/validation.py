@@ -24,7 +24,7 @@ class Judged(NamedTuple):
     whole: float
     """Share of episodes in which all vehicles did their task, and nobody touched anything."""
     share: float
-    """Share of vehicles that did theirs untouched; in ``follow`` the same as ``whole``."""
+    """The task's headline, such as the share of vehicles that did theirs untouched; in ``follow`` that of swarms."""
     contacts: float
     """That began, mean over episodes."""
     time_s: float | None
@@ -45,8 +45,10 @@ def validate(policy: Path, training: Training) -> Judged:
     found = [
         (n, run.seed, run.metrics, _end_s(run)) for n, _ in training.sizes for run in _runs(policy, training, n, seeds)
     ]
-    shares = [share_of(metrics) for _, _, metrics, _ in found]
-    times = [end for (*_, end), share in zip(found, shares, strict=True) if share == 1.0]
+    shares, whole = zip(
+        *(shares_of(metrics, training.loaded.task_class.headline) for _, _, metrics, _ in found), strict=True
+    )
+    times = [end for (*_, end), all_did in zip(found, whole, strict=True) if all_did]
     worst = min(zip(shares, found, strict=True), key=lambda each: (each[0], -each[1][2]["collisions"]))[1]
     return Judged(
         whole=len(times) / len(found),
@@ -68,11 +70,14 @@ def _end_s(run: Run) -> float:
     return float(run.routes.time_s[-1]) if arrived is None else arrived
 
 
-def share_of(metrics: Metrics) -> float:
-    """Share of an episode's vehicles that did their task untouched; in ``follow`` all, if the swarm came well."""
+def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
+    """An episode's headline, and whether the swarm was whole; in ``follow`` whether it came and touched nothing."""
     if "task" not in metrics:
-        return float(metrics["task_time_s"] is not None and not metrics["collisions"])
-    return float(metrics["task"].get("untouched_share") or 0.0)
+        whole = metrics["task_time_s"] is not None and not metrics["collisions"]
+        return float(whole), whole
+    own = metrics["task"]
+    share = own.get(headline)
+    return (own["untouched_share"] if share is None else share) or 0.0, own["whole"] == 1.0
 
 
 def replay_command(policy: Path, training: Training, worst: tuple[int, int]) -> str:

@@ -100,7 +100,8 @@ class Network:
             num, size = entries.shape
             seen = ops.shaped(ops.take(x, entries.reshape(-1)), (-1, size))
             code = ops.shaped(ops.dense(seen, self._tensors[f"{kind}.weight"]), (-1, num, ENCODED))
-            parts.append(ops.total(ops.relu(code + self._tensors[f"{kind}.place"])))
+            place = self._tensors[f"{kind}.place"]
+            parts.append(ops.total(ops.relu(code + place) - ops.relu(place)))  # 0 where nothing is heard
         return ops.joined(parts)
 
     def gates(self, z: Any) -> Any:
