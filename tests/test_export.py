@@ -6,9 +6,10 @@ import pytest
 from onnx.reference import ReferenceEvaluator
 from typer.testing import CliRunner
 
-from tests.nets import saved
+from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.cli import app
 
@@ -64,5 +65,10 @@ def test_the_command(tmp_path):
     done = CliRunner().invoke(app, ["export", best, str(output)])
     assert done.exit_code == 0, done.output
     assert ReferenceEvaluator(str(output)).input_names == ["observation", "state"]
+    other = {"sonar.arrays.bow.sub_sectors": 5}  # the training's scenario is found by what the checkpoint says
+    card = card_for(load_scenario("starter", overrides=other), training={"scenario": "starter", "overrides": other})
+    save_checkpoint(tmp_path / "other" / WEIGHTS_FILE, card, tensors(card))
+    done = CliRunner().invoke(app, ["export", str(tmp_path / "other"), str(output)])
+    assert done.exit_code == 0, done.output
     unwritable = CliRunner().invoke(app, ["export", best, "/dev/null/policy.onnx"])
     assert unwritable.exit_code == 2

@@ -16,9 +16,10 @@ import safetensors.numpy
 import torch
 from typer.testing import CliRunner
 
+from tests.nets import card_for, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint
+from uuv_marl.baselines import granted, make
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
@@ -202,14 +203,28 @@ def test_a_critic_that_sees_its_own_alone_has_the_actors_input():
     assert env.size == env.features == env.observation.shape[1]
 
 
-@pytest.mark.parametrize("beside", [{"filter": True}, {"around": "scout"}])
+RUDDER = {
+    "overrides": {
+        "vehicle": "remus100",
+        "trajectory.speed_mps": 1.5,
+        "start.speed_max_mps": 1.5,
+        "timing.integration_step_s": 0.025,
+    }
+}
+
+
+@pytest.mark.parametrize("beside", [
+    {}, {"filter": True}, {"around": "scout"}, RUDDER, {**RUDDER, "around": "scout"}, {**RUDDER, "around": "sff"},
+], ids=["alone", "filter", "scout", "rudder", "rudder, scout", "rudder, sff"])  # fmt: skip
 def test_rows_act_as_the_policy_will(beside, tmp_path):
-    """What comes of a training's actions is what comes of its checkpoint's, filter and law included."""
-    training = Training(scenario="starter", sizes=[(4, 1)], ppo=TINY, **beside)
+    """What comes of a training's actions is what comes of its checkpoint's, filter, law and all bounds included."""
+    brief = {"time_limit.factor": 0.001, "time_limit.extra_s": 3.0}
+    told = {"scenario": "starter", **beside}
+    training = Training(sizes=[(4, 1)], ppo=TINY, **{**told, "overrides": told.get("overrides", {}) | brief})
     trainer = Trainer(training)
+    trainer.learner.actor.tensors[f"{len(training.network.hidden)}.bias"].data[:] = torch.tensor([1.0, 1.0])
     trainer.save_policy(tmp_path, Record())
     env, learner = trainer.rows, trainer.learner
-    from uuv_marl.baselines import make
 
     policy = make(str(tmp_path), env.groups[0].env.swarm.scenario)
     for _ in range(10):
@@ -285,10 +300,13 @@ def rows(folder):
 
 
 @pytest.mark.parametrize(
-    "kind", [{}, {"network": {"kind": "sectors", "hidden": (8,)}}, {"filter": True}], ids=["gru", "sectors", "filter"]
+    "kind",
+    [{}, {"network": {"kind": "sectors", "hidden": (8,)}}, {"filter": True}, {"around": "random"}, {"around": "scout"}],
+    ids=["gru", "sectors", "filter", "random", "scout"],
 )
 def test_a_resumed_training_equals_an_uninterrupted_one(kind, tmp_path, no_validation):
     """Bit for bit: weights, optimiser, memories, worlds and random numbers; stopped after a checkpoint, and between."""
+    kind = {"validations": 1, **kind}
     records = list(train(tmp_path / "whole", small(**kind)))
     assert [record.iteration for record in records] == [1, 2, 3, 4, 5]
     for stop in (2, 3):
@@ -367,6 +385,43 @@ def test_the_best_policy_is_kept_with_its_worst_episode(tmp_path, monkeypatch):
     assert "--set swarm.num_vehicles=6" in command
 
 
+def test_what_was_better_is_not_lost_with_a_process(tmp_path, monkeypatch):
+    """A validation that was better comes with a checkpoint: time does not repeat, so it might not come again."""
+    monkeypatch.setattr(trainings, "validate", lambda *_: GOOD)
+    begun(tmp_path, 1, validations=5, checkpoint_every=100)
+    assert TrainingFolder(tmp_path, None).record.best == GOOD.score
+
+
+def test_a_folder_says_why_it_can_not_go_on_here_and_what_made_it_so_far(tmp_path, no_validation, monkeypatch):
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "starter"\nversion = 1\n')
+    list(train(tmp_path / "a", small(steps=200, scenario=mine)))
+    config = tmp_path / "a" / "config.json"
+    config.write_text(config.read_text().replace('"torch": "', '"torch": "0.'))
+    assert "so far it was made by torch 0." in TrainingFolder(tmp_path / "a", None).found
+    mine.unlink()
+    with pytest.raises(ResultsError, match="can't be made again here: scenario file .*mine.toml.*resume it where"):
+        next(resume(tmp_path / "a"))
+    with pytest.raises(TrainingError, match="steps must be a finite number, got nan"):
+        TrainingFolder(tmp_path / "b", small()).budget_with(None, float("nan"))
+
+
+@pytest.mark.parametrize("law", ["mappo", "mine:Law", "./runs/best"])
+def test_a_network_is_around_a_law_that_ships(law, tmp_path):
+    with pytest.raises(PolicyError, match=f"around one of the laws bio_inspired, .*, got '{law}'"):
+        Training(around=law)
+    card = card_for(load_scenario("starter")).model_copy(update={"around": law})
+    save_checkpoint(tmp_path / WEIGHTS_FILE, card, tensors(card))
+    with pytest.raises(PolicyError, match="around one of the laws"):
+        make(str(tmp_path), load_scenario("starter"))
+
+
+def test_each_gate_of_a_memory_begins_orthogonal():
+    actor = Trainer(small()).learner.actor
+    for block in np.split(actor.tensors["gru.state_weight"].detach().numpy(), 3, axis=1):
+        np.testing.assert_allclose(block.T @ block, np.eye(len(block)), atol=1e-5)
+
+
 def test_a_folder_that_is_used_or_empty_or_of_another_scenario_is_refused(tmp_path, no_validation):
     mine = tmp_path / "mine.toml"
     mine.write_text('extends = "starter"\nversion = 1\n')
@@ -441,8 +496,8 @@ def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
 
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
 def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_path, no_validation, monkeypatch):
-    list(train(tmp_path / "whole", small()))
-    first = train(tmp_path / "a", small())
+    list(train(tmp_path / "whole", small(validations=1)))
+    first = train(tmp_path / "a", small(validations=1))
     for _ in range(3):
         next(first)
     with monkeypatch.context() as full:

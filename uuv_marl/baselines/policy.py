@@ -297,6 +297,17 @@ class Policy:
         return np.ascontiguousarray(rows)
 
 
+def parts_of(**policies: Policy) -> dict[str, NDArray[Any]]:
+    """The snapshots of policies that are parts of another, in one."""
+    return {f"{part}.{name}": array for part, one in policies.items() for name, array in one.snapshot().items()}
+
+
+def part_of(snapshot: Mapping[str, NDArray[Any]], part: str) -> dict[str, NDArray[Any]]:
+    """The snapshot of one of them."""
+    begin = f"{part}."
+    return {name.removeprefix(begin): array for name, array in snapshot.items() if name.startswith(begin)}
+
+
 @compiled
 def surge_resistance(speed: float, limits: Limits) -> float:
     """Surge resistance per velocity [N s/m] at a speed [m/s] of at least 0. Eq. 4."""

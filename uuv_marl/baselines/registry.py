@@ -285,6 +285,14 @@ def _alone(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameter
     return policy
 
 
+def need_law(name: str) -> None:
+    """Refuse what no network can be around, as a checkpoint runs what it names. Raises PolicyError."""
+    plain = name.partition(",")[0]
+    if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
+        laws = ", ".join(known for known, kind in POLICIES.items() if not isinstance(kind, Trained))
+        raise PolicyError(f"a network can be around one of the laws {laws}, got {name!r}")
+
+
 def beside(network: Policy, card: Card) -> Policy:
     """A network with what its card says decides beside it: a law, to whose actions its own are added; the filter.
 
@@ -297,6 +305,7 @@ def beside(network: Policy, card: Card) -> Policy:
     """
     scenario, num_worlds = network.scenario, network.num_worlds
     if card.around:
+        need_law(card.around)
         network = Around(scenario, num_worlds, law=make(card.around, scenario, num_worlds), inner=network)
     return Guarded(scenario, num_worlds, inner=network) if card.filter else network
 

@@ -12,8 +12,8 @@ def export(
     policy: Annotated[str, typer.Argument(help="Checkpoint of a training without filter and law, file or folder.")],
     output: Annotated[Path, path_argument("ONNX file.")],
     scenario: Annotated[
-        str, typer.Option(help="Name or TOML file of a scenario like that of the training.")
-    ] = "starter",
+        str | None, typer.Option(help="Name or TOML file of a scenario with its observation. Default: the training's.")
+    ] = None,
 ) -> None:
     """Write a network as an ONNX model, from an agent's observation as closeness to its action. Needs the extra "onnx".
 
@@ -26,7 +26,11 @@ def export(
         with extra("onnx", "export to ONNX"):
             from uuv_marl.baselines.learned.export import write_onnx
 
+        from uuv_marl.baselines.learned.checkpoint import load_checkpoint
         from uuv_marl.scenario import load_scenario
+        from uuv_marl.train.training import overrides_for
 
-        write_onnx(policy, load_scenario(scenario), output)
+        told = load_checkpoint(policy).card.training
+        name, own = scenario or told.get("scenario", "starter"), told.get("overrides", {}) if scenario is None else {}
+        write_onnx(policy, load_scenario(name, overrides=overrides_for(name, own)), output)
         console.print(f"Model: {output}")

@@ -1,16 +1,17 @@
 """``uuv-marl train``: from a scenario, or a file, and what differs from it to a policy."""
 
 import re
+import shlex
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from uuv_marl.cli.console import (
-    changes_of,
     console,
     explained,
     extra,
@@ -25,9 +26,10 @@ _TOLD = "swarms whole {whole:.0%}, vehicles {share:.0%}, contacts {contacts:.1f}
 
 def _whole_number(text: str) -> int:
     """A number such as 3000000 or 3e6."""
-    if not re.fullmatch(r"[1-9]\d{0,14}|[1-9](\.\d+)?e\d{1,2}", str(text)):
+    found = re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15})?(e[0-9]{1,2})?", str(text)) and Decimal(text)
+    if not found or found < 1 or found != int(found):
         raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give a number such as 3000000 or 3e6")
-    return int(float(text))
+    return int(found)
 
 
 def train_command(
@@ -82,10 +84,11 @@ def train_command(
     with explained():
         with extra("train", "training"):
             from uuv_marl.train import run
+        from uuv_marl.scenario import parse_override
         from uuv_marl.train.folder import TrainingFolder
         from uuv_marl.train.training import Training, changed_fields, told_by
 
-        find_modules([scenario, *(overrides or [])])
+        find_modules([":" if resume else scenario, *(overrides or [])])  # a folder may name modules, too
         named = {"minutes": minutes, "steps": steps, "seed": seed}
         changes = {name: value for name, value in named.items() if value is not None}
         if resume:
@@ -96,7 +99,7 @@ def train_command(
             told = told_by(scenario)
             for name in {"minutes", "steps"} & changes.keys():
                 told.pop("steps" if name == "minutes" else "minutes", None)
-            training = Training(**changed_fields(told, {**changes_of(overrides or []), **changes}))
+            training = Training(**changed_fields(told, {**dict(map(parse_override, overrides or [])), **changes}))
             until = training.budget
         with _stoppable(output) as stop:
             how: Any = {"say": console.print, "stop": stop}
@@ -151,10 +154,11 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
     finally:
         signal.signal(signal.SIGINT, before)
     if noted:
+        again = f"uuv-marl train --resume --output {shlex.quote(str(output))}"
         if any((output / "checkpoints").glob("[0-9]*[0-9]")):
-            rest = f"The last checkpoint is in {output}; uuv-marl train --resume --output {output} continues."
+            rest = f"The last checkpoint is in {output}; {again} continues."
         elif (output / "config.json").exists():
-            rest = f"There is no checkpoint yet: uuv-marl train --resume --output {output} begins again."
+            rest = f"There is no checkpoint yet: {again} begins again."
         else:
             rest = "Nothing was written yet; the same command begins again."
         console.print(f"Stopped. {rest}")

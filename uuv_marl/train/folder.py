@@ -1,6 +1,7 @@
 """A training on disk: what it is, a row per iteration, and the last checkpoint, whole at any time."""
 
 import json
+import math
 import re
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -13,7 +14,7 @@ from pydantic import TypeAdapter
 
 from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
-from uuv_marl.errors import ResultsError, TrainingError
+from uuv_marl.errors import PolicyError, ResultsError, ScenarioError, TrainingError
 from uuv_marl.train.training import Training
 
 _MADE_HERE = re.compile(r"\d{6,}(\.partial)?")
@@ -84,6 +85,7 @@ class TrainingFolder:
         if training is None:
             self.training = self._read()
             self._find()
+            self.found += self.made_by
             return
         self.training, self.until = training, training.budget
         if path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
@@ -93,8 +95,12 @@ class TrainingFolder:
         """The training that the folder holds."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
-            before, self.until = dict(config["scenario"]), float(config["until"])
+            before, self.until, made_by = dict(config["scenario"]), float(config["until"]), dict(config["versions"])
             training = Training(**config["training"])
+        except (ScenarioError, PolicyError, TrainingError) as error:
+            raise ResultsError(
+                f"the training in {self.path} can't be made again here: {error}; resume it where it was begun"
+            ) from None
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultsError(
                 f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
@@ -105,6 +111,8 @@ class TrainingFolder:
                 f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {training.scenario} as "
                 "it was, or begin anew with another --output"
             )
+        other = [f"{name} {old}" for name, old in made_by.items() if old != versions().get(name)]
+        self.made_by = f"; so far it was made by {', '.join(other)}, so no longer bit for bit" if other else ""
         return training
 
     def _find(self) -> None:
@@ -138,7 +146,10 @@ class TrainingFolder:
         told = {"minutes": minutes and 60.0 * minutes, "steps": steps}
         if told[other] is not None:
             raise TrainingError(f"the training in {self.path} has a budget of {kind}; give --{kind}, not --{other}")
-        return float(told[kind] or self.until)
+        until = float(told[kind] or self.until)
+        if not math.isfinite(until):
+            raise TrainingError(f"{kind} must be a finite number, got {until}")
+        return until
 
     @property
     def _checkpoints(self) -> Path:

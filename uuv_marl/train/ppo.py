@@ -26,6 +26,8 @@ with extra("train", "training"):
 
 _CRITIC = (64, 64)
 """Units of the critic's layers, tanh."""
+_ADAM = ("step", "exp_avg", "exp_avg_sq")
+"""What the optimiser keeps of each tensor."""
 
 
 class Update(NamedTuple):
@@ -38,7 +40,6 @@ class Update(NamedTuple):
 class Environment(Protocol):
     """What sampling needs: ``Rows``, or a problem with a known answer."""
 
-    features: int
     size: int
     rows: int
     observation: Float32
@@ -104,6 +105,10 @@ class Actor:
             name: started(shape, rng, 0.01 if name == last else 1.0 if name.startswith("gru") else math.sqrt(2.0))
             for name, shape in shapes(made, sizes).items()
         }
+        if made.memory:  # of each gate by itself
+            own = self.tensors["gru.state_weight"]
+            gates = [started((len(own), len(own)), rng, 1.0) for _ in range(3)]
+            self.tensors["gru.state_weight"] = torch.cat(gates, 1).detach().requires_grad_()
         self.units = made.hidden[-1] if made.memory else 0
         self.network = Network(made, sizes, self.tensors, TorchOps)
 
@@ -208,7 +213,7 @@ class Learner:
         self._optimiser.param_groups[0]["lr"] = learning_rate
         error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
-        spread = batch.advantage.std() + 1e-8
+        spread = batch.advantage.std(correction=0) + 1e-8
         batch = batch._replace(advantage=(batch.advantage - batch.advantage.mean()) / spread)
         if not self.actor.units:  # moments stand for themselves, and are mixed
             mixed = {name: x.reshape(1, -1, *x.shape[2:]) for name, x in batch._asdict().items() if name != "state"}
@@ -275,6 +280,12 @@ class Learner:
     @torch.no_grad()
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go on with the ``arrays`` of a learner of the same sizes."""
+        if begun := any(name.startswith("adam.") for name in arrays):
+            wanted = {f"adam.{k}.{name}" for k in range(sum(map(len, self._parts))) for name in _ADAM}
+            if lacking := sorted(wanted - arrays.keys()):
+                raise ValueError(f"{lacking[0]} is missing")
+        if not begun and np.array(arrays["moments"]).any():
+            raise ValueError("the optimiser's arrays adam.* are missing")
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
         self._moments = np.array(arrays["moments"])
         for name, x in [("state", self.state), *((f"actor.{name}", x) for name, x in self.actor.tensors.items()),

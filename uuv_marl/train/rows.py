@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.learned.actor import bound, in_disc
 from uuv_marl.baselines.learned.checkpoint import Card
-from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.policy import Policy, part_of, parts_of
 from uuv_marl.baselines.registry import beside
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.percept import Percept
@@ -67,7 +68,9 @@ class Group:
     def step(self, action: Float32, seeds: Seeds) -> tuple[Float32, Bool, Bool, Float32, Float32]:
         """Reward, done and cut off by row, what the critic sees now, and saw last of rows that were cut off."""
         env, n = self.env, self._shape[1]
-        action = np.clip(action, -1.0, 1.0).reshape(*self._shape, 2)
+        action = action.copy()
+        bound(action, in_disc(self._told))
+        action = action.reshape(*self._shape, 2)
         if self._acting is not self._told:
             self._told.action[...] = action
             action = self._acting.act(env.swarm.percept)
@@ -81,15 +84,13 @@ class Group:
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that ``restore`` needs, but what was observed."""
-        acting = self._acting.snapshot().items()
-        return self.env.swarm.snapshot() | {f"acting.{name}": array for name, array in acting}
+        return self.env.swarm.snapshot() | parts_of(acting=self._acting)
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot of a group of the same size."""
         self.env.reset(0)
         self.env.swarm.restore(snapshot)
-        acting = (name for name in snapshot if name.startswith("acting."))
-        self._acting.restore({name.removeprefix("acting."): snapshot[name] for name in acting})
+        self._acting.restore(part_of(snapshot, "acting"))
 
 
 class Rows:
@@ -134,6 +135,5 @@ class Rows:
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot of rows for the same training."""
         for k, group in enumerate(self.groups):
-            mine = {name.removeprefix(f"{k}."): array for name, array in snapshot.items() if name.startswith(f"{k}.")}
-            group.restore(mine)
+            group.restore(part_of(snapshot, str(k)))
         self.observation[...] = snapshot["observation"]

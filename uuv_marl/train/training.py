@@ -12,6 +12,7 @@ from uuv_marl.baselines import granted
 from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.policy import Policy, inner_loop_nms
+from uuv_marl.baselines.registry import need_law
 from uuv_marl.envs.core import Reward, refuse_losses
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
@@ -66,7 +67,7 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     learned to make up for that overshoots without it: end with little."""
     max_gradient: Positive = 0.5
     """Norm to which gradients of actor and critic are clipped."""
-    value_decay: Share = 0.99
+    value_decay: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.99
     """Decay of the running mean and variance by which returns are normalised [1]."""
 
 
@@ -146,7 +147,10 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     def loaded(self) -> Scenario:
         """The scenario that is trained and validated on."""
         scenario = load_scenario(self.scenario, overrides=overrides_for(self.scenario, self.overrides))
-        return granted(self.around, scenario) if self.around else scenario
+        if not self.around:
+            return scenario
+        need_law(self.around)
+        return granted(self.around, scenario)
 
     @cached_property
     def card(self) -> Card:

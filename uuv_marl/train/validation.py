@@ -88,4 +88,5 @@ def replay_command(policy: Path, training: Training, worst: tuple[int, int]) -> 
         del changes["swarm.num_vehicles"]
     kept = {field: value for field, value in changes.items() if field not in _EVERY_POLICYS_OWN}
     sets = [f" --set {shlex.quote(f'{field}={json.dumps(value)}')}" for field, value in kept.items()]
-    return f"uuv-marl replay --scenario {training.scenario} --policy {policy} --seed {seed}{''.join(sets)}"
+    scenario, path = shlex.quote(training.scenario), shlex.quote(str(policy))
+    return f"uuv-marl replay --scenario {scenario} --policy {path} --seed {seed}{''.join(sets)}"

@@ -49,7 +49,7 @@ class Actor(Policy):
         """Actions of shape (world, vehicle, 2)."""
         z = self._features(percept, self.active)
         action = self._network.output(z, self._recalled())
-        bound(action)
+        bound(action, in_disc(self))
         whole = np.zeros((*percept.flat.shape[:2], 2), np.float32)
         whole[self.active] = action.reshape(-1, *whole.shape[1:])
         return whole
@@ -84,11 +84,18 @@ class Recurrent(Actor):
 
 
 @compiled
-def bound(action: Float32) -> None:
-    """Clip each number of actions (row, 2) to [-1, 1], as trainers do, and project them onto the unit disc."""
+def bound(action: Float32, disc: bool) -> None:
+    """Clip each number of actions (row, 2) to [-1, 1], as trainers do, and project them onto the unit disc if asked."""
     for i in range(action.shape[0]):
-        a_x, a_y = project(min(max(action[i, 0], -1.0), 1.0), min(max(action[i, 1], -1.0), 1.0))
+        a_x, a_y = min(max(action[i, 0], -1.0), 1.0), min(max(action[i, 1], -1.0), 1.0)
+        if disc:
+            a_x, a_y = project(a_x, a_y)
         action[i, 0], action[i, 1] = a_x, a_y
+
+
+def in_disc(policy: Policy) -> bool:
+    """Whether what a policy decides is a force, in the unit disc; else thrust and rudder, each up to 1."""
+    return policy.wishes_force or policy.scenario.actuators.kind != "rudder"
 
 
 def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:

@@ -1,13 +1,13 @@
 """A network around a law: the law acts, and the network adds a bounded part to what it does."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned.actor import bound
-from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.learned.actor import bound, in_disc
+from uuv_marl.baselines.policy import Policy, part_of, parts_of
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike
@@ -45,7 +45,7 @@ class Around(Policy):
             each.hear(percept)
             said.append(each.decide(percept))
         action: Float32 = (said[0] + np.float32(SHARE) * said[1]).astype(np.float32)
-        bound(action.reshape(-1, 2))
+        bound(action.reshape(-1, 2), in_disc(self))
         self.clamps[...] = self.law.clamps
         return action
 
@@ -55,8 +55,12 @@ class Around(Policy):
         for each in (self.law, self.inner):
             each._taken(action)
 
-    def _arrays(self) -> dict[str, NDArray[Any]]:
+    def snapshot(self) -> dict[str, NDArray[Any]]:
         """Those of both, too."""
-        both = {"law": self.law, "inner": self.inner}
-        theirs = {f"{of}.{name}": array for of, each in both.items() for name, array in each._arrays().items()}
-        return super()._arrays() | theirs
+        return super().snapshot() | parts_of(law=self.law, inner=self.inner)
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Both, too."""
+        super().restore(snapshot)
+        self.law.restore(part_of(snapshot, "law"))
+        self.inner.restore(part_of(snapshot, "inner"))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
 from uuv_marl.baselines import granted, make
-from uuv_marl.baselines.learned.actor import Actor
+from uuv_marl.baselines.learned.actor import Actor, in_disc
 from uuv_marl.baselines.learned.layers import Network
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.extras import extra
@@ -58,8 +58,8 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
     if network.made.memory:
         state = graph("Identity", network.step(network.gates(z), Value(graph, "state")), name="next_state")
     clipped = graph("Clip", network.output(z, state), np.float32(-1.0), np.float32(1.0))
-    length = graph("Max", graph("ReduceL2", clipped, np.array([-1])), np.float32(1.0))
-    graph("Div", clipped, length, name="action")
+    longest = graph("ReduceL2", clipped, np.array([-1])) if in_disc(made) else np.float32(1.0)
+    graph("Div", clipped, graph("Max", longest, np.float32(1.0)), name="action")
     model = _model(made, graph)
     onnx.checker.check_model(model, full_check=True)  # pyright: ignore[reportUnknownMemberType] - of a path
     with writing(path):

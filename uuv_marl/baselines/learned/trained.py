@@ -20,7 +20,7 @@ class Trained:
         doc: the policy's docstring.
     """
 
-    def __init__(self, name: str, path: UserPath, doc: str | None = Learned.__doc__) -> None:
+    def __init__(self, name: str, path: UserPath, doc: str = "A network from a training.") -> None:
         self.name, self._path, self.__doc__ = name, path, doc
 
     @functools.cached_property

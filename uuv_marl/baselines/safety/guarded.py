@@ -7,14 +7,14 @@ resistance equals the action's force. If nothing is near, actions stay as they a
 With a rudder the action is the wished force; its torque is close to the rudder's at cruise speed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.pose import Reckoning, reckoned, to_map_axes
-from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.policy import Limits, Policy, part_of, parts_of
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier, keeps, planes_of, steer_safely
 from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.baselines.steering import wished_velocity
@@ -62,9 +62,14 @@ class Guarded(Filtered):
         super()._taken(action)
         self.inner._taken(action)
 
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        """Those of the policy inside too."""
-        return super()._arrays() | {f"inner.{name}": array for name, array in self.inner._arrays().items()}
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """That of the policy inside, too."""
+        return super().snapshot() | parts_of(inner=self.inner)
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """The policy inside, too."""
+        super().restore(snapshot)
+        self.inner.restore(part_of(snapshot, "inner"))
 
 
 @compiled
