@@ -174,6 +174,50 @@ def test_a_memory_is_trained_from_where_it_was():
     assert not batch.goes_on.bool().all()
 
 
+class Mixed(Toy):
+    """Rows of which the fifth ends, and the third and the fourth are cut off, each in a step of its own."""
+
+    features, size, rows = 2, 3, 6
+    ends, cuts = ((1, 4),), ((1, 2), (2, 3))
+
+    def step(self, action):
+        k, self._t = self._t, self._t + 1
+        self._draw()
+        ended, cut = np.zeros((2, self.rows), np.bool_)
+        for t, row in self.ends:
+            ended[row] |= t == k
+        for t, row in self.cuts:
+            cut[row] |= t == k
+        self.finals = self._rng.uniform(-1, 1, (int(cut.sum()), self.size)).astype(np.float32)
+        return Transition(np.ones(self.rows, np.float32), ended, cut, self.finals)
+
+
+def test_what_would_have_come_after_a_cut_counts_as_the_memory_would_have_seen_it():
+    """Advantages with lambda 0 by hand: 1 + gamma V(next) - V, next what the critic saw last of rows that were cut off,
+    nothing where the episode ended."""
+    problem = Mixed(None)
+    learner = learner_for(problem, Ppo(horizon=4, gae_lambda=0.0), Architecture(memory=True, hidden=(5,)))
+    learner.value = lambda seen, state: (seen[:, 2] + 10.0 * state.sum(1)).numpy()
+    finals, step = [], problem.step
+    problem.step = lambda action: (step(action), finals.append(problem.finals))[0]
+    batch, _ = learner.sample(problem, 0.3)
+    state = torch.zeros(6, 5)
+    for t in range(4):
+        state = learner.act(batch.observation[t], state)[1]
+        value = learner.value(batch.observation[t], state)
+        after = torch.from_numpy(problem.observation) if t == 3 else batch.observation[t + 1]
+        cut, ended = [row for k, row in problem.cuts if k == t], [row for k, row in problem.ends if k == t]
+        fresh = state.clone()
+        fresh[cut + ended] = 0.0
+        ahead = learner.value(after, learner.act(after, fresh)[1])
+        if cut:
+            final = torch.from_numpy(finals[t])
+            ahead[cut] = learner.value(final, learner.act(final, state[cut])[1])
+        ahead[ended] = 0.0
+        np.testing.assert_allclose(batch.advantage[t], 1.0 + 0.99 * ahead - value, atol=1e-4)
+        state = fresh
+
+
 # --- What is trained on ---
 
 
