@@ -93,7 +93,7 @@ class TwoSwarms(Reach):
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
     channels: ClassVar[Mapping[str, Table]] = {"way": (*WAY, _TURN)}
     terms: ClassVar[Mapping[str, str]] = {
-        **Reach.terms,
+        **{name: told for name, told in Reach.terms.items() if name != "arrival"},
         "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "
         "is left until the limit T",
     }
@@ -175,11 +175,12 @@ class TwoSwarms(Reach):
         }
 
     def reward(self, running: Bool) -> Terms:
-        """Also for staying: so near to its goal a vehicle that leaves it loses hardly any progress."""
+        """For staying, not for arriving: paid once, who does not remember it leaves, and loses hardly any progress."""
         swarm, period = self.swarm, self.swarm.scenario.timing.decision_period_s
         left_s = swarm.time_limit_s - swarm.facts.time_s
         share = np.where(self.done(), left_s + period, period) / swarm.time_limit_s
-        return {**super().reward(running), "stay": self._weight.arrival * share[:, None] * self.there()}
+        usual = {name: paid for name, paid in super().reward(running).items() if name in self.terms}
+        return {**usual, "stay": self._weight.arrival * share[:, None] * self.there()}
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also how long vehicles took, and the last of them."""
