@@ -96,7 +96,7 @@ class TorchOps:
         return x.sum(1)
 
 
-class Actor:
+class TorchActor:
     """The policy's network, and its memory through time."""
 
     def __init__(self, made: Architecture, sizes: Sizes, rng: np.random.Generator) -> None:
@@ -150,7 +150,7 @@ class Learner:
         self, made: Architecture, sizes: Sizes, size: int, rows: int, by: Ppo, rng: np.random.Generator
     ) -> None:
         self.by, self._rng, self._features = by, rng, sum(size for _, size in sizes)
-        self.actor = Actor(made, sizes, rng)
+        self.actor = TorchActor(made, sizes, rng)
         wide = (size + self.actor.units, *_CRITIC, 1)
         self.critic = [started(shape, rng, math.sqrt(2.0) if shape[-1] > 1 else 1.0)
                        for a, b in itertools.pairwise(wide) for shape in ((a, b), (b,))]  # fmt: skip

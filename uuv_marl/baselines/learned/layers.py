@@ -32,7 +32,7 @@ class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
     """Units of the layers, tanh; those of the recurrent layer as of the last."""
 
 
-class Columns(NamedTuple):
+class SectorColumns(NamedTuple):
     """Where the sub-sectors' entries stand in an observation."""
 
     sectors: dict[str, Int64]
@@ -41,7 +41,7 @@ class Columns(NamedTuple):
     """All others."""
 
 
-def columns(sizes: Sizes) -> Columns:
+def columns(sizes: Sizes) -> SectorColumns:
     """Where the sub-sectors' entries stand in an observation with these rows."""
     at: dict[str, Int64] = {}
     sectors: dict[str, Int64] = {}
@@ -53,7 +53,7 @@ def columns(sizes: Sizes) -> Columns:
         if num:
             sectors[kind] = np.concatenate([at[name].reshape(num, -1) for name in names if name in at], axis=1)
     rest = [at[name] for name in at if name not in (*_HEARD, *_ECHO)]
-    return Columns(sectors, np.concatenate(rest))
+    return SectorColumns(sectors, np.concatenate(rest))
 
 
 def shapes(made: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...]]:
@@ -146,7 +146,7 @@ class NumpyOps:
 
     @staticmethod
     def joined(parts: Sequence[Float32]) -> Float32:
-        """Columns side by side."""
+        """SectorColumns side by side."""
         return np.concatenate(parts, axis=1)
 
     @staticmethod
