@@ -14,6 +14,8 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
 from uuv_marl.scenario import Scenario
+from uuv_marl.tasks import TASKS
+from uuv_marl.tasks.maps import KINDS
 
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
@@ -52,6 +54,19 @@ def test_python_blocks_run_and_show_something(block, capsys, tmp_path, monkeypat
         warnings.filterwarnings("ignore", module="torchrl|tensordict")
         exec(compile(begun(block), "README.md", "exec"), {"__name__": "example"})
     assert capsys.readouterr().out or block.startswith("# mine.py")
+
+
+def test_the_gallery_shows_every_task_and_is_as_its_tool_makes_it():
+    spec = importlib.util.spec_from_file_location("make_gallery", ROOT / "tools" / "make_gallery.py")
+    gallery = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(gallery)
+    assert (ROOT / "docs" / "gallery.md").read_text() == gallery.page()
+    films = list(gallery.FOLDER.iterdir())
+    assert {path.stem for path in films} == {film.name for film in gallery.FILMS}
+    assert sum(path.stat().st_size for path in films) < 5_000_000
+    shown = {load_scenario(film.scenario).task.name for film in gallery.FILMS}
+    assert shown == set(TASKS) - {"reach"}
+    assert {film.kind for film in gallery.FILMS} - {""} == set(KINDS)
 
 
 def test_the_site_s_menu_has_every_page():
