@@ -86,10 +86,10 @@ def test_an_encoder_reads_sub_sectors_in_any_order_with_their_places():
 def test_torch_and_numpy_give_the_same(kind, memory):
     import torch
 
-    from uuv_marl.train.ppo import Actor
+    from uuv_marl.train.ppo import TorchActor
 
     card, rng = card_for(water(), kind=kind, memory=memory), np.random.default_rng(0)
-    actor = Actor(card.network, card.sizes, rng)
+    actor = TorchActor(card.network, card.sizes, rng)
     for tensor in actor.tensors.values():
         tensor.data += 0.2 * torch.from_numpy(rng.standard_normal(tensor.shape).astype(np.float32))
     t = {name: x.detach().numpy() for name, x in actor.tensors.items()}
