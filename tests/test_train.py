@@ -444,7 +444,9 @@ def test_a_folder_says_why_it_can_not_go_on_here_and_what_made_it_so_far(tmp_pat
     config.write_text(config.read_text().replace('"torch": "', '"torch": "0.'))
     assert "so far it was made by torch 0." in TrainingFolder(tmp_path / "a", None).found
     mine.unlink()
-    with pytest.raises(ResultsError, match="can't be made again here: scenario file .* does not exist.*resume it where"):
+    with pytest.raises(
+        ResultsError, match="can't be made again here: scenario file .* does not exist.*resume it where"
+    ):
         next(resume(tmp_path / "a"))
     with pytest.raises(TrainingError, match="steps must be a finite number, got nan"):
         TrainingFolder(tmp_path / "b", small()).budget_with(None, float("nan"))
