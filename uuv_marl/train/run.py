@@ -97,7 +97,7 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
                 if validated:
                     draw_curve(folder.rows(), folder.path / "curve.png", training.title or training.loaded.title)
                 stopped = stop()
-                if done or stopped or record.best != before.best or record.iteration % training.checkpoint_every == 0:
+                if validated or stopped or record.iteration % training.checkpoint_every == 0:
                     folder.keep(record, lambda path, record=record: trainer.save(path, record))
                 yield record
 
