@@ -39,9 +39,7 @@ LAWS = {name: name for name in (
     "idle", "guarded:bio_inspired", "guarded:random",
 )} | {f"scout_{preset}": f"scout,preset={preset}" for preset in ("plus", "lead", "wary")}  # fmt: skip
 """Hand-made policies: as a key names them, and the name that makes them today."""
-NETWORKS = {name: name for name in (
-    "mappo", "ppo", "guarded:mappo",
-)} | {"mappo_v4": "trimmed_scout"}  # fmt: skip
+NETWORKS = {name: name for name in ("mappo", "ppo", "guarded:mappo")}
 """The same of policies whose actions are compared, not hashed."""
 DRIVER = "bio_inspired"
 """Whose percepts ``NETWORKS`` see."""

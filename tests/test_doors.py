@@ -254,7 +254,7 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     save_checkpoint("~/best/policy.safetensors", trained.checkpoint.card, trained.checkpoint.tensors)
     for name in ("~/best", "guarded:~/best", "~/best/policy.safetensors"):
         assert make(name, granted(name, load_scenario("starter")))
-    assert load_checkpoint("~/best").layers[0].bias.shape == trained.checkpoint.layers[0].bias.shape
+    assert load_checkpoint("~/best").card == trained.checkpoint.card
 
 
 def test_results_and_replays_go_to_the_home_folder(home):

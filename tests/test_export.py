@@ -42,7 +42,7 @@ def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_p
     assert np.hypot(*action.T).max() <= 1.0 + 1e-6
 
 
-@pytest.mark.parametrize("policy", ["bio_inspired", "scout", "mappo", "trimmed_scout"])
+@pytest.mark.parametrize("policy", ["bio_inspired", "scout", "guarded:mappo"])
 def test_what_is_no_network_end_to_end_is_refused_with_the_remedy(policy, tmp_path):
     with pytest.raises(PolicyError, match=rf"'{policy}' can't be exported.*not laws.*run this policy with"):
         write_onnx(policy, load_scenario("tracking"), tmp_path / "policy.onnx")

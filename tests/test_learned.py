@@ -9,14 +9,12 @@ import safetensors.numpy
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint, vehicle_of
 from uuv_marl.baselines.learned.layers import ENCODED, Architecture, Network, NumpyOps, columns, shapes
-from uuv_marl.baselines.learned.percept_features import BARRIER
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import knowledge
-from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.swarm import Swarm
 
 SHORT = {"trajectory.waypoints_m": [[0.0, 0.0], [40.0, 0.0]], "time_limit.extra_s": 1.0, "time_limit.factor": 1.0}
@@ -155,26 +153,12 @@ def test_what_decides_beside_a_network_is_told_and_acts(beside, told, tmp_path):
         percept = swarm.step(action)
 
 
-def test_first_policies_have_their_class():
-    assert {POLICIES[name].checkpoint.card.policy_class for name in ("mappo", "ppo", "trimmed_scout")} == {
-        "around a law"
-    }
-
-
-def test_no_wish_of_a_first_network_leaves_the_barrier_of_the_papers_law(tmp_path):
-    """With zero weights the action is Eq. 20-21's, which ``bio_inspired`` computes with the barrier's gains."""
-    shipped = POLICIES["mappo"].checkpoint
-    zero = {name: 0.0 * tensor for name, tensor in shipped.tensors.items()}
-    save_checkpoint(tmp_path / WEIGHTS_FILE, shipped.card.model_copy(update={"yaw_damping_nms": 0.0}), zero)
-    scenario = granted(str(tmp_path), load_scenario("single_obstacle"))
-    percept = Swarm(scenario, 2).reset(5)
-    law = make("bio_inspired", scenario, 2, gains=BARRIER)
-    np.testing.assert_allclose(make(str(tmp_path), scenario, 2).act(percept), law.act(percept), atol=1e-6)
-
-
 def test_it_works_for_any_size_and_declares_what_it_needs(best):
     digest = load_checkpoint(learned_file(best)).digest
-    known = {"channels": [], "yaw_damping_nms": 600.0, "source": digest, "policy_class": "end to end"}
+    known = {
+        "channels": [], "yaw_damping_nms": 600.0, "decides_every_s": 0.1, "source": digest,
+        "policy_class": "end to end",
+    }  # fmt: skip
     assert knowledge(best) == known
     for n in (1, 200):
         scenario = granted(best, load_scenario("tracking", num_vehicles=n))
@@ -184,13 +168,17 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
 
 
 def test_another_percept_or_period_is_refused_with_the_remedy(best):
+    """A clock that the scenario does not fix is the policy's own."""
     other = granted(best, water(**{"sonar.arrays.bow.sub_sectors": 5}))
     message = r"another percept.*was .'closeness', 21, '1', 1.0. in .* is .'closeness', 19, '1', 1.0. here; use"
     with pytest.raises(PolicyError, match=message):
         make(best, other)
-    slow = granted(best, water(**{"timing.decision_period_s": 0.5}))
-    with pytest.raises(PolicyError, match=r"decides every 0.1 s.*every 0.5 s; override timing.decision_period_s=0.1"):
-        make(best, slow)
+    slow = water(**{"timing.decision_period_s": 0.5})
+    assert granted(best, slow).timing.decision_period_s == 0.1
+    fixed = granted(best, water(**{"timing.decision_period_s": 0.5, "timing.fixed": True}))
+    for other in (slow, fixed):
+        with pytest.raises(PolicyError, match=r"needs a decision every 0.1 s .timing.decision_period_s."):
+            make(best, other)
 
 
 def test_what_is_no_checkpoint_is_explained(best, tmp_path):
@@ -215,7 +203,6 @@ def test_a_rewritten_checkpoint_is_loaded_anew(best):
 @pytest.mark.parametrize(("field", "value"), [("vehicle.m_kg", 600.0), ("actuators.lever_arm_m", 2.0)])
 @pytest.mark.parametrize("name", ["mappo", "best"])
 def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
-    """Also by checkpoints of version 0.1.0, which do not name theirs: the shipped one."""
     name = best if name == "best" else name
     other = granted(name, load_scenario("tracking", num_vehicles=2, overrides={field: value}))
     was = {**vehicle_of(load_scenario("tracking"))}[field]
@@ -232,12 +219,6 @@ def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
     make(best, granted(best, heavy))
     with pytest.raises(PolicyError, match=r"vehicle.m_kg was 600.0 in the training and is 185.0"):
         make(best, granted(best, load_scenario("tracking")))
-
-
-@pytest.mark.parametrize("name", ["mappo", "ppo"])
-def test_weights_of_the_first_version_run_on_every_shipped_scenario(name):
-    for scenario in scenario_names():
-        make(name, granted(name, load_scenario(scenario)))
 
 
 def changed(name, value=None, at=None, **more):
@@ -276,8 +257,7 @@ def test_weights_that_cannot_run_are_refused(made, message, tmp_path):
     [
         ("network", {"hidden": []}),
         ("network", {"hidden": [0, 4]}),
-        ("decision_period_s", [0.5, 0.1]),
-        ("decision_period_s", [0.0, 0.1]),
+        ("decides_every_s", 0.0),
         ("yaw_damping_nms", float("nan")),
         ("percept", "none"),
         ("format", 2),

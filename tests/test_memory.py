@@ -1,5 +1,6 @@
 """What vehicles remember of their surroundings, beside the truth: places, obstacles, neighbours' velocities."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,8 +11,11 @@ from hypothesis import strategies as st
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.baselines.memory.discs import CONFIRMED
+from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
+from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.scout.law import wary
 from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
@@ -220,3 +224,30 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(kept_
         silent_s += scenario.timing.decision_period_s
     assert kept_s < silent_s < kept_s + 0.15
     assert age_of(0, 0, policy.memory) == 0.0, "and says nothing of the sonar by then"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "least", "most"),
+    [
+        ({}, 0.0, 0.1),
+        ({"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}, 0.95, 1.0),
+        ({"noise.bearing_deg": 2.0}, 0.8, 1.0),
+        ({"timing.decision_period_s": 0.5}, 0.25, 1.0),
+    ],
+    ids=["calm", "lag", "noise", "slow"],
+)
+def test_vehicles_doubt_where_something_is_not_as_expected(overrides, least, most):
+    scenario = granted("scout", load_scenario("random_field", num_vehicles=20, overrides=overrides))
+    swarm, policy, doubts = Swarm(scenario), make("scout", scenario), []
+    percept, decisions = swarm.reset(10_007), round(40.0 / scenario.timing.decision_period_s)
+    for k in range(decisions):
+        percept = swarm.step(policy.act(percept))
+        if k > decisions / 4:
+            doubts.append([doubt(0, i, policy.memory) for i in range(20)])
+    assert least <= np.mean(doubts) <= most
+
+
+def test_who_does_not_doubt_has_the_gains_of_the_law():
+    law = ScoutGains(pull_in_doubt=-0.3, push_in_doubt=0.7)
+    assert wary(law, 0.0) == law
+    assert wary(law, 1.0) == law._replace(pull=law.pull * math.exp(-0.3), push=law.push * math.exp(0.7))

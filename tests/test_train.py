@@ -32,9 +32,9 @@ from uuv_marl.train.ppo import Learner, annealed, gae
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows, Transition
 from uuv_marl.train.run import Trainer, resume, train
 from uuv_marl.train.training import Ppo, Training, told_by
-from uuv_marl.train.validation import VALIDATION_SEEDS, Judged
+from uuv_marl.train.validation import VALIDATION_SEEDS, Judged, Worst
 
-GOOD = Judged(1.0, 1.0, 0.0, 30.0, (3, 900_000))
+GOOD = Judged(1.0, 1.0, 0.0, 30.0, Worst("starter", 3, 900_000))
 TINY = Ppo(horizon=8, minibatches=2)
 
 
@@ -242,6 +242,28 @@ def test_rows_of_mixed_sizes_end_and_start_anew():
     assert np.abs(came.final - before).max() < np.abs(env.observation - before).max()
 
 
+def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
+    """Nothing else is charged, and each contact that begins by as much."""
+    crowd = Training(scenario="starter", sizes=[(12, 4)], ppo=TINY)
+    plain, charged, found = rows_for(crowd), rows_for(crowd), 0
+    charged.charge(7.0)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        action = rng.uniform(-1.0, 1.0, (48, 2)).astype(np.float32)
+        less = plain.step(action).reward - charged.step(action).reward
+        contacts = charged.groups[0].env.swarm.facts.contacts.ravel()
+        np.testing.assert_allclose(less, 7.0 * contacts, atol=1e-4)
+        found += contacts.sum()
+    assert found > 0
+    costs = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Rows, "charge", lambda self, cost: costs.append(cost))
+        list(train(tmp_path, small(steps=5 * 168)))
+    assert costs[0] == 1.0
+    assert costs == sorted(costs)
+    assert 50.0 < costs[-1] < 300.0
+
+
 def test_a_critic_that_sees_its_own_alone_has_the_actors_input():
     env = rows_for(Training(scenario="starter", sizes=[(3, 2)], critic="own", ppo=TINY))
     assert env.size == env.features == env.observation.shape[1]
@@ -418,7 +440,7 @@ def test_the_starter_scenario_is_learned_in_seconds(tmp_path):
 def test_the_best_policy_is_kept_with_its_worst_episode(tmp_path, monkeypatch):
     scores = iter([0.2, 0.5, 0.4, 0.5])
     seen = iter([900_001, 900_002, 900_003, 900_004])
-    judge = lambda *_: GOOD._replace(whole=next(scores), share=0.5, worst=(6, next(seen)))  # noqa: E731
+    judge = lambda *_: GOOD._replace(whole=next(scores), share=0.5, worst=Worst("starter", 6, next(seen)))  # noqa: E731
     monkeypatch.setattr(trainings, "validate", judge)
     records = list(train(tmp_path / "a", small(validations=4, steps=4 * 168)))
     assert [record.best for record in records] == [0.35, 0.5, 0.5, 0.5]
@@ -612,17 +634,21 @@ def test_a_damaged_table_loses_only_what_is_damaged(kept, tmp_path, no_validatio
 
 def test_a_training_fills_in_what_is_left_out(tmp_path):
     plain = Training()
-    assert (plain.scenario, plain.minutes, plain.sizes, plain.budget) == ("starter", 5.0, ((5, 128),), 300.0)
+    assert (plain.scenario, plain.minutes, plain.budget) == ("starter", 5.0, 300.0)
+    assert [(part.vehicles, part.worlds) for part in plain.parts] == [(5, 128)]
     assert plain.loaded == load_scenario("starter"), "which fixes period and inner loop"
     assert plain.card.policy_class == "end to end"
-    assert Training(scenario="hard_water", sizes=[10, 54]).sizes == ((10, 32), (54, 6))
+    mixed = Training(scenario="hard_water", also=["hard_water_hard"], sizes=[10, (54, 2)])
+    assert [(part.name, part.vehicles, part.worlds) for part in mixed.parts] == [
+        ("hard_water", 10, 16), ("hard_water", 54, 2), ("hard_water_hard", 10, 16), ("hard_water_hard", 54, 2),
+    ]  # fmt: skip
     free = Training(scenario="random_field", steps=100).loaded
     assert (free.timing.decision_period_s, free.actuators.yaw_damping_nms) == (0.5, 600.0)
     assert Training(scenario="starter", around="scout,preset=wary").loaded.actuators.yaw_damping_nms == 600.0
     (tmp_path / "mine.toml").write_text('extends = "random_field"\n[swarm]\nnum_vehicles = 20\n')
     (tmp_path / "recipe.toml").write_text('scenario = "hard_water"\n[ppo]\ngamma = 0.98\n')
     mine = Training(**told_by(str(tmp_path / "mine.toml")))
-    assert mine.sizes == ((20, 32),)
+    assert [(part.vehicles, part.worlds) for part in mine.parts] == [(20, 32)]
     assert Training(**told_by(str(tmp_path / "recipe.toml"))).ppo.gamma == 0.98
     assert told_by("starter") == {"scenario": "starter"}
 
@@ -637,6 +663,8 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
         ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
+        ({"also": ["lossy"]}, "training can't show that a vehicle is lost"),
+        ({"also": ["few_informed"]}, "also = 'few_informed' has another percept than 'starter', and one network"),
     ],
 )
 def test_fields_that_cannot_be_trained_with_are_named_with_the_remedy(wrong, told):
@@ -683,7 +711,7 @@ def test_the_command_says_what_to_train_and_can_be_stopped(tmp_path, monkeypatch
     assert "250 agent-steps/s" in done.output
     assert calls == [
         Training(
-            scenario="hard_water", steps=1000, seed=3, sizes=((5, 64), (20, 16)), network={"memory": True},
+            scenario="hard_water", steps=1000, seed=3, sizes=(5, 20), network={"memory": True},
             ppo={"noise": (0.3, 0.1)}, overrides={"sonar.echo_reports": "centre"},
         )
     ]  # fmt: skip

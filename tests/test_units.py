@@ -147,7 +147,7 @@ def test_bad_combinations_are_refused_with_the_remedy():
     with pytest.raises(PolicyError, match=r"'Acts' must define decide\(percept\), and leave act, .* alone"):
         make("tests.test_units:Acts", LAUV)
     with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
-        make("mappo", LAUV)
+        make("mappo", granted("mappo", LAUV))
     rov = load_scenario("sea_trial", overrides={"vehicle": "bluerov2_heavy", "scale": "vehicle"})
     needed = re.escape(f"a yaw damping of {inner_loop_nms(600.0, 3000.0, rov):g} N m s")
     with pytest.raises(PolicyError, match=f"scout needs {needed}"):

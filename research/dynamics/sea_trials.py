@@ -17,7 +17,7 @@ from uuv_marl.scenario import load_scenario, vehicle_names
 SCENARIOS = ("sea_trial", "random_field")
 POLICIES = (
     "bio_inspired", "bio_inspired_plus", "guarded:bio_inspired_plus", "sff", "sdc", "scout",
-    "scout,preset=plus", "scout,preset=lead", "mappo", "trimmed_scout",
+    "scout,preset=plus", "scout,preset=lead", "mappo",
 )  # fmt: skip
 SEEDS = 20
 METRICS = ("task_time_s", "collisions")

@@ -68,12 +68,21 @@ def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenari
     return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_hold_s)
 
 
+class Declared(NamedTuple):
+    """What a policy needs, by the names that ``Policy`` has for it."""
+
+    channels: Sequence[str]
+    yaw_damping_nms: float
+    full_torque_nm: float
+    decides_every_s: float | None
+
+
 def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
     """Refuse a scenario that does not grant what a policy declares: channels, and an inner loop.
 
     Args:
         name: the policy's name in the message.
-        policy: a policy, its class, or anything with ``channels``, ``yaw_damping_nms`` and ``full_torque_nm``.
+        policy: a policy, its class, or what else has what ``Declared`` has.
         scenario: the scenario on which the policy should run.
 
     Raises:
@@ -87,6 +96,9 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
     damping = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
     if not scenario.timing.fixed and not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
         needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
+    period = policy.decides_every_s and policy.decides_every_s * scenario.scale.units.time
+    if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
+        needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
     if needs:
         raise PolicyError(
             f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
@@ -123,6 +135,8 @@ class Policy:
     the link's fields lie where ``at`` says, and ``percept["link_velocity"]`` is not there."""
     yaw_damping_nms: ClassVar[float] = 0.0
     """Inner loop that the policy was designed with [N m s], on a vehicle of ``full_torque_nm``: ``inner_loop_nms``."""
+    decides_every_s: ClassVar[float | None] = None
+    """Period between decisions that the policy needs [s]; None if it is made for any."""
     full_torque_nm: ClassVar[float] = 3000.0
     """Full torque of that vehicle [N m], ``literature_185`` where nothing else is said."""
     wishes_force: ClassVar[bool] = False
@@ -174,7 +188,7 @@ class Policy:
 
     def declare_as(self, other: Any) -> None:
         """Declare what another does: a policy inside, or the card of a training. To be called before ``__init__``."""
-        for name in ("channels", "yaw_damping_nms", "full_torque_nm", "wishes_force"):
+        for name in ("channels", "yaw_damping_nms", "full_torque_nm", "decides_every_s", "wishes_force"):
             setattr(self, name, getattr(other, name))
 
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:

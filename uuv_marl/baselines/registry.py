@@ -39,7 +39,7 @@ from uuv_marl.sim.arguments import rounding
 from uuv_marl.types import Float32
 
 Kind = type[Policy] | Trained
-"""A class of policies: a call with a scenario makes a policy. It has ``channels`` and ``yaw_damping_nms``."""
+"""A class of policies: a call with a scenario makes a policy. It has what a policy declares."""
 
 POLICIES: dict[str, Kind] = {
     "bio_inspired": BioInspired,
@@ -61,11 +61,9 @@ POLICIES: dict[str, Kind] = {
     "pull": Pull,
     "oracle": Oracle,
     "tangent_bug": TangentBug,
-    "mappo": shipped("mappo", "Trained by MAPPO on random_field: an actor from the percept alone, plus a barrier."),
-    "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on random_field: as mappo, an actor plus a barrier."),
-    "trimmed_scout": shipped(
-        "trimmed_scout", "Trained by MAPPO: scout,preset=wary, steered more softly where a vehicle's actuators lag."
-    ),
+    "mappo": shipped("mappo", "Trained by MAPPO on random_field, end to end."),
+    "mappo_2": shipped("mappo_2", "A second training of mappo, with another seed."),
+    "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on training_field, end to end."),
     "random": Random,
     "idle": Idle,
 }
@@ -185,23 +183,30 @@ def channels_in(scenario: Scenario, declared: Sequence[str]) -> list[str]:
 
 
 def granted(name: str, scenario: Scenario) -> Scenario:
-    """The scenario with exactly the channels and the inner loop (``inner_loop_nms``) that a policy declares.
+    """The scenario with exactly the channels, the inner loop (``inner_loop_nms``) and the clock that a policy declares.
 
-    Where the scenario fixes the inner loop for all (``timing.fixed``), only the channels, unless the name begins with
-    ``own_clock:``, which also gives the policy a decision at every control hold.
+    Where the scenario fixes inner loop and clock for all (``timing.fixed``), only the channels, unless the name begins
+    with ``own_clock:``, which also gives a policy that is made for any clock a decision at every control hold.
     If the scenario has ``modem``, a policy that declares ``link`` gets ``modem`` instead. There are two exceptions: a
     policy that declares both, and a trained policy, which knows only the channels of its training.
     """
-    policy = policy_class(name)
-    trained, timing = isinstance(policy, Trained), scenario.timing
+    return granted_to(name, policy_class(name), scenario)
+
+
+def granted_to(name: str, declared: Any, scenario: Scenario) -> Scenario:
+    """``granted`` for a policy of that name, by what it declared (``Declared``)."""
+    timing, own = scenario.timing, name.startswith(OWN)
     changes: dict[str, object] = {
-        "sonar.channels": list(policy.channels) if trained else channels_in(scenario, policy.channels)
+        "sonar.channels": list(declared.channels) if is_trained(name) else channels_in(scenario, declared.channels)
     }
-    if not timing.fixed or name.startswith(OWN):
-        loop = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
+    if own or not timing.fixed:
+        loop = inner_loop_nms(declared.yaw_damping_nms, declared.full_torque_nm, scenario)
+        period = declared.decides_every_s and declared.decides_every_s * scenario.scale.units.time
         changes["actuators.yaw_damping_nms"] = loop
-    if timing.fixed and name.startswith(OWN):
-        changes |= {"timing.fixed": False, "timing.decision_period_s": timing.control_hold_s}
+        changes["timing.decision_period_s"] = period or (
+            timing.control_hold_s if timing.fixed else timing.decision_period_s
+        )
+        changes["timing.fixed"] = False
     return load_scenario(scenario, overrides=changes)
 
 

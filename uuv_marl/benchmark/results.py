@@ -22,7 +22,7 @@ from typing_extensions import TypedDict
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
 from uuv_marl.baselines.learned.trained import Trained
-from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.policy import Declared, Policy
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
@@ -56,6 +56,8 @@ class Knowledge(TypedDict):
     channels: list[str]
     yaw_damping_nms: float
     """The policy's inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
+    decides_every_s: NotRequired[float]
+    """Period between decisions, where it needs one."""
     source: str | None
     policy_class: NotRequired[str]
     """What decides beside a network: ``end to end``, ``end to end + filter``, ``around a law``."""
@@ -255,9 +257,17 @@ def knowledge(policy: str) -> Knowledge:
         source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
     damping = made.yaw_damping_nms * (Policy.full_torque_nm / made.full_torque_nm)
     known = Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
-    if isinstance(made, Trained) and made.checkpoint.card.features == "closeness":
+    if made.decides_every_s:
+        known["decides_every_s"] = made.decides_every_s
+    if isinstance(made, Trained):
         known["policy_class"] = made.checkpoint.card.policy_class
     return known
+
+
+def declared(known: Knowledge) -> Declared:
+    """What a policy declared of which this is known."""
+    every = known.get("decides_every_s")
+    return Declared(known["channels"], known["yaw_damping_nms"], Policy.full_torque_nm, every)
 
 
 def origin(policy: str) -> dict[str, str | None]:

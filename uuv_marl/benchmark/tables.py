@@ -8,10 +8,9 @@ from rich.markup import escape
 from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
-from uuv_marl.baselines.policy import Policy, inner_loop_nms
-from uuv_marl.baselines.registry import OWN, channels_in, is_trained
+from uuv_marl.baselines.registry import OWN, granted_to
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
-from uuv_marl.benchmark.results import Knowledge, ResultRow, Results
+from uuv_marl.benchmark.results import Knowledge, ResultRow, Results, declared
 from uuv_marl.scenario import Scenario, differences
 from uuv_marl.tasks import Task
 from uuv_marl.types import Float64
@@ -215,12 +214,12 @@ def counted(number: int, what: str) -> str:
 def _knows(scenario: Scenario, policy: str, known: Knowledge) -> str:
     """What a policy has beyond the percept on a scenario, and beyond what all others have there."""
     told = [known["policy_class"]] if "policy_class" in known else []
-    told += known["channels"] if is_trained(policy) else channels_in(scenario, known["channels"])
-    own = policy.startswith(OWN)
-    if scenario.timing.fixed and own:
-        told.append(f"a decision every {scenario.timing.control_hold_s:g} s")
-    damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, scenario)
-    if damping and (own or not scenario.timing.fixed):
+    has = granted_to(policy, declared(known), scenario)
+    told += has.sonar.channels
+    if has.timing.decision_period_s != scenario.timing.decision_period_s:
+        told.append(f"a decision every {has.timing.decision_period_s:g} s")
+    damping = has.actuators.yaw_damping_nms
+    if damping and (policy.startswith(OWN) or not scenario.timing.fixed):
         told.append(f"yaw damping {damping:g} N m s")
     return ", ".join(told) or _NOTHING
 

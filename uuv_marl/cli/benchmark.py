@@ -43,7 +43,7 @@ def benchmark(
         typer.Option(
             help="Name, checkpoint (runs/mine/best) or module:Class, whose module is looked for in the current folder "
             "too, after all installed ones; repeat for several. "
-            "Default: bio_inspired, sff, sdc, scout, mappo, ppo and trimmed_scout."
+            "Default: bio_inspired, sff, sdc, scout, mappo and ppo."
         ),
     ] = None,
     seeds: Annotated[

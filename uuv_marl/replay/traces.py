@@ -7,17 +7,16 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from pydantic import ValidationError
 
-from uuv_marl.baselines.policy import Policy, inner_loop_nms
-from uuv_marl.baselines.registry import channels_in, is_trained
+from uuv_marl.baselines.registry import granted_to
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.benchmark.results import FILE, Content, load_trace, read_content, trace_path
+from uuv_marl.benchmark.results import FILE, Content, declared, load_trace, read_content, trace_path
 from uuv_marl.errors import ReplayError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay.command import command
 from uuv_marl.replay.events import arrival, losses, near_misses
 from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Recording, Water
-from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.files import frozen
 from uuv_marl.sim.sea.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
@@ -174,10 +173,7 @@ def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
             f"{saved.folder / FILE} describes {name!r} in the words of another version of uuv_marl ({field}: "
             f"{first['msg']}); run the benchmark again"
         ) from None
-    known = saved.content["policies"][policy]
-    damping = inner_loop_nms(known["yaw_damping_nms"], Policy.full_torque_nm, scenario)
-    channels = known["channels"] if is_trained(policy) else channels_in(scenario, known["channels"])
-    return load_scenario(scenario, overrides={"sonar.channels": channels, "actuators.yaw_damping_nms": damping})
+    return granted_to(policy, declared(saved.content["policies"][policy]), scenario)
 
 
 def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:

@@ -95,7 +95,7 @@ class TrainingFolder:
         """The training that the folder holds."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
-            before, self.until, made_by = dict(config["scenario"]), float(config["until"]), dict(config["versions"])
+            before, self.until, made_by = dict(config["scenarios"]), float(config["until"]), dict(config["versions"])
             training = Training(**config["training"])
         except (ScenarioError, PolicyError, TrainingError) as error:
             raise ResultsError(
@@ -106,11 +106,12 @@ class TrainingFolder:
                 f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
                 "empty --output"
             ) from None
-        for field, then, now in _differences(before, training.loaded.model_dump(mode="json")):
-            raise ResultsError(
-                f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {training.scenario} as "
-                "it was, or begin anew with another --output"
-            )
+        for name, scenario in _scenarios(training).items():
+            for field, then, now in _differences(before.get(name, {}), scenario):
+                raise ResultsError(
+                    f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {name} as it was, or "
+                    "begin anew with another --output"
+                )
         other = [f"{name} {old}" for name, old in made_by.items() if old != versions().get(name)]
         self.made_by = f"; so far it was made by {', '.join(other)}, so no longer bit for bit" if other else ""
         return training
@@ -164,7 +165,7 @@ class TrainingFolder:
         """Make the folder ready for the next iteration, and note how it comes about: budget, versions."""
         config = {
             "training": self.training.model_dump(mode="json"),
-            "scenario": self.training.loaded.model_dump(mode="json"),
+            "scenarios": _scenarios(self.training),
             "until": until,
             "versions": versions(),
         }
@@ -229,6 +230,11 @@ def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[
         if folder.found:
             say(folder.found)
         yield folder
+
+
+def _scenarios(training: Training) -> dict[str, Any]:
+    """What is trained on, whole, by name."""
+    return {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
 
 
 def versions() -> dict[str, str]:

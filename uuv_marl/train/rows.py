@@ -13,9 +13,9 @@ from uuv_marl.baselines.policy import Policy, part_of, parts_of
 from uuv_marl.baselines.registry import beside
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.percept import Percept
-from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario import Scenario
 from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
-from uuv_marl.train.training import Training
+from uuv_marl.train.training import Part, Training
 from uuv_marl.types import Bool, Float32
 
 TRAINING_SEEDS = (100_000, 900_000)
@@ -51,14 +51,18 @@ class Told(Policy):
 
 
 class Group:
-    """Worlds of one swarm size, and what decides beside the network, if anything does."""
+    """Worlds of one scenario and swarm size, and what decides beside the network, if anything does."""
 
-    def __init__(self, training: Training, num_vehicles: int, num_worlds: int) -> None:
-        scenario, card = load_scenario(training.loaded, num_vehicles=num_vehicles), training.card
-        self.env = BatchedEnv(scenario, num_worlds, training.paid, observe="closeness", keep_terms=False)
-        self._told = Told(scenario, num_worlds, card)
+    def __init__(self, training: Training, part: Part) -> None:
+        scenario, card = part.scenario, training.card
+        self.env = BatchedEnv(
+            scenario, part.worlds, training.paid(scenario), observe="closeness", keep_terms=False
+        )  # fmt: skip
+        self._told = Told(scenario, part.worlds, card)
         self._acting = beside(self._told, card)
-        self._shape, self._state = (num_worlds, num_vehicles), training.critic == "state"
+        self._shape, self._state = (part.worlds, part.vehicles), training.critic == "state"
+        self.contact_cost = 0.0
+        """What a contact that begins costs beyond the reward."""
 
     def seen(self, observation: Float32) -> Float32:
         """What the critic sees with these observations (world, vehicle, entry), shape (row, entry)."""
@@ -75,12 +79,13 @@ class Group:
             self._told.action[...] = action
             action = self._acting.act(env.swarm.percept)
         came = env.step(action)
+        reward = came.reward - self.contact_cost * env.swarm.facts.contacts
         done, cut = np.repeat(came.world_terminated, n), np.repeat(came.world_truncated, n)
         observation, over = came.observation, np.flatnonzero(came.over)
         final = self.seen(observation)[cut] if cut.any() else np.zeros((0, 0), np.float32)
         if len(over):
             observation = env.reset([int(seed) for seed in seeds(len(over))], over.tolist())
-        return came.reward.reshape(-1).astype(np.float32), done, cut, self.seen(observation), final
+        return reward.reshape(-1).astype(np.float32), done, cut, self.seen(observation), final
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that ``restore`` needs, but what was observed."""
@@ -105,8 +110,8 @@ class Rows:
 
     def __init__(self, training: Training, seeds: Seeds) -> None:
         self._seeds = seeds
-        self.groups = [Group(training, n, worlds) for n, worlds in training.sizes]
-        ends = np.cumsum([0, *(n * worlds for n, worlds in training.sizes)]).tolist()
+        self.groups = [Group(training, part) for part in training.parts]
+        ends = np.cumsum([0, *(part.vehicles * part.worlds for part in training.parts)]).tolist()
         self._rows = [slice(first, end) for first, end in itertools.pairwise(ends)]
         self.rows: int = ends[-1]
         self.features = self.groups[0].env.layout.size
@@ -115,6 +120,11 @@ class Rows:
         for group, rows in zip(self.groups, self._rows, strict=True):
             started = group.env.reset([int(seed) for seed in seeds(group.env.swarm.num_worlds)])
             self.observation[rows] = group.seen(started)
+
+    def charge(self, contact_cost: float) -> None:
+        """From now on a contact that begins costs so much beyond the reward."""
+        for group in self.groups:
+            group.contact_cost = contact_cost
 
     def step(self, action: Float32) -> Transition:
         """Act, shape (row, 2)."""

@@ -27,7 +27,7 @@ from uuv_marl.train.folder import Record, Say, Stop, TrainingFolder, opened, qui
 from uuv_marl.train.ppo import Learner, annealed
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows
 from uuv_marl.train.training import Training
-from uuv_marl.train.validation import Judged, replay_command, validate
+from uuv_marl.train.validation import Judged, Worst, replay_command, validate
 
 with extra("train", "training"):
     import torch
@@ -81,8 +81,10 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
     training, record, stopped = folder.training, folder.record, False
     if record.spent(training) >= until:
         return
-    sizes = ", ".join(f"{n} vehicles ({worlds} worlds)" for n, worlds in training.sizes)
-    say(f"{training.card.policy_class}: swarms of {sizes}; {conditions(training.loaded)}.")
+    several, parts = len({part.name for part in training.parts}) > 1, list[str]()
+    for part in training.parts:
+        parts.append(f"{part.vehicles} vehicles ({f'{part.name}, ' if several else ''}{part.worlds} worlds)")
+    say(f"{training.card.policy_class}: swarms of {', '.join(parts)}; {conditions(training.loaded)}.")
     with one_thread():
         trainer = Trainer(training, folder.checkpoint)
         folder.begin(until)
@@ -129,6 +131,7 @@ class Trainer:
         started, by = time.process_time(), self.training.ppo
         share = before.spent(self.training) / self.training.budget
         noise = annealed(by.noise, share)
+        self.rows.charge(annealed(by.contact_cost, share))
         batch, reward = self.learner.sample(self.rows, noise)
         update = self.learner.update(batch, noise, annealed(by.learning_rate, share))
         return Record(
@@ -198,9 +201,8 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
 def worst_replay(output: Path) -> str:
     """The command that shows the worst episode in the validation of a training's best policy."""
     told = dict(load_checkpoint(output / "best").card.training)
-    n, seed = told["worst"]
     kept = {name: value for name, value in told.items() if name in Training.model_fields}
-    return replay_command(output / "best", Training(**kept), (n, seed))
+    return replay_command(output / "best", Training(**kept), Worst(*told["worst"]))
 
 
 @contextmanager

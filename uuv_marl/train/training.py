@@ -4,7 +4,7 @@ import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, Literal, NamedTuple, Self, cast
 
 import pydantic
 
@@ -33,14 +33,19 @@ Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, pydantic.Field(gt=0.0)]
 
 
-def swarms_of(sizes: Sequence[int]) -> tuple[tuple[int, int], ...]:
-    """Vehicles and worlds for these sizes: about as many vehicles of each, ``ROWS`` in all."""
-    return tuple((n, max(1, round(ROWS / len(sizes) / n))) for n in sizes)
+class Part(NamedTuple):
+    """What of a training is stepped together."""
 
+    name: str
+    """The scenario's, or its file."""
+    scenario: Scenario
+    """With its number of vehicles."""
+    worlds: int
 
-def _with_worlds(sizes: Any) -> Any:
-    alone = isinstance(sizes, list) and sizes and all(isinstance(n, int) and n > 0 for n in cast(list[Any], sizes))
-    return swarms_of(cast(list[int], sizes)) if alone else sizes
+    @property
+    def vehicles(self) -> int:
+        """Of each world."""
+        return self.scenario.swarm.num_vehicles
 
 
 class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -65,6 +70,9 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     noise: tuple[Positive, Positive] = (0.5, 0.1)
     """Standard deviation of actions [1], at the start and at the end. Noise is clipped at full force, and a policy that
     learned to make up for that overshoots without it: end with little."""
+    contact_cost: tuple[Positive, Positive] = (1.0, 300.0)
+    """What a contact that begins costs beyond the reward, at the start and at the end: little at first, so that
+    vehicles learn where to go."""
     max_gradient: Positive = 0.5
     """Norm to which gradients of actor and critic are clipped."""
     value_decay: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.99
@@ -84,10 +92,13 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """What it is for, in words."""
     scenario: str = "starter"
     """Name or TOML file."""
+    also: tuple[str, ...] = ()
+    """Further scenarios for the same network, with the same observation, vehicle and clock; to equal parts."""
     overrides: dict[str, Any] = {}
-    """Fields of the scenario that differ from its file; ``OVERRIDES`` are added where they are not here."""
-    sizes: Annotated[tuple[tuple[Count, Count], ...], pydantic.BeforeValidator(_with_worlds)] = ()
-    """Vehicles and worlds of each swarm, or vehicles alone (``swarms_of``). If empty: the scenario's own."""
+    """Fields of ``scenario`` that differ from its file; ``OVERRIDES`` are added where they are not here."""
+    sizes: tuple[Count | tuple[Count, Count], ...] = ()
+    """Vehicles of each swarm, or vehicles and worlds. If empty: the scenario's own. Where no worlds are given, about as
+    many vehicles of each size, ``ROWS`` in all."""
     reward: str | None = None
     """One of the task's rewards, ``team``, or ``module:function`` of one's own: from the swarm after a decision to an
     array (world, vehicle). If None: the task's first."""
@@ -126,16 +137,22 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
         """Fill in what is left out, and refuse what can't be run."""
         if self.minutes is not None and self.steps is not None:
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
-        refuse_losses(self.loaded, "training")
         if self.minutes is None and self.steps is None:
             object.__setattr__(self, "minutes", 5.0)
-        object.__setattr__(self, "sizes", self.sizes or swarms_of([self.loaded.swarm.num_vehicles]))
-        known = (*self.loaded.task_class.rewards, "team")
-        if self.reward is not None and ":" not in self.reward and self.reward not in known:
-            raise TrainingError(
-                f"reward must be one of {', '.join(known)}, the rewards of task {self.loaded.task.name!r}, or "
-                f"module:function, got {self.reward!r}"
-            )
+        for name, scenario in self._scenarios.items():
+            refuse_losses(scenario, "training")
+            known = (*scenario.task_class.rewards, "team")
+            if self.reward is not None and ":" not in self.reward and self.reward not in known:
+                raise TrainingError(
+                    f"reward must be one of {', '.join(known)}, the rewards of task {scenario.task.name!r}, or "
+                    f"module:function, got {self.reward!r}"
+                )
+            said = self._card(scenario)
+            if differs := next((f for f in Card.model_fields if getattr(said, f) != getattr(self.card, f)), None):
+                raise TrainingError(
+                    f"also = {name!r} has another {differs} than {self.scenario!r}, and one network can't have both; "
+                    "leave it out, or make them alike in a file of your own"
+                )
         return self
 
     @property
@@ -145,23 +162,42 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     @cached_property
     def loaded(self) -> Scenario:
-        """The scenario that is trained and validated on."""
-        scenario = load_scenario(self.scenario, overrides=overrides_for(self.scenario, self.overrides))
-        if not self.around:
-            return scenario
-        need_law(self.around)
-        return granted(self.around, scenario)
+        """The first scenario that is trained and validated on."""
+        return next(iter(self._scenarios.values()))
+
+    @cached_property
+    def _scenarios(self) -> dict[str, Scenario]:
+        if self.around:
+            need_law(self.around)
+        found = {
+            name: load_scenario(name, overrides=overrides_for(name, self.overrides if name == self.scenario else {}))
+            for name in (self.scenario, *self.also)
+        }
+        return {name: granted(self.around, each) if self.around else each for name, each in found.items()}
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """All swarms that are stepped at once: of each scenario its sizes."""
+        found: list[Part] = []
+        for name, scenario in self._scenarios.items():
+            sizes = self.sizes or (scenario.swarm.num_vehicles,)
+            share = ROWS / len(self._scenarios) / len(sizes)
+            for size in sizes:
+                n, worlds = size if isinstance(size, tuple) else (size, max(1, round(share / size)))
+                found.append(Part(name, load_scenario(scenario, num_vehicles=n), worlds))
+        return tuple(found)
 
     @cached_property
     def card(self) -> Card:
         """What a checkpoint says of its policy."""
-        own = {"network": self.network, "filter": self.filter, "around": self.around}
-        return card_of(self.loaded, **own)
+        return self._card(self.loaded)
 
-    @cached_property
-    def paid(self) -> Reward:
+    def _card(self, scenario: Scenario) -> Card:
+        return card_of(scenario, network=self.network, filter=self.filter, around=self.around)
+
+    def paid(self, scenario: Scenario) -> Reward:
         """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
-        name = self.reward or self.loaded.task_class.rewards[0]
+        name = self.reward or scenario.task_class.rewards[0]
         if ":" not in name:
             return cast(Reward, name)
         try:

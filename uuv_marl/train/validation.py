@@ -11,11 +11,19 @@ from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import load_scenario
 from uuv_marl.train.rows import TRAINING_SEEDS
-from uuv_marl.train.training import Training, overrides_for
+from uuv_marl.train.training import Part, Training, overrides_for
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
 """The first of the validation seeds: up to 999,999, which no training uses."""
 _EVERY_POLICYS_OWN = ("sonar.channels", "actuators.yaw_damping_nms")
+
+
+class Worst(NamedTuple):
+    """An episode."""
+
+    scenario: str
+    vehicles: int
+    seed: int
 
 
 class Judged(NamedTuple):
@@ -29,8 +37,8 @@ class Judged(NamedTuple):
     """That began, mean over episodes."""
     time_s: float | None
     """Mean over whole episodes, of the time until the task was done."""
-    worst: tuple[int, int] = (0, 0)
-    """Vehicles and seed of the worst episode: of the fewest vehicles that did their task, then of the most contacts."""
+    worst: Worst
+    """Of the fewest vehicles that did their task, then of the most contacts."""
 
     @property
     def score(self) -> float:
@@ -39,28 +47,27 @@ class Judged(NamedTuple):
 
 
 def validate(policy: Path, training: Training) -> Judged:
-    """Run a checkpoint on a training's validation seeds, with each size of swarm."""
-    number = max(1, training.validation_episodes // len(training.sizes))
+    """Run a checkpoint on a training's validation seeds, with each scenario and size of swarm."""
+    number = max(1, training.validation_episodes // len(training.parts))
     seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + number)
-    found = [
-        (n, run.seed, run.metrics, _end_s(run)) for n, _ in training.sizes for run in _runs(policy, training, n, seeds)
-    ]
+    found = [(part, run) for part in training.parts for run in _runs(policy, part, seeds)]
     shares, whole = zip(
-        *(shares_of(metrics, training.loaded.task_class.headline) for _, _, metrics, _ in found), strict=True
+        *(shares_of(run.metrics, part.scenario.task_class.headline) for part, run in found), strict=True
     )
-    times = [end for (*_, end), all_did in zip(found, whole, strict=True) if all_did]
-    worst = min(zip(shares, found, strict=True), key=lambda each: (each[0], -each[1][2]["collisions"]))[1]
+    times = [_end_s(run) for (_, run), all_did in zip(found, whole, strict=True) if all_did]
+    contacts = [run.metrics["collisions"] for _, run in found]
+    part, run = found[min(range(len(found)), key=lambda k: (shares[k], -contacts[k]))]
     return Judged(
         whole=len(times) / len(found),
         share=sum(shares) / len(found),
-        contacts=sum(metrics["collisions"] for _, _, metrics, _ in found) / len(found),
+        contacts=sum(contacts) / len(found),
         time_s=sum(times) / len(times) if times else None,
-        worst=worst[:2],
+        worst=Worst(part.name, part.vehicles, run.seed),
     )
 
 
-def _runs(policy: Path, training: Training, num_vehicles: int, seeds: Sequence[int]) -> Iterator[Run]:
-    scenario = granted(str(policy), load_scenario(training.loaded, num_vehicles=num_vehicles))
+def _runs(policy: Path, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
+    scenario = granted(str(policy), part.scenario)
     yield from (event for event in evaluate(scenario, str(policy), seeds) if isinstance(event, Run))
 
 
@@ -80,13 +87,14 @@ def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
     return (own["untouched_share"] if share is None else share) or 0.0, own["whole"] == 1.0
 
 
-def replay_command(policy: Path, training: Training, worst: tuple[int, int]) -> str:
-    """The command that shows an episode of a validation, by its number of vehicles and seed."""
-    n, seed = worst
-    changes = {**overrides_for(training.scenario, training.overrides), "swarm.num_vehicles": n}
-    if n == load_scenario(training.scenario).swarm.num_vehicles:
+def replay_command(policy: Path, training: Training, worst: Worst) -> str:
+    """The command that shows an episode of a validation."""
+    name, n, seed = worst
+    own = training.overrides if name == training.scenario else {}
+    changes = {**overrides_for(name, own), "swarm.num_vehicles": n}
+    if n == load_scenario(name).swarm.num_vehicles:
         del changes["swarm.num_vehicles"]
     kept = {field: value for field, value in changes.items() if field not in _EVERY_POLICYS_OWN}
     sets = [f" --set {shlex.quote(f'{field}={json.dumps(value)}')}" for field, value in kept.items()]
-    scenario, path = shlex.quote(training.scenario), shlex.quote(str(policy))
+    scenario, path = shlex.quote(name), shlex.quote(str(policy))
     return f"uuv-marl replay --scenario {scenario} --policy {path} --seed {seed}{''.join(sets)}"

@@ -110,7 +110,7 @@ def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
         PolicyError: the percept, the vehicle or the decision period differs.
     """
     scenario, name = policy.scenario, policy.name
-    rows = card_rows(scenario, card.features)
+    rows = card_rows(scenario)
     then, now = ({f"field {k}": row for k, row in enumerate(own)} for own in (card.percept, rows))
     pairs: list[tuple[str, Mapping[str, object], Mapping[str, object], str]] = [
         ("percept", then, now, "use a scenario with the sonar suite of its training")
@@ -126,10 +126,3 @@ def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
                 f"{old.get(other)} in the training and is {new.get(other)} here; {remedy}, or train on this scenario "
                 f"(uuv-marl train {scenario.name})"
             )
-    shortest, longest = card.decision_period_s
-    if not shortest - 1e-9 <= scenario.timing.decision_period_s <= longest + 1e-9:
-        raise PolicyError(
-            f"{name} decides every {f'{shortest:g} to ' if shortest < longest else ''}{longest:g} s, but scenario "
-            f"{scenario.name!r} has a decision every {scenario.timing.decision_period_s:g} s; override "
-            f"timing.decision_period_s{f'={longest:g}' if shortest == longest else ''}"
-        )

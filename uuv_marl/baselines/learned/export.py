@@ -48,8 +48,8 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
     made = make(policy, granted(policy, scenario))
     if not isinstance(made, Actor):
         raise PolicyError(
-            f"policy {policy!r} can't be exported: ONNX holds networks end to end, not laws, filters, networks around "
-            "a law, or those that shipped first. Export a checkpoint of a training without filter and law; run this "
+            f"policy {policy!r} can't be exported: ONNX holds networks end to end, not laws, filters, or networks "
+            "around a law. Export a checkpoint of a training without filter and law; run this "
             "policy with uuv_marl.baselines.make"
         )
     graph = Graph()
@@ -79,7 +79,7 @@ def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
         units_of = checkpoint.card.network.hidden[-1]
         takes.append(_tensor("state", units_of, "What was remembered; zeros at an episode's start."))
         gives.append(_tensor("next_state", units_of, "What is remembered."))
-    damping, period = policy.scenario.actuators.yaw_damping_nms, checkpoint.card.decision_period_s[1]
+    damping, period = policy.scenario.actuators.yaw_damping_nms, checkpoint.card.decides_every_s
     opset = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(
         helper.make_graph(graph.nodes, "policy", takes, gives, graph.constants),

@@ -5,8 +5,6 @@ from pathlib import Path
 
 from uuv_marl.baselines.learned.actor import Actor, Recurrent
 from uuv_marl.baselines.learned.checkpoint import Checkpoint, load_checkpoint
-from uuv_marl.baselines.learned.network import Learned
-from uuv_marl.baselines.learned.trimmed_scout import LearnedScout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario
 
@@ -39,17 +37,18 @@ class Trained:
         return self.checkpoint.card.yaw_damping_nms
 
     @property
+    def decides_every_s(self) -> float:
+        """Period between decisions in the training [s]."""
+        return self.checkpoint.card.decides_every_s
+
+    @property
     def full_torque_nm(self) -> float:
         """Full torque of the training's vehicle [N m]."""
         return self.checkpoint.card.full_torque_nm
 
-    def __call__(
-        self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False
-    ) -> Actor | Learned | LearnedScout:
+    def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Actor:
         """The network for a scenario, without filter or law. Raises PolicyError as ``Actor`` does."""
-        card = self.checkpoint.card
-        own = Recurrent if card.network.memory else Actor
-        kind = {"closeness": own, "percept": Learned, "memory": LearnedScout}[card.features]
+        kind = Recurrent if self.checkpoint.card.network.memory else Actor
         return kind(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)
 
 

@@ -12,13 +12,12 @@ import numpy as np
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.doubt import trim_weights
+from uuv_marl.baselines.memory.doubt import doubt
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of, steer_safely
 from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS, ScoutGains
-from uuv_marl.baselines.scout.trims import softened, wary
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
@@ -40,8 +39,6 @@ class Scout(Filtered):
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
-    num_trims: ClassVar[int] = 0
-    """1 where an actor trims each vehicle's steering."""
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: ScoutGains | None = None,
@@ -53,7 +50,6 @@ class Scout(Filtered):
         super().__init__(scenario, num_worlds, barrier or numbers.barrier)
         self.gains = gains or numbers.gains
         self._growth = growth(scenario.swarm.num_vehicles)
-        self._trims = np.zeros((num_worlds, scenario.swarm.num_vehicles, self.num_trims), np.float32)
 
     @property
     def kept_s(self) -> float:
@@ -62,14 +58,10 @@ class Scout(Filtered):
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2)."""
-        return self._decided()
-
-    def _decided(self) -> Float32:
-        """The actions, where ``_trims`` change the gains."""
-        action = np.zeros((*self._trims.shape[:2], 2), np.float32)
+        action = np.zeros((self.num_worlds, self.scenario.swarm.num_vehicles, 2), np.float32)
         decide_all(
             self.active, self.model.own.period_s, self.grown(), self.barrier, self.limits, self.gain, self.memory,
-            self.planes, self._trims, action,
+            self.planes, action,
         )  # fmt: skip
         return action
 
@@ -80,6 +72,16 @@ class Scout(Filtered):
             pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
             together=by.together / g**3,
         )  # fmt: skip
+
+
+@compiled
+def wary(g: ScoutGains, share: float) -> ScoutGains:
+    """Gains of a vehicle that doubts: pull and push, changed. ``share``: how much it doubts, 0 to 1."""
+    pull, push = math.exp(share * g.pull_in_doubt), math.exp(share * g.push_in_doubt)
+    return ScoutGains(
+        g.pull * pull, g.push * push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m, g.steering,
+        g.kept_s, g.lead, g.pull_in_doubt, g.push_in_doubt,
+    )  # fmt: skip
 
 
 @compiled
@@ -151,26 +153,17 @@ def _lead(w: int, i: int, share: float, limits: Limits, kept: Surroundings, acti
 @compiled
 def decide_all(
     worlds: Bool, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
-    planes: Float64, trims: Float32, action: Float32,
+    planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle.
-
-    ``trims`` of steering, shape (world, vehicle, 1), count as far as actuators lag; shape (world, vehicle, 0) for none.
-    """
-    doubts = trims.shape[2] > 0 or g.pull_in_doubt != 0.0 or g.push_in_doubt != 0.0
+    """The law for every vehicle."""
+    doubts = g.pull_in_doubt != 0.0 or g.push_in_doubt != 0.0
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                own = g
-                if doubts:
-                    lags, share = trim_weights(w, i, g.lead, kept)
-                    if kept.reference_speed[w, i] > 0.0:
-                        own = wary(own, share)
-                    if trims.shape[2] > 0:
-                        own = softened(own, float(trims[w, i, 0]), lags)
+                own = wary(g, doubt(w, i, kept)) if doubts and kept.reference_speed[w, i] > 0.0 else g
                 w_x, w_y = wished(w, i, own, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
                 num = planes_of(w, i, period, barrier, kept, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain * own.steering, limits, kept, action)
+                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, kept, action)
                 if g.lead > 0.0 and limits.helm == 0.0:
                     _lead(w, i, g.lead, limits, kept, action)

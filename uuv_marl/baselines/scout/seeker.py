@@ -115,7 +115,7 @@ class NearestTarget(Scout):
         else:
             decide_all(
                 self.active, period, self.grown(), self.barrier, self.limits, self.gain, self._kept, self.planes,
-                self._trims, action,
+                action,
             )  # fmt: skip
         return action
 

@@ -35,7 +35,7 @@ class Plan(NamedTuple):
 
 SHIPPED = Plan(tuple(AXES), (1, 3, 5), ("random_field",), (
     "bio_inspired", "bio_inspired_plus", "scout", "scout,preset=plus", "scout,preset=lead", "scout,preset=wary",
-    "mappo", "trimmed_scout",
+    "mappo",
 ), 20)  # fmt: skip
 """The plan of docs/robustness.md, which also has comparators, on 10 seeds."""
 QUICK = SHIPPED._replace(

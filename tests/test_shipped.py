@@ -1,0 +1,35 @@
+"""Networks that ship: each is what its recipe makes, and runs where its task is."""
+
+from pathlib import Path
+
+import pytest
+
+from uuv_marl import load_scenario
+from uuv_marl.baselines import POLICIES, granted, make
+from uuv_marl.baselines.learned.trained import Trained
+from uuv_marl.scenario import scenario_names
+from uuv_marl.sim.observation import observation_layout
+from uuv_marl.train.training import Training, told_by
+
+RECIPES = Path(__file__).parents[1] / "examples" / "training"
+NETWORKS = [name for name, kind in POLICIES.items() if isinstance(kind, Trained)]
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_it_is_end_to_end_and_runs_where_its_task_is(name):
+    card = POLICIES[name].checkpoint.card
+    assert card.policy_class == "end to end"
+    rows = observation_layout(load_scenario(card.training.get("scenario", "training_field")), "closeness").table
+    for scenario in map(load_scenario, scenario_names()):
+        if observation_layout(scenario, "closeness").table == rows:
+            make(name, granted(name, scenario))
+
+
+@pytest.mark.parametrize("name", [name for name in NETWORKS if name.startswith("mappo")])
+def test_it_is_what_its_recipe_makes(name):
+    """But for the seed, which a second training of the same recipe has of its own."""
+    first = name.removesuffix("_2")
+    card = POLICIES[name].checkpoint.card
+    made = Training(**told_by(str(RECIPES / f"{first}.toml")), seed=int(name != first))
+    assert card.training == card.training | made.model_dump(mode="json")
+    assert card == made.card.model_copy(update={"training": card.training})
