@@ -235,15 +235,16 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "message"),
+    ("others", "overrides", "message"),
     [
-        ({"sonar.channels": ["compass"]}, "sonar.channels can't hold compass: with 'bio_inspired' the learner has no"),
-        ({"actuators.yaw_damping_nms": 600.0}, "can't be 600: with 'bio_inspired' all vehicles have 0; leave"),
+        ("bio_inspired", {"sonar.channels": ["compass"]}, "sonar.channels can't hold compass: with 'bio_inspired' the learner has no"),
+        ("bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: with 'bio_inspired' all vehicles have 0; leave"),
+        ("mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: with 'mappo' all vehicles have 0.5; leave"),
     ],
 )
-def test_solo_drops_no_override(overrides, message):
+def test_solo_drops_no_override(others, overrides, message):
     with pytest.raises(ScenarioError, match=message):
-        SoloEnv(STARTER, overrides=overrides)
+        SoloEnv(STARTER, others, overrides=overrides)
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
     assert both.scenario.sonar.channels == ("compass", "modem")
 

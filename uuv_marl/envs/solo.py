@@ -119,9 +119,10 @@ def _suited(others: str, plain: Scenario, asked: Scenario) -> Scenario:
             f"sonar.channels can't hold {', '.join(sorted(dropped))}: with {others!r} the learner has "
             f"{', '.join(heard) or 'no channels'}; {remedy}"
         )
-    wanted, damping = asked.actuators.yaw_damping_nms, suited.actuators.yaw_damping_nms
-    if wanted not in (plain.actuators.yaw_damping_nms, damping):
-        raise ScenarioError(
-            f"actuators.yaw_damping_nms can't be {wanted:g}: with {others!r} all vehicles have {damping:g}; {remedy}"
-        )
+    for section, field in (("actuators", "yaw_damping_nms"), ("timing", "decision_period_s")):
+        usual, wanted, given = (getattr(getattr(each, section), field) for each in (plain, asked, suited))
+        if wanted not in (usual, given):
+            raise ScenarioError(
+                f"{section}.{field} can't be {wanted:g}: with {others!r} all vehicles have {given:g}; {remedy}"
+            )
     return suited
