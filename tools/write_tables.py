@@ -58,7 +58,8 @@ def benchmark() -> str:
             policy, extra, _, time, _, _, obstacle, _, spacing, _, _, collisions, _ = line.strip("| ").split(" | ")
             if policy not in DEFAULT_POLICIES:
                 continue
-            name = f"`{policy}`" + ("" if extra == "–" else f" with {extra.removesuffix(' 600 N m s')}")
+            needs = extra.removesuffix(" 600 N m s").removeprefix("end to end, ")
+            name = f"`{policy}`" + ("" if extra == "–" else f" with {needs}")
             closest = (
                 f"{Decimal(obstacle):.1f} m, {Decimal(spacing):.1f} m"  # what ends in 5 was rounded before: to even
             )
