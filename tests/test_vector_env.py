@@ -237,8 +237,8 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
 @pytest.mark.parametrize(
     ("others", "overrides", "message"),
     [
-        ("bio_inspired", {"sonar.channels": ["compass"]}, "sonar.channels can't hold compass: with 'bio_inspired' the learner has no"),
-        ("bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: with 'bio_inspired' all vehicles have 0; leave"),
+        ("bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: with 'bio_inspired' the learner has no"),
+        ("bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: with 'bio_inspired' all vehicles have 0"),
         ("mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: with 'mappo' all vehicles have 0.5; leave"),
     ],
 )
