@@ -176,6 +176,9 @@ def test_another_percept_or_period_is_refused_with_the_remedy(best):
     slow = water(**{"timing.decision_period_s": 0.5})
     assert granted(best, slow).timing.decision_period_s == 0.1
     fixed = granted(best, water(**{"timing.decision_period_s": 0.5, "timing.fixed": True}))
+    odd = {"timing.control_hold_s": 0.2, "timing.integration_step_s": 0.2, "timing.decision_period_s": 0.2}
+    with pytest.raises(PolicyError, match="can't run on scenario 'tracking' with what it declares: .*multiple"):
+        granted(best, water(**odd))
     for other in (slow, fixed):
         with pytest.raises(PolicyError, match=r"needs a decision every 0.1 s .timing.decision_period_s."):
             make(best, other)

@@ -663,6 +663,8 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
         ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
+        ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
+        ({"sizes": [[5, -1]]}, "sizes.0.1 should be greater than or equal to 0, got -1"),
         ({"also": ["lossy"]}, "training can't show that a vehicle is lost"),
         ({"also": ["few_informed"]}, "also = 'few_informed' has another percept than 'starter', and one network"),
     ],
@@ -780,3 +782,9 @@ def test_a_training_gives_global_state_back(end, tmp_path, no_validation):
         with pytest.raises(LookupError, match="no"):
             list(records)
     assert global_state() == before
+
+
+def test_what_is_annealed_goes_in_equal_ratios_or_evenly_from_nothing():
+    assert [annealed((1.0, 100.0), share) for share in (0.0, 0.5, 1.0, 2.0)] == pytest.approx([1.0, 10.0, 100.0, 100.0])
+    assert [annealed((0.0, 8.0), share) for share in (0.0, 0.5, 2.0)] == [0.0, 4.0, 8.0]
+    assert annealed((0.0, 0.0), 0.5) == 0.0

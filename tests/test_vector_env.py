@@ -245,6 +245,8 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
 def test_solo_drops_no_override(others, overrides, message):
     with pytest.raises(ScenarioError, match=message):
         SoloEnv(STARTER, others, overrides=overrides)
+    with pytest.raises(baselines.PolicyError, match="another vehicle"):  # and not for a period that nobody asked for
+        SoloEnv("tracking", "mappo", overrides={"vehicle": "lauv", "scale": "vehicle"})
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
     assert both.scenario.sonar.channels == ("compass", "modem")
 

@@ -78,7 +78,7 @@ class Declared(NamedTuple):
 
 
 def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
-    """Refuse a scenario that does not grant what a policy declares: channels, and an inner loop.
+    """Refuse a scenario that does not grant what a policy declares: channels, an inner loop, a clock.
 
     Args:
         name: the policy's name in the message.
@@ -86,7 +86,7 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
         scenario: the scenario on which the policy should run.
 
     Raises:
-        PolicyError: the scenario lacks channels or the inner loop; the message names them and the remedy.
+        PolicyError: the scenario lacks channels, the inner loop or the clock; the message names them and the remedy.
     """
     has = scenario.sonar.channels
     missing = [name for name in policy.channels if name not in has and not (name == "link" and "modem" in has)]
@@ -100,9 +100,10 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
     if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
         needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
     if needs:
+        own = f", or run it as own_clock:{name}" if scenario.timing.fixed else ""
         raise PolicyError(
             f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
-            "use uuv_marl.baselines.granted(policy, scenario), or override these fields"
+            f"use uuv_marl.baselines.granted(policy, scenario), or override these fields{own}"
         )
 
 
@@ -121,7 +122,7 @@ class Policy:
         num_worlds: first axis of the percepts.
 
     Raises:
-        PolicyError: the scenario does not grant the channels or the inner loop that the policy declares.
+        PolicyError: the scenario does not grant the channels, the inner loop or the clock that the policy declares.
     """
 
     Memory: ClassVar[type[Any] | None] = None

@@ -30,6 +30,7 @@ from uuv_marl.baselines.scout.carrot import Carrot, CarrotInformed
 from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.baselines.scout.seeker import NearestTarget
 from uuv_marl.baselines.units import Reader, in_own_units
+from uuv_marl.errors import ScenarioError
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept
@@ -207,7 +208,10 @@ def granted_to(name: str, declared: Any, scenario: Scenario) -> Scenario:
             timing.control_hold_s if timing.fixed else timing.decision_period_s
         )
         changes["timing.fixed"] = False
-    return load_scenario(scenario, overrides=changes)
+    try:
+        return load_scenario(scenario, overrides=changes)
+    except ScenarioError as error:
+        raise PolicyError(f"{name} can't run on scenario {scenario.name!r} with what it declares: {error}") from None
 
 
 @overload

@@ -152,5 +152,5 @@ def find_modules(names: Sequence[str]) -> None:
     Args:
         names: of policies, scenarios and tasks, or whole overrides.
     """
-    if any(":" in name or name.endswith(".toml") for name in names):
+    if any(":" in name or ".toml" in name for name in names):
         sys.path.append("")  # last, so that no file of this folder takes the place of an installed module

@@ -1,5 +1,6 @@
 """``SoloEnv``: one learner among vehicles that follow a policy, a plain Gymnasium environment."""
 
+import math
 from typing import Any, Unpack
 
 import gymnasium
@@ -121,7 +122,8 @@ def _suited(others: str, plain: Scenario, asked: Scenario) -> Scenario:
         )
     for section, field in (("actuators", "yaw_damping_nms"), ("timing", "decision_period_s")):
         usual, wanted, given = (getattr(getattr(each, section), field) for each in (plain, asked, suited))
-        if wanted not in (usual, given):
+        usual *= asked.scale.units.time / plain.scale.units.time
+        if not any(math.isclose(wanted, each, rel_tol=1e-9) for each in (usual, given)):
             raise ScenarioError(
                 f"{section}.{field} can't be {wanted:g}: with {others!r} all vehicles have {given:g}; {remedy}"
             )

@@ -154,7 +154,7 @@ class Timing(Section):
     """Time between two decisions, a multiple of the control hold; meanwhile the force is held in the world frame."""
     fixed: bool
     """Whether the decision period and the inner loop (``actuators.yaw_damping_nms``) are the scenario's, for every
-    policy alike; if not, a policy is granted the inner loop that it declares."""
+    policy alike; if not, a policy is granted what it declares of them."""
 
     @property
     def holds_per_decision(self) -> int:

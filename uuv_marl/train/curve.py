@@ -12,7 +12,7 @@ from uuv_marl.train.folder import Record
 _SHOWN = {
     "share of validation episodes": {"whole": "swarms whole", "share": "vehicles untouched and there"},
     "contacts per validation episode": {"contacts": ""},
-    "reward per decision, with noise": {"reward": ""},
+    "reward per decision, with noise\nand the cost of contacts": {"reward": ""},
 }
 
 

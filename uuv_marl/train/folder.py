@@ -43,7 +43,7 @@ class Record(NamedTuple):
     seconds: float = 0.0
     """Processor time of the training so far, validations apart."""
     reward: float | None = None
-    """Mean per decision and vehicle, of this iteration's samples."""
+    """Mean per decision and vehicle, of this iteration's samples, less what contacts cost by then."""
     kl: float | None = None
     """Divergence from the policy that sampled to the one that learned."""
     explained: float | None = None
@@ -97,6 +97,7 @@ class TrainingFolder:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
             before, self.until, made_by = dict(config["scenarios"]), float(config["until"]), dict(config["versions"])
             training = Training(**config["training"])
+            now_there = _scenarios(training)
         except (ScenarioError, PolicyError, TrainingError) as error:
             raise ResultsError(
                 f"the training in {self.path} can't be made again here: {error}; resume it where it was begun"
@@ -106,7 +107,7 @@ class TrainingFolder:
                 f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
                 "empty --output"
             ) from None
-        for name, scenario in _scenarios(training).items():
+        for name, scenario in now_there.items():
             for field, then, now in _differences(before.get(name, {}), scenario):
                 raise ResultsError(
                     f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {name} as it was, or "

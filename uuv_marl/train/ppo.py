@@ -329,5 +329,7 @@ def gae(reward: Float32, value: Float32, ended: Bool, gamma: float, lam: float) 
 
 
 def annealed(ends: tuple[float, float], share: float) -> float:
-    """A number that goes from the first to the second in equal ratios, as ``share`` goes from 0 to 1."""
+    """A number from the first to the second, in equal ratios as ``share`` goes from 0 to 1, or evenly if one is 0."""
+    if min(ends) == 0.0:
+        return ends[0] + (ends[1] - ends[0]) * min(share, 1.0)
     return ends[0] * (ends[1] / ends[0]) ** min(share, 1.0)

@@ -65,7 +65,7 @@ def resume(
     Args:
         output: the folder of the training.
         until: its budget in all, agent-steps or seconds, that before included; as before if None. Beyond the first
-            budget noise and rate stay as they were at its end.
+            budget noise, rate and the cost of contacts stay as they were at its end.
         say: told from where it goes on.
         stop: as for ``train``.
 
@@ -81,10 +81,11 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
     training, record, stopped = folder.training, folder.record, False
     if record.spent(training) >= until:
         return
-    several, parts = len({part.name for part in training.parts}) > 1, list[str]()
-    for part in training.parts:
-        parts.append(f"{part.vehicles} vehicles ({f'{part.name}, ' if several else ''}{part.worlds} worlds)")
-    say(f"{training.card.policy_class}: swarms of {', '.join(parts)}; {conditions(training.loaded)}.")
+    parts = [
+        f"{part.vehicles} vehicles ({part.name}, {part.worlds} worlds, {conditions(part.scenario)})"
+        for part in training.parts
+    ]
+    say(f"{training.card.policy_class}: swarms of {'; '.join(parts)}.")
     with one_thread():
         trainer = Trainer(training, folder.checkpoint)
         folder.begin(until)

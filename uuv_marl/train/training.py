@@ -29,8 +29,15 @@ ROWS = 640
 """Vehicles at once, about."""
 
 Count = Annotated[int, pydantic.Field(ge=1)]
+Whole = Annotated[int, pydantic.Field(ge=0)]
 Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, pydantic.Field(gt=0.0)]
+NotNegative = Annotated[float, pydantic.Field(ge=0.0)]
+
+
+def _paired(sizes: Any) -> Any:
+    alone = isinstance(sizes, list | tuple)
+    return [(each, 0) if isinstance(each, int) else each for each in cast(list[Any], sizes)] if alone else sizes
 
 
 class Part(NamedTuple):
@@ -70,9 +77,9 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     noise: tuple[Positive, Positive] = (0.5, 0.1)
     """Standard deviation of actions [1], at the start and at the end. Noise is clipped at full force, and a policy that
     learned to make up for that overshoots without it: end with little."""
-    contact_cost: tuple[Positive, Positive] = (1.0, 300.0)
-    """What a contact that begins costs beyond the reward, at the start and at the end: little at first, so that
-    vehicles learn where to go."""
+    contact_cost: tuple[NotNegative, NotNegative] = (1.0, 300.0)
+    """What a contact that begins costs beyond the reward, at the start and at the end, in equal ratios, or evenly from
+    or to 0: little at first, so that vehicles learn where to go."""
     max_gradient: Positive = 0.5
     """Norm to which gradients of actor and critic are clipped."""
     value_decay: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.99
@@ -96,9 +103,9 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """Further scenarios for the same network, with the same observation, vehicle and clock; to equal parts."""
     overrides: dict[str, Any] = {}
     """Fields of ``scenario`` that differ from its file; ``OVERRIDES`` are added where they are not here."""
-    sizes: tuple[Count | tuple[Count, Count], ...] = ()
-    """Vehicles of each swarm, or vehicles and worlds. If empty: the scenario's own. Where no worlds are given, about as
-    many vehicles of each size, ``ROWS`` in all."""
+    sizes: Annotated[tuple[tuple[Count, Whole], ...], pydantic.BeforeValidator(_paired)] = ()
+    """Vehicles and worlds of each swarm, or vehicles alone. If empty: the scenario's own. Without worlds, or with 0,
+    about as many vehicles of each size, ``ROWS`` in all."""
     reward: str | None = None
     """One of the task's rewards, ``team``, or ``module:function`` of one's own: from the swarm after a decision to an
     array (world, vehicle). If None: the task's first."""
@@ -180,11 +187,10 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
         """All swarms that are stepped at once: of each scenario its sizes."""
         found: list[Part] = []
         for name, scenario in self._scenarios.items():
-            sizes = self.sizes or (scenario.swarm.num_vehicles,)
+            sizes = self.sizes or ((scenario.swarm.num_vehicles, 0),)
             share = ROWS / len(self._scenarios) / len(sizes)
-            for size in sizes:
-                n, worlds = size if isinstance(size, tuple) else (size, max(1, round(share / size)))
-                found.append(Part(name, load_scenario(scenario, num_vehicles=n), worlds))
+            for n, worlds in sizes:
+                found.append(Part(name, load_scenario(scenario, num_vehicles=n), worlds or max(1, round(share / n))))
         return tuple(found)
 
     @cached_property
