@@ -15,6 +15,7 @@ from uuv_marl.baselines.learned.layers import ENCODED, Architecture, Network, Nu
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import knowledge
+from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
 
 SHORT = {"trajectory.waypoints_m": [[0.0, 0.0], [40.0, 0.0]], "time_limit.extra_s": 1.0, "time_limit.factor": 1.0}
@@ -177,7 +178,7 @@ def test_another_percept_or_period_is_refused_with_the_remedy(best):
     assert granted(best, slow).timing.decision_period_s == 0.1
     fixed = granted(best, water(**{"timing.decision_period_s": 0.5, "timing.fixed": True}))
     odd = {"timing.control_hold_s": 0.2, "timing.integration_step_s": 0.2, "timing.decision_period_s": 0.2}
-    with pytest.raises(PolicyError, match="can't run on scenario 'tracking' with what it declares: .*multiple"):
+    with pytest.raises(ScenarioError, match="can't run on scenario 'tracking' with what it declares: .*multiple"):
         granted(best, water(**odd))
     for other in (slow, fixed):
         with pytest.raises(PolicyError, match=r"needs a decision every 0.1 s .timing.decision_period_s."):

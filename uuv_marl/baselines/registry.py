@@ -211,7 +211,7 @@ def granted_to(name: str, declared: Any, scenario: Scenario) -> Scenario:
     try:
         return load_scenario(scenario, overrides=changes)
     except ScenarioError as error:
-        raise PolicyError(f"{name} can't run on scenario {scenario.name!r} with what it declares: {error}") from None
+        raise ScenarioError(f"{name} can't run on scenario {scenario.name!r} with what it declares: {error}") from None
 
 
 @overload
