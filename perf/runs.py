@@ -122,6 +122,8 @@ def trained() -> str:
 def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any, ...]]]:
     """Kind, name, maker and its arguments of every hash."""
     for (kind, (base, changes)), policy in itertools.product(SETS.items(), POLICIES):
+        if changes in PERIODS.values() and getattr(POLICIES[policy], "decides_every_s", None):
+            continue  # it has its own
         name = f"{kind} {policy}"
         scenario = load_scenario(base, overrides=changes)
         yield "episodes", name, episodes, (scenario, policy, SEED + zlib.crc32(name.encode()) % 80_000)

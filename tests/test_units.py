@@ -9,8 +9,9 @@ import pytest
 from tests.conftest import COUPLED, LIFT
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines.grants import inner_loop_nms
 from uuv_marl.baselines.paper.bio_inspired import BioInspired
-from uuv_marl.baselines.policy import Limits, Policy, inner_loop_nms
+from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
 from uuv_marl.percept import Percept, PerceptLayout

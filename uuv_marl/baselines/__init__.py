@@ -17,7 +17,6 @@ Arguments of compiled functions have the same names and the same meaning everywh
                             map. ``kept_s``: how long it remembers a neighbour that it hears no more [s].
 ``planes``, ``num``         Half-planes n_x v_x + n_y v_y <= b [m/s], a row each, shape (disc + sector, 3), and how many
                             rows count.
-``out``, ``features``       Filled with features: of a vehicle, shape (size,); of all, (world, vehicle, size).
 ``u``, ``v``                Own surge and sway velocity [m/s]; ``w_x`` and ``w_y`` are parts of the wished velocity.
 ==========================  =========================================================================================
 """

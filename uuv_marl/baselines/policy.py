@@ -1,7 +1,6 @@
-"""The base class of policies: from percepts to actions, with a memory, and with the channels that a policy needs."""
+"""The base class of policies: from percepts to actions, with a memory."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any, ClassVar, NamedTuple, final
@@ -9,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from uuv_marl.baselines.grants import need_granted
 from uuv_marl.baselines.rudder import Rudder, steer_by_rudder
 from uuv_marl.baselines.units import Reader
 from uuv_marl.errors import PolicyError
@@ -48,63 +48,6 @@ class Limits(NamedTuple):
             actuators.max_force_n, actuators.max_torque_nm, actuators.lever_arm_m, vehicle.X_u, vehicle.X_uu,
             helm if actuators.kind == "rudder" else 0.0, actuators.yaw_damping_nms / actuators.max_torque_nm,
         )  # fmt: skip
-
-
-def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenario) -> float:
-    """The inner loop that a policy gets on a scenario's vehicle [N m s]: the declared one, scaled with full torque.
-
-    So on every vehicle the loop takes all torque at the same yaw rate, in the scenario's scale. But it is no stiffer
-    than a loop that stops a yaw rate within one control hold. For a vehicle with a rudder the loop is 0.
-
-    Args:
-        declared_nms: the policy's ``yaw_damping_nms``.
-        full_torque_nm: full torque of the vehicle for which the policy declares the loop [N m].
-        scenario: gives the vehicle.
-    """
-    actuators = scenario.actuators
-    if actuators.kind == "rudder":
-        return 0.0
-    alike = declared_nms * (actuators.max_torque_nm / full_torque_nm) * scenario.scale.units.time
-    return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_hold_s)
-
-
-class Declared(NamedTuple):
-    """What a policy needs, by the names that ``Policy`` has for it."""
-
-    channels: Sequence[str]
-    yaw_damping_nms: float
-    full_torque_nm: float
-    decides_every_s: float | None
-
-
-def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
-    """Refuse a scenario that does not grant what a policy declares: channels, an inner loop, a clock.
-
-    Args:
-        name: the policy's name in the message.
-        policy: a policy, its class, or what else has what ``Declared`` has.
-        scenario: the scenario on which the policy should run.
-
-    Raises:
-        PolicyError: the scenario lacks channels, the inner loop or the clock; the message names them and the remedy.
-    """
-    has = scenario.sonar.channels
-    missing = [name for name in policy.channels if name not in has and not (name == "link" and "modem" in has)]
-    needs: list[str] = []
-    if missing:
-        needs.append(f"the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)} (sonar.channels)")
-    damping = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
-    if not scenario.timing.fixed and not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
-        needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
-    period = policy.decides_every_s and policy.decides_every_s * scenario.scale.units.time
-    if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
-        needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
-    if needs:
-        own = f", or run it as own_clock:{name}" if scenario.timing.fixed else ""
-        raise PolicyError(
-            f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
-            f"use uuv_marl.baselines.granted(policy, scenario), or override these fields{own}"
-        )
 
 
 class Policy:

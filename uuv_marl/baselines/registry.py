@@ -16,13 +16,14 @@ from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaber
 from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
 from uuv_marl.baselines.comparators.pull import Pull
+from uuv_marl.baselines.grants import channels_in, inner_loop_nms, need_granted, period_s
 from uuv_marl.baselines.learned.around import Around
 from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained, shipped
 from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.paper.sdc import Sdc, SdcInformed
 from uuv_marl.baselines.paper.sff import Sff, SffInformed
-from uuv_marl.baselines.policy import Policy, PolicyError, inner_loop_nms, need_granted
+from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.random_idle import Idle, Random
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
@@ -109,8 +110,8 @@ class EnvPolicy:
 GUARDED = "guarded:"
 """Prefix of a policy's name that puts it inside the safety filter."""
 OWN = "own_clock:"
-"""Prefix of a policy's name, before all others, that runs it with a decision at every control hold and the inner loop
-that it declares, as it was tuned, where the scenario fixes others for all (``timing.fixed``)."""
+"""Prefix of a policy's name, before all others, that runs it with the clock and the inner loop that it declares where
+the scenario fixes others for all (``timing.fixed``); made for any clock, it decides at every control hold."""
 
 
 class Named(NamedTuple):
@@ -177,12 +178,6 @@ def is_trained(name: str) -> bool:
     return isinstance(POLICIES[plain], Trained) if plain in POLICIES else not re.fullmatch(r"[\w.]+:\w+", plain)
 
 
-def channels_in(scenario: Scenario, declared: Sequence[str]) -> list[str]:
-    """What a hand-made policy gets that declares these channels: ``modem`` for ``link`` where the scenario has it."""
-    told = "modem" if "modem" in scenario.sonar.channels and "modem" not in declared else "link"
-    return [told if channel == "link" else channel for channel in declared]
-
-
 def granted(name: str, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels, the inner loop (``inner_loop_nms``) and the clock that a policy declares.
 
@@ -202,11 +197,9 @@ def granted_to(name: str, declared: Any, scenario: Scenario) -> Scenario:
     }
     if own or not timing.fixed:
         loop = inner_loop_nms(declared.yaw_damping_nms, declared.full_torque_nm, scenario)
-        period = declared.decides_every_s and declared.decides_every_s * scenario.scale.units.time
+        usual = timing.control_hold_s if timing.fixed else timing.decision_period_s
         changes["actuators.yaw_damping_nms"] = loop
-        changes["timing.decision_period_s"] = period or (
-            timing.control_hold_s if timing.fixed else timing.decision_period_s
-        )
+        changes["timing.decision_period_s"] = period_s(declared.decides_every_s, scenario) or usual
         changes["timing.fixed"] = False
     try:
         return load_scenario(scenario, overrides=changes)
@@ -231,8 +224,8 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
         parameters: keyword arguments of the policy, such as ``gains``, or single gains by name.
 
     Raises:
-        PolicyError: the name or a parameter is unknown, or the target lacks channels or the inner loop that the policy
-            declares (see ``granted``).
+        PolicyError: the name or a parameter is unknown, or the target lacks channels, the inner loop or the clock that
+            the policy declares (see ``granted``).
     """
     kind, written = parse_policy(name)
     if isinstance(target, Scenario):

@@ -21,8 +21,9 @@ from typing_extensions import TypedDict
 
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
+from uuv_marl.baselines.grants import Declared
 from uuv_marl.baselines.learned.trained import Trained
-from uuv_marl.baselines.policy import Declared, Policy
+from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics

@@ -30,8 +30,9 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     ``arrived``, ``time_s``, ``collisions`` (``uuv_marl.envs.ending.ending``).
 
     Args:
-        others: name of a policy, or ``module:Class``. The scenario gets the channels and the yaw damping that the
-            policy declares (``uuv_marl.baselines.granted``), also for the learner: ``sdc`` makes observations longer.
+        others: name of a policy, or ``module:Class``. The scenario gets the channels, the yaw damping and the clock
+            that the policy declares (``uuv_marl.baselines.granted``), also for the learner: ``sdc`` makes observations
+            longer.
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
             otherwise.
@@ -40,7 +41,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, likewise.
 
     Raises:
-        ScenarioError: the overrides ask for channels or a yaw damping that the policy does not declare.
+        ScenarioError: the overrides ask for channels, a yaw damping or a clock that the policy does not declare.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012

@@ -9,9 +9,10 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, cast
 import pydantic
 
 from uuv_marl.baselines import granted
+from uuv_marl.baselines.grants import inner_loop_nms
 from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
-from uuv_marl.baselines.policy import Policy, inner_loop_nms
+from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.registry import need_law
 from uuv_marl.envs.core import Reward, refuse_losses
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError

@@ -107,7 +107,7 @@ def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
         any_vehicle: whether the policy may run on a vehicle that it was not trained on.
 
     Raises:
-        PolicyError: the percept, the vehicle or the decision period differs.
+        PolicyError: the percept or the vehicle differs.
     """
     scenario, name = policy.scenario, policy.name
     rows = card_rows(scenario)
