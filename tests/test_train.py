@@ -264,6 +264,22 @@ def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
     assert 50.0 < costs[-1] < 300.0
 
 
+def test_one_network_learns_on_several_scenarios(tmp_path):
+    short = {"time_limit.factor": 0.01, "time_limit.extra_s": 3.0}
+    (tmp_path / "short.toml").write_text('extends = "training_field"\n[time_limit]\nfactor = 0.01\nextra_s = 3.0\n')
+    several = Training(
+        scenario="starter", also=[str(tmp_path / "short.toml")], overrides=short, sizes=[(3, 2)], steps=1,
+        ppo=TINY, validations=1, validation_episodes=2,
+    )  # fmt: skip
+    env = rows_for(several)
+    assert [group.env.swarm.scenario.name for group in env.groups] == ["starter", "short"]
+    assert env.rows == 12
+    (record,) = train(tmp_path / "run", several)
+    assert record.agent_steps == 12 * TINY.horizon
+    assert list(resume(tmp_path / "run")) == []
+    assert trainings.worst_replay(tmp_path / "run").startswith("uuv-marl replay --scenario")
+
+
 def test_a_critic_that_sees_its_own_alone_has_the_actors_input():
     env = rows_for(Training(scenario="starter", sizes=[(3, 2)], critic="own", ppo=TINY))
     assert env.size == env.features == env.observation.shape[1]

@@ -65,7 +65,7 @@ POLICIES: dict[str, Kind] = {
     "tangent_bug": TangentBug,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field, end to end."),
     "mappo_2": shipped("mappo_2", "A second training of mappo, with another seed."),
-    "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on training_field, end to end."),
+    "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on short random fields, end to end."),
     "random": Random,
     "idle": Idle,
 }

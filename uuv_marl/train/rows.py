@@ -55,9 +55,8 @@ class Group:
 
     def __init__(self, training: Training, part: Part) -> None:
         scenario, card = part.scenario, training.card
-        self.env = BatchedEnv(
-            scenario, part.worlds, training.paid(scenario), observe="closeness", keep_terms=False
-        )  # fmt: skip
+        paid = training.paid(scenario)
+        self.env = BatchedEnv(scenario, part.worlds, paid, observe="closeness", keep_terms=False)
         self._told = Told(scenario, part.worlds, card)
         self._acting = beside(self._told, card)
         self._shape, self._state = (part.worlds, part.vehicles), training.critic == "state"
