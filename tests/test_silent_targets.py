@@ -120,7 +120,8 @@ def test_the_held_share_is_that_of_the_last_half():
             if held:
                 swarm.state.eta[0, k, :2] = swarm.course.obstacles[0, k, :2] + (0.0, 20.0)
         result = batch.step(np.zeros((1, 8, 2)))
-        assert result.terms["held"][0, 5] == pytest.approx(20.0 * 0.5 / limit * sum(holds.values()) / 4.0)
+        np.testing.assert_allclose(result.terms["held"][0, :4], 20.0 * 0.5 / limit * np.array([*holds.values()]))
+        assert not result.terms["held"][0, 4:].any()
     measured = task.metrics(0)
     assert measured["held_share"] == pytest.approx((1.0 + 0.5) / 4.0, abs=0.01)
     assert (measured["found_share"], measured["whole"]) == (0.75, 0.0)
@@ -129,7 +130,7 @@ def test_the_held_share_is_that_of_the_last_half():
     assert task.success(0, 5) != bool(swarm.state.touched[0, 5])
 
 
-def test_progress_counts_the_nearest_target_that_no_other_holds():
+def test_progress_and_pay_count_targets_that_no_nearer_vehicle_holds():
     swarm = water(**{"task.targets": 2})
     swarm.reset(TUNING)
     alone(swarm)
@@ -141,6 +142,12 @@ def test_progress_counts_the_nearest_target_that_no_other_holds():
     assert left[1] == pytest.approx(np.hypot(200.0, 50.0))
     swarm.state.eta[0, 2, :2] = (200.0, 5.0)
     assert swarm.task._left()[0, 1] == 0.0  # none is left
+    swarm.state.eta[0, 1, :2] = 0.0, -20.0  # a second one at the first target changes nothing for who is nearer
+    swarm.state.eta[0, 2, :2] = 300.0, 500.0
+    left, held = swarm.task._left()[0], swarm.task.reward(np.ones(1, np.bool_))["held"][0]
+    assert left[:2] == pytest.approx([10.0, np.hypot(200.0, 20.0)])
+    assert held[0] > 0.0
+    assert not held[1:].any()
 
 
 def test_a_run_goes_on_alike_from_a_snapshot():

@@ -65,7 +65,7 @@ class SilentTargetsMemory(NamedTuple):
     """What ``silent_targets`` remembers."""
 
     there_s: Annotated[Float64, "world vehicle", "When the vehicle held a target first [s]; 0 before."]
-    left: Annotated[Float64, "world vehicle", "Distance to the nearest target that no other vehicle holds, or 0 [m]."]
+    left: Annotated[Float64, "world vehicle", "Distance to the nearest target that no nearer vehicle holds, or 0 [m]."]
     was: Annotated[Float64, "world vehicle", "The same before the step."]
     speed: Annotated[Float64, "world target", "Speed of the target [m/s]."]
     course: Annotated[Float64, "world target", "Where it goes, clockwise from north [rad]."]
@@ -127,11 +127,10 @@ class SilentTargets(Reach):
     )
     channels: ClassVar[Mapping[str, Table]] = {"way": WAY}
     terms: ClassVar[Mapping[str, str]] = {
-        **Reach.terms,
-        "arrival": "+w once, when the vehicle is first within held_m of a target",
-        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no other "
-        "vehicle holds, 0 if there is none, D: progress_far_m, c: progress_m",
-        "held": "+w_arrival · dt/T · (share of the targets that are held), to everybody; T: the time limit",
+        **{name: told for name, told in Reach.terms.items() if name != "arrival"},
+        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no vehicle "
+        "nearer to it holds, 0 if there is none, D: progress_far_m, c: progress_m",
+        "held": "+w_arrival · dt/T for each target that is held, to the vehicle nearest to it; T: the time limit",
     }
     traffic: ClassVar[bool] = False
     leads: ClassVar[bool] = False
@@ -217,11 +216,11 @@ class SilentTargets(Reach):
         return self.away().min(axis=1) <= self.numbers.held_m
 
     def _left(self) -> Float64:
-        """Distance to the nearest target that no other vehicle holds [m], 0 where there is none."""
+        """Distance to the nearest target that no vehicle nearer to it holds [m], 0 where there is none."""
         away = self.away()
-        near = away <= self.numbers.held_m
-        nearest = np.where(near.sum(axis=1, keepdims=True) > near, math.inf, away).min(axis=2)
-        return np.where(np.isfinite(nearest), nearest, 0.0)
+        nearest = away.min(axis=1, keepdims=True)
+        left = np.where((nearest <= self.numbers.held_m) & (nearest < away), math.inf, away).min(axis=2)
+        return np.where(np.isfinite(left), left, 0.0)
 
     def there(self) -> Bool:
         """Vehicles that hold a target."""
@@ -262,13 +261,15 @@ class SilentTargets(Reach):
         }
 
     def reward(self, running: Bool) -> Terms:
-        """Also what is held."""
-        share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s * self.held().mean(axis=1)
-        held = self._weight.arrival * share[:, None]
-        return {**super().reward(running), "held": np.broadcast_to(held, self.swarm.state.alive.shape)}
+        """For holding, not for arriving: paid once, who does not remember it leaves."""
+        share, away = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s, self.away()
+        nearest = away.min(axis=1, keepdims=True)
+        holds = ((away == nearest) & (nearest <= self.numbers.held_m)).sum(axis=2)
+        usual = {name: paid for name, paid in super().reward(running).items() if name in self.terms}
+        return {**usual, "held": self._weight.arrival * share[:, None] * holds}
 
     def left(self) -> tuple[Float64, Float64]:
-        """How far vehicles are from the nearest target that no other holds, and were before the step [m]."""
+        """How far vehicles are from the nearest target that no nearer one holds, and were before the step [m]."""
         return self.memory.left, self.memory.was
 
     def done(self) -> Bool:
