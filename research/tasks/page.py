@@ -8,6 +8,7 @@ import numpy as np
 from research.data import read_text
 from research.episodes import Row, measured, select
 from research.tasks.studies import STUDIES, Study, set_name
+from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.types import Float64
@@ -56,6 +57,7 @@ def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
             found, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
         learners=_compared(found, task, {each.removeprefix(f"{task}-"): [each] for each in sets}),
+        final=_final(found, study),
         informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "untouched_share"),
     )
 
@@ -109,6 +111,22 @@ def _size(row: Row) -> int:
     scenario, _, rest = row["set"].partition("-")
     last = rest.split("-")[-1]
     return int(last) if last.isdigit() else load_scenario(scenario).swarm.num_vehicles
+
+
+def _final(found: Found, study: Study) -> str:
+    """The headline and whole swarms on the final seeds, and by how much a network is above the best law there."""
+    heads, table = ["policy"], dict[str, list[str]]()
+    for scenario, name in study.final.items():
+        mine = {policy: rows for (policy, where), rows in found.items() if where == name}
+        shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
+        best = max((policy for policy in mine if not is_trained(policy)), key=lambda law: shares[law].mean())
+        heads += [scenario, "above the best law"]
+        for policy, rows in mine.items():
+            gain = _with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
+            table.setdefault(policy, [policy]).extend(
+                (f"{_with_interval([shares[policy]])}, {_mean([rows], 'whole')}", gain)
+            )
+    return markdown_table(heads, table.values())
 
 
 def _policies(found: Found) -> list[str]:

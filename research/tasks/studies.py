@@ -9,6 +9,9 @@ from research.sets import EpisodeSet
 _TOLD: dict[str, Any] = read_toml("tasks", "studies.toml")
 SEEDS: int = _TOLD["seeds"]
 """Episodes of each policy on each set, from seed 0 on."""
+FINAL = range(*_TOLD["final"])
+"""Seeds of the final sets, on which nothing is run before its weights are frozen."""
+_FINAL = "final"
 SIZE, INFORMED = "swarm.num_vehicles", "task.informed"
 
 
@@ -33,6 +36,11 @@ class Study(NamedTuple):
         """What policies are compared by."""
         return self.metrics[0]
 
+    @property
+    def final(self) -> Mapping[str, str]:
+        """Final sets by scenario."""
+        return {each.scenario: name for name, each in self.sets.items() if name.endswith(f"-{_FINAL}")}
+
 
 def set_name(scenario: str, kind: str = "", number: int = 0) -> str:
     """``two_swarms_easy``, ``hard_water-gate``, ``hard_water-gate-54``: the number of vehicles, or of the informed."""
@@ -45,13 +53,17 @@ def _study(told: dict[str, Any]) -> Study:
     policies: dict[str, dict[str, range]] = {}
     for run in told["runs"]:
         own = {field: run[key] for field, key in ((SIZE, "num_vehicles"), (INFORMED, "informed")) if key in run}
+        seeds = FINAL if run.get(_FINAL) else range(SEEDS)
         for scenario in run["scenarios"]:
-            for kind in run.get("kinds", [""]):
+            for kind in run.get("kinds", [_FINAL if run.get(_FINAL) else ""]):
                 name = set_name(scenario, kind, *own.values())
-                changes[name] = scenario, ({"task.kinds": [kind], **own} if kind else own)
-                policies.setdefault(name, {}).update(dict.fromkeys(_TOLD["policies"][run["policies"]], range(SEEDS)))
+                changes[name] = scenario, ({"task.kinds": [kind], **own} if "kinds" in run else own)
+                policies.setdefault(name, {}).update(dict.fromkeys(_TOLD["policies"][run["policies"]], seeds))
     sets = {name: EpisodeSet(name, scenario, policies[name], own) for name, (scenario, own) in changes.items()}
-    judged = (each for each in sets if each.startswith(told["judged"]) and not {SIZE, INFORMED} & {*changes[each][1]})
+    judged = (
+        each for each in sets
+        if each.startswith(told["judged"]) and not each.endswith(_FINAL) and not {SIZE, INFORMED} & {*changes[each][1]}
+    )  # fmt: skip
     return Study(sets, told["learns"], told["worlds"], told.get("memory", False), tuple(judged), tuple(told["metrics"]))
 
 

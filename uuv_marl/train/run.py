@@ -187,7 +187,7 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
     """The record with a validation of the policy as it stands, which becomes ``best`` where none was better."""
     candidate, best = output / "candidate", output / "best"
     trainer.save_policy(candidate, record)
-    judged = validate(candidate, trainer.training)
+    judged = validate(str(candidate), trainer.training)
     better = record.best is None or judged.score >= record.best
     told = {name: value for name, value in judged._asdict().items() if name in Record._fields}
     record = record._replace(best=judged.score if better else record.best, **told)

@@ -46,8 +46,8 @@ class Judged(NamedTuple):
         return (self.whole + self.share) / 2.0
 
 
-def validate(policy: Path, training: Training) -> Judged:
-    """Run a checkpoint on a training's validation seeds, with each scenario and size of swarm."""
+def validate(policy: str, training: Training) -> Judged:
+    """Run a policy, by its name or path, on a training's validation seeds, with each scenario and size of swarm."""
     number = max(1, training.validation_episodes // len(training.parts))
     seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + number)
     found = [(part, run) for part in training.parts for run in _runs(policy, part, seeds)]
@@ -66,9 +66,9 @@ def validate(policy: Path, training: Training) -> Judged:
     )
 
 
-def _runs(policy: Path, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
-    scenario = granted(str(policy), part.scenario)
-    yield from (event for event in evaluate(scenario, str(policy), seeds) if isinstance(event, Run))
+def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
+    scenario = granted(policy, part.scenario)
+    yield from (event for event in evaluate(scenario, policy, seeds) if isinstance(event, Run))
 
 
 def _end_s(run: Run) -> float:

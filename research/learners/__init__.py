@@ -1,0 +1,1 @@
+"""Learners on all tasks, by one protocol: trainings, episodes, page."""

@@ -1,0 +1,87 @@
+"""BenchMARL's MASAC as a learner, the one that is not PPO. Runs in the environment of ``make test-benchmarl``."""
+
+# pyright: reportMissingImports=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false, reportUntypedBaseClass=false
+# BenchMARL lives in an environment of its own.
+
+import warnings
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+from typing import Any
+
+import safetensors.numpy
+import torch
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # BenchMARL, TorchRL and torch deprecate parts of each other
+    from benchmarl.algorithms import MasacConfig
+    from benchmarl.experiment import Callback, Experiment, ExperimentConfig
+    from benchmarl.models.mlp import MlpConfig
+
+    from uuv_marl.envs.benchmarl import SwarmTask
+
+from research.episodes import Row
+from research.learners.protocol import Task
+from research.learners.squashed import FILE
+from research.learners.watch import Report, Watch
+from uuv_marl.train.training import overrides_for
+
+TRAINING_SEEDS = 100_000
+KEPT = 500_000
+"""Agent-steps that are kept to learn from."""
+
+
+class _SpentError(Exception):
+    """The budget is."""
+
+
+class _Measured(Callback):
+    """Measures when it is due, and ends the training when the budget is spent."""
+
+    def __init__(self, watch: Watch, folder: Path, vehicles: int) -> None:
+        super().__init__()
+        self._watch, self._folder, self._vehicles = watch, folder, vehicles
+
+    def __getstate__(self) -> dict[str, object]:
+        return {}  # BenchMARL pickles callbacks into the experiment's folder
+
+    def on_train_end(self, training_td: object, group: str) -> None:  # noqa: ARG002
+        """After the updates of an iteration."""
+        steps = self.experiment.total_frames * self._vehicles
+        if self._watch.due(steps):
+            actor = self.experiment.group_policies[group]
+            layers = [x.detach().numpy() for x in actor.parameters()]
+            candidate = self._folder / "candidate.safetensors"
+            tensors = {f"{k // 2}.{'bias' if k % 2 else 'weight'}": x.T.copy() for k, x in enumerate(layers)}
+            candidate.write_bytes(safetensors.numpy.save(tensors))
+            if self._watch.measure(f"research.learners.squashed:Squashed,path={candidate}", steps):
+                candidate.replace(self._folder / FILE)
+        if self._watch.share(steps) >= 1.0:
+            raise _SpentError
+
+
+def learn(
+    task: Task, seed: int, folder: Path, settings: dict[str, object], agent_steps: int, minutes: float, report: Report
+) -> list[Row]:
+    """As ``watch.Trainer`` says."""
+    torch.set_num_threads(1)
+    told: dict[str, Any] = dict(settings)
+    watch = Watch(task, agent_steps, minutes, report)
+    config = ExperimentConfig.get_from_yaml()
+    config.save_folder, config.loggers, config.create_json, config.render = str(folder), [], False, False
+    config.evaluation = False
+    config.lr, config.max_n_frames = told["lr"], 10**9
+    worlds = config.off_policy_n_envs_per_worker = told["worlds"]
+    config.off_policy_collected_frames_per_batch = worlds * told["decisions"]
+    config.off_policy_n_optimizer_steps, config.off_policy_train_batch_size = told["optimizer_steps"], told["batch"]
+    config.off_policy_memory_size = KEPT // task.num_vehicles
+    config.off_policy_init_random_frames = told["random_steps"] // task.num_vehicles
+    model = MlpConfig(num_cells=[64, 64], layer_class=torch.nn.Linear, activation_class=torch.nn.Tanh)
+    options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": overrides_for(task.name, {})}
+    with (folder / "benchmarl.log").open("w") as log, redirect_stderr(log), redirect_stdout(log), suppress(_SpentError):
+        Experiment(
+            task=getattr(SwarmTask, task.name.upper()).get_task(options), algorithm_config=MasacConfig.get_from_yaml(),
+            model_config=model, critic_model_config=model, seed=TRAINING_SEEDS + seed, config=config,
+            callbacks=[_Measured(watch, folder, task.num_vehicles)],
+        ).run()  # fmt: skip
+    return watch.curve

@@ -1,0 +1,171 @@
+"""``learners.md``: who learns what, written from curves and episodes alone."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from research.data import read_text
+from research.episodes import Row, measured, write_rows
+from research.learners.figures import draw_curves, draw_profiles
+from research.learners.layout import marl_eval
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TIERS
+from research.learners.statistics import Estimate, improvement, interquartile_mean
+from uuv_marl.atomic import write_text
+from uuv_marl.benchmark.style import house_style
+from uuv_marl.benchmark.tables import markdown_table
+from uuv_marl.types import Float64
+
+Found = Mapping[tuple[str, str], Mapping[str, Mapping[str, Sequence[Row]]]]
+"""Rows by task and learner or policy, then by training, then by set."""
+
+
+def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list[Path]:
+    """The page, its pictures, and its files; the paths."""
+    write_rows(folder / "learners.csv.gz", rows)
+    write_rows(folder / "learners_curves.csv.gz", curves)
+    write_text(folder / "learners_marl_eval.json", json.dumps(marl_eval(curves, rows)) + "\n")
+    write_text(folder / "learners.md", report(curves, rows))
+    with house_style():
+        drawn = [
+            draw_curves(curves, rows, folder / "figures" / "learners_curves.png"),
+            draw_profiles(scores(found_in(rows)), folder / "figures" / "learners_profiles.png"),
+        ]
+    names = ("learners.md", "learners.csv.gz", "learners_curves.csv.gz", "learners_marl_eval.json")
+    return [*(folder / name for name in names), *drawn]
+
+
+def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
+    """The page's text."""
+    found = found_in(rows)
+    return Template(read_text("learners", "story.md")).substitute(
+        first=_first(found), tiers=_tiers(found), safety=_safety(found), pairs=_pairs(found), apart=_apart(found),
+        compute=_compute(curves), settings=_settings(), episodes=f"{len(rows):,}", steps=f"{AGENT_STEPS / 1e6:g}",
+        minutes=f"{MINUTES:g}", trainings=len({(row["task"], row["learner"], row["training"]) for row in curves}),
+    )  # fmt: skip
+
+
+def found_in(rows: Iterable[Row]) -> Found:
+    """Rows by where they belong."""
+    found: dict[tuple[str, str], dict[str, dict[str, list[Row]]]] = {}
+    for row in rows:
+        mine = found.setdefault((row["task"], row["learner"]), {}).setdefault(row["training"], {})
+        mine.setdefault(row["set"], []).append(row)
+    return found
+
+
+def scores(found: Found) -> dict[str, Float64]:
+    """The headline of each learner's trainings on unseen seeds, shape (training, task)."""
+    return {who: np.concatenate([_values(found, task, who) for task in TASKS], axis=1) for who in LEARNERS}
+
+
+def _values(found: Found, task: str, who: str, tier: int = 0, name: str = "share") -> Float64:
+    """A measure of each training, mean over the episodes and then the sets of a tier, shape (training, 1)."""
+    names, trainings = [each.name for each in TASKS[task].tiers[tier]], found[task, who].values()
+    return np.array([[float(np.mean([_mean(sets[each], name) for each in names]))] for sets in trainings], np.float64)
+
+
+def _mean(rows: Sequence[Row], name: str) -> float:
+    values = measured(rows, name)
+    return float(np.mean(values)) if values else float("nan")
+
+
+def short(share: float) -> str:
+    """Two digits after the point, without a zero before it."""
+    return f"{share:.2f}".replace("0.", ".", 1) if abs(share) < 0.995 else f"{share:.2f}"
+
+
+def _told(found: Estimate) -> str:
+    return f"{short(found.point)} [{short(found.low)}, {short(found.high)}]"
+
+
+def _first(found: Found) -> str:
+    """Headline and whole swarms on unseen seeds, a column for each task."""
+    table: list[tuple[str, ...]] = []
+    for who, every in scores(found).items():
+        own = [
+            f"{_told(interquartile_mean(every[:, k : k + 1]))}, "
+            f"{short(float(_values(found, task, who, 0, 'whole').mean()))}"
+            for k, task in enumerate(TASKS)
+        ]
+        table.append((who, *own, _told(interquartile_mean(every))))
+    for words in ("the best law", "oracle", "random"):
+        named = {name: task.policies[0] if words == "the best law" else words for name, task in TASKS.items()}
+        cells = [
+            ", ".join(short(float(_values(found, task, who, 0, name).mean())) for name in ("share", "whole"))
+            if (task, who) in found else "–"
+            for task, who in named.items()
+        ]  # fmt: skip
+        table.append((words, *cells, ""))
+    return markdown_table(("", *TASKS, "all tasks"), table)
+
+
+def _tiers(found: Found) -> str:
+    """The headline in each tier."""
+    table = [
+        (task, who, *(short(float(_values(found, task, who, tier).mean())) for tier in range(len(TIERS))))
+        for task in TASKS
+        for who in (*LEARNERS, *TASKS[task].policies)
+    ]
+    return markdown_table(("task", "", *TIERS), table)
+
+
+def _safety(found: Found) -> str:
+    """Contacts, distances and time on unseen seeds."""
+    ways = {"contacts": "{:.3f}", "to_obstacles": "{:.1f} m", "to_others": "{:.1f} m", "time": "{:.2f}"}
+    table: list[tuple[str, ...]] = []
+    for task in TASKS:
+        for who in (*LEARNERS, *TASKS[task].policies):
+            values = {name: _values(found, task, who, 0, name) for name in ways}
+            cells = [
+                "–" if np.isnan(mine).all() else ways[name].format(float(np.nanmean(mine)))
+                for name, mine in values.items()
+            ]
+            table.append((task, who, *cells))
+    return markdown_table(("task", "", *(name.replace("_", " ") for name in ways)), table)
+
+
+def _pairs(found: Found) -> str:
+    """Probability of improvement over all tasks."""
+    every = scores(found)
+    table = [(f"{one} over {other}", _told(improvement(every[one], every[other])))
+             for one, other in combinations(LEARNERS, 2)]  # fmt: skip
+    return markdown_table(("", "probability"), table)
+
+
+def _apart(found: Found) -> str:
+    """Pairs that are told apart on each task: the interval holds no one half."""
+    every, table = scores(found), list[tuple[str, ...]]()
+    for k, task in enumerate(TASKS):
+        apart: list[str] = []
+        for one, other in combinations(LEARNERS, 2):
+            told = improvement(every[one][:, k : k + 1], every[other][:, k : k + 1])
+            if told.low > 0.5 or told.high < 0.5:
+                apart.append(f"{one} over {other}" if told.low > 0.5 else f"{other} over {one}")
+        table.append((task, str(len(apart)), ", ".join(apart) or "–"))
+    return markdown_table(("task", "pairs", "told apart"), table)
+
+
+def _compute(curves: Sequence[Row]) -> str:
+    """Agent-steps and processor time of a training, mean."""
+    table: list[tuple[str, ...]] = []
+    for who in LEARNERS:
+        cells: list[str] = []
+        for task in TASKS:
+            last = {row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, who)}.values()
+            steps, minutes = (float(np.mean(measured(last, name))) for name in ("agent_steps", "minutes"))
+            cells.append(f"{steps / 1e6:.1f} M, {minutes:.1f} min")
+        table.append((who, *cells))
+    return markdown_table(("", *TASKS), table)
+
+
+def _settings() -> str:
+    """What differs from the trainers' defaults."""
+    table = [
+        (each.name, each.by, ", ".join(f"`{name}` {value}" for name, value in each.settings.items()) or "none")
+        for each in LEARNERS.values()
+    ]
+    return markdown_table(("", "trainer", "settings"), table)

@@ -1,0 +1,96 @@
+"""By what learners are compared: tasks, tiers of episodes, budgets, and each learner's settings (protocol.toml)."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from research.data import read_toml
+from research.sets import EpisodeSet
+from uuv_marl.benchmark.robustness.axes import AXES
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.train.training import Training, overrides_for
+
+_TOLD: dict[str, Any] = read_toml("learners", "protocol.toml")
+TRAININGS: int = _TOLD["trainings"]
+"""Of each learner on each task, with seeds from 0 on."""
+AGENT_STEPS: int = _TOLD["agent_steps"]
+MINUTES: float = _TOLD["minutes"]
+MEASURES: int = _TOLD["measures"]
+TIERS = ("unseen seeds", "unseen sizes and ranges", "unseen maps and sea")
+SEA, SEA_LEVEL = "sea", 1
+"""Name of a set in the sea, and the level of the robustness axis ``X`` there."""
+_SIZE = "swarm.num_vehicles"
+
+
+class Task(NamedTuple):
+    """A scenario to learn, and the episodes by which it is judged."""
+
+    name: str
+    """That of the scenario."""
+    num_vehicles: int
+    policies: tuple[str, ...]
+    """Run beside the learners: the best law without a privilege, then others."""
+    tiers: tuple[tuple[EpisodeSet, ...], ...]
+    """Sets of each of ``TIERS``."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is trained on, for every learner alike."""
+        return load_scenario(self.name, num_vehicles=self.num_vehicles, overrides=overrides_for(self.name, {}))
+
+    def training(self, **more: Any) -> Training:
+        """A training of ours on it, which also says what validations are of all learners."""
+        return Training(
+            scenario=self.name, sizes=[self.num_vehicles], validations=MEASURES,
+            validation_episodes=_TOLD["validation_episodes"], **more,
+        )  # fmt: skip
+
+
+class Learner(NamedTuple):
+    """Who learns, and how."""
+
+    name: str
+    by: str
+    """Whose trainer: ``own``, ``sb3``, ``benchmarl``."""
+    settings: Mapping[str, Any]
+    """What differs from the trainer's defaults."""
+    tried: tuple[Mapping[str, Any], ...]
+    """What was tried in their place."""
+
+
+def _task(told: Mapping[str, Any]) -> Task:
+    own: dict[str, object] = {_SIZE: told["num_vehicles"]}
+    changes: list[list[tuple[str, dict[str, object]]]] = [[(told["name"], own)], [], []]
+    for tier, key in ((1, "two"), (2, "three")):
+        for change in told[key]:
+            if change == SEA:
+                speed = load_scenario(told["name"]).trajectory.speed_mps
+                changes[tier].append((told["name"], own | AXES["X"].overrides(SEA_LEVEL, speed)))
+            else:
+                other = {**change}
+                name = other.pop("scenario", told["name"])
+                changes[tier].append((name, other if name != told["name"] else own | other))
+    tiers = tuple(
+        tuple(_set(name, over, told, count) for name, over in mine)
+        for mine, count in zip(changes, _TOLD["tiers"], strict=True)
+    )
+    return Task(told["name"], told["num_vehicles"], tuple(told["policies"]), tiers)
+
+
+def _set(scenario: str, overrides: Mapping[str, object], told: Mapping[str, Any], count: int) -> EpisodeSet:
+    """So many episodes of a tier, named by what is changed."""
+    words = [scenario]
+    if any(field.startswith("current.") for field in overrides):
+        words.append(SEA)
+    elif "task.kinds" in overrides:
+        words += [str(kind) for kind in overrides["task.kinds"]]  # type: ignore[attr-defined]
+    elif _SIZE in overrides and (scenario, overrides[_SIZE]) != (told["name"], told["num_vehicles"]):
+        words.append(str(overrides[_SIZE]))
+    seeds = range(_TOLD["first"], _TOLD["first"] + count)
+    return EpisodeSet("learners-" + "-".join(words), scenario, dict.fromkeys(told["policies"], seeds), overrides)
+
+
+TASKS = {told["name"]: _task(told) for told in _TOLD["tasks"]}
+LEARNERS = {
+    name: Learner(name, told["by"], told["settings"], tuple(told.get("tried", ())))
+    for name, told in _TOLD["learners"].items()
+}

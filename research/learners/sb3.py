@@ -1,0 +1,67 @@
+"""Stable-Baselines3's PPO as a learner: vehicles are rows of one environment, and share the policy."""
+
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownParameterType=false
+# Stable-Baselines3 leaves the types of observations and spaces open.
+
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecNormalize
+
+from research.episodes import Row
+from research.learners.protocol import Task
+from research.learners.watch import Report, Watch
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
+from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.train.sb3 import save_sb3
+from uuv_marl.train.training import ROWS
+
+TRAINING_SEEDS = 100_000
+STEPS = 64
+"""Decisions of each world between two updates, as our own trainer has."""
+
+
+class _Measured(BaseCallback):
+    """Measures when it is due, and ends the training when the budget is spent."""
+
+    def __init__(self, watch: Watch, folder: Path) -> None:
+        super().__init__()
+        self._watch, self._folder = watch, folder
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        self.measure()
+
+    def measure(self) -> None:
+        """If it is due."""
+        if self._watch.due(self.num_timesteps):
+            candidate = self._folder / "candidate.safetensors"
+            save_sb3(self.model, candidate)  # type: ignore[arg-type]
+            if self._watch.measure(str(candidate), self.num_timesteps):
+                candidate.replace(self._folder / WEIGHTS_FILE)
+
+
+def learn(
+    task: Task, seed: int, folder: Path, settings: dict[str, object], agent_steps: int, minutes: float, report: Report
+) -> list[Row]:
+    """As ``watch.Trainer`` says."""
+    torch.set_num_threads(1)
+    told: dict[str, Any] = dict(settings)
+    watch = Watch(task, agent_steps, minutes, report)
+    worlds = max(1, round(ROWS / task.num_vehicles))
+    env = VecNormalize(SwarmVecEnv(task.scenario, worlds, observe="closeness"), norm_obs=False)
+    rate = float(told.pop("learning_rate"))
+    model = PPO(
+        "MlpPolicy", env, n_steps=STEPS, policy_kwargs={"net_arch": [64, 64], "log_std_init": told.pop("log_std_init")},
+        learning_rate=lambda left: rate * max(left, 0.02), seed=TRAINING_SEEDS + seed,
+        device="cpu", **told,
+    )  # fmt: skip
+    measured = _Measured(watch, folder)
+    model.learn(agent_steps, callback=measured)
+    measured.measure()
+    return watch.curve

@@ -1,0 +1,44 @@
+"""``Squashed``: a policy whose layers end in tanh, as those of SAC do, from a file of its weights."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+import safetensors.numpy
+
+from uuv_marl.baselines import Policy
+from uuv_marl.errors import PolicyError
+from uuv_marl.paths import user_path
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.observation import observation_layout, observer
+from uuv_marl.types import Float32
+
+FILE = "policy.safetensors"
+
+
+class Squashed(Policy):
+    """Layers of tanh units; the first half of the last one's outputs, through tanh, is the action.
+
+    Args:
+        path: of the weights ``0.weight`` (in, out), ``0.bias`` and so on.
+    """
+
+    yaw_damping_nms: ClassVar[float] = 600.0
+    decides_every_s: ClassVar[float | None] = 0.5
+    wishes_force: ClassVar[bool] = True
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, path: str) -> None:
+        super().__init__(scenario, num_worlds)
+        self._tensors: dict[str, Any] = safetensors.numpy.load(user_path(path).read_bytes())
+        self._seeing = observation_layout(scenario, "closeness")
+        if len(self._tensors["0.weight"]) != self._seeing.size:
+            raise PolicyError(f"{path} reads {len(self._tensors['0.weight'])} entries, got {self._seeing.size}")
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        x, fill = observer(percept, self._seeing)
+        fill(0, len(x))
+        for k in range(len(self._tensors) // 2):
+            x = np.tanh(x) if k else x
+            x = x @ self._tensors[f"{k}.weight"] + self._tensors[f"{k}.bias"]
+        return np.tanh(x[..., :2]).astype(np.float32)

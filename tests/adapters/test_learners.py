@@ -1,0 +1,122 @@
+"""The comparison of learners: every trainer keeps its budget and leaves a policy, and the page is that of its rows."""
+
+import json
+
+import numpy as np
+import pytest
+
+from research.episodes import read_rows
+from research.learners import cells, page, protocol, statistics, watch
+from research.learners.layout import marl_eval
+from research.learners.protocol import LEARNERS, TASKS
+from research.learners.statistics import improvement, interquartile_mean
+from uuv_marl.scenario import load_scenario
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+MEASURED = ("share", "whole", "contacts", "to_obstacles", "to_others", "time")
+
+
+def quiet(_):
+    pass
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, monkeypatch):
+    task = TASKS["hard_water"]
+    small = tuple(
+        tuple(each._replace(seeds={policy: range(7000, 7001) for policy in each.seeds}) for each in tier[:1])
+        for tier in task.tiers
+    )
+    task = task._replace(tiers=small)
+    monkeypatch.setattr(cells, "AGENT_STEPS", 45_000)
+    for module in (protocol, watch):
+        monkeypatch.setattr(module, "MEASURES", 2)
+    monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
+    cell = cells.Cell(task, LEARNERS[name], 0)
+    folder = cell.folder(tmp_path)
+    folder.mkdir(parents=True)
+    cells.make(cell, folder, quiet)
+    curve, rows = cells.read(cell, folder)
+    assert 1 <= len(curve) <= 2
+    assert 40_000 <= int(curve[-1]["agent_steps"]) < 100_000
+    assert [row["set"] for row in rows] == [each.name for tier in small for each in tier]
+    before = (folder / cells.EPISODES).stat().st_mtime_ns
+    cells.make(cell, folder, quiet)
+    assert (folder / cells.EPISODES).stat().st_mtime_ns == before
+    first = small[0][0]
+    (again,) = cells.episodes(cell.policy(folder), first, range(7000, 7001))
+    assert again == {key: rows[0][key] for key in again}
+
+
+def invented(better=()):
+    """Rows and curves of three trainings; some learners are better."""
+    rng = np.random.default_rng(0)
+    curves, rows = [], []
+    for task in TASKS.values():
+        for who in (*LEARNERS, *task.policies):
+            for training in range(3) if who in LEARNERS else ("",):
+                place = {"task": task.name, "learner": who, "training": str(training)}
+                share = 0.1 * rng.uniform() + 0.5 * (who in better)
+                for each in (each for tier in task.tiers for each in tier):
+                    values = dict.fromkeys(MEASURED, "1") | {"share": f"{share:.3g}", "time": ""}
+                    rows += [place | {"set": each.name, "seed": str(seed)} | values for seed in (7000, 7001)]
+                if who in LEARNERS:
+                    curves += [
+                        place | {"agent_steps": str(k), "minutes": "1.00", "share": "0.1", "whole": "0", "contacts": "2"}
+                        for k in (1000, 2000)
+                    ]
+    return curves, rows
+
+
+def alike(rows):
+    return [{**row, "share": "0.5"} for row in rows]
+
+
+def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monkeypatch):
+    monkeypatch.setattr(statistics, "_OF_PAIRS", 25)
+    curves, rows = invented(better=("masac",))
+    state = np.random.get_state()[1].copy()
+    text = page.report(curves, rows)
+    assert text == page.report(curves, rows)
+    np.testing.assert_array_equal(np.random.get_state()[1], state)
+    for task in TASKS:
+        (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
+        assert all(f"masac over {other}" in row for other in LEARNERS if other != "masac")
+    assert not any(" over " in row for row in page._apart(page.found_in(alike(rows))).splitlines())
+
+
+def test_estimates_are_what_they_say():
+    scores = np.linspace(0.0, 1.0, 40).reshape(8, 5)
+    found = interquartile_mean(scores)
+    assert found.point == pytest.approx(np.sort(scores.ravel())[10:30].mean())
+    assert found.low < found.point < found.high
+    assert improvement(scores + 2.0, scores) == (1.0, 1.0, 1.0)
+    assert improvement(scores, scores).point == 0.5
+
+
+def test_the_layout_is_that_of_marl_eval():
+    """As its README has it: environment, task, algorithm, run, then steps and absolute metrics."""
+    told = json.loads(json.dumps(marl_eval(*invented())))
+    assert list(told) == ["uuv_marl"]
+    for task in told["uuv_marl"].values():
+        assert list(task) == list(LEARNERS)
+        for runs in task.values():
+            assert list(runs) == ["seed_0", "seed_1", "seed_2"]
+            for run in runs.values():
+                assert list(run) == ["step_0", "step_1", "absolute_metrics"]
+                assert {"step_count", "elapsed_time"} < set(run["step_0"])
+                metrics = {*run["step_0"]} - {"step_count", "elapsed_time"}
+                assert {*run["absolute_metrics"]} == metrics
+                assert all(isinstance(values, list) for values in run["absolute_metrics"].values())
+
+
+def test_every_set_of_the_protocol_can_be_run_by_its_learners():
+    for task in TASKS.values():
+        for each in (each for tier in task.tiers for each in tier):
+            load_scenario(each.scenario, overrides=each.overrides)
+
+
+def test_rows_are_read_as_they_were_written(tmp_path):
+    curves, rows = invented()
+    page.write_rows(tmp_path / "rows.csv.gz", rows)
+    assert read_rows(tmp_path / "rows.csv.gz") == rows
