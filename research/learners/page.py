@@ -103,12 +103,17 @@ def _first(found: Found) -> str:
     return markdown_table(("", *TASKS, "all tasks"), table)
 
 
+def _everyone(found: Found, task: str) -> list[str]:
+    """Learners, then policies, then those from elsewhere."""
+    return [*LEARNERS, *(who for where, who in found if where == task and who not in LEARNERS)]
+
+
 def _tiers(found: Found) -> str:
     """The headline in each tier."""
     table = [
         (task, who, *(short(float(_values(found, task, who, tier).mean())) for tier in range(len(TIERS))))
         for task in TASKS
-        for who in (*LEARNERS, *TASKS[task].policies)
+        for who in _everyone(found, task)
     ]
     return markdown_table(("task", "", *TIERS), table)
 
@@ -118,7 +123,7 @@ def _safety(found: Found) -> str:
     ways = {"contacts": "{:.3f}", "to_obstacles": "{:.1f} m", "to_others": "{:.1f} m", "time": "{:.2f}"}
     table: list[tuple[str, ...]] = []
     for task in TASKS:
-        for who in (*LEARNERS, *TASKS[task].policies):
+        for who in _everyone(found, task):
             values = {name: _values(found, task, who, 0, name) for name in ways}
             cells = [
                 "–" if np.isnan(mine).all() else ways[name].format(float(np.nanmean(mine)))

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from research.data import read_toml
-from research.sets import EpisodeSet
 from uuv_marl.benchmark.robustness.axes import AXES
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.training import Training, overrides_for
@@ -15,10 +14,21 @@ TRAININGS: int = _TOLD["trainings"]
 AGENT_STEPS: int = _TOLD["agent_steps"]
 MINUTES: float = _TOLD["minutes"]
 MEASURES: int = _TOLD["measures"]
+TRIED_ON: list[str] = _TOLD["tried_on"]
 TIERS = ("unseen seeds", "unseen sizes and ranges", "unseen maps and sea")
 SEA, SEA_LEVEL = "sea", 1
 """Name of a set in the sea, and the level of the robustness axis ``X`` there."""
 _SIZE = "swarm.num_vehicles"
+
+
+class Judged(NamedTuple):
+    """Episodes of one kind."""
+
+    name: str
+    scenario: str
+    overrides: Mapping[str, object]
+    episodes: range
+    """Their seeds."""
 
 
 class Task(NamedTuple):
@@ -29,8 +39,13 @@ class Task(NamedTuple):
     num_vehicles: int
     policies: tuple[str, ...]
     """Run beside the learners: the best law without a privilege, then others."""
-    tiers: tuple[tuple[EpisodeSet, ...], ...]
+    tiers: tuple[tuple[Judged, ...], ...]
     """Sets of each of ``TIERS``."""
+
+    @property
+    def sets(self) -> tuple[Judged, ...]:
+        """Of all tiers."""
+        return tuple(each for tier in self.tiers for each in tier)
 
     @property
     def scenario(self) -> Scenario:
@@ -51,10 +66,15 @@ class Learner(NamedTuple):
     name: str
     by: str
     """Whose trainer: ``own``, ``sb3``, ``benchmarl``."""
-    settings: Mapping[str, Any]
-    """What differs from the trainer's defaults."""
-    tried: tuple[Mapping[str, Any], ...]
-    """What was tried in their place."""
+    tried: tuple[dict[str, object], ...]
+    """Settings that were tried."""
+    chosen: int
+    """Which of them it has."""
+
+    @property
+    def settings(self) -> dict[str, object]:
+        """What differs from the trainer's defaults."""
+        return self.tried[self.chosen]
 
 
 def _task(told: Mapping[str, Any]) -> Task:
@@ -76,7 +96,7 @@ def _task(told: Mapping[str, Any]) -> Task:
     return Task(told["name"], told["num_vehicles"], tuple(told["policies"]), tiers)
 
 
-def _set(scenario: str, overrides: Mapping[str, object], told: Mapping[str, Any], count: int) -> EpisodeSet:
+def _set(scenario: str, overrides: Mapping[str, object], told: Mapping[str, Any], count: int) -> Judged:
     """So many episodes of a tier, named by what is changed."""
     words = [scenario]
     if any(field.startswith("current.") for field in overrides):
@@ -86,11 +106,11 @@ def _set(scenario: str, overrides: Mapping[str, object], told: Mapping[str, Any]
     elif _SIZE in overrides and (scenario, overrides[_SIZE]) != (told["name"], told["num_vehicles"]):
         words.append(str(overrides[_SIZE]))
     seeds = range(_TOLD["first"], _TOLD["first"] + count)
-    return EpisodeSet("learners-" + "-".join(words), scenario, dict.fromkeys(told["policies"], seeds), overrides)
+    return Judged("-".join(words), scenario, overrides, seeds)
 
 
 TASKS = {told["name"]: _task(told) for told in _TOLD["tasks"]}
 LEARNERS = {
-    name: Learner(name, told["by"], told["settings"], tuple(told.get("tried", ())))
+    name: Learner(name, told["by"], tuple({**told["always"], **each} for each in told["tried"]), told["chosen"])
     for name, told in _TOLD["learners"].items()
 }

@@ -13,6 +13,8 @@ from research.episodes import Row as Cells
 from research.episodes import cells as told
 from research.episodes import read_text
 from research.heldout import sets as heldout
+from research.learners import cells as learners
+from research.learners.protocol import LEARNERS, TASKS
 from research.paper import report as paper
 from research.sets import DIGITS
 from research.tasks import studies
@@ -22,7 +24,9 @@ from uuv_marl.benchmark.robustness import job as robustness
 from uuv_marl.benchmark.robustness.axes import AXES, CALM
 from uuv_marl.benchmark.suite import NOTHING, Case
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError
-from uuv_marl.scenario import Scenario
+from uuv_marl.scenario import Scenario, load_scenario
+
+_OF_LEARNERS = ("task", "learner", "training", "set", "seed")
 
 
 class NoEpisodesError(ResultsError):
@@ -107,6 +111,8 @@ def _kind(head: Sequence[str]) -> Kind | None:
         (("scenario", "vehicle", "policy", "seed"), _sea_trial, sea_trials.DIGITS),
         (("scenario", "policy", "seed"), _paper, paper.DIGITS),
     )
+    if tuple(head) == (*_OF_LEARNERS, *learners.MEASURES):
+        return Kind(_OF_LEARNERS, learners.MEASURES, _learned, _learned_written)
     known = {*Metrics.__annotations__, *studies.METRICS}
     for keys, source, digits in kinds:
         measured = tuple(head[len(keys) :])
@@ -128,6 +134,24 @@ def _set(cells: Cells) -> Source:
     if found is None:
         raise ResultsError(f"there is no set {cells['set']!r} in this version")
     return _of(Case(found.name, found.scenario, cells["policy"], found.overrides))
+
+
+def _learned(cells: Cells) -> Source:
+    task = TASKS.get(cells["task"])
+    each = next((each for each in task.sets if each.name == cells["set"]), None) if task else None
+    if task is None or each is None:
+        raise ResultsError(f"there is no set {cells['set']!r} of task {cells['task']!r} in this version")
+    policy = cells["learner"]
+    if cells["training"]:
+        cell = learners.Cell(task, LEARNERS[policy], int(cells["training"]))
+        if not cell.kept.exists():
+            raise PolicyError(f"of {cell.kept.stem} no policy is kept; python -m research.learners trains it again")
+        policy = cell.policy(cell.kept)
+    return Source(load_scenario(each.scenario, overrides=each.overrides), policy)
+
+
+def _learned_written(cells: Cells, metrics: Metrics) -> Sequence[str]:
+    return list(learners.measures(metrics, _learned(cells).scenario).values())
 
 
 def _robustness(cells: Cells) -> Source:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from research.episodes import read_rows
-from research.learners import cells, page, protocol, statistics, watch
+from research.learners import cells, others, page, protocol, statistics, watch
 from research.learners.layout import marl_eval
 from research.learners.protocol import LEARNERS, TASKS
 from research.learners.statistics import improvement, interquartile_mean
+from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore")
-MEASURED = ("share", "whole", "contacts", "to_obstacles", "to_others", "time")
 
 
 def quiet(_):
@@ -23,10 +23,7 @@ def quiet(_):
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, monkeypatch):
     task = TASKS["hard_water"]
-    small = tuple(
-        tuple(each._replace(seeds={policy: range(7000, 7001) for policy in each.seeds}) for each in tier[:1])
-        for tier in task.tiers
-    )
+    small = tuple(tuple(each._replace(episodes=range(7000, 7001)) for each in tier[:1]) for tier in task.tiers)
     task = task._replace(tiers=small)
     monkeypatch.setattr(cells, "AGENT_STEPS", 45_000)
     for module in (protocol, watch):
@@ -44,7 +41,7 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     cells.make(cell, folder, quiet)
     assert (folder / cells.EPISODES).stat().st_mtime_ns == before
     first = small[0][0]
-    (again,) = cells.episodes(cell.policy(folder), first, range(7000, 7001))
+    (again,) = cells.episodes(cell.policy(folder / cells.FILE), first, range(7000, 7001))
     assert again == {key: rows[0][key] for key in again}
 
 
@@ -57,12 +54,13 @@ def invented(better=()):
             for training in range(3) if who in LEARNERS else ("",):
                 place = {"task": task.name, "learner": who, "training": str(training)}
                 share = 0.1 * rng.uniform() + 0.5 * (who in better)
-                for each in (each for tier in task.tiers for each in tier):
-                    values = dict.fromkeys(MEASURED, "1") | {"share": f"{share:.3g}", "time": ""}
+                for each in task.sets:
+                    values = dict.fromkeys(cells.MEASURES, "1") | {"share": f"{share:.3g}", "time": ""}
                     rows += [place | {"set": each.name, "seed": str(seed)} | values for seed in (7000, 7001)]
                 if who in LEARNERS:
                     curves += [
-                        place | {"agent_steps": str(k), "minutes": "1.00", "share": "0.1", "whole": "0", "contacts": "2"}
+                        place
+                        | {"agent_steps": str(k), "minutes": "1.00", "share": "0.1", "whole": "0", "contacts": "2"}
                         for k in (1000, 2000)
                     ]
     return curves, rows
@@ -75,10 +73,10 @@ def alike(rows):
 def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monkeypatch):
     monkeypatch.setattr(statistics, "_OF_PAIRS", 25)
     curves, rows = invented(better=("masac",))
-    state = np.random.get_state()[1].copy()
+    state = np.random.get_state()[1].copy()  # noqa: NPY002
     text = page.report(curves, rows)
     assert text == page.report(curves, rows)
-    np.testing.assert_array_equal(np.random.get_state()[1], state)
+    np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
     for task in TASKS:
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
         assert all(f"masac over {other}" in row for other in LEARNERS if other != "masac")
@@ -112,11 +110,24 @@ def test_the_layout_is_that_of_marl_eval():
 
 def test_every_set_of_the_protocol_can_be_run_by_its_learners():
     for task in TASKS.values():
-        for each in (each for tier in task.tiers for each in tier):
+        for each in task.sets:
             load_scenario(each.scenario, overrides=each.overrides)
 
 
-def test_rows_are_read_as_they_were_written(tmp_path):
-    curves, rows = invented()
+def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
+    task = TASKS["hard_water"]
+    few = task._replace(tiers=tuple((tier[0]._replace(episodes=range(7000, 7002)),) for tier in task.tiers))
+    rows = list(others.every(few, "scout", quiet))
     page.write_rows(tmp_path / "rows.csv.gz", rows)
     assert read_rows(tmp_path / "rows.csv.gz") == rows
+    others.need_whole(rows, few)
+    for row in rows[::3]:
+        others.need_alike(row, "scout", few)
+    with pytest.raises(ResultsError, match="set hard_water must have the seeds 7000 to 7001 once each, got 1 rows"):
+        others.need_whole(rows[1:], few)
+    with pytest.raises(ResultsError, match="set hard_water, seed 7000 came again with to_others 9.9, now"):
+        others.need_alike({**rows[0], "to_others": "9.9"}, "scout", few)
+    with pytest.raises(ResultsError, match="came again with"):
+        others.need_alike(rows[0], "random", few)
+    with pytest.raises(ResultsError, match="set must be one of hard_water, .*, got 'lake'"):
+        others.need_alike({**rows[0], "set": "lake"}, "scout", few)

@@ -1,0 +1,86 @@
+"""``python -m research.learners.others``: rows of a policy from elsewhere, made, or checked digit by digit."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from research import FOLDER
+from research.episodes import Row, read_rows, write_rows
+from research.learners.cells import OTHERS, episodes
+from research.learners.protocol import TASKS, Task
+from research.learners.watch import Report
+from uuv_marl.cli.console import console, explained, path_option, progress_line, working
+from uuv_marl.errors import ResultsError
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def main(
+    policy: Annotated[str, typer.Argument(help="A checkpoint, or module:Class.")],
+    rows: Annotated[Path, typer.Argument(help="File of its episodes, .csv or .csv.gz.")],
+    task: Annotated[str, typer.Option(help=f"One of {', '.join(TASKS)}.")],
+    sample: Annotated[int, typer.Option(min=1, help="Rows that are run again.")] = 20,
+    output: Annotated[Path, path_option("Folder of the comparison.")] = Path("results/learners"),
+) -> None:
+    """Make the rows of a policy on a task if the file is not there; else run a sample of them again.
+
+    If the sample comes again alike, the rows go into OUTPUT/others, and python -m research.learners puts them on the
+    page, marked as checked.
+
+    Example: python -m research.learners.others runs/sb3 sb3.csv --task hard_water
+    """
+    with explained(FOLDER):
+        if task not in TASKS:
+            raise ResultsError(f"task must be one of {', '.join(TASKS)}, got {task!r}")
+        with working("Nothing was kept") as bar:
+            told = progress_line(bar, rows.name)
+            if not rows.exists():
+                write_rows(rows, list(every(TASKS[task], policy, told)))
+                console.print(f"  {rows}", highlight=False)
+                return
+            given = read_rows(rows)
+            need_whole(given, TASKS[task])
+            drawn = np.random.default_rng().choice(len(given), min(sample, len(given)), replace=False)
+            for k, at in enumerate(map(int, drawn)):
+                told(k / len(drawn))
+                need_alike(given[at], policy, TASKS[task])
+            told(1.0)
+        path = output / OTHERS / task / f"{rows.name.partition('.')[0]}.csv"
+        write_rows(path, given)
+        console.print(f"  {len(drawn)} of {len(given)} rows came again alike: {path}", highlight=False)
+
+
+def every(task: Task, policy: str, told: Report) -> Iterator[Row]:
+    """A policy's rows on all sets of a task."""
+    for k, each in enumerate(task.sets):
+        told(k / len(task.sets))
+        yield from episodes(policy, each, each.episodes)
+
+
+def need_whole(rows: list[Row], task: Task) -> None:
+    """Refuse rows that leave out an episode, or have one twice. Raises ResultsError."""
+    for each in task.sets:
+        seeds = sorted(int(row["seed"]) for row in rows if row["set"] == each.name)
+        if seeds != list(each.episodes):
+            raise ResultsError(
+                f"set {each.name} must have the seeds {each.episodes[0]} to {each.episodes[-1]} once each, "
+                f"got {len(seeds)} rows"
+            )
+
+
+def need_alike(row: Row, policy: str, task: Task) -> None:
+    """Run the episode of a row again. Raises ResultsError where it is another, or in no set of the task."""
+    seed, each = int(row["seed"]), next((each for each in task.sets if each.name == row["set"]), None)
+    if each is None:
+        raise ResultsError(f"set must be one of {', '.join(each.name for each in task.sets)}, got {row['set']!r}")
+    (again,) = episodes(policy, each, range(seed, seed + 1))
+    if other := [f"{key} {row.get(key)}, now {value}" for key, value in again.items() if row.get(key) != value]:
+        raise ResultsError(f"set {each.name}, seed {seed} came again with {'; '.join(other)}")
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,66 @@
+"""``python -m research.learners.tune``: the trials by which each learner's settings were chosen."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from research import FOLDER
+from research.episodes import Row, read_rows, write_rows
+from research.learners.cells import trainer_of
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRIED_ON
+from research.learners.watch import Report
+from uuv_marl.cli.console import console, explained, path_option, progress_line, working
+from uuv_marl.errors import ResultsError
+
+SEED, PART = 100, 3
+"""Of the trainings, which no other has, and the part of the budget that they get: one third."""
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def main(
+    learner: Annotated[str, typer.Argument(help=f"One of {', '.join(LEARNERS)}.")],
+    output: Annotated[Path, path_option("Folder for the trainings.")] = Path("results/learners-tuning"),
+) -> None:
+    """Train a learner with each of its settings on two tasks, and write what came of it.
+
+    A trial's score is the mean over both tasks of its best validation: the mean of the headline and of the share of
+    whole swarms. The trials that ship are in research/learners/trials.csv.
+
+    Example: python -m research.learners.tune ppo
+    """
+    with explained(FOLDER):
+        if learner not in LEARNERS:
+            raise ResultsError(f"learner must be one of {', '.join(LEARNERS)}, got {learner!r}")
+        who = LEARNERS[learner]
+        rows: list[Row] = []
+        with working(f"Finished trials are in {output}") as bar:
+            for k, settings in enumerate(who.tried):
+                path = output / f"{learner}-{k}.csv"
+                if not path.exists():
+                    told = progress_line(bar, f"{learner}, trial {k + 1} of {len(who.tried)}")
+                    write_rows(path, [_trial(learner, k, settings, output / f"{learner}-{k}", told)])
+                rows += read_rows(path)
+        write_rows(output / f"{learner}.csv", rows)
+        for row in sorted(rows, key=lambda row: -float(row["score"])):
+            console.print(f"  {row['score']}  trial {row['trial']}: {row['settings']}", highlight=False)
+
+
+def _trial(learner: str, k: int, settings: dict[str, object], folder: Path, told: Report) -> Row:
+    """One setting on all tasks that are tried on."""
+    scores: dict[str, str] = {}
+    for name in TRIED_ON:
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        curve = trainer_of(LEARNERS[learner])(
+            TASKS[name], SEED, folder / name, settings, AGENT_STEPS // PART, MINUTES / PART, told
+        )
+        scores[name] = f"{max((float(row['share']) + float(row['whole'])) / 2.0 for row in curve):.4f}"
+    score = float(np.mean([float(each) for each in scores.values()]))
+    return {"learner": learner, "trial": str(k), "score": f"{score:.4f}", **scores, "settings": json.dumps(settings)}
+
+
+if __name__ == "__main__":
+    app()
