@@ -1,22 +1,18 @@
 """Case of JaxMARL's MPE_simple_spread_v3 for perf/compare.py: ``step`` over worlds and time, compiled as one."""
 
-import os
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 import jaxmarl
-from worker import MEMORY_SHARE, Case, serve
+from peer_jax import Pytree, looped
+from worker import Case, serve
 
 SETS = 8
-Pytree = Any
 
 
 def simple_spread(agents: int, worlds: int) -> Case:
     """``jit`` of a loop over ``vmap(env.step)``, resets included, as its documents do it.
 
-    The latest observations, rewards and dones leave the loop, so that none of them is optimised away. As many landmarks
-    as agents, as in MPE2.
+    As many landmarks as agents, as in MPE2.
     """
     env = jaxmarl.make("MPE_simple_spread_v3", num_agents=agents, num_landmarks=agents)
     key = jax.random.key(0)
@@ -26,7 +22,6 @@ def simple_spread(agents: int, worlds: int) -> Case:
     actions = jax.random.randint(key, (SETS, agents, worlds), 0, 5)
     zeros, no = jnp.zeros(worlds), jnp.zeros(worlds, bool)
     rewards, dones = dict.fromkeys(env.agents, zeros), dict.fromkeys([*env.agents, "__all__"], no)
-    start = keys, observation, state, rewards, dones
 
     def one(k: int, carry: Pytree) -> Pytree:
         keys, _, state, _, _ = carry
@@ -34,17 +29,8 @@ def simple_spread(agents: int, worlds: int) -> Case:
         chosen = dict(zip(env.agents, actions[k % SETS], strict=True))
         return keys[:, 0], *jax.vmap(env.step)(keys[:, 1], state, chosen)[:4]
 
-    loop = jax.jit(lambda units, carry: jax.lax.fori_loop(0, units, one, carry)).lower(1, start).compile()
-    memory = loop.memory_analysis()
-    needed = memory.temp_size_in_bytes + 2 * memory.output_size_in_bytes
-    if needed > MEMORY_SHARE * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
-        raise MemoryError(f"would need {needed / 2**30:.0f} GiB, by XLA's count")
-    latest = [start]
-
-    def run(units: int) -> None:
-        latest[0] = jax.block_until_ready(loop(units, latest[0]))
-
-    return Case(run, agents * worlds, {"entries": observation[env.agents[0]].shape[-1]})
+    start = keys, observation, state, rewards, dones
+    return looped(one, start, agents * worlds, entries=observation[env.agents[0]].shape[-1])
 
 
 if __name__ == "__main__":
