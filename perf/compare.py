@@ -8,6 +8,7 @@ table are printed: median [lowest, highest] of the rates, and of their ratios to
 
 import argparse
 import contextlib
+import itertools
 import json
 import math
 import os
@@ -28,11 +29,15 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 RESULTS, TRAININGS = HERE / "results.json", HERE / "training.json"
 AGENTS, WORLDS = (3, 54, 500), (1, 64, 1024)
+HARD_AGENTS = AGENTS[:2]
+"""More don't fit onto maps with so few discs, theirs or ours."""
 FLOOR_CELLS = ((54, 1), (54, 64), (500, 1), (500, 64))
 CURVE = (3, 10, 54, 200, 500, 1000, 2000, 5000, 10000)
 ADAPTERS = ("swarm_idle", "task_idle", "vector_env_idle", "sb3_idle", "torchrl_idle")
 TRAINED = ("mappo", "plain")
 PEERS = ("mpe2", "vmas", "jaxmarl")
+HARD = {"hard_vector_env": "uuv_marl", "hard_core": "uuv_marl", "camar": "camar"}
+"""Library by case, on maps of hundreds of discs."""
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("NUMBA", "OMP", "MKL", "OPENBLAS")}
 LIMIT_S, CASE_LIMIT_S, PATIENCE_S = 240.0, 10.0, 20.0
 """For a build or a repeat; for a case's repeats together; for a process to end by itself."""
@@ -51,7 +56,7 @@ class Library(NamedTuple):
 
 LIBRARIES = {
     "uuv_marl": Library(".venv", "ours.py"),
-    **{peer: Library(f".venv-perf-{peer}", f"peer_{peer}.py") for peer in PEERS},
+    **{peer: Library(f".venv-perf-{peer}", f"peer_{peer}.py") for peer in (*PEERS, "camar")},
     "train": Library(".venv", "trainings.py", ONE_THREAD),
     "supersuit": Library(".venv-perf-supersuit", "trainings.py", ONE_THREAD),
     "rllib": Library(".venv-rllib", "trainings.py", ONE_THREAD),
@@ -77,6 +82,8 @@ def plan(training: bool) -> Iterator[Cell]:
             names = ("core", "vector_env", "parallel_env", *(KERNELS if (agents, worlds) in FLOOR_CELLS else ()))
             ours = dict.fromkeys(names, ("uuv_marl", worlds))
             yield Cell("rates", agents, ours | {peer: (peer, worlds) for peer in PEERS})
+    for agents, worlds in itertools.product(HARD_AGENTS, WORLDS):
+        yield Cell("hard", agents, {case: (library, worlds) for case, library in HARD.items()})
     yield Cell("terms", 54, dict.fromkeys(("parallel_env", "parallel_env_terms"), ("uuv_marl", 1)))
     yield Cell("adapters", 54, dict.fromkeys(ADAPTERS, ("uuv_marl", 64)))
     yield Cell("training", 54, {"ppo": ("uuv_marl", 64), "mpe2_ppo": ("mpe2", 4), "vmas_ppo": ("vmas", 64)})

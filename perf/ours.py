@@ -17,6 +17,8 @@ from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.sim.swarm import Swarm
 
 SETS, SETTLE_STEPS, SETTLE_S = 8, 200, 10.0
+PILES: dict[str, Any] = {"scenario": "hard_water", "overrides": {"task.kinds": ["piles"]}}
+"""The kind of hard maps with the most discs: 200 to 320 each, 265 on average."""
 
 
 def random_actions(agents: int, worlds: int) -> NDArray[np.float32]:
@@ -24,9 +26,9 @@ def random_actions(agents: int, worlds: int) -> NDArray[np.float32]:
     return np.random.default_rng(0).uniform(-1.0, 1.0, (SETS, worlds, agents, 2)).astype(np.float32)
 
 
-def core(agents: int, worlds: int) -> Case:
+def core(agents: int, worlds: int, scenario: str = "single_obstacle", **changes: Any) -> Case:
     """``Swarm.step``: motion, sonar, percepts."""
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=agents), worlds)
+    swarm = Swarm(load_scenario(scenario, num_vehicles=agents, **changes), worlds)
     actions = random_actions(agents, worlds)
     swarm.reset(0)
     return repeated(lambda k: swarm.step(actions[k % SETS]), agents * worlds, entries=swarm.layout.size)
@@ -37,6 +39,19 @@ def vector_env(agents: int, worlds: int) -> Case:
     envs, actions = uuv_marl.vector_env(worlds, num_vehicles=agents), random_actions(agents, worlds)
     envs.reset(seed=0)
     return repeated(lambda k: envs.step(actions[k % SETS]), agents * worlds, entries=envs.swarm.layout.size)
+
+
+def hard_vector_env(agents: int, worlds: int) -> Case:
+    """``vector_env`` on hard maps, with a decision of 0.5 s, five steps of the water.
+
+    Worlds begin at all ages, so that a step draws as many new maps as in the long run.
+    """
+    envs, actions = uuv_marl.vector_env(worlds, num_vehicles=agents, **PILES), random_actions(agents, worlds)
+    envs.reset(seed=0)
+    swarm, ages = envs.swarm, np.random.default_rng(0).uniform(size=worlds)
+    swarm.state.tick[:] = ages * swarm.time_limit_s / swarm.scenario.timing.control_hold_s
+    discs = float(swarm.course.num_obstacles.mean())
+    return repeated(lambda k: envs.step(actions[k % SETS]), agents * worlds, entries=swarm.layout.size, discs=discs)
 
 
 def parallel_env(agents: int, worlds: int, info_terms: bool = False) -> Case:
@@ -121,8 +136,10 @@ def ceiling(kind: str, agents: int, worlds: int) -> Case:
 
 
 CASES: dict[str, Maker] = {
-    case.__name__: case for case in (core, vector_env, parallel_env, parallel_env_terms, idle, bio_inspired, ppo)
+    case.__name__: case
+    for case in (core, vector_env, hard_vector_env, parallel_env, parallel_env_terms, idle, bio_inspired, ppo)
 }
+CASES["hard_core"] = partial(core, **PILES)
 CASES |= {name: partial(adapter, name) for name in ADAPTERS}
 CASES |= {kind: partial(ceiling, kind) for kind in KERNELS}
 

@@ -20,7 +20,7 @@ MEMORY_SHARE = 0.7
 """Of the machine's memory; with more, a case fails."""
 TOLD = (
     "uuv_marl", "numpy", "numba", "gymnasium", "pettingzoo", "stable_baselines3", "torch", "mpe2", "vmas", "jaxmarl",
-    "jax", "jaxlib", "supersuit", "ray",
+    "jax", "jaxlib", "camar", "supersuit", "ray",
 )  # fmt: skip
 """Libraries whose versions a case tells if it has imported them."""
 

@@ -11,7 +11,7 @@ import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # What pip installs by name, with constraints-NAME.txt, or with constraints.txt where there is no such file. BenchMARL
-# and RLlib pin what the others have newer, so they live apart; perf/ measures the last four beside uuv_marl.
+# and RLlib pin what the others have newer, so they live apart; perf/ measures the last five beside uuv_marl.
 WANTED = {
     "base": ("-e", "."),
     "dev": ("-e", ".[dev]"),
@@ -23,6 +23,7 @@ WANTED = {
     "perf-mpe2": ("mpe2", "stable-baselines3"),
     "perf-vmas": ("vmas", "stable-baselines3"),
     "perf-jaxmarl": ("jaxmarl",),
+    "perf-camar": ("camar",),
     "perf-supersuit": ("-e", ".[sb3,train]", "supersuit"),
 }
 
