@@ -1,9 +1,20 @@
-"""Checkpoints with random weights."""
+"""Checkpoints with random weights, and which policies fly anywhere."""
 
 import numpy as np
 
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
+from uuv_marl import load_scenario
+from uuv_marl.baselines import POLICIES
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, card_rows, save_checkpoint
 from uuv_marl.baselines.learned.layers import Architecture, shapes
+from uuv_marl.baselines.learned.trained import Trained
+
+ANYWHERE = [
+    name
+    for name, policy in POLICIES.items()
+    if "way" not in policy.channels
+    and not (isinstance(policy, Trained) and policy.checkpoint.card.percept != card_rows(load_scenario("starter")))
+]
+"""Policies that fly in any scenario; the others need a channel, or a row of the observation, that few tasks have."""
 
 
 def tensors(card, scale=0.3, seed=0):

@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.golden import STARTER
+from tests.nets import ANYWHERE
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, Policy, PolicyError, granted, make
+from uuv_marl.baselines import Policy, PolicyError, granted, make
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
@@ -21,8 +22,6 @@ from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
 GAINS = bio_inspired.BioInspiredGains()
-ANYWHERE = [name for name, policy in POLICIES.items() if "way" not in policy.channels]
-"""Policies that fly in any scenario; the others need a channel that few tasks have."""
 
 
 def test_the_default_gains_are_table_1():

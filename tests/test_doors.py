@@ -15,6 +15,7 @@ import typer
 from typer.testing import CliRunner
 
 import uuv_marl
+from tests.nets import ANYWHERE
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, PolicyError, granted, make
 from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoint
@@ -44,7 +45,7 @@ def made_for(name, n=5, worlds=2):
     return swarm, policy, swarm.reset(0)
 
 
-@pytest.mark.parametrize("name", [name for name, policy in POLICIES.items() if "way" not in policy.channels])
+@pytest.mark.parametrize("name", ANYWHERE)
 def test_percepts_of_others_are_refused(name):
     """Compiled code would read, and write memory, beyond the ends of the policy's arrays."""
     _, policy, percept = made_for(name)

@@ -75,7 +75,7 @@ def _mean(rows: Sequence[Row], name: str) -> float:
 
 def short(share: float) -> str:
     """Two digits after the point, without a zero before it."""
-    return f"{share:.2f}".replace("0.", ".", 1) if abs(share) < 0.995 else f"{share:.2f}"
+    return f"{share:.2f}".replace("0.", ".", 1)
 
 
 def _told(found: Estimate) -> str:

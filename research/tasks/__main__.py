@@ -1,19 +1,16 @@
 """``python -m research.tasks``: every policy on a task that is not the paper's, and the task's page."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from research import FOLDER
-from research.episodes import Row, read_rows, write_rows
+from research.episodes import write_rows
 from research.sets import run
-from research.tasks.figures import draw_curves
 from research.tasks.page import report
 from research.tasks.studies import STUDIES
 from uuv_marl.atomic import locked, write_text
-from uuv_marl.benchmark.style import house_style
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 from uuv_marl.errors import ResultsError
 
@@ -27,12 +24,11 @@ def main(
         list[str] | None, typer.Option(help="Run only this set, such as hard_water-gate. Repeat it for several sets.")
     ] = None,
     seeds: Annotated[int | None, typer.Option(min=1, max=10_000, help="At most this many seeds. Default: all.")] = None,
-    output: Annotated[Path, path_option("Folder for results, page and picture.")] = Path("results/tasks"),
+    output: Annotated[Path, path_option("Folder for results and page.")] = Path("results/tasks"),
 ) -> None:
-    """Run every policy on the sets of a task, and write its page with the trainings that lie in OUTPUT/learned/TASK.
+    """Run every policy on the sets of a task, and write its page from them.
 
-    The folder gets TASK.md, the rows of all episodes and a picture of the learners' curves. Ctrl-C keeps the finished
-    episodes; the same command continues.
+    The folder gets TASK.md and all rows. Ctrl-C keeps the finished episodes; the same command continues.
 
     Example: python -m research.tasks hard_water --only hard_water-gate --seeds 8
     """
@@ -46,23 +42,10 @@ def main(
             )
             told(1.0)
         if not only:
-            with locked(output, wait_s=60.0), house_style():
-                _write(task, output, rows)
+            with locked(output, wait_s=60.0):
+                write_rows(output / f"{task}.csv.gz", rows)
+                write_text(output / f"{task}.md", report(task, rows))
         console.print(f"  {output}", highlight=False)
-
-
-def _write(task: str, output: Path, rows: Sequence[Row]) -> None:
-    """The page, its rows and its picture."""
-    trainings = sorted(path.parent for path in (output / "learned" / task).glob("*/episodes.csv"))
-    if not trainings:
-        raise ResultsError(f"{output / 'learned' / task} holds no training; run python -m research.tasks.learn {task}")
-    episodes = [row for folder in trainings for row in read_rows(folder / "episodes.csv")]
-    curves = [{"learner": folder.name, **row} for folder in trainings for row in read_rows(folder / "curve.csv")]
-    write_rows(output / f"{task}.csv.gz", rows)
-    write_rows(output / f"learned_{task}.csv.gz", episodes)
-    write_rows(output / f"curves_{task}.csv", curves)
-    write_text(output / f"{task}.md", report(task, rows, episodes))
-    draw_curves(curves, STUDIES[task].headline, output / "figures" / f"{task}_curves.png")
 
 
 if __name__ == "__main__":

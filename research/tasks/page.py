@@ -6,7 +6,7 @@ from string import Template
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, measured, select
+from research.episodes import Row, measured
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.tables import markdown_table
@@ -18,7 +18,7 @@ Found = Mapping[tuple[str, str], Sequence[Row]]
 Columns = Mapping[str, Sequence[str]]
 """Sets by the head of their column."""
 _RESAMPLES = 2000
-_NO_LAWS = ("oracle", "carrot_informed", "random", "idle")
+_NO_LAWS = ("oracle", "carrot_informed", "random", "idle", "research.blind")
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
     "found_share": ("found", lambda values, _: _short(float(np.mean(values)))),
     "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
@@ -32,40 +32,29 @@ _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
 """Heads and cells of measures, from an episode's values and the number of vehicles."""
 
 
-def report(task: str, rows: Sequence[Row], episodes: Sequence[Row]) -> str:
+def report(task: str, rows: Sequence[Row]) -> str:
     """The page's text.
 
     Args:
         task: a name of ``STUDIES``.
-        rows: episodes of policies, as ``TASK.csv.gz`` holds them.
-        episodes: episodes of learners, as ``learned_TASK.csv.gz`` holds them.
+        rows: episodes, as ``TASK.csv.gz`` holds them.
     """
     found: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         found.setdefault((row["policy"], row["set"]), []).append(row)
-    names = _learners(task)
-    for row in sorted(episodes, key=lambda row: [*names].index(row["learner"].split("-")[0])):
-        found.setdefault((names[row["learner"].split("-")[0]], row["set"]), []).append(row)
-    study, sets = STUDIES[task], STUDIES[task].judged
-    kinds = {name.split("-")[1]: [name] for name in sets if "-" in name}
+    study = STUDIES[task]
+    kinds = {name.split("-")[1]: [name] for name in study.own if "-" in name}
     return Template(read_text("tasks", "stories", f"{task}.md")).substitute(
-        episodes=f"{len(rows):,}",
+        episodes=f"{sum(row['set'] not in study.final.values() for row in rows):,}",
         tiers=_shares(found, study, _tiers(task)),
         kinds=_measures(found, study, kinds),
         measures=_measures(found, study, {}),
         many=_measures(
             found, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
-        learners=_compared(found, task, {each.removeprefix(f"{task}-"): [each] for each in sets}),
         final=_final(found, study),
         informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "untouched_share"),
     )
-
-
-def _learners(task: str) -> dict[str, str]:
-    """What the trainings of a task are called in its tables, by the first word of their folders."""
-    name = "RecurrentPPO" if STUDIES[task].memory else "PPO"
-    return {"sighted": name, "zeroed": f"{name}, echoes zeroed here", "blind": f"{name}, trained with echoes zeroed"}
 
 
 def _tiers(task: str) -> Columns:
@@ -88,10 +77,10 @@ def _shares(found: Found, study: Study, columns: Columns, share: str = "") -> st
 
 
 def _measures(found: Found, study: Study, columns: Columns) -> str:
-    """The headline and the share of whole swarms in each column, or of the tier that is learned, and other measures."""
+    """The headline and the share of whole swarms in each column, or of the medium tier, and other measures."""
     table: list[tuple[str, ...]] = []
     for policy in _policies(found):
-        cells = [found.get((policy, name), ()) for names in ([*columns.values()] or [[study.learns]]) for name in names]
+        cells = [found.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names]
         if every := [row for rows in cells for row in rows]:
             shares = [[_mean([rows], name) for name in (study.headline, "whole")] if rows else ["–"] for rows in cells]
             own = [", ".join(two) for two in shares] if columns else shares[0]
@@ -119,13 +108,16 @@ def _final(found: Found, study: Study) -> str:
     for scenario, name in study.final.items():
         mine = {policy: rows for (policy, where), rows in found.items() if where == name}
         shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
-        best = max((policy for policy in mine if not is_trained(policy)), key=lambda law: shares[law].mean())
+        laws = [
+            policy for policy in mine
+            if not (is_trained(policy) or policy.startswith(_NO_LAWS) or "_informed" in policy)
+        ]  # fmt: skip
+        best = max(laws, key=lambda law: shares[law].mean())
         heads += [scenario, "above the best law"]
         for policy, rows in mine.items():
             gain = _with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
-            table.setdefault(policy, [policy]).extend(
-                (f"{_with_interval([shares[policy]])}, {_mean([rows], 'whole')}", gain)
-            )
+            told = f"{_with_interval([shares[policy]])}, {_mean([rows], 'whole')}"
+            table.setdefault(policy, [policy]).extend((told, gain))
     return markdown_table(heads, table.values())
 
 
@@ -140,60 +132,23 @@ def _cells(found: Found, policy: str, columns: Columns) -> list[list[Sequence[Ro
 
 
 def _values(mine: Sequence[Sequence[Row]], name: str) -> list[Float64]:
-    """Of each set, shape (training, episode); a policy that was not trained here has one training."""
-    return [
-        np.array([measured(select(rows, learner=who) if who else rows, name) for who in _trainings(rows)])
-        for rows in mine
-    ]
-
-
-def _trainings(rows: Sequence[Row]) -> list[str]:
-    return list(dict.fromkeys(row.get("learner", "") for row in rows))
+    """Of each set, shape (episode,)."""
+    return [np.array(measured(rows, name)) for rows in mine]
 
 
 def _mean(mine: Sequence[Sequence[Row]], name: str) -> str:
     return _short(float(np.mean([values.mean() for values in _values(mine, name)])))
 
 
-def _compared(found: Found, task: str, columns: Columns) -> str:
-    """The headline of trainings on each set, beside the best law that is told no more, and by how much they differ."""
-    study, names = STUDIES[task], _learners(task)
-    mixed = _tiers(task)[study.learns]
-    laws = [
-        policy
-        for policy in _policies(found)
-        if not policy.startswith(_NO_LAWS) and "_informed" not in policy and policy not in names.values()
-    ]
-    shares = {policy: _values(cells[0], study.headline) for policy in (*laws, *names.values())
-              if (cells := _cells(found, policy, {"": mixed}))}  # fmt: skip
-    best = max((law for law in laws if law in shares), key=lambda law: float(np.mean([v.mean() for v in shares[law]])))
-    called = {words: words for words in names.values() if words in shares} | {best: f"the best law: {best}"}
-    table = [
-        (words, *(_mean(mine, study.headline) for mine in _cells(found, policy, columns)),
-         _with_interval(shares[policy]))
-        for policy, words in called.items()
-    ]  # fmt: skip
-    gain = [own - law for own, law in zip(shares[names["sighted"]], shares[best], strict=True)]
-    table.append((f"{names['sighted']} above the best law", *[""] * len(columns), _with_interval(gain)))
-    return markdown_table(("", *columns, f"mean of {study.learns}"), table)
-
-
 def _with_interval(sets: Sequence[Float64]) -> str:
-    """The mean over sets, and its 95 % interval over episodes and trainings.
-
-    ``sets``: values of each set, shape (episode,) or (training, episode); both are drawn anew, trainings for all sets
-    alike.
-    """
-    rng, values = np.random.default_rng(0), [np.atleast_2d(each) for each in sets]
-    means = np.empty(_RESAMPLES)
+    """The mean over sets of values, shape (episode,) each, and its 95 % interval over episodes."""
+    rng, means = np.random.default_rng(0), np.empty(_RESAMPLES)
     for k in range(_RESAMPLES):
-        trainings = rng.integers(len(values[0]), size=len(values[0]))
-        means[k] = np.mean([v[trainings][:, rng.integers(v.shape[1], size=v.shape[1])].mean() for v in values])
+        means[k] = np.mean([values[rng.integers(len(values), size=len(values))].mean() for values in sets])
     low, high = np.percentile(means, (2.5, 97.5))
-    return f"{_short(float(np.mean([v.mean() for v in values])))} [{_short(low)}, {_short(high)}]"
+    return f"{_short(float(np.mean([values.mean() for values in sets])))} [{_short(low)}, {_short(high)}]"
 
 
 def _short(share: float) -> str:
     """Two digits after the point, without a zero before it."""
-    text = f"{share:.2f}"
-    return text.replace("0.", ".", 1) if abs(share) < 0.995 else text
+    return f"{share:.2f}".replace("0.", ".", 1)

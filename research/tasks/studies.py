@@ -1,4 +1,4 @@
-"""What is run for each task: policies on sets of episodes, and what a plain learner trains on."""
+"""What is run for each task: policies on sets of episodes."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -20,14 +20,10 @@ class Study(NamedTuple):
 
     sets: Mapping[str, EpisodeSet]
     """By name."""
-    learns: str
-    """The scenario that a plain learner trains on."""
-    worlds: int
-    """How many it trains in."""
-    memory: bool
-    """Whether it has a memory."""
-    judged: tuple[str, ...]
-    """Names of the sets that it is judged on, which are the scenario's own in all but the kind of map."""
+    medium: str
+    """The scenario of the medium tier."""
+    own: tuple[str, ...]
+    """Names of its sets, which are the scenario's own in all but the kind of map."""
     metrics: tuple[str, ...]
     """What is kept of an episode."""
 
@@ -47,7 +43,7 @@ def set_name(scenario: str, kind: str = "", number: int = 0) -> str:
     return "-".join([scenario, *([kind] if kind else []), *([str(number)] if number else [])])
 
 
-def _study(told: dict[str, Any]) -> Study:
+def _study(task: str, told: dict[str, Any]) -> Study:
     """One table of ``studies.toml``."""
     changes: dict[str, tuple[str, dict[str, object]]] = {}
     policies: dict[str, dict[str, range]] = {}
@@ -60,14 +56,14 @@ def _study(told: dict[str, Any]) -> Study:
                 changes[name] = scenario, ({"task.kinds": [kind], **own} if "kinds" in run else own)
                 policies.setdefault(name, {}).update(dict.fromkeys(_TOLD["policies"][run["policies"]], seeds))
     sets = {name: EpisodeSet(name, scenario, policies[name], own) for name, (scenario, own) in changes.items()}
-    judged = (
-        each for each in sets
-        if each.startswith(told["judged"]) and not each.endswith(_FINAL) and not {SIZE, INFORMED} & {*changes[each][1]}
+    own = (
+        name for name, (scenario, fields) in changes.items()
+        if scenario == task and not name.endswith(_FINAL) and not {SIZE, INFORMED} & {*fields}
     )  # fmt: skip
-    return Study(sets, told["learns"], told["worlds"], told.get("memory", False), tuple(judged), tuple(told["metrics"]))
+    return Study(sets, task, tuple(own), tuple(told["metrics"]))
 
 
-STUDIES = {name: _study(_TOLD[name]) for name in ("hard_water", "two_swarms", "few_informed", "silent_targets")}
+STUDIES = {name: _study(name, _TOLD[name]) for name in ("hard_water", "two_swarms", "few_informed", "silent_targets")}
 """By task."""
 SETS = tuple(each for study in STUDIES.values() for each in study.sets.values())
 """All of them."""

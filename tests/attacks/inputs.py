@@ -18,8 +18,9 @@ from gymnasium.error import ResetNeeded
 from typer.testing import CliRunner
 
 import uuv_marl
+from tests.nets import ANYWHERE
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.baselines import POLICIES, granted, make
+from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
@@ -280,7 +281,7 @@ def call_sequences(rng, folder):
 
 def foreign_percepts(rng, folder):
     """A policy is handed the percepts of another swarm, or numbers that no sonar gives."""
-    name = pick(rng, list(POLICIES))
+    name = pick(rng, ANYWHERE)
     n, worlds = int(rng.integers(1, 7)), int(rng.integers(1, 4))
     scenario = granted(name, load_scenario("single_obstacle", num_vehicles=n))
     policy = make(name, scenario, worlds)

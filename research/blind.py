@@ -1,0 +1,43 @@
+"""``Blind``: another policy that hears no echoes, which shows what its sonar of obstacles is worth."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from uuv_marl.baselines import Policy, make
+from uuv_marl.percept import Percept
+from uuv_marl.scenario import Scenario
+from uuv_marl.sim.arguments import SeedLike
+from uuv_marl.types import Float32
+
+
+class Blind(Policy):
+    """A network, or any policy with its clock and inner loop, whose percepts tell of no echo.
+
+    Args:
+        inner: its name.
+    """
+
+    yaw_damping_nms: ClassVar[float] = 600.0
+    decides_every_s: ClassVar[float | None] = 0.5
+    wishes_force: ClassVar[bool] = True
+
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: str) -> None:
+        super().__init__(scenario, num_worlds)
+        self._inner = make(inner, scenario, num_worlds)
+        told = [np.full(field.size, not field.name.startswith("echo")) for field in self.layout.table]
+        self._told = np.concatenate(told).astype(np.float32)
+
+    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
+        """Reset the policy inside, too."""
+        super().reset(seed, worlds)
+        self._inner.reset(seed, worlds)
+
+    def decide(self, percept: Percept) -> Float32:
+        """Actions of shape (world, vehicle, 2)."""
+        unheard = dataclasses.replace(percept, flat=percept.flat * self._told)
+        self._inner.active = self.active
+        self._inner.hear(unheard)
+        return self._inner.decide(unheard)
