@@ -147,7 +147,7 @@ def terminal_table(table: Table, width: int) -> RichTable:
     """A table for a terminal of a given width in columns."""
     if table.headers == HEADERS:
         return rich_table(table.title, [TableRow(*row) for row in table.rows], width)
-    return task_table(table.title, table.headers, table.rows)
+    return task_table(table.title, table.headers, table.rows, width)
 
 
 def _table(results: Results, scenario: Scenario, policies: Sequence[str], seeds: Sequence[int]) -> Table:

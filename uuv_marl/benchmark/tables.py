@@ -157,9 +157,12 @@ def task_rows(results: Results, scenario: str, policies: Sequence[str], seeds: S
     return rows
 
 
-def task_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]) -> RichTable:
-    """The table of a task for a terminal."""
-    table = RichTable(title=title, title_justify="left", caption=TASK_CAPTION, caption_justify="left")
+def task_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> RichTable:
+    """The table of a task for a terminal of a given width in columns."""
+    table = RichTable(
+        title=title, title_justify="left", caption=TASK_CAPTION, caption_justify="left",
+        padding=0 if width < _NARROW else (0, 1),
+    )  # fmt: skip
     for header in headers:
         table.add_column(escape(header), overflow="fold")
     for row in rows:

@@ -62,6 +62,9 @@ class Replay:
         self._title = _title(recordings)
         self._height_px = height_px
 
+    def __repr__(self) -> str:
+        return f"Replay of {self._title}"
+
     def _repr_html_(self) -> str:
         return (
             f'<iframe title="{html.escape(self._title)}" sandbox="allow-scripts" width="100%" '
