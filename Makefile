@@ -9,7 +9,7 @@ HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
 .PHONY: help benchmark reproduce test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
-.PHONY: docs test-docs docs-links check size dist test-release test-attacks perf perf-training clean
+.PHONY: docs notebooks test-docs docs-links check size dist test-release test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
@@ -17,6 +17,7 @@ help:
 	@echo "make test      [ARGS='-k sonar']    checks and tests"
 	@echo "make docs-check                     pages, tables and pictures are those of the code and of the shipped data"
 	@echo "make docs                           the site of these pages and of the code: build/site/index.html"
+	@echo "make notebooks [ARGS=1-first-steps] runs the tutorials and writes them as notebooks: docs/tutorials/*.ipynb"
 	@echo "make test-docs                      the site without a warning, its links, search and width; tutorials run"
 	@echo "make docs-links                     the site's links to other sites, which need the internet"
 	@echo "make test-bounds                    the simulation's tests, every index of compiled code checked"
@@ -51,6 +52,9 @@ SITE := .venv-docs/bin/python docs/site/build.py
 
 docs: .venv-docs/docs.stamp
 	$(SITE) $(ARGS)
+
+notebooks: .venv-docs/docs.stamp
+	.venv-docs/bin/python docs/site/notebooks.py $(ARGS)
 
 # From nothing, because Sphinx warns of a page only when it reads it.
 test-docs: .venv-docs/docs.stamp

@@ -1,6 +1,7 @@
 """What the documents say is executed, or compared with the code."""
 
 import importlib.util
+import json
 import re
 import warnings
 from fnmatch import fnmatch
@@ -21,7 +22,8 @@ pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
 README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
 POLICY = [ROOT / name for name in ("SECURITY.md",)]
-PAGES = [README, CONTRIBUTING, *POLICY, *sorted((ROOT / "docs").rglob("*.md"))]
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.py"))
+PAGES = [README, CONTRIBUTING, *POLICY, *sorted((ROOT / "docs").rglob("*.md")), *TUTORIALS]
 ELSEWHERE = {"benchmarl": "from benchmarl.", "rllib": "from ray.rllib."}
 """Imports by which the examples are known that run in tests/adapters, where their libraries are."""
 
@@ -73,6 +75,26 @@ def test_the_site_s_menu_has_every_page():
     menu = re.findall(r"^(?:.*<)?([^\s:<>`]+)>?$", (ROOT / "docs" / "site" / "navigation.txt").read_text(), flags=re.M)
     pages = {page.relative_to(ROOT).with_suffix("").as_posix() for page in PAGES} - {"README"}
     assert {page for page in pages if not any(fnmatch(page, entry) for entry in menu)} == set()
+
+
+def cells(source):
+    """Kind and text of each cell that a tutorial shows, as jupytext reads them."""
+    parts = re.split(r"^# %%(| .*)\n", source.read_text(), flags=re.M)
+    for mark, text in zip(parts[1::2], parts[2::2], strict=True):
+        hidden = r"^# ?" if "markdown" in mark or "bash" in mark else r"^# (?=%)"
+        shown = ("%%bash\n" if "bash" in mark else "") + re.sub(hidden, "", text.strip("\n"), flags=re.M)
+        if "check" not in mark:
+            yield "markdown" if "markdown" in mark else "code", shown
+
+
+@pytest.mark.parametrize("source", TUTORIALS, ids=lambda path: path.stem)
+def test_a_notebook_has_the_cells_of_its_source_and_one_that_installs(source):
+    path = source.with_suffix(".ipynb")
+    first, *stored = json.loads(path.read_text())["cells"]
+    assert "%pip install" in "".join(first["source"])
+    assert [(cell["cell_type"], "".join(cell["source"])) for cell in stored] == list(cells(source)), "make notebooks"
+    assert all(cell["outputs"] for cell in stored if cell["cell_type"] == "code")
+    assert path.stat().st_size < 300_000
 
 
 def stop(*args, **kwargs):

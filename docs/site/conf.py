@@ -25,14 +25,7 @@ exclude_patterns = ["docs/site", "uuv_marl", "examples"]
 
 # The pages are written for a code host; it makes the same anchors of the headings.
 myst_heading_anchors = 6
-# Tutorials run, each in an empty folder, when their cells have changed; tests/site runs them always.
-nb_execution_mode = "cache"
-nb_execution_cache_path = str(ROOT / "build" / "notebooks")
-nb_execution_in_temp = True
-nb_execution_raise_on_error = True
-nb_execution_timeout = 600
-nb_execution_show_tb = True
-nb_merge_streams = True
+nb_execution_mode = "off"  # make notebooks has run them
 
 # The code is read, not imported: compiled functions keep their signatures, and no extra has to be installed.
 autoapi_dirs = [str(ROOT / "uuv_marl")]

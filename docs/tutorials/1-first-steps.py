@@ -1,0 +1,152 @@
+# %% [markdown]
+# # 1. First steps
+#
+# A swarm of five vehicles passes an obstacle. You will see what one vehicle hears, how the episode ends, a replay, and
+# how to make a scenario of your own.
+#
+# - **Time**: about 2 minutes on two cores, of which 60 s are compiling at the first run.
+# - **Needs**: the extras `analysis` and `render`; the first cell installs uuv_marl where it is missing.
+#
+# ## A swarm and its controller
+#
+# A scenario holds every number of a simulation. `starter` is the smallest that ships: five vehicles, one obstacle, half
+# a minute. `granted` adds what a policy needs beyond its sonar. Look at what `bio_inspired_plus` needs.
+
+# %%
+import uuv_marl
+from uuv_marl import baselines
+
+scenario = baselines.granted("bio_inspired_plus", uuv_marl.load_scenario("starter"))
+print(scenario.title)
+print("yaw damping:", scenario.actuators.yaw_damping_nms, "N m s")
+
+# %% [markdown]
+# The policy gets yaw damping, an inner loop that brakes turns, but no compass and no messages.
+# [Policies](../policies.md) lists what each policy gets.
+#
+# The environment is a PettingZoo `ParallelEnv`. `reset` gives one observation per vehicle. Look at the length of an
+# observation.
+
+# %%
+env = uuv_marl.parallel_env(scenario)
+policy = baselines.make("bio_inspired_plus", env)
+observations, infos = env.reset(seed=0)
+policy.reset(seed=0)
+print(env.agents)
+print("one observation:", observations["uuv_0"].shape, observations["uuv_0"].dtype)
+
+# %% [markdown]
+# ## What one vehicle hears
+#
+# An observation is a row of 98 numbers, each divided by a scale. `Percept.from_observation` turns the row back into
+# fields in physical units. Look at the fields' names: they are also in [the observation's
+# table](../environment.md#observation).
+
+# %%
+import pandas as pd
+
+from uuv_marl.percept import Percept, PerceptLayout
+
+layout = PerceptLayout.of(scenario)
+percept = Percept.from_observation(observations["uuv_0"], layout)
+rows = [(layout.starts[f.name], f.size, f.kind.unit, f.kind.scale) for f in layout.table]
+pd.DataFrame(rows, index=list(percept.names), columns=["first entry", "entries", "unit", "scale"])
+
+# %% [markdown]
+# All positions are relative to the vehicle: the first number is the distance ahead, the second the distance to
+# starboard, the vehicle's right-hand side.
+#
+# Each of the 21 sub-sectors of the sonar hears the nearest vehicle in the sub-sector, or none. Look at how many
+# vehicles are heard, and how far away they are.
+
+# %%
+import numpy as np
+
+heard = percept["heard"] == 1.0
+ahead, starboard = percept["neighbour"][heard].T.astype(float)
+neighbours = pd.DataFrame({"ahead [m]": ahead, "to starboard [m]": starboard}, index=np.flatnonzero(heard))
+neighbours["distance [m]"] = np.hypot(ahead, starboard)
+neighbours.round(1)
+
+# %% [markdown]
+# Every row is a sub-sector with a vehicle that `uuv_0` hears. The row has no name, because `uuv_0` can't know which
+# vehicle it hears. A vehicle behind another in the same sub-sector is not heard.
+#
+# ## Run the episode
+#
+# The loop is that of any PettingZoo environment: actions in, observations out, until no agent is left. Look at `ending`
+# and `collisions` in the last `infos`.
+
+# %%
+while env.agents:
+    observations, rewards, terminations, truncations, infos = env.step(policy(observations))
+infos["uuv_0"]
+
+# %% [markdown]
+# The swarm arrived, and no vehicle touched anything. The policy follows l(t), a point that moves for 30 s, so no swarm
+# can arrive earlier. `time_s` also includes the 2 s for which the swarm must stay at the end.
+#
+# ## Watch it
+#
+# `record` runs an episode as the benchmark does and keeps all of it. `inspect` names vehicles whose sonar is kept, too.
+# `Replay` shows the recording in a notebook. Press the space bar, and click on vehicle 0 to see which vehicles it
+# hears.
+
+# %%
+from uuv_marl.replay.page import Replay
+from uuv_marl.replay.record import record
+
+recording = record(uuv_marl.load_scenario("starter"), "bio_inspired_plus", seed=0, inspect=[0])
+Replay([recording])
+
+# %% [markdown]
+# `uuv-marl replay` makes the same page, a film or a picture from the command line ([Watch an
+# episode](../benchmark.md#watch-an-episode)).
+#
+# ## Your own scenario
+#
+# A scenario of your own is a TOML file that says what differs from another scenario. Everything that the file leaves
+# out is as in `starter`. Look at what was loaded, and at the error for a misspelt field.
+
+# %%
+from pathlib import Path
+
+from uuv_marl.scenario import ScenarioError
+
+Path("two.toml").write_text("""
+extends = "starter"
+title = "Two obstacles"
+source = "mine"
+version = 1
+
+[swarm]
+num_vehicles = 6
+
+[[obstacles]]
+centre_m = [30.0, 20.0]
+radius_m = 10.0
+
+[[obstacles]]
+centre_m = [70.0, -15.0]
+radius_m = 8.0
+""")
+scenario = uuv_marl.load_scenario("two.toml")
+print(scenario.title, scenario.swarm.num_vehicles, [disc.radius_m for disc in scenario.obstacles])
+try:
+    uuv_marl.load_scenario("two.toml", overrides={"swarm.num_vehicle": 7})
+except ScenarioError as error:
+    print(error)
+
+# %% [markdown]
+# You can give the file's path wherever a scenario's name is expected. `overrides` changes a field without a file.
+# [Scenarios](../scenarios.md) has more.
+#
+# Next: [write a policy of your own](2-your-own-policy.ipynb).
+
+# %% tags=["check"]
+assert len(observations["uuv_0"]) == 98
+assert len(heard) == 21
+assert 1 <= heard.sum() <= 4
+assert infos["uuv_0"]["ending"] == "arrival"
+assert infos["uuv_0"]["collisions"] == 0
+assert 32.0 <= infos["uuv_0"]["time_s"] < 40.0

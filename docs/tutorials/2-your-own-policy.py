@@ -1,0 +1,101 @@
+# %% [markdown]
+# # 2. Your own policy
+#
+# A law of a dozen lines brings five vehicles past an obstacle as early as any policy can, and touches nothing. On
+# harder courses it touches obstacles. With the safety filter that ships it touches nothing there, either.
+#
+# - **Time**: about 2 minutes on two cores, of which 60 s are compiling at the first run.
+# - **Needs**: nothing but uuv_marl; the first cell installs it where it is missing. [First steps](1-first-steps.ipynb)
+#   explains what a vehicle hears.
+#
+# ## The law
+#
+# A policy is a class with a method `decide`. It gets the percept, what all vehicles know, and returns a thrust and a
+# turn for each of them, as shares of full force and torque. All arrays begin with the axes world and vehicle, so the
+# law of one vehicle is written once and acts for all. The cell saves the class in a file, because the benchmark reads
+# it from there.
+
+# %%
+# %%writefile mine.py
+import numpy as np
+
+from uuv_marl import baselines
+
+
+class Careful(baselines.Policy):
+    """Goes to l(t), and away from every vehicle and every obstacle that it hears."""
+
+    yaw_damping_nms = 600.0  # an inner loop that brakes turns
+
+    def decide(self, percept):
+        heard = np.concatenate([percept["heard"], percept["echo"]], axis=-1)[..., None]
+        position = np.concatenate([percept["neighbour"], percept["echo_position"]], axis=-2)
+        squared = np.maximum((position**2).sum(axis=-1, keepdims=True), 1.0)
+        away = -(heard * position / squared).sum(axis=-2)
+        wish = percept["reference_velocity"] + 0.2 * percept["reference"] + 40.0 * away
+        ahead, starboard = wish[..., 0], wish[..., 1]
+        thrust, turn = np.clip(0.12 * ahead, 0.0, 1.0), 0.3 * np.arctan2(starboard, ahead)
+        return np.stack([thrust, turn], axis=-1).astype(np.float32)
+
+
+# %% [markdown]
+# `wish` has three parts: the velocity of l(t), the point that the swarm follows; a pull to l(t); and a push away from
+# all that is heard, which halves when the distance doubles. [The observation's table](../environment.md#observation)
+# lists the fields that a law can use.
+#
+# ## In a table
+#
+# The benchmark takes the class as `module:Class`. It runs all policies on the same seeds. Look at the columns *task
+# time* and *obstacle distance*.
+
+# %% language="bash"
+# uuv-marl benchmark --scenario starter --seeds 10 --output results/starter \
+#     --policy mine:Careful --policy bio_inspired_plus --policy scout
+
+# %% [markdown]
+# `Careful` arrives after 30 s, when l(t) comes to rest, so no policy can be faster. It touches nothing, but comes
+# within some 2 m of the obstacle. `scout` is about as fast and keeps much more distance.
+#
+# The benchmark also writes pictures. Each panel shows the routes of a policy with one seed.
+
+# %%
+from IPython.display import Image
+
+Image("results/starter/figures/starter_routes.png", width=700)
+
+# %% [markdown]
+# ## On harder courses
+#
+# `random_field` draws another course and other obstacles for each seed. `guarded:` in front of a policy's name puts the
+# policy inside [the safety filter](../policies.md#the-filter), which changes an action only if it is not safe. Look at
+# the collisions.
+
+# %% language="bash"
+# uuv-marl benchmark --scenario random_field --set swarm.num_vehicles=10 --seeds 10 --output results/fields \
+#     --policy mine:Careful --policy guarded:mine:Careful --policy scout
+
+# %% [markdown]
+# `Careful` touches obstacles with every seed; a negative distance means inside the disc. Its push depends on the
+# distance to the obstacle's centre, which the sonar gives, and large obstacles begin far from their centre. Inside the
+# filter it touches nothing and arrives as early.
+#
+# To improve the law, use `percept["echo_range"]`, the distance to the surface. After each change of `mine.py` add
+# `--anew` to the command: it runs your policy again and keeps the runs of the others. Your policy can also have [a
+# memory](../policies.md#a-policy-that-remembers).
+#
+# Next: [a task of your own](3-your-own-task.ipynb).
+
+# %% tags=["check"]
+import uuv_marl.benchmark
+
+runs = uuv_marl.benchmark.load("results/starter").set_index("policy")
+assert runs["task_time_s"].notna().all()
+assert runs["collisions"].sum() == 0
+assert runs.loc["mine:Careful", "task_time_s"].max() < 31.0
+assert 1.0 < runs.loc["mine:Careful", "min_obstacle_distance_m"].min() < 3.0
+assert runs.loc["scout", "min_obstacle_distance_m"].min() > 10.0
+runs = uuv_marl.benchmark.load("results/fields").set_index("policy")
+assert (runs.loc["mine:Careful", "collisions"] > 0).all()
+assert runs.loc["mine:Careful", "min_obstacle_distance_m"].min() < 0.0
+assert runs.loc["guarded:mine:Careful", "collisions"].sum() == 0
+assert runs["task_time_s"].notna().all()
