@@ -23,20 +23,6 @@ def test_the_table_is_that_of_other_shipped_episodes(policy):
     assert line.split(" | ")[1:3] == [f"{middle + 1e-9:.1f} s", ", ".join(f"{d + 1e-9:.1f} m" for d in distances)]
 
 
-@pytest.mark.parametrize(("column", "task"), [(3, "hard_water"), (4, "two_swarms")])
-def test_shares_in_the_table_are_those_of_shipped_episodes(column, task):
-    """Of the medium tier, mean over the kinds of maps that it draws."""
-    rows = read_rows(DOCS / f"{task}.csv.gz")
-    sets = {"hard_water": [f"hard_water-{kind}" for kind in ("pocket", "bar", "gate", "forest")]}.get(task, [task])
-    lines = re.findall(r"^\| `(\w+)`(.*) \|$", (ROOT / "README.md").read_text(), re.M)
-    told = {policy: f"|{cells}".split(" | ")[column] for policy, cells in lines if cells.count(" | ") == 4}
-    assert len(told) == 10
-    for policy, share in told.items():
-        if share != "–":
-            mine = [measured(select(rows, policy=policy, set=name), "untouched_share") for name in sets]
-            assert share == f"{np.mean([np.mean(each) for each in mine]):.2f}".replace("0.", "."), policy
-
-
 def test_make_help_lists_every_target_that_is_named():
     makefile = (ROOT / "Makefile").read_text()
     for target in re.findall(r"(?:^|`|; |: )make ([a-z-]+)", (ROOT / "README.md").read_text(), re.M):

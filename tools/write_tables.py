@@ -7,8 +7,9 @@ from pathlib import Path
 
 import uuv_marl
 from research.dynamics import acceptance, sea_trials
-from research.episodes import read_rows
+from research.episodes import measured, read_rows, select
 from research.heldout import page as heldout
+from research.tasks.studies import set_name
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
 from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
@@ -24,6 +25,13 @@ PAGES = (ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in NAMES))
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
 TRIALS = read_rows(ROOT / "docs" / "sea-trials.csv.gz")
+TIERS = {task: read_rows(ROOT / "docs" / f"{task}.csv.gz") for task in ("hard_water", "two_swarms")}
+IN_TASKS = {
+    "tangent_bug": "`tangent_bug` with yaw damping",
+    **{name: f"`{name}` with a decision every 0.5 s, yaw damping" for name in ("mappo_hard_water", "mappo_two_swarms")},
+    "oracle": "`oracle`, who sees the map, with way, link, yaw damping",
+}
+"""What else README's table has."""
 HELD = heldout.tables(read_rows(ROOT / "docs" / "heldout.csv.gz"))
 
 
@@ -50,7 +58,7 @@ def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:
 
 
 def benchmark() -> str:
-    """The default policies' rows of ``single_obstacle``, shorter, from the long table in docs/results.md."""
+    """The default policies' rows of ``single_obstacle`` in docs/results.md, shorter, and what all do in tasks."""
     section = RESULTS.read_text(encoding="utf-8").partition("\n## single_obstacle")[2].partition("\n## ")[0]
     lines: list[tuple[str, ...]] = []
     for line in section.splitlines():
@@ -63,9 +71,21 @@ def benchmark() -> str:
             closest = (
                 f"{Decimal(obstacle):.1f} m, {Decimal(spacing):.1f} m"  # what ends in 5 was rounded before: to even
             )
-            lines.append((name, f"{time.split()[0]} s", closest, collisions))
-    closest = "smallest distance to the obstacle, to a vehicle (worst seed)"
-    return table(("policy, and what it gets beyond sonar", "task time", closest, "collisions"), lines)
+            lines.append((name, f"{time.split()[0]} s", closest, collisions, *shares(policy)))
+    lines += [(told, "–", "–", "–", *shares(policy)) for policy, told in IN_TASKS.items()]
+    heads = ("one obstacle: time", "to the obstacle, to a vehicle", "collisions", "hard water", "two swarms")
+    return table(("policy, and what it gets beyond sonar", *heads), lines)
+
+
+def shares(policy: str) -> list[str]:
+    """Of the vehicles that succeed in the medium tier of each of ``TIERS``, mean over the kinds of maps it draws."""
+    found: list[str] = []
+    for task, rows in TIERS.items():
+        kinds = getattr(load_scenario(task).task_numbers, "kinds", [""])
+        sets = [select(rows, policy=policy, set=set_name(task, kind)) for kind in kinds]
+        means = [sum(measured(each, "untouched_share")) / len(each) for each in sets if each]
+        found.append(f"{sum(means) / len(means):.2f}".replace("0.", ".") if means else "–")
+    return found
 
 
 def scenarios() -> str:
