@@ -12,6 +12,9 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike
 from uuv_marl.types import Float32
 
+BLIND = "research.blind:Blind,inner="
+"""The name of a blind policy, before that of the policy inside."""
+
 
 class Blind(Policy):
     """A network, or any policy with its clock and inner loop, whose percepts tell of no echo.

@@ -10,6 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from research.episodes import read_rows, select, write_rows
+from research.learners import cells
+from research.learners.protocol import TASKS
 from research.verify import check
 from research.verify.__main__ import app
 from uuv_marl import load_scenario
@@ -120,3 +122,23 @@ def test_every_kind_of_shipped_row_knows_what_it_is_made_of():
     some = {(row.file, key, row.cells[key]): row for row in rows for key in row.kind.keys if key != "seed"}
     for row in {row.where: row for row in some.values()}.values():
         assert row.kind.source(row.cells).policy, row.where
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, ""),
+        ({"learner": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
+        ({"learner": "research.blind:Blind,inner=evil:Law"}, "is not part of the package"),
+        ({"learner": "other", "training": "0"}, "there is no training '0' of a learner 'other' in this version"),
+        ({"learner": "ippo", "training": "0"}, "of hard_water-ippo-0 no policy is kept"),
+        ({"set": "nowhere"}, "there is no set 'nowhere' of task 'hard_water' in this version"),
+    ],
+)
+def test_rows_of_learners_come_out_again_and_run_nothing_from_elsewhere(tmp_path, changes, reason):
+    (row,) = cells.episodes("scout", TASKS["hard_water"].sets[0], range(7000, 7001))
+    place = {"task": "hard_water", "learner": "scout", "training": ""}
+    write_rows(tmp_path / "learners.csv", [{**place, **row, **changes}])
+    code, output = verify("learners.csv")
+    assert code == bool(reason), output
+    assert reason in output

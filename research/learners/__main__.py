@@ -65,7 +65,7 @@ def _write(chosen: list[Cell], output: Path, told: Report) -> None:
     """The page, if all trainings are there."""
     missing = [cell for cell in chosen if not (cell.folder(output) / EPISODES).exists()]
     if missing:
-        console.print(f"  {len(missing)} trainings are being made by others; run the command again for the page")
+        console.print(f"  {len(missing)} trainings are not done, here or by another process; run the command again")
         return
     curves: list[Row] = []
     rows: list[Row] = []
@@ -73,8 +73,9 @@ def _write(chosen: list[Cell], output: Path, told: Report) -> None:
         curve, final = read(cell, cell.folder(output))
         curves += curve
         rows += final
-    with locked(output, wait_s=60.0):
-        for path in write_page(output, curves, rows + beside(output, told)):
+    rows += beside(output, told)
+    with locked(output, wait_s=600.0):
+        for path in write_page(output, curves, rows):
             console.print(f"  {path}", highlight=False)
 
 

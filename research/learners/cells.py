@@ -1,5 +1,7 @@
 """Cells: a learner's training on a task with a seed, and what its policy does in the final episodes."""
 
+import json
+import shutil
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -7,15 +9,17 @@ from typing import NamedTuple
 
 from research.episodes import Row, read_rows, write_rows
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, Judged, Learner, Task
-from research.learners.squashed import FILE
 from research.learners.watch import Report, Trainer
+from uuv_marl.atomic import write_text
 from uuv_marl.baselines import granted
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.validation import shares_of
 
-CURVE, EPISODES, OTHERS = "curve.csv", "episodes.csv", "others"
+MADE, CURVE, EPISODES, OTHERS = "made.json", "curve.csv", "episodes.csv", "others"
 _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.masac"}
 _TRAINED = 0.8
 """Share of a cell's progress that the training is; assumed."""
@@ -58,25 +62,39 @@ def trainer_of(learner: Learner) -> Trainer:
     return made
 
 
+def emptied(folder: Path) -> None:
+    """Remove all that a folder holds."""
+    for path in folder.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
 def make(cell: Cell, folder: Path, report: Report) -> None:
-    """Train it, and run its policy; what is there already stays."""
+    """Train it, and run its policy; what is there already stays.
+
+    Raises:
+        ResultsError: it is there with other settings.
+    """
+    told = {"settings": cell.learner.settings, "agent_steps": AGENT_STEPS, "minutes": MINUTES}
     if not (folder / CURVE).exists():
-        for path in sorted(folder.rglob("*"), reverse=True):  # of a training that was cut off
-            if path.name.startswith("."):
-                continue
-            path.rmdir() if path.is_dir() else path.unlink()
+        emptied(folder)  # of a training that was cut off
         learn = trainer_of(cell.learner)
         curve = learn(cell.task, cell.seed, folder, cell.learner.settings, AGENT_STEPS, MINUTES,
                       lambda share: report(_TRAINED * share))  # fmt: skip
+        write_text(folder / MADE, json.dumps(told) + "\n")
         write_rows(folder / CURVE, curve)
+    elif json.loads((folder / MADE).read_text(encoding="utf-8")) != json.loads(json.dumps(told)):
+        raise ResultsError(f"{folder} was made with other settings; remove it, or give another --output")
     if not (folder / EPISODES).exists():
-        write_rows(folder / EPISODES, _episodes(cell, folder, report))
+        policy = cell.policy(folder / WEIGHTS_FILE)
+        rows = every(cell.task, policy, lambda share: report(_TRAINED + (1.0 - _TRAINED) * share))
+        write_rows(folder / EPISODES, rows)
 
 
-def _episodes(cell: Cell, folder: Path, report: Report) -> Iterator[Row]:
-    for k, each in enumerate(cell.task.sets):
-        report(_TRAINED + (1.0 - _TRAINED) * k / len(cell.task.sets))
-        yield from episodes(cell.policy(folder / FILE), each, each.episodes)
+def every(task: Task, policy: str, report: Report) -> Iterator[Row]:
+    """A policy's rows on all sets of a task."""
+    for k, each in enumerate(task.sets):
+        report(k / len(task.sets))
+        yield from episodes(policy, each, each.episodes)
 
 
 def episodes(policy: str, each: Judged, seeds: range) -> Iterator[Row]:
@@ -119,7 +137,7 @@ def beside(output: Path, report: Report) -> list[Row]:
         report(k / len(todo))
         path = output / "policies" / f"{task.name}-{policy}.csv"
         if not path.exists():
-            write_rows(path, [row for each in task.sets for row in episodes(policy, each, each.episodes)])
+            write_rows(path, every(task, policy, lambda _: None))
         found += [{"task": task.name, "learner": policy, "training": "", **row} for row in read_rows(path)]
     for path in sorted((output / OTHERS).glob("*/*.csv")):
         place = {"task": path.parent.name, "learner": f"{path.stem} (checked)", "training": ""}

@@ -22,17 +22,17 @@ with warnings.catch_warnings():
 
 from research.episodes import Row
 from research.learners.protocol import Task
-from research.learners.squashed import FILE
 from research.learners.watch import Report, Watch
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
+from uuv_marl.train.rows import TRAINING_SEEDS
 from uuv_marl.train.training import overrides_for
 
-TRAINING_SEEDS = 100_000
-KEPT = 500_000
+REPLAYED = 500_000
 """Agent-steps that are kept to learn from."""
 
 
 class _SpentError(Exception):
-    """The budget is."""
+    """The budget is spent."""
 
 
 class _Measured(Callback):
@@ -55,7 +55,7 @@ class _Measured(Callback):
             tensors = {f"{k // 2}.{'bias' if k % 2 else 'weight'}": x.T.copy() for k, x in enumerate(layers)}
             candidate.write_bytes(safetensors.numpy.save(tensors))
             if self._watch.measure(f"research.learners.squashed:Squashed,path={candidate}", steps):
-                candidate.replace(self._folder / FILE)
+                candidate.replace(self._folder / WEIGHTS_FILE)
         if self._watch.share(steps) >= 1.0:
             raise _SpentError
 
@@ -74,14 +74,14 @@ def learn(
     worlds = config.off_policy_n_envs_per_worker = told["worlds"]
     config.off_policy_collected_frames_per_batch = worlds * told["decisions"]
     config.off_policy_n_optimizer_steps, config.off_policy_train_batch_size = told["optimizer_steps"], told["batch"]
-    config.off_policy_memory_size = KEPT // task.num_vehicles
+    config.off_policy_memory_size = REPLAYED // task.num_vehicles
     config.off_policy_init_random_frames = told["random_steps"] // task.num_vehicles
     model = MlpConfig(num_cells=[64, 64], layer_class=torch.nn.Linear, activation_class=torch.nn.Tanh)
     options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": overrides_for(task.name, {})}
     with (folder / "benchmarl.log").open("w") as log, redirect_stderr(log), redirect_stdout(log), suppress(_SpentError):
         Experiment(
             task=getattr(SwarmTask, task.name.upper()).get_task(options), algorithm_config=MasacConfig.get_from_yaml(),
-            model_config=model, critic_model_config=model, seed=TRAINING_SEEDS + seed, config=config,
+            model_config=model, critic_model_config=model, seed=TRAINING_SEEDS[0] + 1000 * seed, config=config,
             callbacks=[_Measured(watch, folder, task.num_vehicles)],
         ).run()  # fmt: skip
     return watch.curve

@@ -1,6 +1,5 @@
 """``python -m research.learners.others``: rows of a policy from elsewhere, made, or checked digit by digit."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -9,9 +8,8 @@ import typer
 
 from research import FOLDER
 from research.episodes import Row, read_rows, write_rows
-from research.learners.cells import OTHERS, episodes
+from research.learners.cells import MEASURES, OTHERS, episodes, every
 from research.learners.protocol import TASKS, Task
-from research.learners.watch import Report
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 from uuv_marl.errors import ResultsError
 
@@ -39,7 +37,7 @@ def main(
         with working("Nothing was kept") as bar:
             told = progress_line(bar, rows.name)
             if not rows.exists():
-                write_rows(rows, list(every(TASKS[task], policy, told)))
+                write_rows(rows, every(TASKS[task], policy, told))
                 console.print(f"  {rows}", highlight=False)
                 return
             given = read_rows(rows)
@@ -54,15 +52,13 @@ def main(
         console.print(f"  {len(drawn)} of {len(given)} rows came again alike: {path}", highlight=False)
 
 
-def every(task: Task, policy: str, told: Report) -> Iterator[Row]:
-    """A policy's rows on all sets of a task."""
-    for k, each in enumerate(task.sets):
-        told(k / len(task.sets))
-        yield from episodes(policy, each, each.episodes)
-
-
 def need_whole(rows: list[Row], task: Task) -> None:
-    """Refuse rows that leave out an episode, or have one twice. Raises ResultsError."""
+    """Refuse rows that leave out an episode, have one twice, or are of something else. Raises ResultsError."""
+    columns = ["set", "seed", *MEASURES]
+    if list(rows[0]) != columns:
+        raise ResultsError(f"the columns must be {', '.join(columns)}, got {', '.join(rows[0])}")
+    for name in {row["set"] for row in rows} - {each.name for each in task.sets}:
+        raise ResultsError(f"set must be one of {', '.join(each.name for each in task.sets)}, got {name!r}")
     for each in task.sets:
         seeds = sorted(int(row["seed"]) for row in rows if row["set"] == each.name)
         if seeds != list(each.episodes):
@@ -73,10 +69,8 @@ def need_whole(rows: list[Row], task: Task) -> None:
 
 
 def need_alike(row: Row, policy: str, task: Task) -> None:
-    """Run the episode of a row again. Raises ResultsError where it is another, or in no set of the task."""
-    seed, each = int(row["seed"]), next((each for each in task.sets if each.name == row["set"]), None)
-    if each is None:
-        raise ResultsError(f"set must be one of {', '.join(each.name for each in task.sets)}, got {row['set']!r}")
+    """Run the episode of a row again. Raises ResultsError where it is another."""
+    seed, each = int(row["seed"]), next(each for each in task.sets if each.name == row["set"])
     (again,) = episodes(policy, each, range(seed, seed + 1))
     if other := [f"{key} {row.get(key)}, now {value}" for key, value in again.items() if row.get(key) != value]:
         raise ResultsError(f"set {each.name}, seed {seed} came again with {'; '.join(other)}")

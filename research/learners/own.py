@@ -7,6 +7,7 @@ from research.episodes import Row
 from research.learners.protocol import Task
 from research.learners.watch import Report, point
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
+from uuv_marl.errors import ResultsError
 from uuv_marl.train.run import train
 from uuv_marl.train.training import Training, changed_fields
 
@@ -21,8 +22,16 @@ def learn(
     for record in train(folder / "run", training):
         report(max(record.agent_steps / agent_steps, record.seconds / 60.0 / minutes))
         if record.share is not None and record.whole is not None and record.contacts is not None:
-            curve.append(point(record.agent_steps, record.seconds / 60.0, record.share, record.whole, record.contacts))
+            curve.append(
+                point(
+                    record.agent_steps,
+                    record.seconds / 60.0,
+                    record.share,
+                    record.whole,
+                    record.contacts / task.num_vehicles,
+                )
+            )
         if record.seconds > 60.0 * minutes:
-            break
+            raise ResultsError(f"{agent_steps:,} agent-steps take longer than {minutes:g} minutes here; lower them")
     (folder / "run" / "best" / WEIGHTS_FILE).replace(folder / WEIGHTS_FILE)
     return curve

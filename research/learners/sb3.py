@@ -16,10 +16,10 @@ from research.learners.protocol import Task
 from research.learners.watch import Report, Watch
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.envs.sb3 import SwarmVecEnv
+from uuv_marl.train.rows import TRAINING_SEEDS
 from uuv_marl.train.sb3 import save_sb3
 from uuv_marl.train.training import ROWS
 
-TRAINING_SEEDS = 100_000
 STEPS = 64
 """Decisions of each world between two updates, as our own trainer has."""
 
@@ -32,7 +32,7 @@ class _Measured(BaseCallback):
         self._watch, self._folder = watch, folder
 
     def _on_step(self) -> bool:
-        return True
+        return not self._watch.late
 
     def _on_rollout_start(self) -> None:
         self.measure()
@@ -58,7 +58,7 @@ def learn(
     rate = float(told.pop("learning_rate"))
     model = PPO(
         "MlpPolicy", env, n_steps=STEPS, policy_kwargs={"net_arch": [64, 64], "log_std_init": told.pop("log_std_init")},
-        learning_rate=lambda left: rate * max(left, 0.02), seed=TRAINING_SEEDS + seed,
+        learning_rate=lambda left: rate * max(left, 0.02), seed=TRAINING_SEEDS[0] + 1000 * seed,
         device="cpu", **told,
     )  # fmt: skip
     measured = _Measured(watch, folder)

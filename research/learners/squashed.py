@@ -13,8 +13,6 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.observation import observation_layout, observer
 from uuv_marl.types import Float32
 
-FILE = "policy.safetensors"
-
 
 class Squashed(Policy):
     """Layers of tanh units; the first half of the last one's outputs, through tanh, is the action.

@@ -9,7 +9,7 @@ import typer
 
 from research import FOLDER
 from research.episodes import Row, read_rows, write_rows
-from research.learners.cells import trainer_of
+from research.learners.cells import emptied, trainer_of
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRIED_ON
 from research.learners.watch import Report
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
@@ -28,7 +28,7 @@ def main(
     """Train a learner with each of its settings on two tasks, and write what came of it.
 
     A trial's score is the mean over both tasks of its best validation: the mean of the headline and of the share of
-    whole swarms. The trials that ship are in research/learners/trials.csv.
+    whole swarms. OUTPUT/LEARNER.csv holds them all.
 
     Example: python -m research.learners.tune ppo
     """
@@ -54,6 +54,7 @@ def _trial(learner: str, k: int, settings: dict[str, object], folder: Path, told
     scores: dict[str, str] = {}
     for name in TRIED_ON:
         (folder / name).mkdir(parents=True, exist_ok=True)
+        emptied(folder / name)  # of a trial that was cut off
         curve = trainer_of(LEARNERS[learner])(
             TASKS[name], SEED, folder / name, settings, AGENT_STEPS // PART, MINUTES / PART, told
         )

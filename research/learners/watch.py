@@ -27,12 +27,18 @@ class Watch:
         """A row for each measurement."""
         self._training = task.training(steps=agent_steps)
         self._whole, self._minutes, self._report = agent_steps, minutes, report
+        self._vehicles = task.num_vehicles
         self._begin, self._apart, self._best = time.process_time(), 0.0, -1.0
 
     @property
     def minutes(self) -> float:
         """Processor time so far, measuring apart [min]."""
         return (time.process_time() - self._begin - self._apart) / 60.0
+
+    @property
+    def late(self) -> bool:
+        """Whether the processor time is spent."""
+        return self.minutes >= self._minutes
 
     def share(self, agent_steps: int) -> float:
         """The part of the budget that is spent after so many agent-steps."""
@@ -49,14 +55,14 @@ class Watch:
         minutes, begin = self.minutes, time.process_time()
         judged = validate(policy, self._training)
         self._apart += time.process_time() - begin
-        self.curve.append(point(agent_steps, minutes, judged.share, judged.whole, judged.contacts))
+        self.curve.append(point(agent_steps, minutes, judged.share, judged.whole, judged.contacts / self._vehicles))
         better = judged.score >= self._best
         self._best = max(self._best, judged.score)
         return better
 
 
 def point(agent_steps: int, minutes: float, share: float, whole: float, contacts: float) -> Row:
-    """A row of a curve."""
+    """A row of a curve; the contacts are those of a vehicle."""
     return {
         "agent_steps": str(agent_steps), "minutes": f"{minutes:.2f}", "share": f"{share:.4f}", "whole": f"{whole:.4f}",
         "contacts": f"{contacts:.3f}",

@@ -1,1 +1,1 @@
-"""Tasks beyond the paper: what laws and a plain learner reach, scenario by scenario and map by map."""
+"""Tasks beyond the paper: what laws and networks reach, scenario by scenario and map by map."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import binomtest
 
+from research.blind import BLIND
 from research.verify.rows import NoEpisodesError, Row, rows_of
 from uuv_marl.baselines import granted
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
@@ -89,8 +90,8 @@ def only(rows: Sequence[Row], places: Collection[str], policies: Collection[str]
 
 
 def policy_of(row: Row) -> str:
-    """The policy's name; a file of the paper's own policy names none."""
-    return row.cells.get("policy", "bio_inspired")
+    """The policy's name, or the learner's; a file of the paper's own policy names none."""
+    return row.cells.get("policy") or row.cells.get("learner") or "bio_inspired"
 
 
 def fresh_seed() -> int:
@@ -124,7 +125,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
 
 
 def _need_trust(policy: str, allowed: Collection[str]) -> None:
-    plain = policy.removeprefix(OWN).removeprefix(GUARDED)
+    plain = policy.removeprefix(BLIND).removeprefix(OWN).removeprefix(GUARDED)
     if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
         raise PolicyError(f"policy {policy!r} is not part of the package; if you trust it, give --policy {policy}")
 

@@ -143,6 +143,8 @@ def _learned(cells: Cells) -> Source:
         raise ResultsError(f"there is no set {cells['set']!r} of task {cells['task']!r} in this version")
     policy = cells["learner"]
     if cells["training"]:
+        if policy not in LEARNERS or not cells["training"].isdecimal():
+            raise ResultsError(f"there is no training {cells['training']!r} of a learner {policy!r} in this version")
         cell = learners.Cell(task, LEARNERS[policy], int(cells["training"]))
         if not cell.kept.exists():
             raise PolicyError(f"of {cell.kept.stem} no policy is kept; python -m research.learners trains it again")

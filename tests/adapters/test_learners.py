@@ -31,7 +31,8 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
     cell = cells.Cell(task, LEARNERS[name], 0)
     folder = cell.folder(tmp_path)
-    folder.mkdir(parents=True)
+    (folder / "run" / "checkpoints").mkdir(parents=True)
+    (folder / "run" / ".lock").touch()  # of a training that was cut off
     cells.make(cell, folder, quiet)
     curve, rows = cells.read(cell, folder)
     assert 1 <= len(curve) <= 2
@@ -40,8 +41,11 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     before = (folder / cells.EPISODES).stat().st_mtime_ns
     cells.make(cell, folder, quiet)
     assert (folder / cells.EPISODES).stat().st_mtime_ns == before
+    cell = cell._replace(learner=cell.learner._replace(tried=({**cell.learner.settings, "seed": 1},), chosen=0))
+    with pytest.raises(ResultsError, match="was made with other settings; remove it, or give another --output"):
+        cells.make(cell, folder, quiet)
     first = small[0][0]
-    (again,) = cells.episodes(cell.policy(folder / cells.FILE), first, range(7000, 7001))
+    (again,) = cells.episodes(cell.policy(folder / cells.WEIGHTS_FILE), first, range(7000, 7001))
     assert again == {key: rows[0][key] for key in again}
 
 
@@ -117,7 +121,7 @@ def test_every_set_of_the_protocol_can_be_run_by_its_learners():
 def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
     task = TASKS["hard_water"]
     few = task._replace(tiers=tuple((tier[0]._replace(episodes=range(7000, 7002)),) for tier in task.tiers))
-    rows = list(others.every(few, "scout", quiet))
+    rows = list(cells.every(few, "scout", quiet))
     page.write_rows(tmp_path / "rows.csv.gz", rows)
     assert read_rows(tmp_path / "rows.csv.gz") == rows
     others.need_whole(rows, few)
@@ -130,4 +134,6 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
     with pytest.raises(ResultsError, match="came again with"):
         others.need_alike(rows[0], "random", few)
     with pytest.raises(ResultsError, match="set must be one of hard_water, .*, got 'lake'"):
-        others.need_alike({**rows[0], "set": "lake"}, "scout", few)
+        others.need_whole([{**rows[0], "set": "lake"}], few)
+    with pytest.raises(ResultsError, match="the columns must be set, seed, share, .*, got set, .*, colour"):
+        others.need_whole([{**row, "colour": "blue"} for row in rows], few)
