@@ -15,7 +15,7 @@ from nbformat import NotebookNode
 SOURCES = sorted((Path(__file__).resolve().parent.parent / "tutorials").glob("*.py"))
 # OWNER: put the repository's address, or the name of the package on PyPI, into INSTALL, and run this file again.
 INSTALL = """\
-# Installs uuv_marl where it is missing, as on Colab.
+# Installs uuv_marl where it is missing.
 import os
 import sys
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from research.episodes import Row, read_rows, write_rows
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, Judged, Learner, Task
-from research.learners.watch import Report, Trainer
+from research.learners.watch import Asked, Report, Trainer
 from uuv_marl.atomic import write_text
 from uuv_marl.baselines import granted
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
@@ -23,9 +23,8 @@ MADE, CURVE, EPISODES, OTHERS = "made.json", "curve.csv", "episodes.csv", "other
 _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.masac"}
 _TRAINED = 0.8
 """Share of a cell's progress that the training is; assumed."""
-
-
 KEPT = Path(__file__).resolve().parent / "policies"
+"""Weights that ship, so that their rows can be run again."""
 
 
 class Cell(NamedTuple):
@@ -77,9 +76,9 @@ def make(cell: Cell, folder: Path, report: Report) -> None:
     told = {"settings": cell.learner.settings, "agent_steps": AGENT_STEPS, "minutes": MINUTES}
     if not (folder / CURVE).exists():
         emptied(folder)  # of a training that was cut off
-        learn = trainer_of(cell.learner)
-        curve = learn(cell.task, cell.seed, folder, cell.learner.settings, AGENT_STEPS, MINUTES,
-                      lambda share: report(_TRAINED * share))  # fmt: skip
+        spent: Report = lambda share: report(_TRAINED * share)  # noqa: E731
+        asked = Asked(cell.task, cell.seed, folder, cell.learner.settings, AGENT_STEPS, MINUTES, spent)
+        curve = trainer_of(cell.learner)(asked)
         write_text(folder / MADE, json.dumps(told) + "\n")
         write_rows(folder / CURVE, curve)
     elif json.loads((folder / MADE).read_text(encoding="utf-8")) != json.loads(json.dumps(told)):

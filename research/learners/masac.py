@@ -21,8 +21,7 @@ with warnings.catch_warnings():
     from uuv_marl.envs.benchmarl import SwarmTask
 
 from research.episodes import Row
-from research.learners.protocol import Task
-from research.learners.watch import Report, Watch
+from research.learners.watch import Asked, Watch
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.train.rows import TRAINING_SEEDS
 from uuv_marl.train.training import overrides_for
@@ -49,24 +48,24 @@ class _Measured(Callback):
         """After the updates of an iteration."""
         steps = self.experiment.total_frames * self._vehicles
         if self._watch.due(steps):
-            actor = self.experiment.group_policies[group]
-            layers = [x.detach().numpy() for x in actor.parameters()]
             candidate = self._folder / "candidate.safetensors"
-            tensors = {f"{k // 2}.{'bias' if k % 2 else 'weight'}": x.T.copy() for k, x in enumerate(layers)}
-            candidate.write_bytes(safetensors.numpy.save(tensors))
+            candidate.write_bytes(safetensors.numpy.save(tensors_of(self.experiment.group_policies[group])))
             if self._watch.measure(f"research.learners.squashed:Squashed,path={candidate}", steps):
                 candidate.replace(self._folder / WEIGHTS_FILE)
         if self._watch.share(steps) >= 1.0:
             raise _SpentError
 
 
-def learn(
-    task: Task, seed: int, folder: Path, settings: dict[str, object], agent_steps: int, minutes: float, report: Report
-) -> list[Row]:
+def tensors_of(actor: Any) -> dict[str, Any]:
+    """The layers of BenchMARL's actor by name, as ``squashed.Squashed`` reads them: weights (in, out), and biases."""
+    layers = [x.detach().numpy() for x in actor.parameters()]
+    return {f"{k // 2}.{'bias' if k % 2 else 'weight'}": x.T.copy() for k, x in enumerate(layers)}
+
+
+def learn(asked: Asked) -> list[Row]:
     """As ``watch.Trainer`` says."""
     torch.set_num_threads(1)
-    told: dict[str, Any] = dict(settings)
-    watch = Watch(task, agent_steps, minutes, report)
+    told, task, folder, watch = asked.settings, asked.task, asked.folder, Watch(asked)
     config = ExperimentConfig.get_from_yaml()
     config.save_folder, config.loggers, config.create_json, config.render = str(folder), [], False, False
     config.evaluation = False
@@ -81,7 +80,7 @@ def learn(
     with (folder / "benchmarl.log").open("w") as log, redirect_stderr(log), redirect_stdout(log), suppress(_SpentError):
         Experiment(
             task=getattr(SwarmTask, task.name.upper()).get_task(options), algorithm_config=MasacConfig.get_from_yaml(),
-            model_config=model, critic_model_config=model, seed=TRAINING_SEEDS[0] + 1000 * seed, config=config,
+            model_config=model, critic_model_config=model, seed=TRAINING_SEEDS[0] + 1000 * asked.seed, config=config,
             callbacks=[_Measured(watch, folder, task.num_vehicles)],
         ).run()  # fmt: skip
     return watch.curve

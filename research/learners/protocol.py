@@ -18,7 +18,6 @@ TRIED_ON: list[str] = _TOLD["tried_on"]
 TIERS = ("unseen seeds", "unseen sizes and ranges", "unseen maps and sea")
 SEA, SEA_LEVEL = "sea", 1
 """Name of a set in the sea, and the level of the robustness axis ``X`` there."""
-_SIZE = "swarm.num_vehicles"
 
 
 class Judged(NamedTuple):
@@ -78,35 +77,20 @@ class Learner(NamedTuple):
 
 
 def _task(told: Mapping[str, Any]) -> Task:
-    own: dict[str, object] = {_SIZE: told["num_vehicles"]}
-    changes: list[list[tuple[str, dict[str, object]]]] = [[(told["name"], own)], [], []]
+    task: str = told["name"]
+    own: dict[str, object] = {"swarm.num_vehicles": told["num_vehicles"]}
+    seeds = [range(_TOLD["first"], _TOLD["first"] + count) for count in _TOLD["tiers"]]
+    tiers: list[list[Judged]] = [[Judged(task, task, own, seeds[0])], [], []]
     for tier, key in ((1, "two"), (2, "three")):
         for change in told[key]:
             if change == SEA:
-                speed = load_scenario(told["name"]).trajectory.speed_mps
-                changes[tier].append((told["name"], own | AXES["X"].overrides(SEA_LEVEL, speed)))
+                sea = AXES["X"].overrides(SEA_LEVEL, load_scenario(task).trajectory.speed_mps)
+                tiers[tier].append(Judged(f"{task}-{SEA}", task, own | sea, seeds[tier]))
             else:
                 other = {**change}
-                name = other.pop("scenario", told["name"])
-                changes[tier].append((name, other if name != told["name"] else own | other))
-    tiers = tuple(
-        tuple(_set(name, over, told, count) for name, over in mine)
-        for mine, count in zip(changes, _TOLD["tiers"], strict=True)
-    )
-    return Task(told["name"], told["num_vehicles"], tuple(told["policies"]), tiers)
-
-
-def _set(scenario: str, overrides: Mapping[str, object], told: Mapping[str, Any], count: int) -> Judged:
-    """So many episodes of a tier, named by what is changed."""
-    words = [scenario]
-    if any(field.startswith("current.") for field in overrides):
-        words.append(SEA)
-    elif "task.kinds" in overrides:
-        words += [str(kind) for kind in overrides["task.kinds"]]  # type: ignore[attr-defined]
-    elif _SIZE in overrides and (scenario, overrides[_SIZE]) != (told["name"], told["num_vehicles"]):
-        words.append(str(overrides[_SIZE]))
-    seeds = range(_TOLD["first"], _TOLD["first"] + count)
-    return Judged("-".join(words), scenario, overrides, seeds)
+                name, scenario = other.pop("name"), other.pop("scenario", task)
+                tiers[tier].append(Judged(name, scenario, own | other if scenario == task else other, seeds[tier]))
+    return Task(task, told["num_vehicles"], tuple(told["policies"]), tuple(map(tuple, tiers)))
 
 
 TASKS = {told["name"]: _task(told) for told in _TOLD["tasks"]}

@@ -4,7 +4,6 @@
 # Stable-Baselines3 leaves the types of observations and spaces open.
 
 from pathlib import Path
-from typing import Any
 
 import torch
 from stable_baselines3 import PPO
@@ -12,8 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
 from research.episodes import Row
-from research.learners.protocol import Task
-from research.learners.watch import Report, Watch
+from research.learners.watch import Asked, Watch
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.train.rows import TRAINING_SEEDS
@@ -46,22 +44,19 @@ class _Measured(BaseCallback):
                 candidate.replace(self._folder / WEIGHTS_FILE)
 
 
-def learn(
-    task: Task, seed: int, folder: Path, settings: dict[str, object], agent_steps: int, minutes: float, report: Report
-) -> list[Row]:
+def learn(asked: Asked) -> list[Row]:
     """As ``watch.Trainer`` says."""
     torch.set_num_threads(1)
-    told: dict[str, Any] = dict(settings)
-    watch = Watch(task, agent_steps, minutes, report)
+    told, task, watch = dict(asked.settings), asked.task, Watch(asked)
     worlds = max(1, round(ROWS / task.num_vehicles))
     env = VecNormalize(SwarmVecEnv(task.scenario, worlds, observe="closeness"), norm_obs=False)
     rate = float(told.pop("learning_rate"))
     model = PPO(
         "MlpPolicy", env, n_steps=STEPS, policy_kwargs={"net_arch": [64, 64], "log_std_init": told.pop("log_std_init")},
-        learning_rate=lambda left: rate * max(left, 0.02), seed=TRAINING_SEEDS[0] + 1000 * seed,
+        learning_rate=lambda left: rate * max(left, 0.02), seed=TRAINING_SEEDS[0] + 1000 * asked.seed,
         device="cpu", **told,
     )  # fmt: skip
-    measured = _Measured(watch, folder)
-    model.learn(agent_steps, callback=measured)
+    measured = _Measured(watch, asked.folder)
+    model.learn(asked.agent_steps, callback=measured)
     measured.measure()
     return watch.curve

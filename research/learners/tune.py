@@ -11,7 +11,7 @@ from research import FOLDER
 from research.episodes import Row, read_rows, write_rows
 from research.learners.cells import emptied, trainer_of
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRIED_ON
-from research.learners.watch import Report
+from research.learners.watch import Asked, Report
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 from uuv_marl.errors import ResultsError
 
@@ -55,9 +55,8 @@ def _trial(learner: str, k: int, settings: dict[str, object], folder: Path, told
     for name in TRIED_ON:
         (folder / name).mkdir(parents=True, exist_ok=True)
         emptied(folder / name)  # of a trial that was cut off
-        curve = trainer_of(LEARNERS[learner])(
-            TASKS[name], SEED, folder / name, settings, AGENT_STEPS // PART, MINUTES / PART, told
-        )
+        asked = Asked(TASKS[name], SEED, folder / name, settings, AGENT_STEPS // PART, MINUTES / PART, told)
+        curve = trainer_of(LEARNERS[learner])(asked)
         scores[name] = f"{max((float(row['share']) + float(row['whole'])) / 2.0 for row in curve):.4f}"
     score = float(np.mean([float(each) for each in scores.values()]))
     return {"learner": learner, "trial": str(k), "score": f"{score:.4f}", **scores, "settings": json.dumps(settings)}

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from research.episodes import Row
 from research.learners.protocol import MEASURES, Task
@@ -12,22 +13,33 @@ Report = Callable[[float], None]
 """Called with the share of the budget that is spent."""
 
 
+class Asked(NamedTuple):
+    """A training that a trainer is asked for."""
+
+    task: Task
+    seed: int
+    folder: Path
+    """Where the best policy goes, ``policy.safetensors``."""
+    settings: dict[str, Any]
+    """What differs from the trainer's defaults."""
+    agent_steps: int
+    """The whole budget."""
+    minutes: float
+    """Of processor time, if that ends first."""
+    report: Report
+
+
+Trainer = Callable[[Asked], list[Row]]
+"""Trains, leaves its best policy, and gives the curve: a row for each measurement."""
+
+
 class Watch:
-    """Counts processor time, measuring apart, and measures a policy in even parts of the budget.
+    """Counts processor time, measuring apart, and measures a policy in even parts of the budget."""
 
-    Args:
-        task: what is learned.
-        agent_steps: of the whole budget.
-        minutes: of processor time, if that ends first.
-        report: called as it goes on.
-    """
-
-    def __init__(self, task: Task, agent_steps: int, minutes: float, report: Report) -> None:
+    def __init__(self, asked: Asked) -> None:
         self.curve: list[Row] = []
         """A row for each measurement."""
-        self._training = task.training(steps=agent_steps)
-        self._whole, self._minutes, self._report = agent_steps, minutes, report
-        self._vehicles = task.num_vehicles
+        self._asked, self._training = asked, asked.task.training(steps=asked.agent_steps)
         self._begin, self._apart, self._best = time.process_time(), 0.0, -1.0
 
     @property
@@ -38,12 +50,12 @@ class Watch:
     @property
     def late(self) -> bool:
         """Whether the processor time is spent."""
-        return self.minutes >= self._minutes
+        return self.minutes >= self._asked.minutes
 
     def share(self, agent_steps: int) -> float:
         """The part of the budget that is spent after so many agent-steps."""
-        spent = max(agent_steps / self._whole, self.minutes / self._minutes)
-        self._report(min(spent, 1.0))
+        spent = max(agent_steps / self._asked.agent_steps, self.minutes / self._asked.minutes)
+        self._asked.report(min(spent, 1.0))
         return spent
 
     def due(self, agent_steps: int) -> bool:
@@ -52,10 +64,10 @@ class Watch:
 
     def measure(self, policy: str, agent_steps: int) -> bool:
         """Run a policy on the episodes of validation, and note what came of it; whether it is the best so far."""
-        minutes, begin = self.minutes, time.process_time()
+        minutes, begin, vehicles = self.minutes, time.process_time(), self._asked.task.num_vehicles
         judged = validate(policy, self._training)
         self._apart += time.process_time() - begin
-        self.curve.append(point(agent_steps, minutes, judged.share, judged.whole, judged.contacts / self._vehicles))
+        self.curve.append(point(agent_steps, minutes, judged.share, judged.whole, judged.contacts / vehicles))
         better = judged.score >= self._best
         self._best = max(self._best, judged.score)
         return better
@@ -67,8 +79,3 @@ def point(agent_steps: int, minutes: float, share: float, whole: float, contacts
         "agent_steps": str(agent_steps), "minutes": f"{minutes:.2f}", "share": f"{share:.4f}", "whole": f"{whole:.4f}",
         "contacts": f"{contacts:.3f}",
     }  # fmt: skip
-
-
-Trainer = Callable[[Task, int, Path, dict[str, object], int, float, Report], list[Row]]
-"""Trains on a task with a seed, into a folder, with settings, for so many agent-steps or minutes; the curve. The folder
-then holds the best policy, ``policy.safetensors``."""

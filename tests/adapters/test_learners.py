@@ -4,14 +4,21 @@ import json
 
 import numpy as np
 import pytest
+import safetensors.numpy
+import torch
+from tensordict import TensorDict
+from torchrl.envs import ExplorationType, set_exploration_type
 
 from research.episodes import read_rows
-from research.learners import cells, others, page, protocol, statistics, watch
+from research.learners import cells, masac, others, page, protocol, statistics, watch
 from research.learners.layout import marl_eval
 from research.learners.protocol import LEARNERS, TASKS
+from research.learners.squashed import Squashed
 from research.learners.statistics import improvement, interquartile_mean
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
+from uuv_marl.sim.observation import observation_layout, observer
+from uuv_marl.sim.swarm import Swarm
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -47,6 +54,26 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     first = small[0][0]
     (again,) = cells.episodes(cell.policy(folder / cells.WEIGHTS_FILE), first, range(7000, 7001))
     assert again == {key: rows[0][key] for key in again}
+
+
+def test_what_masac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
+    actors = []
+    usual = masac.tensors_of
+    monkeypatch.setattr(masac, "tensors_of", lambda actor: actors.append(actor) or usual(actor))
+    monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
+    task = TASKS["hard_water"]
+    masac.learn(watch.Asked(task, 0, tmp_path, LEARNERS["masac"].settings, 25_000, 1.0, quiet))
+    (tmp_path / "now").write_bytes(safetensors.numpy.save(usual(actors[0])))
+    swarm = Swarm(task.scenario, 3)
+    percept = swarm.reset(10_100)
+    observation, fill = observer(percept, observation_layout(task.scenario, "closeness"))
+    fill(0, 3)
+    told = TensorDict({"uuv": TensorDict({"observation": torch.from_numpy(observation)}, [3, 10])}, [3])
+    with set_exploration_type(ExplorationType.DETERMINISTIC), torch.no_grad():
+        wanted = actors[0](told)["uuv", "action"].numpy()
+    found = Squashed(task.scenario, 3, path=str(tmp_path / "now")).decide(percept)
+    np.testing.assert_allclose(found, wanted, atol=1e-5)
+    assert np.abs(wanted).max() > 0.01
 
 
 def invented(better=()):

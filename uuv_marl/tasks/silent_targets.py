@@ -217,10 +217,14 @@ class SilentTargets(Reach):
 
     def _left(self) -> Float64:
         """Distance to the nearest target that no vehicle nearer to it holds [m], 0 where there is none."""
-        away = self.away()
-        nearest = away.min(axis=1, keepdims=True)
+        away, nearest = self._nearest()
         left = np.where((nearest <= self.numbers.held_m) & (nearest < away), math.inf, away).min(axis=2)
         return np.where(np.isfinite(left), left, 0.0)
+
+    def _nearest(self) -> tuple[Float64, Float64]:
+        """``away``, and of each target the distance of the vehicle nearest to it [m], shape (world, 1, target)."""
+        away = self.away()
+        return away, away.min(axis=1, keepdims=True)
 
     def there(self) -> Bool:
         """Vehicles that hold a target."""
@@ -262,8 +266,8 @@ class SilentTargets(Reach):
 
     def reward(self, running: Bool) -> Terms:
         """For holding, not for arriving: paid once, who does not remember it leaves."""
-        share, away = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s, self.away()
-        nearest = away.min(axis=1, keepdims=True)
+        share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s
+        away, nearest = self._nearest()
         holds = ((away == nearest) & (nearest <= self.numbers.held_m)).sum(axis=2)
         usual = {name: paid for name, paid in super().reward(running).items() if name in self.terms}
         return {**usual, "held": self._weight.arrival * share[:, None] * holds}
