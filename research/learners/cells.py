@@ -20,7 +20,7 @@ from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.validation import shares_of
 
 MADE, CURVE, EPISODES, OTHERS = "made.json", "curve.csv", "episodes.csv", "others"
-_TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.masac"}
+_TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.isac"}
 _TRAINED = 0.8
 """Share of a cell's progress that the training is; assumed."""
 KEPT = Path(__file__).resolve().parent / "policies"

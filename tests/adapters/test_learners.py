@@ -10,7 +10,7 @@ from tensordict import TensorDict
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from research.episodes import read_rows
-from research.learners import cells, masac, others, page, protocol, statistics, watch
+from research.learners import cells, isac, others, page, protocol, statistics, watch
 from research.learners.layout import marl_eval
 from research.learners.protocol import LEARNERS, TASKS
 from research.learners.squashed import Squashed
@@ -56,13 +56,13 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     assert again == {key: rows[0][key] for key in again}
 
 
-def test_what_masac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
+def test_what_isac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
     actors = []
-    usual = masac.tensors_of
-    monkeypatch.setattr(masac, "tensors_of", lambda actor: actors.append(actor) or usual(actor))
+    usual = isac.tensors_of
+    monkeypatch.setattr(isac, "tensors_of", lambda actor: actors.append(actor) or usual(actor))
     monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
     task = TASKS["hard_water"]
-    masac.learn(watch.Asked(task, 0, tmp_path, LEARNERS["masac"].settings, 25_000, 1.0, quiet))
+    isac.learn(watch.Asked(task, 0, tmp_path, LEARNERS["isac"].settings, 25_000, 1.0, quiet))
     (tmp_path / "now").write_bytes(safetensors.numpy.save(usual(actors[0])))
     swarm = Swarm(task.scenario, 3)
     percept = swarm.reset(10_100)
@@ -103,14 +103,14 @@ def alike(rows):
 
 def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monkeypatch):
     monkeypatch.setattr(statistics, "_OF_PAIRS", 25)
-    curves, rows = invented(better=("masac",))
+    curves, rows = invented(better=("isac",))
     state = np.random.get_state()[1].copy()  # noqa: NPY002
     text = page.report(curves, rows)
     assert text == page.report(curves, rows)
     np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
     for task in TASKS:
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
-        assert all(f"masac over {other}" in row for other in LEARNERS if other != "masac")
+        assert all(f"isac over {other}" in row for other in LEARNERS if other != "isac")
     assert not any(" over " in row for row in page._apart(page.found_in(alike(rows))).splitlines())
 
 
@@ -164,3 +164,11 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
         others.need_whole([{**rows[0], "set": "lake"}], few)
     with pytest.raises(ResultsError, match="the columns must be set, seed, share, .*, got set, .*, colour"):
         others.need_whole([{**row, "colour": "blue"} for row in rows], few)
+
+
+def test_the_page_that_ships_comes_again_from_its_rows():
+    docs = FOLDER / "docs"
+    curves, rows = (read_rows(docs / name) for name in ("learners_curves.csv.gz", "learners.csv.gz"))
+    assert page.report(curves, rows) == (docs / "learners.md").read_text(encoding="utf-8")
+    told = json.loads((docs / "learners_marl_eval.json").read_text(encoding="utf-8"))
+    assert told == json.loads(json.dumps(marl_eval(curves, rows)))

@@ -1,4 +1,4 @@
-"""BenchMARL's MASAC as a learner, the one that is not PPO. Runs in the environment of ``make test-benchmarl``."""
+"""BenchMARL's ISAC as a learner, the one that is not PPO. Runs in the environment of ``make test-benchmarl``."""
 
 # pyright: reportMissingImports=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false, reportUntypedBaseClass=false
@@ -14,7 +14,7 @@ import torch
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # BenchMARL, TorchRL and torch deprecate parts of each other
-    from benchmarl.algorithms import MasacConfig
+    from benchmarl.algorithms import IsacConfig
     from benchmarl.experiment import Callback, Experiment, ExperimentConfig
     from benchmarl.models.mlp import MlpConfig
 
@@ -69,17 +69,21 @@ def learn(asked: Asked) -> list[Row]:
     config = ExperimentConfig.get_from_yaml()
     config.save_folder, config.loggers, config.create_json, config.render = str(folder), [], False, False
     config.evaluation = False
-    config.lr, config.max_n_frames = told["lr"], 10**9
-    worlds = config.off_policy_n_envs_per_worker = told["worlds"]
-    config.off_policy_collected_frames_per_batch = worlds * told["decisions"]
-    config.off_policy_n_optimizer_steps, config.off_policy_train_batch_size = told["optimizer_steps"], told["batch"]
-    config.off_policy_memory_size = REPLAYED // task.num_vehicles
-    config.off_policy_init_random_frames = told["random_steps"] // task.num_vehicles
+    config.lr, config.gamma, config.max_n_frames = told["lr"], told["gamma"], 10**9
+    frames = lambda agent_steps: max(1, round(agent_steps / task.num_vehicles))  # noqa: E731 - of all vehicles at once
+    config.off_policy_n_envs_per_worker = frames(told["rows"])
+    config.off_policy_collected_frames_per_batch = frames(told["rows"]) * told["decisions"]
+    config.off_policy_n_optimizer_steps = told["optimizer_steps"]
+    config.off_policy_train_batch_size = frames(told["batch"])
+    config.off_policy_memory_size = frames(REPLAYED)
+    config.off_policy_init_random_frames = frames(told["random_steps"])
+    algorithm = IsacConfig.get_from_yaml()
+    algorithm.alpha_init = told["alpha_init"]
     model = MlpConfig(num_cells=[64, 64], layer_class=torch.nn.Linear, activation_class=torch.nn.Tanh)
     options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": overrides_for(task.name, {})}
     with (folder / "benchmarl.log").open("w") as log, redirect_stderr(log), redirect_stdout(log), suppress(_SpentError):
         Experiment(
-            task=getattr(SwarmTask, task.name.upper()).get_task(options), algorithm_config=MasacConfig.get_from_yaml(),
+            task=getattr(SwarmTask, task.name.upper()).get_task(options), algorithm_config=algorithm,
             model_config=model, critic_model_config=model, seed=TRAINING_SEEDS[0] + 1000 * asked.seed, config=config,
             callbacks=[_Measured(watch, folder, task.num_vehicles)],
         ).run()  # fmt: skip
