@@ -1,6 +1,5 @@
 """``hard_water``: closed water with walls, drawn by seed, through which every swarm can pass, if it finds the way."""
 
-import itertools
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -35,6 +34,8 @@ they follow each other at s_u, 4 m, and 5 m/s."""
 _DEAR_M, _DEAR, _NARROW = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0), 0.5, 20.0
 """Nearer to a surface than each of these [m], a way that leads (``lead``) costs so much more, and nearer than the
 clearance that each map has, so much. Tried by hand."""
+_AROUND = np.indices((3, 3)).reshape(2, 9, 1) - 1
+"""Rows and columns from a cell to itself and to its eight neighbours."""
 
 
 def _known(kinds: tuple[str, ...]) -> tuple[str, ...]:
@@ -204,11 +205,10 @@ class HardWater(Reach):
         (c, s), (north, east) = self.memory.turn[world].T, place.T
         x, y = c * north + s * east, c * east - s * north
         row, column = self._grid.cells(x, y)
-        best = np.full(x.shape, FAR_M)
-        for d_r, d_c in itertools.product((-1, 0, 1), repeat=2):
-            r, k = np.clip(row + d_r, 0, self._grid.rows - 1), np.clip(column + d_c, 0, self._grid.columns - 1)
-            off = np.hypot(x - (self._grid.x + r * CELL_M), y - (self._grid.y + k * CELL_M))
-            best = np.minimum(best, self.memory.way[world, r, k] + off)
+        r = np.minimum(np.maximum(row + _AROUND[0], 0), self._grid.rows - 1)
+        k = np.minimum(np.maximum(column + _AROUND[1], 0), self._grid.columns - 1)
+        off = np.hypot(x - (self._grid.x + r * CELL_M), y - (self._grid.y + k * CELL_M))
+        best = np.minimum((self.memory.way[world, r, k] + off).min(axis=0), FAR_M)
         return np.maximum(best, np.hypot(*(place - goal).T))
 
     def ways(self, which: Bool | None = None) -> Float64:
