@@ -1,6 +1,7 @@
 """The comparison of learners: every trainer keeps its budget and leaves a policy, and the page is that of its rows."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from uuv_marl.sim.observation import observation_layout, observer
 from uuv_marl.sim.swarm import Swarm
 
 pytestmark = pytest.mark.filterwarnings("ignore")
+FOLDER = Path(__file__).resolve().parents[2]
 
 
 def quiet(_):
@@ -164,6 +166,14 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
         others.need_whole([{**rows[0], "set": "lake"}], few)
     with pytest.raises(ResultsError, match="the columns must be set, seed, share, .*, got set, .*, colour"):
         others.need_whole([{**row, "colour": "blue"} for row in rows], few)
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_learner_has_the_best_of_the_settings_that_were_tried(name):
+    learner = LEARNERS[name]
+    rows = [row for row in read_rows(FOLDER / "research" / "learners" / "trials.csv") if row["learner"] == name]
+    assert [json.loads(row["settings"]) for row in rows] == list(learner.tried)
+    assert learner.chosen == np.argmax([float(row["score"]) for row in rows])
 
 
 def test_the_page_that_ships_comes_again_from_its_rows():
