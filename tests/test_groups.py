@@ -66,6 +66,11 @@ def test_groups_that_swap_sides_have_colours_of_their_own_and_so_have_their_goal
     assert words(swap)[:3] == ["group 1", "group 2", "goal of a vehicle"]
 
 
+def test_a_goal_at_rest_is_a_goal_in_the_legend_and_nothing_to_follow():
+    scene, *_ = played("hard_water", "idle", 1.0)
+    assert words(scene)[:2] == ["vehicle", "goal"]
+
+
 def test_each_group_has_its_trajectory_and_its_leading_point():
     scene, *_ = played("multi_obstacle", "idle", 30.0, num_vehicles=8, overrides=TWO)
     picture, camera = painted(scene)

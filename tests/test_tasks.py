@@ -12,6 +12,8 @@ import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.figures import _outcome
+from uuv_marl.benchmark.frame import load
 from uuv_marl.cli import app
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import RewardError, ScenarioError
@@ -196,7 +198,13 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     assert done.exit_code == 0, done.output
     runs = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]
     assert all(set(run["metrics"]["task"]) == {"untouched_share", "whole", "spread_m"} for run in runs)
-    assert "| spread_m |" in (tmp_path / "out" / "table.md").read_text()
+    text = (tmp_path / "out" / "table.md").read_text()
+    assert "| spread_m |" in text
+    assert "spread_m: mean distance from the centre at the end [m]." in text
+    np.testing.assert_array_equal(
+        load(tmp_path / "out")["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs]
+    )
+    assert _outcome(runs[0]["metrics"]).startswith("0% untouched and there, ")
     done = CliRunner().invoke(app, ["replay", *how, "--output", str(tmp_path / "replay.html")])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "replay.html").stat().st_size > 10_000

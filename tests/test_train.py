@@ -715,7 +715,8 @@ def test_the_command_says_what_to_train_and_can_be_stopped(tmp_path, monkeypatch
 
     def fake(output, given, *, say, stop):
         calls.append(given)
-        yield Record(1, 500, 2.0, -1.5, 0.01, 0.5, 0.25, 0.75, 0.9, 0.5, 30.0)
+        yield Record(1, 500, 2.0, -1.5, 0.01, 0.5, 0.825, 0.75, 0.9, 0.5, 30.0)
+        yield Record(2, 1000, 4.0, -1.5, 0.01, 0.5, 0.825, 0.5, 0.7, 0.0, 30.0)
         for _ in range(interrupts):
             os.kill(os.getpid(), signal.SIGINT)
         assert stop() is bool(interrupts)
@@ -725,7 +726,10 @@ def test_the_command_says_what_to_train_and_can_be_stopped(tmp_path, monkeypatch
     command += ["--set=sizes=[5,20]", "--set=ppo.noise=[0.3, 0.1]", "--set=sonar.echo_reports=centre"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
-    assert "swarms whole 75%, vehicles 90%, contacts 0.5 an episode, 30 s" in done.output
+    assert "swarms whole 75%, vehicles 90%, contacts 0.5 an episode, time 30 s" in done.output
+    told = " ".join(done.output.split())
+    assert "Done: swarms whole 50%" in told
+    assert "The best validation was that after 0.0 min: swarms whole 75%, vehicles 90%" in told
     assert "250 agent-steps/s" in done.output
     assert calls == [
         Training(

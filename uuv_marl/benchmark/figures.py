@@ -122,8 +122,11 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
 
 
 def _outcome(metrics: Mapping[str, Any]) -> str:
-    time, collisions = metrics["task_time_s"], metrics["collisions"]
-    arrived = "never arrives" if time is None else f"arrives after {time:.0f} s"
+    time, collisions, own = metrics["task_time_s"], metrics["collisions"], metrics.get("task")
+    if own is not None and (share := own.get("untouched_share")) is not None:
+        arrived = f"{share:.0%} untouched and there"
+    else:
+        arrived = "never arrives" if time is None else f"arrives after {time:.0f} s"
     return f"{arrived}, {collisions or 'no'} collision{'' if collisions == 1 else 's'}"
 
 

@@ -18,7 +18,8 @@ def load(path: UserPath) -> Any:
     """The runs of a ``results.json`` as a pandas data frame, a row for each, by scenario, policy and seed.
 
     Columns are ``scenario``, ``policy``, ``seed``, every metric (``constraint_share`` as ``constraint_share_all``,
-    ``constraint_share_s_l`` and so on), and ``trace``, the path of the run's time series for ``load_trace``. NaN means
+    ``constraint_share_s_l`` and so on), those of the task by their names, such as ``untouched_share``, and ``trace``,
+    the path of the run's time series for ``load_trace``. NaN means
     that there was nothing to measure. No policy is imported.
 
     Args:
@@ -35,6 +36,7 @@ def load(path: UserPath) -> Any:
     for row in sorted(read_content(file)["runs"], key=lambda row: row[:3]):
         metrics: dict[str, Any] = {**row.metrics}
         shares = {f"constraint_share_{name}": share for name, share in metrics.pop("constraint_share").items()}
+        own = metrics.pop("task", {})
         key = {"scenario": row.scenario, "policy": row.policy, "seed": row.seed}
-        records.append({**key, **metrics, **shares, "trace": str(trace_path(file.parent, *row[:3]))})
+        records.append({**key, **metrics, **shares, **own, "trace": str(trace_path(file.parent, *row[:3]))})
     return pandas.DataFrame.from_records(records)

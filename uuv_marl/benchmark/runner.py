@@ -16,12 +16,12 @@ from uuv_marl.benchmark.results import ResultRow, Results
 from uuv_marl.benchmark.tables import (
     CAPTION,
     HEADERS,
-    TASK_CAPTION,
     TableRow,
     counted,
     markdown_table,
     rich_table,
     table_rows,
+    task_caption,
     task_headers,
     task_rows,
     task_table,
@@ -118,6 +118,7 @@ class Table(NamedTuple):
     rows: Sequence[TableRow] | Sequence[tuple[str, ...]]
     headers: tuple[str, ...] = HEADERS
     """Those of ``follow``, whose rows are ``TableRow``, or of another task."""
+    caption: str = CAPTION
 
 
 def write_report(
@@ -137,7 +138,7 @@ def write_report(
     tables = [_table(results, scenario, policies, seeds) for scenario in scenarios]
     path = results.folder / "table.md"
     texts = [f"## {table.title}\n\n{markdown_table(table.headers, table.rows)}" for table in tables]
-    captions = dict.fromkeys(CAPTION if table.headers == HEADERS else TASK_CAPTION for table in tables)
+    captions = dict.fromkeys(table.caption for table in tables)
     write_text(path, "\n".join([*texts, *(f"{caption}\n" for caption in captions)]))
     with writing(results.folder / "figures"):
         return tables, [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]
@@ -147,11 +148,12 @@ def terminal_table(table: Table, width: int) -> RichTable:
     """A table for a terminal of a given width in columns."""
     if table.headers == HEADERS:
         return rich_table(table.title, [TableRow(*row) for row in table.rows], width)
-    return task_table(table.title, table.headers, table.rows, width)
+    return task_table(table.title, table.headers, table.rows, table.caption, width)
 
 
 def _table(results: Results, scenario: Scenario, policies: Sequence[str], seeds: Sequence[int]) -> Table:
     name, heading = scenario.name, title(scenario, seeds)
     if issubclass(scenario.task_class, Follow):
         return Table(heading, table_rows(results, name, policies, seeds))
-    return Table(heading, task_rows(results, name, policies, seeds), task_headers(scenario.task_class))
+    task = scenario.task_class
+    return Table(heading, task_rows(results, name, policies, seeds), task_headers(task), task_caption(task))

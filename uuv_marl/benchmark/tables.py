@@ -25,7 +25,7 @@ _NARROW = 110
 """Columns of a terminal below which its table leaves out intervals and the time mean."""
 
 HEADERS = (
-    "policy", "beyond the percept", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
+    "policy", "class, and beyond sonar", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
     "spacing [m]", "worst", "mean spacing [m]", "within Eq. 7", "collisions", "paper",
 )  # fmt: skip
 
@@ -127,16 +127,23 @@ def table_rows(results: Results, scenario: str, policies: Sequence[str], seeds: 
 def task_headers(task: type[Task]) -> tuple[str, ...]:
     """Columns of the table of a task other than ``follow``."""
     return (
-        "policy", "beyond the percept", "whole swarms", "untouched and there", *task.columns, "obstacle distance [m]",
-        "worst", "spacing [m]", "worst", "collisions",
+        "policy", "class, and beyond sonar", "whole swarms", "untouched and there", *task.columns,
+        "obstacle distance [m]", "worst", "spacing [m]", "worst", "collisions",
     )  # fmt: skip
 
 
-TASK_CAPTION = (
+_TASK_CAPTION = (
     "Interquartile mean over seeds [95 % bootstrap interval]; worst seed. Whole swarms: episodes in which every "
     "vehicle succeeded; a vehicle succeeds that is where the task wants it when the episode ends, and has touched "
-    "nothing. Untouched and there: mean share of such vehicles. Distances as in the tables of follow."
+    "nothing. Untouched and there: mean share of such vehicles. Obstacle distance: smallest, to the surface; spacing: "
+    "smallest between two vehicles."
 )
+
+
+def task_caption(task: type[Task]) -> str:
+    """What the columns of ``task_headers`` are."""
+    own = "".join(f" {name}: {told}." for name, told in task.columns.items())
+    return _TASK_CAPTION + own
 
 
 def task_rows(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, ...]]:
@@ -157,14 +164,17 @@ def task_rows(results: Results, scenario: str, policies: Sequence[str], seeds: S
     return rows
 
 
-def task_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> RichTable:
-    """The table of a task for a terminal of a given width in columns."""
+def task_table(
+    title: str, headers: Sequence[str], rows: Sequence[Sequence[str]], caption: str, width: int
+) -> RichTable:
+    """The table of a task for a terminal of a given width in columns; names of policies are cut last."""
     table = RichTable(
-        title=title, title_justify="left", caption=TASK_CAPTION, caption_justify="left",
+        title=title, title_justify="left", caption=escape(caption), caption_justify="left",
         padding=0 if width < _NARROW else (0, 1),
     )  # fmt: skip
-    for header in headers:
-        table.add_column(escape(header), overflow="fold")
+    for k, header in enumerate(headers):
+        longest = 0 if k else max((len(row[0]) for row in rows), default=0)
+        table.add_column(escape(header), overflow="fold", min_width=min(longest, width // 4))
     for row in rows:
         table.add_row(*(escape(cell.replace(_NOTHING, "-")) for cell in row))
     return table

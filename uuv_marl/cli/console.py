@@ -23,10 +23,10 @@ from uuv_marl.paths import user_path
 
 
 def _width() -> int | None:
-    """Columns: those of the terminal (None), those that fit a notebook, else as many as make tables legible."""
+    """Columns: those of the terminal (None), those that fit a notebook, else 100, as docs and logs have."""
     if sys.stdout.isatty():
         return None
-    return 88 if "JPY_PARENT_PID" in os.environ else 130  # Jupyter gives it to all that a kernel starts
+    return 88 if "JPY_PARENT_PID" in os.environ else 100  # Jupyter gives it to all that a kernel starts
 
 
 console = Console(width=_width())

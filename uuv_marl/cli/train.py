@@ -105,7 +105,7 @@ def train_command(
             how: Any = {"say": console.print, "stop": stop}
             records = run.resume(output, until, **how) if resume else run.train(output, training, **how)
             last = _follow(records, training, until)
-        console.print(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png")
+        console.print(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png", highlight=False)
         if (output / "best").is_dir():
             console.print("The worst episode of its validation:")
             console.print(f"  {run.worst_replay(output)}", highlight=False, soft_wrap=True)
@@ -122,17 +122,19 @@ def _alone(context: typer.Context) -> None:
 
 def _follow(records: Iterator[Any], training: Any, until: float) -> str:
     """Show a training in a bar, and a line for each validation; how it stood at last."""
-    last, judged = "nothing was to be done, because the whole budget is spent already", "no validation yet"
+    last, judged, best = "nothing was to be done, because the whole budget is spent already", "no validation yet", ""
     with progress_bar() as bar:
         report = progress_line(bar, "starting", until)
         for record in records:
             if record.whole is not None:
                 judged = _TOLD.format(**record._asdict())
-                time = "" if record.time_s is None else f", {record.time_s:.0f} s"
+                time = "" if record.time_s is None else f", time {record.time_s:.0f} s"
                 console.print(f"  {record.seconds / 60.0:5.1f} min  {judged}{time}", highlight=False)
+                if (record.whole + record.share) / 2.0 >= record.best:
+                    best = f". The best validation was that after {record.seconds / 60.0:.1f} min: {judged}"
             last = f"{judged}, {record.agent_steps / max(record.seconds, 1e-9):,.0f} agent-steps/s"
             report(record.spent(training), f"reward {record.reward:.3f}, {last}")
-    return last
+    return last + best
 
 
 @contextmanager

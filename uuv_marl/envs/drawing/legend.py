@@ -27,9 +27,10 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
     found = [(f"group {k + 1}" if len(teams) > 1 else alone, _dart(ink.TEAMS[k])) for k in teams]
     if not all_know:
         found.append(("does not perceive l(t)", lambda *on: (_dart(ink.BLUE)(*on), _dart(ink.WHITE, 7.5)(*on))))
-    found.append(("l(t), to follow", _target) if scene.leads else (scene.scenario.task_class.place, _goal))
+    task = scene.scenario.task_class
+    found.append((task.target, _target) if scene.leads else (task.place, _goal))
     if len(scene.marks):
-        found.append((scene.scenario.task_class.marked or "of the task", _mark))
+        found.append((task.marked or "of the task", _mark))
     if scene.trail.size:
         found.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
