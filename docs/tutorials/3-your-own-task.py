@@ -122,7 +122,7 @@ Image("meet.gif", width=400)
 import uuv_marl.benchmark
 
 runs = uuv_marl.benchmark.load("results/meet").set_index("policy")
-whole = runs["task"].map(lambda numbers: numbers["whole"])
+whole = runs["whole"]
 assert 6 <= whole["meet:Join"].sum() < 10
 assert runs.loc["meet:Join", "collisions"].sum() > 0
 assert whole["idle"].sum() == 0
