@@ -1,9 +1,11 @@
 """Metrics, resumable results, tables, pictures and the command line."""
 
+import io
 import json
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
@@ -12,7 +14,7 @@ from uuv_marl.baselines.safety import Barrier
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, ResultsError
-from uuv_marl.benchmark.tables import estimate
+from uuv_marl.benchmark.tables import estimate, task_caption, task_headers, task_table
 from uuv_marl.cli import app
 
 QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
@@ -213,3 +215,20 @@ def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
     for name in ("bio_inspired_plus.json", "bio_inspired_plus.csv"):
         assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
     assert len((tmp_path / "whole" / "bio_inspired_plus.csv").read_text().splitlines()) == 6
+
+
+@pytest.mark.parametrize("width", [80, 88, 100, 130])
+def test_a_tasks_table_fits_its_width_with_no_letter_cut(width):
+    task = load_scenario("hard_water").task_class
+    row = ("mine:Dodge", "end to end", "3/5", "86.0%", "1.17 [1.09, 1.30]", "4.63 [3.9, 5.15]", "1.26",
+           "7.31 [6.77, 8.02]", "3.46", "13 in 3 seeds")  # fmt: skip
+    rows = [row, ("runs/easy/best_of_many", *row[1:])]
+    table = task_table("hard_water_easy", task_headers(task), rows, task_caption(task), width)
+    out = Console(width=width, file=io.StringIO())
+    out.print(table)
+    text = out.file.getvalue()
+    assert max(map(len, text.splitlines())) <= width
+    lines = [line for line in text.splitlines() if "│" in line]
+    assert all(line.rstrip()[-1] == "│" for line in lines)
+    cells = ["".join(line.split("│")[k + 1].strip() for line in lines[:4]) for k in range(len(row))]
+    assert all("".join(cell.split()) in "".join(found.split()) for cell, found in zip(row, cells, strict=True))

@@ -233,6 +233,7 @@ def test_results_are_read_as_a_data_frame(tmp_path):
     assert frame["constraint_share_s_u"][0] == runs[0]["metrics"]["constraint_share"]["s_u"]
     assert frame["effort"][3] == runs[3]["metrics"]["effort"]
     assert frame["task_time_s"].isna().all()
+    assert frame["task_time_s"].dtype == float
     assert load_trace(frame["trace"][2])["min_spacing_m"].min() == np.float32(frame["min_spacing_m"][2])
     assert load(tmp_path / "results.json").equals(frame)
     frame.to_csv(tmp_path / "runs.csv", index=False)

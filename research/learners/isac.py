@@ -70,7 +70,11 @@ def learn(asked: Asked) -> list[Row]:
     config.save_folder, config.loggers, config.create_json, config.render = str(folder), [], False, False
     config.evaluation = False
     config.lr, config.gamma, config.max_n_frames = told["lr"], told["gamma"], 10**9
-    frames = lambda agent_steps: max(1, round(agent_steps / task.num_vehicles))  # noqa: E731 - of all vehicles at once
+
+    def frames(agent_steps: int) -> int:
+        """Decisions of all vehicles at once."""
+        return max(1, round(agent_steps / task.num_vehicles))
+
     config.off_policy_n_envs_per_worker = frames(told["rows"])
     config.off_policy_collected_frames_per_batch = frames(told["rows"]) * told["decisions"]
     config.off_policy_n_optimizer_steps = told["optimizer_steps"]

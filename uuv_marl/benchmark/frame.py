@@ -1,6 +1,7 @@
 """Results as a table for analysis. Needs the extra ``analysis``."""
 
 import importlib
+import math
 from typing import Any
 
 from uuv_marl.benchmark.results import FILE, read_content, trace_path
@@ -38,5 +39,6 @@ def load(path: UserPath) -> Any:
         shares = {f"constraint_share_{name}": share for name, share in metrics.pop("constraint_share").items()}
         own = metrics.pop("task", {})
         key = {"scenario": row.scenario, "policy": row.policy, "seed": row.seed}
-        records.append({**key, **metrics, **shares, **own, "trace": str(trace_path(file.parent, *row[:3]))})
+        told = {name: math.nan if value is None else value for name, value in {**metrics, **shares, **own}.items()}
+        records.append({**key, **told, "trace": str(trace_path(file.parent, *row[:3]))})
     return pandas.DataFrame.from_records(records)

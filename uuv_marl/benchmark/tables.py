@@ -172,9 +172,10 @@ def task_table(
         title=title, title_justify="left", caption=escape(caption), caption_justify="left",
         padding=0 if width < _NARROW else (0, 1),
     )  # fmt: skip
-    for k, header in enumerate(headers):
-        longest = 0 if k else max((len(row[0]) for row in rows), default=0)
-        table.add_column(escape(header), overflow="fold", min_width=min(longest, width // 4))
+    longest = max((len(row[0]) for row in rows), default=0)
+    whole = {headers[0]: min(longest, width // 4), headers[-1]: len(headers[-1])}
+    for header in headers:
+        table.add_column(escape(header), overflow="fold", width=whole.get(header))
     for row in rows:
         table.add_row(*(escape(cell.replace(_NOTHING, "-")) for cell in row))
     return table

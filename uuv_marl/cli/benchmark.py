@@ -103,7 +103,7 @@ def benchmark(
         console.print(_WORST.format(worst=worst), markup=False, highlight=False)
         console.print(f"  {again}", markup=False, highlight=False, soft_wrap=True)
         console.print(_NEXT.format(output=output), markup=False, highlight=False)
-        if set(policies) <= {*POLICIES} and names == ["starter"]:
+        if set(policies) <= {*POLICIES} and names == ["starter"] and not overrides:
             console.print(_TRAIN.format(scenario=files[0]), markup=False, highlight=False)
 
 
