@@ -174,11 +174,3 @@ def test_a_learner_has_the_best_of_the_settings_that_were_tried(name):
     rows = [row for row in read_rows(FOLDER / "research" / "learners" / "trials.csv") if row["learner"] == name]
     assert [json.loads(row["settings"]) for row in rows] == list(learner.tried)
     assert learner.chosen == np.argmax([float(row["score"]) for row in rows])
-
-
-def test_the_page_that_ships_comes_again_from_its_rows():
-    docs = FOLDER / "docs"
-    curves, rows = (read_rows(docs / name) for name in ("learners_curves.csv.gz", "learners.csv.gz"))
-    assert page.report(curves, rows) == (docs / "learners.md").read_text(encoding="utf-8")
-    told = json.loads((docs / "learners_marl_eval.json").read_text(encoding="utf-8"))
-    assert told == json.loads(json.dumps(marl_eval(curves, rows)))
