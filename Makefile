@@ -28,7 +28,7 @@ help:
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
 	@echo "make check                          ruff, pyright and import-linter only"
 	@echo "make dist                           source distribution and wheel in dist/"
-	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS and JaxMARL (docs/speed.md), and CAMAR"
+	@echo "make perf      [ARGS='--only vmas'] rates beside MPE2, VMAS, JaxMARL and CAMAR: docs/speed.md"
 	@echo "make perf-training                  training beside SuperSuit and RLlib: docs/speed.md"
 	@echo "make versions OTHER=path            is another checkout the same, bit for bit, and as fast?"
 	@echo "make size                           lines, words, megabytes, commands and options of this repository"

@@ -1,6 +1,5 @@
-"""Cases of uuv_marl for perf/compare.py: the batched core, its public environments, training, and the ceilings."""
+"""Cases of uuv_marl for perf/compare.py: the batched core, its public environments, and the ceilings."""
 
-import time
 from functools import partial
 from typing import Any
 
@@ -12,11 +11,10 @@ from worker import Case, Maker, built, repeated, serve
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.sim.swarm import Swarm
 
-SETS, SETTLE_STEPS, SETTLE_S = 8, 200, 10.0
+SETS = 8
 PILES: dict[str, Any] = {"scenario": "hard_water", "overrides": {"task.kinds": ["piles"]}}
 """The kind of hard maps with the most discs: 200 to 320 each, 265 on average."""
 
@@ -74,35 +72,6 @@ def parallel_env_terms(agents: int, worlds: int) -> Case:
     return parallel_env(agents, worlds, info_terms=True)
 
 
-def idle(agents: int, worlds: int) -> Case:
-    """``Swarm.step`` of idle vehicles on ``tracking``: the start's two dense groups stay together."""
-    swarm = Swarm(load_scenario("tracking", num_vehicles=agents), worlds)
-    swarm.reset(0)
-    action = np.zeros((worlds, agents, 2), np.float32)
-    return repeated(lambda _: swarm.step(action), agents * worlds)
-
-
-def bio_inspired(agents: int, worlds: int) -> Case:
-    """The paper's controller and ``Swarm.step`` on ``tracking``, after a while under way."""
-    scenario = load_scenario("tracking", num_vehicles=agents)
-    swarm, policy = Swarm(scenario, worlds), make("bio_inspired", scenario, worlds)
-    swarm.reset(0)
-    policy.reset(0)
-    case = repeated(lambda _: swarm.step(policy.act(swarm.percept)), agents * worlds)
-    settled, start = 0, time.perf_counter()
-    while settled < SETTLE_STEPS and (settled < 2 or time.perf_counter() - start < SETTLE_S):
-        case.run(1)
-        settled += 1
-    return case._replace(facts={"settled": settled})
-
-
-def ppo(agents: int, worlds: int) -> Case:
-    """PPO of Stable-Baselines3 through ``SwarmVecEnv``, sampling and learning."""
-    from ppo import training
-
-    return training(SwarmVecEnv(num_worlds=worlds, num_vehicles=agents))
-
-
 def adapter(name: str, agents: int, worlds: int) -> Case:
     """A step of one API, with idle vehicles on worlds that never end while they are measured."""
     how: Any = {"num_vehicles": agents, "overrides": {"time_limit.extra_s": 1e6}}
@@ -136,8 +105,7 @@ def ceiling(kind: str, agents: int, worlds: int) -> Case:
 
 
 CASES: dict[str, Maker] = {
-    case.__name__: case
-    for case in (core, vector_env, hard_vector_env, parallel_env, parallel_env_terms, idle, bio_inspired, ppo)
+    case.__name__: case for case in (core, vector_env, hard_vector_env, parallel_env, parallel_env_terms)
 }
 CASES["hard_core"] = partial(core, **PILES)
 CASES |= {name: partial(adapter, name) for name in ADAPTERS}

@@ -1,13 +1,9 @@
-"""Cases of VMAS's flocking for perf/compare.py: its batched step on the CPU, and PPO over its agents."""
+"""Cases of VMAS's flocking for perf/compare.py: its batched step on the CPU."""
 
 from typing import Any
 
-import numpy as np
 import torch
 import vmas
-from gymnasium.spaces import Box
-from numpy.typing import NDArray
-from ppo import Rows, training
 from worker import Case, repeated, seconds_of, serve
 
 DEFAULT_THREADS = torch.get_num_threads()
@@ -58,21 +54,5 @@ def step(agents: int, worlds: int) -> Case:
     return steps(env, agents, worlds, entries=entries, threads=torch.get_num_threads())
 
 
-def ppo(agents: int, worlds: int) -> Case:
-    """PPO of Stable-Baselines3, a row per agent."""
-    choose_threads(agents, worlds)
-    env = flocking(agents, worlds)
-
-    def rows(tensors: list[torch.Tensor]) -> NDArray[Any]:
-        return torch.stack(tensors).flatten(0, 1).numpy()
-
-    def row_step(actions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        observations, rewards, _, _ = env.step(list(torch.from_numpy(actions).view(agents, worlds, 2)))
-        return rows(observations), rows(rewards)
-
-    start = rows(env.reset())
-    return training(Rows(start, row_step, Box(-np.inf, np.inf, start.shape[1:]), Box(-1.0, 1.0, (2,))))
-
-
 if __name__ == "__main__":
-    serve({"vmas": step, "vmas_ppo": ppo})
+    serve({"vmas": step})

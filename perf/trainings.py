@@ -43,13 +43,15 @@ def mappo(agents: int, worlds: int) -> Case:
 
 
 def sb3_ppo(env: Any, seed: int | None) -> Case:
-    """Stable-Baselines3's PPO on a ``VecEnv``; a unit is an iteration."""
-    from ppo import training
+    """Stable-Baselines3's PPO on a ``VecEnv``; a unit is a rollout of all rows, and the learning from it."""
+    from stable_baselines3 import PPO
 
-    return training(
-        env, seed, learning_rate=LEARNING_RATE, n_steps=DECISIONS, batch_size=MINIBATCH, n_epochs=EPOCHS, gamma=GAMMA,
-        gae_lambda=GAE_LAMBDA, clip_range=CLIP, policy_kwargs={"net_arch": list(HIDDEN)},
+    model = PPO(
+        "MlpPolicy", env, seed=seed, device="cpu", learning_rate=LEARNING_RATE, n_steps=DECISIONS, batch_size=MINIBATCH,
+        n_epochs=EPOCHS, gamma=GAMMA, gae_lambda=GAE_LAMBDA, clip_range=CLIP, policy_kwargs={"net_arch": list(HIDDEN)},
     )  # fmt: skip
+    amount = model.n_steps * env.num_envs
+    return Case(lambda units: model.learn(units * amount, reset_num_timesteps=False), amount)
 
 
 def plain(agents: int, worlds: int) -> Case:

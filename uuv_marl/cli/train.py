@@ -107,8 +107,10 @@ def train_command(
             last = _follow(records, training, until)
         console.print(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png", highlight=False)
         if (output / "best").is_dir():
-            console.print("The worst episode of its validation:")
-            console.print(f"  {run.worst_replay(output)}", highlight=False, soft_wrap=True)
+            best, worst = run.best_of(output)
+            told = f"{_TOLD.format(**best._asdict())}, after {best.seconds / 60.0:.1f} min"
+            console.print(f"Its validation was the best: {told}. The worst episode of it:", highlight=False)
+            console.print(f"  {worst}", highlight=False, soft_wrap=True)
 
 
 def _alone(context: typer.Context) -> None:
@@ -122,7 +124,7 @@ def _alone(context: typer.Context) -> None:
 
 def _follow(records: Iterator[Any], training: Any, until: float) -> str:
     """Show a training in a bar, and a line for each validation; how it stood at last."""
-    last, judged, best = "nothing was to be done, because the whole budget is spent already", "no validation yet", ""
+    last, judged = "nothing was to be done, because the whole budget is spent already", "no validation yet"
     with progress_bar() as bar:
         report = progress_line(bar, "starting", until)
         for record in records:
@@ -130,11 +132,9 @@ def _follow(records: Iterator[Any], training: Any, until: float) -> str:
                 judged = _TOLD.format(**record._asdict())
                 time = "" if record.time_s is None else f", time {record.time_s:.0f} s"
                 console.print(f"  {record.seconds / 60.0:5.1f} min  {judged}{time}", highlight=False)
-                if (record.whole + record.share) / 2.0 >= record.best:
-                    best = f". The best validation was that after {record.seconds / 60.0:.1f} min: {judged}"
             last = f"{judged}, {record.agent_steps / max(record.seconds, 1e-9):,.0f} agent-steps/s"
             report(record.spent(training), f"reward {record.reward:.3f}, {last}")
-    return last + best
+    return last
 
 
 @contextmanager

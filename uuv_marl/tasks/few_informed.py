@@ -33,7 +33,7 @@ class FewInformed(Reach):
     """
 
     Numbers = FewInformedNumbers
-    target: ClassVar[str] = Task.target
+    place: ClassVar[str] = Task.place
     observed: ClassVar[Table] = (
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )

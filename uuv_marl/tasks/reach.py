@@ -34,7 +34,7 @@ class Reach(Task):
 
     Numbers = ReachNumbers
     Memory: ClassVar[type[Any] | None] = Reached
-    target: ClassVar[str] = "goal"
+    place: ClassVar[str] = "goal"
     terms: ClassVar[Mapping[str, str]] = {
         "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
         "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",

@@ -89,10 +89,8 @@ class Task:
     """Whether the scenario's ``traffic`` may move the obstacles that the task draws."""
     leads: ClassVar[bool] = True
     """Whether references say where to go: else no arrival is told, and pictures show a place."""
-    target: ClassVar[str] = "l(t), to follow"
-    """What a reference is, in a legend's words."""
-    place: ClassVar[str] = "goal of a vehicle"
-    """What the reference at rest of a group is, in a legend's words."""
+    place: ClassVar[str] = "l(t), to follow"
+    """What a reference is, in a legend's words; pictures call it by those before a comma."""
     marked: ClassVar[str] = ""
     """What ``marks`` are, in a legend's words."""
     ending: ClassVar[str] = "done"

@@ -101,6 +101,7 @@ class TwoSwarms(Reach):
         "time_ratio": "mean over vehicles there, of the time until then over the straight way at full speed [1]",
         "whole_ratio": "the same of the last vehicle, if all came there [1]",
     }
+    place: ClassVar[str] = "goal of a vehicle"
     marked: ClassVar[str] = "where a vehicle is there"
     guide: ClassVar[str] = "tangent_bug"
 

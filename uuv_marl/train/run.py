@@ -199,11 +199,11 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
     return record
 
 
-def worst_replay(output: Path) -> str:
-    """The command that shows the worst episode in the validation of a training's best policy."""
+def best_of(output: Path) -> tuple[Record, str]:
+    """Of a training's best policy: its iteration, and the command that shows the worst episode in its validation."""
     told = dict(load_checkpoint(output / "best").card.training)
     kept = {name: value for name, value in told.items() if name in Training.model_fields}
-    return replay_command(output / "best", Training(**kept), Worst(*told["worst"]))
+    return Record(**told["record"]), replay_command(output / "best", Training(**kept), Worst(*told["worst"]))
 
 
 @contextmanager

@@ -108,7 +108,6 @@ def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
         colour = ink.ORANGE if value < touching else ink.AMBER if value < least else ink.TEXT
         return ("–", ink.TEXT) if not math.isfinite(value) else (_metres(value), colour)
 
-    target = scene.scenario.task_class.target.partition(",")[0]
     alive, n, arrived = int(scene.alive.sum()), len(scene.alive), scene.arrival_s is not None
     return [
         ("arrived after", "arrived", f"{scene.arrival_s:.1f} s", ink.GREEN)
@@ -118,7 +117,7 @@ def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
         ("smallest obstacle distance", "clearance", *distance(scene.clearance_m, limits.s_o_m, contact)),
         ("vehicles", "vehicles", f"{alive}" if alive == n else f"{alive} of {n}", ink.TEXT),
         ("collisions", "collisions", f"{scene.collisions}", ink.ORANGE if scene.collisions else ink.TEXT),
-        (f"swarm's centre to {target}", f"to {target}", _metres(scene.centre_error_m), ink.TEXT),
+        (f"swarm's centre to {scene.place}", f"to {scene.place}", _metres(scene.centre_error_m), ink.TEXT),
     ][: 6 if scene.leads else 5]
 
 

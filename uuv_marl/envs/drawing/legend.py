@@ -28,7 +28,7 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
     if not all_know:
         found.append(("does not perceive l(t)", lambda *on: (_dart(ink.BLUE)(*on), _dart(ink.WHITE, 7.5)(*on))))
     task = scene.scenario.task_class
-    found.append((task.target, _target) if scene.leads else (task.place, _goal))
+    found.append((task.place, _target if scene.leads else _goal))
     if len(scene.marks):
         found.append((task.marked or "of the task", _mark))
     if scene.trail.size:

@@ -177,15 +177,15 @@ class Painter:
 
     def _words(self, scene: Scene, camera: Camera, cell: float) -> None:
         unit = self._unit / FINE
-        height, target = round(12 * unit), scene.scenario.task_class.target.partition(",")[0]
+        height = round(12 * unit)
         for team, way, reference in scene.leads:
             for words, point in (("start", way[0]), ("goal", way[-1])):
                 x, y = camera.pixels(point).tolist()
                 left = x - ink.text(words, height, bold=True).get_width() / 2
                 ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)
-            if target != "goal":  # whose word is there
+            if scene.place != "goal":  # whose word is there
                 (x, y), colour = camera.pixels(reference).tolist(), ink.TEAMS.get(team, ink.GREEN)
-                ink.write(self._shown, target, (x + 15 * unit, y - 7 * unit), height, colour, bold=True, halo=True)
+                ink.write(self._shown, scene.place, (x + 15 * unit, y - 7 * unit), height, colour, bold=True, halo=True)
         right, low = self.size[0], self.size[1] - 9 * unit - height
         words = f"{cell:g} m"
         left = right - 34 * unit - (cell * camera.scale + ink.text(words, height).get_width()) / 2

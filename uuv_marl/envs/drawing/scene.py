@@ -70,6 +70,11 @@ class Scene(NamedTuple):
     """How it moves; None where the scenario's water is still."""
 
     @property
+    def place(self) -> str:
+        """What a reference is called, such as ``l(t)``."""
+        return self.scenario.task_class.place.partition(",")[0]
+
+    @property
     def leads(self) -> list[tuple[int | None, Float, Float]]:
         """Team, corners and l(t) of each group, but for goals at rest of several groups."""
         return [(team, way, self.references[g]) for g, (team, way) in self.groups.ways.items() if len(way) > 1]

@@ -32,10 +32,8 @@ class WayGrid(NamedTuple):
 
     def cells(self, x: Float64, y: Float64) -> tuple[Int64, Int64]:
         """Rows and columns of the cells nearest to places [m], shape (place,)."""
-        row, column = np.rint((x - self.x) / CELL_M), np.rint((y - self.y) / CELL_M)
-        row, column = (
-            np.minimum(np.maximum(place, 0), most - 1) for place, most in ((row, self.rows), (column, self.columns))
-        )
+        row = np.minimum(np.maximum(np.rint((x - self.x) / CELL_M), 0), self.rows - 1)
+        column = np.minimum(np.maximum(np.rint((y - self.y) / CELL_M), 0), self.columns - 1)
         return row.astype(np.int64), column.astype(np.int64)
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
