@@ -236,6 +236,14 @@ def test_results_are_read_as_a_data_frame(tmp_path):
     assert frame["task_time_s"].dtype == float
     assert load_trace(frame["trace"][2])["min_spacing_m"].min() == np.float32(frame["min_spacing_m"][2])
     assert load(tmp_path / "results.json").equals(frame)
+    content = json.loads((tmp_path / "results.json").read_text())
+    for run in content["runs"]:
+        run["metrics"]["task"] = {"effort": 2.0, "found": None}
+    (tmp_path / "results.json").write_text(json.dumps(content))
+    own = load(tmp_path)
+    assert own["effort"].equals(frame["effort"])
+    assert list(own["task_effort"]) == [2.0] * 4
+    assert own["found"].isna().all()
     frame.to_csv(tmp_path / "runs.csv", index=False)
     with (tmp_path / "runs.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 4

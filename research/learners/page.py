@@ -12,13 +12,15 @@ from research.data import read_text
 from research.episodes import Row, measured, write_rows
 from research.learners.figures import draw_curves, draw_profiles
 from research.learners.layout import marl_eval
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TIERS
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TIERS, TRAININGS
 from research.learners.statistics import Estimate, improvement, interquartile_mean
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.types import Float64
 
+_ENOUGH = 4
+"""With three trainings of each, one in ten pairs that are alike would be told apart: all of the one above the other's."""
 Found = Mapping[tuple[str, str], Mapping[str, Mapping[str, Sequence[Row]]]]
 """Rows by task and learner or policy, then by training, then by set."""
 
@@ -40,11 +42,12 @@ def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list
 
 def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     """The page's text."""
-    found = found_in(rows)
+    found, made = found_in(rows), len({(row["task"], row["learner"], row["training"]) for row in curves})
+    wanted = len(TASKS) * len(LEARNERS) * TRAININGS
     return Template(read_text("learners", "story.md")).substitute(
         first=_first(found), tiers=_tiers(found), safety=_safety(found), pairs=_pairs(found), apart=_apart(found),
         compute=_compute(curves), settings=_settings(), episodes=f"{len(rows):,}", steps=f"{AGENT_STEPS / 1e6:g}",
-        minutes=f"{MINUTES:g}", trainings=len({(row["task"], row["learner"], row["training"]) for row in curves}),
+        minutes=f"{MINUTES:g}", trainings=f"{made} trainings" if made >= wanted else f"{made} trainings so far (of {wanted})",
     )  # fmt: skip
 
 
@@ -79,7 +82,8 @@ def short(share: float) -> str:
 
 
 def _told(found: Estimate) -> str:
-    return f"{short(found.point)} [{short(found.low)}, {short(found.high)}]"
+    interval = "" if found.low == found.high else f" [{short(found.low)}, {short(found.high)}]"
+    return short(found.point) + interval
 
 
 def _first(found: Found) -> str:
@@ -144,6 +148,8 @@ def _pairs(found: Found) -> str:
 def _apart(found: Found) -> str:
     """Pairs that are told apart on each task: the interval holds no one half."""
     every, table = scores(found), list[tuple[str, ...]]()
+    if (num := min(map(len, every.values()))) < _ENOUGH:
+        return f"So far there are {num} trainings of each, too few to tell anyone apart."
     for k, task in enumerate(TASKS):
         apart: list[str] = []
         for one, other in combinations(LEARNERS, 2):

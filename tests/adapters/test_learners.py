@@ -79,12 +79,12 @@ def test_what_isac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
 
 
 def invented(better=()):
-    """Rows and curves of three trainings; some learners are better."""
+    """Rows and curves of four trainings; some learners are better."""
     rng = np.random.default_rng(0)
     curves, rows = [], []
     for task in TASKS.values():
         for who in (*LEARNERS, *task.policies):
-            for training in range(3) if who in LEARNERS else ("",):
+            for training in range(4) if who in LEARNERS else ("",):
                 place = {"task": task.name, "learner": who, "training": str(training)}
                 share = 0.1 * rng.uniform() + 0.5 * (who in better)
                 for each in task.sets:
@@ -132,7 +132,7 @@ def test_the_layout_is_that_of_marl_eval():
     for task in told["uuv_marl"].values():
         assert list(task) == list(LEARNERS)
         for runs in task.values():
-            assert list(runs) == ["seed_0", "seed_1", "seed_2"]
+            assert list(runs) == ["seed_0", "seed_1", "seed_2", "seed_3"]
             for run in runs.values():
                 assert list(run) == ["step_0", "step_1", "absolute_metrics"]
                 assert {"step_count", "elapsed_time"} < set(run["step_0"])

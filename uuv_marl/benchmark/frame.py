@@ -19,9 +19,9 @@ def load(path: UserPath) -> Any:
     """The runs of a ``results.json`` as a pandas data frame, a row for each, by scenario, policy and seed.
 
     Columns are ``scenario``, ``policy``, ``seed``, every metric (``constraint_share`` as ``constraint_share_all``,
-    ``constraint_share_s_l`` and so on), those of the task by their names, such as ``untouched_share``, and ``trace``,
-    the path of the run's time series for ``load_trace``. NaN means
-    that there was nothing to measure. No policy is imported.
+    ``constraint_share_s_l`` and so on), those of the task by their names, such as ``untouched_share``, with
+    ``task_`` before a name that is taken, and ``trace``, the path of the run's time series for ``load_trace``. NaN
+    means that there was nothing to measure. No policy is imported.
 
     Args:
         path: of the file, or of the folder that holds it.
@@ -39,6 +39,8 @@ def load(path: UserPath) -> Any:
         shares = {f"constraint_share_{name}": share for name, share in metrics.pop("constraint_share").items()}
         own = metrics.pop("task", {})
         key = {"scenario": row.scenario, "policy": row.policy, "seed": row.seed}
-        told = {name: math.nan if value is None else value for name, value in {**metrics, **shares, **own}.items()}
-        records.append({**key, **told, "trace": str(trace_path(file.parent, *row[:3]))})
+        usual = {**key, **metrics, **shares}
+        every = usual | {f"task_{name}" if name in {*usual, "trace"} else name: value for name, value in own.items()}
+        told = {name: math.nan if value is None else value for name, value in every.items()}
+        records.append({**told, "trace": str(trace_path(file.parent, *row[:3]))})
     return pandas.DataFrame.from_records(records)
