@@ -20,7 +20,7 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.types import Float64
 
 _ENOUGH = 4
-"""With three trainings of each, one in ten pairs that are alike would be told apart: all of the one above the other's."""
+"""With three trainings of each, one in ten pairs that are alike would be told apart: all of one above the other's."""
 Found = Mapping[tuple[str, str], Mapping[str, Mapping[str, Sequence[Row]]]]
 """Rows by task and learner or policy, then by training, then by set."""
 
@@ -47,7 +47,7 @@ def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     return Template(read_text("learners", "story.md")).substitute(
         first=_first(found), tiers=_tiers(found), safety=_safety(found), pairs=_pairs(found), apart=_apart(found),
         compute=_compute(curves), settings=_settings(), episodes=f"{len(rows):,}", steps=f"{AGENT_STEPS / 1e6:g}",
-        minutes=f"{MINUTES:g}", trainings=f"{made} trainings" if made >= wanted else f"{made} trainings so far (of {wanted})",
+        minutes=f"{MINUTES:g}", trainings=f"{made} trainings" + f" so far (of {wanted})" * (made < wanted),
     )  # fmt: skip
 
 
