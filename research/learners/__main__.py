@@ -9,7 +9,7 @@ from filelock import FileLock, Timeout
 
 from research import FOLDER
 from research.episodes import Row
-from research.learners.cells import EPISODES, Cell, beside, cells, make, read
+from research.learners.cells import EPISODES, Cell, beside, cells, make, need_protocol, read
 from research.learners.page import write_page
 from research.learners.protocol import LEARNERS, TASKS, TRAININGS
 from research.learners.watch import Report
@@ -42,6 +42,7 @@ def main(
         for name, known, what in ((task, TASKS, "task"), (learner, LEARNERS, "learner")):
             if unknown := [each for each in name or [] if each not in known]:
                 raise ResultsError(f"{what} must be one of {', '.join(known)}, got {unknown[0]!r}")
+        need_protocol(output)
         chosen = cells(task or [], learner or [], trainings)
         with working(f"Finished trainings are in {output}") as bar:
             for k, cell in enumerate(chosen):

@@ -1,14 +1,15 @@
 """Cells: a learner's training on a task with a seed, and what its policy does in the final episodes."""
 
-import json
 import shutil
+import tomllib
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
+from research.data import read_text
 from research.episodes import Row, read_rows, write_rows
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, Judged, Learner, Task
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, PROTOCOL, TASKS, Judged, Learner, Task
 from research.learners.watch import Asked, Report, Trainer
 from uuv_marl.atomic import write_text
 from uuv_marl.baselines import granted
@@ -19,7 +20,7 @@ from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.validation import shares_of
 
-MADE, CURVE, EPISODES, OTHERS = "made.json", "curve.csv", "episodes.csv", "others"
+CURVE, EPISODES, OTHERS = "curve.csv", "episodes.csv", "others"
 _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.isac"}
 _TRAINED = 0.8
 """Share of a cell's progress that the training is; assumed."""
@@ -49,6 +50,16 @@ class Cell(NamedTuple):
         return KEPT / f"{self.task.name}-{self.learner.name}-{self.seed}.safetensors"
 
 
+def need_protocol(output: Path) -> None:
+    """Note in a new folder by which protocol it is made. Raises ResultsError where it was another."""
+    path, told = output / PROTOCOL, read_text("learners", PROTOCOL)
+    if not path.exists():
+        output.mkdir(parents=True, exist_ok=True)
+        write_text(path, told)
+    elif tomllib.loads(path.read_text(encoding="utf-8")) != tomllib.loads(told):
+        raise ResultsError(f"{output} was made by another protocol, see {path}; remove it, or give another --output")
+
+
 def cells(tasks: list[str], learners: list[str], trainings: int) -> list[Cell]:
     """All cells of these tasks and learners, the first seed of each first."""
     chosen = [(TASKS[task], LEARNERS[name]) for task in tasks or TASKS for name in learners or LEARNERS]
@@ -68,21 +79,13 @@ def emptied(folder: Path) -> None:
 
 
 def make(cell: Cell, folder: Path, report: Report) -> None:
-    """Train it, and run its policy; what is there already stays.
-
-    Raises:
-        ResultsError: it is there with other settings.
-    """
-    told = {"settings": cell.learner.settings, "agent_steps": AGENT_STEPS, "minutes": MINUTES}
+    """Train it, and run its policy; what is there already stays."""
     if not (folder / CURVE).exists():
         emptied(folder)  # of a training that was cut off
         spent: Report = lambda share: report(_TRAINED * share)  # noqa: E731
         asked = Asked(cell.task, cell.seed, folder, cell.learner.settings, AGENT_STEPS, MINUTES, spent)
         curve = trainer_of(cell.learner)(asked)
-        write_text(folder / MADE, json.dumps(told) + "\n")
         write_rows(folder / CURVE, curve)
-    elif json.loads((folder / MADE).read_text(encoding="utf-8")) != json.loads(json.dumps(told)):
-        raise ResultsError(f"{folder} was made with other settings; remove it, or give another --output")
     if not (folder / EPISODES).exists():
         policy = cell.policy(folder / WEIGHTS_FILE)
         rows = every(cell.task, policy, lambda share: report(_TRAINED + (1.0 - _TRAINED) * share))
@@ -111,11 +114,11 @@ MEASURES = ("share", "whole", "contacts", "to_obstacles", "to_others", "time")
 
 
 def measures(metrics: Metrics, scenario: Scenario) -> dict[str, str]:
-    """Headline, whole swarms, contacts of a vehicle, smallest distances [m], and time over the reference's [1]."""
+    """Headline, whole swarms, contacts of a vehicle, smallest distances [m], and time over l(t)'s or the way's [1]."""
     share, whole = shares_of(metrics, scenario.task_class.headline)
     ratio = metrics["task"].get("time_ratio") if "task" in metrics else None
     if "task" not in metrics and metrics["task_time_s"] is not None:
-        ratio = metrics["task_time_s"] / scenario.task_class.longest_s(scenario)
+        ratio = metrics["task_time_s"] / metrics["duration_s"]
     contacts = metrics["collisions"] / scenario.swarm.num_vehicles
     values = (share, float(whole), contacts, metrics["min_obstacle_distance_m"], metrics["min_spacing_m"], ratio)
     return {name: "" if v is None else f"{v:.3g}" for name, v in zip(MEASURES, values, strict=True)}

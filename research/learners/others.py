@@ -47,7 +47,7 @@ def main(
                 told(k / len(drawn))
                 need_alike(given[at], policy, TASKS[task])
             told(1.0)
-        path = output / OTHERS / task / f"{rows.name.partition('.')[0]}.csv"
+        path = output / OTHERS / task / f"{rows.name.removesuffix('.gz').removesuffix('.csv')}.csv"
         write_rows(path, given)
         console.print(f"  {len(drawn)} of {len(given)} rows came again alike: {path}", highlight=False)
 
@@ -55,13 +55,14 @@ def main(
 def need_whole(rows: list[Row], task: Task) -> None:
     """Refuse rows that leave out an episode, have one twice, or are of something else. Raises ResultsError."""
     columns = ["set", "seed", *MEASURES]
-    if list(rows[0]) != columns:
-        raise ResultsError(f"the columns must be {', '.join(columns)}, got {', '.join(rows[0])}")
+    got = list(rows[0]) if rows else []
+    if got != columns:
+        raise ResultsError(f"the columns must be {', '.join(columns)}, got {', '.join(got) or 'no rows'}")
     for name in {row["set"] for row in rows} - {each.name for each in task.sets}:
         raise ResultsError(f"set must be one of {', '.join(each.name for each in task.sets)}, got {name!r}")
     for each in task.sets:
-        seeds = sorted(int(row["seed"]) for row in rows if row["set"] == each.name)
-        if seeds != list(each.episodes):
+        seeds = [row["seed"] for row in rows if row["set"] == each.name]
+        if sorted(seeds) != sorted(map(str, each.episodes)):
             raise ResultsError(
                 f"set {each.name} must have the seeds {each.episodes[0]} to {each.episodes[-1]} once each, "
                 f"got {len(seeds)} rows"

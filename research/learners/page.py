@@ -20,7 +20,8 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.types import Float64
 
 _ENOUGH = 4
-"""With three trainings of each, one in ten pairs that are alike would be told apart: all of one above the other's."""
+"""Of pairs that are alike a fifth would be told apart with three trainings of each, a twelfth with four or five (3,000
+simulated)."""
 Found = Mapping[tuple[str, str], Mapping[str, Mapping[str, Sequence[Row]]]]
 """Rows by task and learner or policy, then by training, then by set."""
 

@@ -8,7 +8,8 @@ from uuv_marl.benchmark.robustness.axes import AXES
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.training import Training, overrides_for
 
-_TOLD: dict[str, Any] = read_toml("learners", "protocol.toml")
+PROTOCOL = "protocol.toml"
+_TOLD: dict[str, Any] = read_toml("learners", PROTOCOL)
 TRAININGS: int = _TOLD["trainings"]
 """Of each learner on each task, with seeds from 0 on."""
 AGENT_STEPS: int = _TOLD["agent_steps"]

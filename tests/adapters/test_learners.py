@@ -50,12 +50,35 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     before = (folder / cells.EPISODES).stat().st_mtime_ns
     cells.make(cell, folder, quiet)
     assert (folder / cells.EPISODES).stat().st_mtime_ns == before
-    cell = cell._replace(learner=cell.learner._replace(tried=({**cell.learner.settings, "seed": 1},), chosen=0))
-    with pytest.raises(ResultsError, match="was made with other settings; remove it, or give another --output"):
-        cells.make(cell, folder, quiet)
     first = small[0][0]
     (again,) = cells.episodes(cell.policy(folder / cells.WEIGHTS_FILE), first, range(7000, 7001))
     assert again == {key: rows[0][key] for key in again}
+
+
+def test_a_folder_has_one_protocol(tmp_path):
+    for _ in range(2):
+        cells.need_protocol(tmp_path / "new")
+    path = tmp_path / "new" / "protocol.toml"
+    path.write_text(path.read_text().replace("first = 7000", "first = 8000"))
+    with pytest.raises(ResultsError, match="was made by another protocol, see .*; remove it, or give another --output"):
+        cells.need_protocol(tmp_path / "new")
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_training_that_runs_out_of_time_is_measured_at_its_end(name, tmp_path, monkeypatch):
+    monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
+    task = TASKS["hard_water"]
+    asked = watch.Asked(task, 0, tmp_path, LEARNERS[name].settings, 5_000_000, 0.02, quiet)
+    curve = cells.trainer_of(LEARNERS[name])(asked)
+    assert 1 <= len(curve) <= protocol.MEASURES
+    assert 0.02 <= float(curve[-1]["minutes"]) < 0.2
+    assert (tmp_path / "policy.safetensors").exists()
+
+
+def test_the_time_of_a_field_is_over_that_of_its_own_reference():
+    (first,) = TASKS["random_field"].tiers[0]
+    rows = list(cells.episodes("scout", first, range(7000, 7003)))
+    assert all(1.0 <= float(row["time"]) < 1.1 for row in rows)
 
 
 def test_what_isac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
@@ -164,6 +187,8 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
         others.need_alike(rows[0], "random", few)
     with pytest.raises(ResultsError, match="set must be one of hard_water, .*, got 'lake'"):
         others.need_whole([{**rows[0], "set": "lake"}], few)
+    with pytest.raises(ResultsError, match="the columns must be set, .*, got no rows"):
+        others.need_whole([], few)
     with pytest.raises(ResultsError, match="the columns must be set, seed, share, .*, got set, .*, colour"):
         others.need_whole([{**row, "colour": "blue"} for row in rows], few)
 
