@@ -111,6 +111,10 @@ def test_bad_input_names_the_agent_and_the_remedy():
     lone.reset(seed=0)
     with pytest.raises(ValueError, match="must give finite numbers"):
         lone.step({"uuv_0": np.zeros(2)})
+    huge = uuv_marl.parallel_env(num_vehicles=1, reward=lambda swarm: np.full(swarm.facts.spacing.shape, 1e300))
+    huge.reset(seed=0)
+    with pytest.raises(ValueError, match=r"must give finite numbers, 1e\+09 at most"):
+        huge.step({"uuv_0": np.zeros(2)})
 
 
 def test_stepping_nobody_after_the_end_gives_nothing():

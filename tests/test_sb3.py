@@ -13,6 +13,7 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from uuv_marl import load_scenario
@@ -162,6 +163,13 @@ def test_a_checkpoint_acts_as_the_model_does(tmp_path):
         observation, *_ = env.step(wish)
 
 
+class Doubled(FlattenExtractor):
+    """Features that are not the observation."""
+
+    def forward(self, observations):
+        return 2.0 * super().forward(observations)
+
+
 def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
     for env in (swarm(), VecNormalize(actors())):
         with pytest.raises(PolicyError, match="train on SwarmVecEnv.*observe='closeness'"):
@@ -169,6 +177,14 @@ def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
     relu = PPO("MlpPolicy", actors(), policy_kwargs={"activation_fn": torch.nn.ReLU}, device="cpu")
     with pytest.raises(PolicyError, match="tanh layers, got .*leave activation_fn out"):
         save_sb3(relu, tmp_path / "a")
+    for told in ({"squash_output": True}, {"features_extractor_class": Doubled}):
+        other = PPO("MlpPolicy", actors(), use_sde="squash_output" in told, policy_kwargs=told, device="cpu")
+        with pytest.raises(PolicyError, match="the actor alone; leave features_extractor_class and squash_output out"):
+            save_sb3(other, tmp_path / "a")
+    with pytest.raises(PolicyError, match=r"sees one observation of .*, got \(\d+,\); leave VecFrameStack out"):
+        save_sb3(PPO("MlpPolicy", VecFrameStack(actors(), 2), device="cpu"), tmp_path / "a")
+    with pytest.raises(PolicyError, match="a layer before its last"):
+        save_sb3(PPO("MlpPolicy", actors(), policy_kwargs={"net_arch": []}, device="cpu"), tmp_path / "a")
 
 
 def test_the_example_trains_a_policy(tmp_path):

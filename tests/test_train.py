@@ -4,9 +4,11 @@ import csv
 import errno
 import itertools
 import json
+import math
 import os
 import random
 import re
+import shlex
 import shutil
 import signal
 
@@ -24,6 +26,7 @@ from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
 from uuv_marl.errors import PolicyError, ResultsError, RewardError, ScenarioError, TrainingError
+from uuv_marl.scenario import parse_override
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import run as trainings
 from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
@@ -32,7 +35,7 @@ from uuv_marl.train.ppo import Learner, annealed, gae
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows, Transition
 from uuv_marl.train.run import Trainer, resume, train
 from uuv_marl.train.training import Ppo, Training, told_by
-from uuv_marl.train.validation import VALIDATION_SEEDS, Judged, Worst
+from uuv_marl.train.validation import VALIDATION_SEEDS, Judged, Worst, replay_command
 
 GOOD = Judged(1.0, 1.0, 0.0, 30.0, Worst("starter", 3, 900_000))
 TINY = Ppo(horizon=8, minibatches=2)
@@ -414,6 +417,9 @@ def test_a_finished_training_goes_on_to_more_steps_as_it_ended(tmp_path, no_vali
     assert files(tmp_path / "parts") == files(tmp_path / "whole")
     assert json.loads((tmp_path / "parts" / "config.json").read_text())["training"]["steps"] == 2 * 168
     assert TrainingFolder(tmp_path / "parts", None).until == 5 * 168
+    for until in (0.0, math.nan, math.inf):
+        with pytest.raises(TrainingError, match="until must be above 0 and finite"):
+            list(resume(tmp_path / "parts", until))
 
 
 def test_a_training_of_minutes_ends_by_processor_time(tmp_path, no_validation):
@@ -466,6 +472,16 @@ def test_the_best_policy_is_kept_with_its_worst_episode(tmp_path, monkeypatch):
     assert command.startswith(f"uuv-marl replay --scenario starter --policy {tmp_path}/a/best --seed 900004 --set ")
     assert "--set time_limit.extra_s=6.0" in command
     assert "--set swarm.num_vehicles=6" in command
+
+
+def test_the_command_that_replays_an_episode_takes_a_trainings_tables(tmp_path):
+    tables = {"task": {"name": "reach", "near_m": 20.0}, "timing": {"decision_period_s": 0.5}}
+    training = small(overrides={**tables, "sonar": {"channels": []}})
+    words = shlex.split(replay_command(tmp_path, training, Worst(training.scenario, 3, 900_000)))
+    sets = [word for word, before in zip(words[1:], words, strict=False) if before == "--set"]
+    told = dict(parse_override(each) for each in sets)
+    assert load_scenario("starter", overrides=told).task_numbers.near_m == 20.0
+    assert "sonar.channels" not in told
 
 
 def test_what_was_better_is_not_lost_with_a_process(tmp_path, monkeypatch):

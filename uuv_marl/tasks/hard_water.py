@@ -76,6 +76,14 @@ class HardWaterNumbers(ReachNumbers):
     harbour: Harbour
     piles: Piles
 
+    def _check(self) -> None:
+        if (far := self.length_m[0] - self.goal_clear_m) < self.first_wall_m:
+            raise ValueError(
+                f"task.length_m must leave room for walls from task.first_wall_m = {self.first_wall_m:g} on to "
+                f"task.goal_clear_m = {self.goal_clear_m:g} before the goal, got {list(self.length_m)}, of which the "
+                f"shortest ends at {far:g}; raise it to at least {self.first_wall_m + self.goal_clear_m:g}"
+            )
+
     def grid(self) -> WayGrid:
         """Cells that hold the largest water."""
         rows = int((self.behind_m + self.length_m[1] + self.beyond_m) / CELL_M) + 1

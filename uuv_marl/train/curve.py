@@ -34,5 +34,5 @@ def draw_curve(rows: Sequence[Sequence[str]], path: Path, title: str) -> None:
             ax.set(xlabel="processor time [min]", ylabel=what)
         axes[0].set_ylim(-0.02, 1.02)
         axes[0].legend()
-        figure.suptitle(title)
+        figure.suptitle(title, parse_math=False)
         figure.savefig(path)

@@ -5,6 +5,7 @@ the best validation; ``curve.png``. Needs ``train``.
 """
 
 import json
+import math
 import shutil
 import time
 from collections.abc import Iterator, Mapping
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
-from uuv_marl.errors import ResultsError
+from uuv_marl.errors import ResultsError, TrainingError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import conditions
@@ -71,7 +72,10 @@ def resume(
 
     Raises:
         ResultsError: the folder holds no training, or a damaged one, or is in use; the message names the file.
+        TrainingError: ``until`` is not above 0 and finite.
     """
+    if until is not None and not 0.0 < until < math.inf:
+        raise TrainingError(f"until must be above 0 and finite, got {until}; leave it out to go on to the budget")
     with opened(user_path(output), None, say) as folder:
         yield from _run(folder, until or folder.until, say, stop)
 
@@ -97,11 +101,11 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
                 if validated:
                     record = _validated(trainer, record, folder.path)
                 folder.note(record)
-                if validated:
-                    draw_curve(folder.rows(), folder.path / "curve.png", training.title or training.loaded.title)
                 stopped = stop()
                 if validated or stopped or record.iteration % training.checkpoint_every == 0:
                     folder.keep(record, lambda path, record=record: trainer.save(path, record))
+                if validated:
+                    draw_curve(folder.rows(), folder.path / "curve.png", training.title or training.loaded.title)
                 yield record
 
 

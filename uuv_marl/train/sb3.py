@@ -11,6 +11,7 @@ from uuv_marl.paths import UserPath
 
 with extra("sb3", "training with Stable-Baselines3"):
     from stable_baselines3 import PPO
+    from stable_baselines3.common.torch_layers import FlattenExtractor
     from torch import nn
 
 
@@ -35,7 +36,19 @@ def save_sb3(model: PPO, path: UserPath) -> None:
         )
     policy: Any = model.policy
     hidden = list(policy.mlp_extractor.policy_net)
-    if not hidden or [type(layer) for layer in hidden] != [nn.Linear, nn.Tanh] * (len(hidden) // 2):
+    inputs = model.observation_space.shape
+    if type(policy.features_extractor) is not FlattenExtractor or policy.squash_output:
+        raise PolicyError(
+            "a checkpoint's network is the actor alone; leave features_extractor_class and squash_output out"
+        )
+    if inputs != env.observation_space.shape:
+        raise PolicyError(
+            f"a checkpoint's network sees one observation of {env.observation_space.shape}, got {inputs}; leave "
+            "VecFrameStack out"
+        )
+    if not hidden:
+        raise PolicyError("a checkpoint's network has a layer before its last, got net_arch=[]; give one")
+    if [type(layer) for layer in hidden] != [nn.Linear, nn.Tanh] * (len(hidden) // 2):
         raise PolicyError(f"a checkpoint's network has tanh layers, got {hidden}; leave activation_fn out")
     layers = [*hidden[::2], policy.action_net]
     tensors = {f"{k}.weight": layer.weight.detach().cpu().numpy().T for k, layer in enumerate(layers)}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, between, joined, side, wall
+from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, Span, between, joined, side, wall
 from uuv_marl.types import Float64
 
 _FIRST_M, _FREE_M, _OFF = 20.0, 10.0, 0.3
@@ -15,7 +15,7 @@ class Harbour(MapKind):
 
     pier_m: Range
     """Length of a pier from the bank."""
-    basin_m: Range
+    basin_m: Span
     """Width of a basin, from pier to pier."""
     mole_m: Range
     """Length of the mole that lies across the way, off both banks."""

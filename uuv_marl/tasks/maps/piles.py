@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, Share, between, joined, wall
+from uuv_marl.tasks.maps.walls import Basin, MapKind, Share, Span, between, joined, wall
 from uuv_marl.types import Float64
 
 _ASLANT = 0.15
@@ -12,7 +12,7 @@ _ASLANT = 0.15
 class Piles(MapKind):
     """A grid that fills the water from bank to bank."""
 
-    apart_m: Range
+    apart_m: Span
     """From pile to pile, along and across."""
     braced: Share
     """Share of neighbouring piles across the way that a wall joins."""

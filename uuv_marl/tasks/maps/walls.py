@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import AfterValidator
 
-from uuv_marl.scenario.fields import NonNegative, Section, within
+from uuv_marl.scenario.fields import NonNegative, Positive, Section, within
 from uuv_marl.types import Float64
 
 STEP = 1.6
@@ -27,6 +27,8 @@ def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
 
 Range = Annotated[tuple[NonNegative, NonNegative], AfterValidator(_ordered)]
 """Lowest and highest value; each map draws its own between them."""
+Span = Annotated[tuple[Positive, Positive], AfterValidator(_ordered)]
+"""The same, above 0."""
 
 Share = Annotated[float, within(0, 1)]
 
@@ -51,7 +53,7 @@ class Basin(NamedTuple):
 class MapKind(Section):
     """Numbers of one kind of map."""
 
-    radius_m: Range
+    radius_m: Span
     """Radius of the discs that its walls are made of."""
 
     def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
