@@ -1,6 +1,7 @@
 """``learners.md``: who learns what, written from curves and episodes alone."""
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -34,15 +35,23 @@ def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list
     write_text(folder / "learners.md", report(curves, rows))
     with house_style():
         drawn = [
-            draw_curves(curves, rows, folder / "figures" / "learners_curves.png"),
-            draw_profiles(scores(found_in(rows)), folder / "figures" / "learners_profiles.png"),
+            draw_curves(*whole(curves, rows), folder / "figures" / "learners_curves.png"),
+            draw_profiles(scores(found_in(whole(curves, rows)[1])), folder / "figures" / "learners_profiles.png"),
         ]
     names = ("learners.md", "learners.csv.gz", "learners_curves.csv.gz", "learners_marl_eval.json")
     return [*(folder / name for name in names), *drawn]
 
 
+def whole(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
+    """Those of the trainings that all learners have on all tasks, and of policies that are not trained here."""
+    num = Counter(training for *_, training in {(row["task"], row["learner"], row["training"]) for row in curves})
+    shown = {"", *(training for training, learned in num.items() if learned == len(TASKS) * len(LEARNERS))}
+    return [row for row in curves if row["training"] in shown], [row for row in rows if row["training"] in shown]
+
+
 def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
-    """The page's text."""
+    """The page's text, on ``whole`` trainings."""
+    curves, rows = whole(curves, rows)
     found, made = found_in(rows), len({(row["task"], row["learner"], row["training"]) for row in curves})
     wanted = len(TASKS) * len(LEARNERS) * TRAININGS
     return Template(read_text("learners", "story.md")).substitute(

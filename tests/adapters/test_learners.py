@@ -139,6 +139,23 @@ def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monk
     assert not any(" over " in row for row in page._apart(page.found_in(alike(rows))).splitlines())
 
 
+def test_the_page_shows_the_trainings_that_all_learners_have():
+    curves, rows = invented()
+    assert page.whole(curves, rows) == (curves, rows)
+    lacking = [row for row in curves if (row["task"], row["learner"], row["training"]) != ("hard_water", "ppo", "3")]
+    shown = page.whole(lacking, rows)
+    assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
+    assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
+    assert "too few to tell anyone apart" in page._apart(page.found_in(shown[1]))
+
+
+@pytest.mark.skipif(not (FOLDER / "docs" / "learners.csv.gz").exists(), reason="the comparison does not ship yet")
+def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
+    curves, rows = (read_rows(FOLDER / "docs" / f"{name}.csv.gz") for name in ("learners_curves", "learners"))
+    assert (FOLDER / "docs" / "learners.md").read_text() == page.report(curves, rows)
+    assert json.loads((FOLDER / "docs" / "learners_marl_eval.json").read_text()) == marl_eval(curves, rows)
+
+
 def test_estimates_are_what_they_say():
     scores = np.linspace(0.0, 1.0, 40).reshape(8, 5)
     found = interquartile_mean(scores)
