@@ -13,7 +13,7 @@ from research.data import read_text
 from research.episodes import Row, measured, write_rows
 from research.learners.figures import draw_curves, draw_profiles
 from research.learners.layout import marl_eval
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TIERS, TRAININGS
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, SEA, TASKS, TRAININGS
 from research.learners.statistics import Estimate, improvement, interquartile_mean
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style
@@ -75,9 +75,9 @@ def scores(found: Found) -> dict[str, Float64]:
     return {who: np.concatenate([_values(found, task, who) for task in TASKS], axis=1) for who in LEARNERS}
 
 
-def _values(found: Found, task: str, who: str, tier: int = 0, name: str = "share") -> Float64:
-    """A measure of each training, mean over the episodes and then the sets of a tier, shape (training, 1)."""
-    names, trainings = [each.name for each in TASKS[task].tiers[tier]], found[task, who].values()
+def _values(found: Found, task: str, who: str, sets: Sequence[str] = (), name: str = "share") -> Float64:
+    """A measure of each training, mean over the episodes and then the sets, shape (training, 1); on unseen seeds."""
+    names, trainings = sets or [each.name for each in TASKS[task].tiers[0]], found[task, who].values()
     return np.array([[float(np.mean([_mean(sets[each], name) for each in names]))] for sets in trainings], np.float64)
 
 
@@ -102,14 +102,14 @@ def _first(found: Found) -> str:
     for who, every in scores(found).items():
         own = [
             f"{_told(interquartile_mean(every[:, k : k + 1]))}, "
-            f"{short(float(_values(found, task, who, 0, 'whole').mean()))}"
+            f"{short(float(_values(found, task, who, name='whole').mean()))}"
             for k, task in enumerate(TASKS)
         ]
         table.append((who, *own, _told(interquartile_mean(every))))
     for words in ("the best law", "oracle", "random"):
         named = {name: task.policies[0] if words == "the best law" else words for name, task in TASKS.items()}
         cells = [
-            ", ".join(short(float(_values(found, task, who, 0, name).mean())) for name in ("share", "whole"))
+            ", ".join(short(float(_values(found, task, who, name=name).mean())) for name in ("share", "whole"))
             if (task, who) in found else "–"
             for task, who in named.items()
         ]  # fmt: skip
@@ -123,13 +123,16 @@ def _everyone(found: Found, task: str) -> list[str]:
 
 
 def _tiers(found: Found) -> str:
-    """The headline in each tier."""
-    table = [
-        (task, who, *(short(float(_values(found, task, who, tier).mean())) for tier in range(len(TIERS))))
-        for task in TASKS
-        for who in _everyone(found, task)
-    ]
-    return markdown_table(("task", "", *TIERS), table)
+    """The headline in each tier, of the last without the sea and in it."""
+    table: list[tuple[str, ...]] = []
+    for task in TASKS.values():
+        seeds, sizes, last = ([each.name for each in tier] for tier in task.tiers)
+        sea = [name for name in last if name.endswith(SEA)]
+        columns = (seeds, sizes, [name for name in last if name not in sea], sea)
+        for who in _everyone(found, task.name):
+            shares = (_values(found, task.name, who, names).mean() if names else None for names in columns)
+            table.append((task.name, who, *("–" if share is None else short(float(share)) for share in shares)))
+    return markdown_table(("task", "", "unseen seeds", "unseen sizes and ranges", "unseen maps", "sea"), table)
 
 
 def _safety(found: Found) -> str:
@@ -138,7 +141,7 @@ def _safety(found: Found) -> str:
     table: list[tuple[str, ...]] = []
     for task in TASKS:
         for who in _everyone(found, task):
-            values = {name: _values(found, task, who, 0, name) for name in ways}
+            values = {name: _values(found, task, who, name=name) for name in ways}
             cells = [
                 "–" if np.isnan(mine).all() else ways[name].format(float(np.nanmean(mine)))
                 for name, mine in values.items()
@@ -159,7 +162,7 @@ def _apart(found: Found) -> str:
     """Pairs that are told apart on each task: the interval holds no one half."""
     every, table = scores(found), list[tuple[str, ...]]()
     if (num := min(map(len, every.values()))) < _ENOUGH:
-        return f"So far there are {num} trainings of each, too few to tell anyone apart."
+        return f"Each learner has {num} of {TRAININGS} trainings so far, too few to tell anyone apart.\n"
     for k, task in enumerate(TASKS):
         apart: list[str] = []
         for one, other in combinations(LEARNERS, 2):

@@ -16,7 +16,6 @@ AGENT_STEPS: int = _TOLD["agent_steps"]
 MINUTES: float = _TOLD["minutes"]
 MEASURES: int = _TOLD["measures"]
 TRIED_ON: list[str] = _TOLD["tried_on"]
-TIERS = ("unseen seeds", "unseen sizes and ranges", "unseen maps and sea")
 SEA, SEA_LEVEL = "sea", 1
 """Name of a set in the sea, and the level of the robustness axis ``X`` there."""
 
@@ -40,7 +39,7 @@ class Task(NamedTuple):
     policies: tuple[str, ...]
     """Run beside the learners: the best law without a privilege, then others."""
     tiers: tuple[tuple[Judged, ...], ...]
-    """Sets of each of ``TIERS``."""
+    """Sets of unseen seeds; of unseen sizes and ranges; of unseen kinds of maps and the sea."""
 
     @property
     def sets(self) -> tuple[Judged, ...]:
