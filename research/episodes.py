@@ -49,6 +49,11 @@ def measured(rows: Iterable[Row], name: str) -> list[float]:
     return [float(row[name]) for row in rows if row[name]]
 
 
+def short(share: float) -> str:
+    """Two digits after the point, without a zero before it."""
+    return f"{share:.2f}".replace("0.", ".", 1)
+
+
 def succeeded(row: Row) -> bool:
     """Whether the swarm arrived, and nobody touched anything."""
     return bool(row["task_time_s"]) and row["collisions"] == "0"

@@ -139,6 +139,11 @@ def test_at_a_goal_at_rest_who_touched_something_has_failed():
     assert batch.task.metrics(0) == {"untouched_share": 0.8, "whole": 0.0}
 
 
+def test_a_task_that_is_named_takes_fields_too():
+    for fields in ({"task.name": "reach", "task.near_m": 20.0}, {"task": "reach", "task.near_m": 20.0}):
+        assert uuv_marl.load_scenario("starter", overrides=fields).task_numbers.near_m == 20.0
+
+
 @pytest.mark.parametrize(("task", "message"), [
     ("folow", "task 'folow' is unknown; did you mean 'follow'"),
     ("nowhere:Task", "task 'nowhere:Task' can't be imported: No module named 'nowhere'"),

@@ -479,6 +479,7 @@ def test_the_command_that_replays_an_episode_takes_a_trainings_tables(tmp_path):
     training = small(overrides={**tables, "sonar": {"channels": []}})
     words = shlex.split(replay_command(tmp_path, training, Worst(training.scenario, 3, 900_000)))
     sets = [word for word, before in zip(words[1:], words, strict=False) if before == "--set"]
+    assert 'task.name="reach"' in sets
     told = dict(parse_override(each) for each in sets)
     assert load_scenario("starter", overrides=told).task_numbers.near_m == 20.0
     assert "sonar.channels" not in told

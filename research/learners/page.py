@@ -10,7 +10,7 @@ from string import Template
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, measured, write_rows
+from research.episodes import Row, measured, short, write_rows
 from research.learners.figures import draw_curves, draw_profiles
 from research.learners.layout import marl_eval
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, SEA, TASKS, TRAININGS
@@ -35,23 +35,23 @@ def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list
     write_text(folder / "learners.md", report(curves, rows))
     with house_style():
         drawn = [
-            draw_curves(*whole(curves, rows), folder / "figures" / "learners_curves.png"),
-            draw_profiles(scores(found_in(whole(curves, rows)[1])), folder / "figures" / "learners_profiles.png"),
+            draw_curves(*complete(curves, rows), folder / "figures" / "learners_curves.png"),
+            draw_profiles(scores(found_in(complete(curves, rows)[1])), folder / "figures" / "learners_profiles.png"),
         ]
     names = ("learners.md", "learners.csv.gz", "learners_curves.csv.gz", "learners_marl_eval.json")
     return [*(folder / name for name in names), *drawn]
 
 
-def whole(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
-    """Those of the trainings that all learners have on all tasks, and of policies that are not trained here."""
+def complete(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
+    """Those of the trainings that all learners have on all tasks, and rows of policies that are not trained here."""
     num = Counter(training for *_, training in {(row["task"], row["learner"], row["training"]) for row in curves})
     shown = {"", *(training for training, learned in num.items() if learned == len(TASKS) * len(LEARNERS))}
     return [row for row in curves if row["training"] in shown], [row for row in rows if row["training"] in shown]
 
 
 def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
-    """The page's text, on ``whole`` trainings."""
-    curves, rows = whole(curves, rows)
+    """The page's text, on ``complete`` passes."""
+    curves, rows = complete(curves, rows)
     found, made = found_in(rows), len({(row["task"], row["learner"], row["training"]) for row in curves})
     wanted = len(TASKS) * len(LEARNERS) * TRAININGS
     return Template(read_text("learners", "story.md")).substitute(
@@ -84,11 +84,6 @@ def _values(found: Found, task: str, who: str, sets: Sequence[str] = (), name: s
 def _mean(rows: Sequence[Row], name: str) -> float:
     values = measured(rows, name)
     return float(np.mean(values)) if values else float("nan")
-
-
-def short(share: float) -> str:
-    """Two digits after the point, without a zero before it."""
-    return f"{share:.2f}".replace("0.", ".", 1)
 
 
 def _told(found: Estimate) -> str:

@@ -6,7 +6,7 @@ from string import Template
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, measured
+from research.episodes import Row, measured, short
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.registry import is_trained, policy_class
 from uuv_marl.benchmark.tables import markdown_table
@@ -20,9 +20,9 @@ Columns = Mapping[str, Sequence[str]]
 _RESAMPLES = 2000
 _NO_LAWS = ("oracle", "carrot_informed", "random", "idle", "research.blind")
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
-    "found_share": ("found", lambda values, _: _short(float(np.mean(values)))),
+    "found_share": ("found", lambda values, _: short(float(np.mean(values)))),
     "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
-    "untouched_share": ("untouched", lambda values, _: _short(float(np.mean(values)))),
+    "untouched_share": ("untouched", lambda values, _: short(float(np.mean(values)))),
     "collisions": ("contacts", lambda values, n: f"{np.mean(values) / n:.2f}"),
     "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
     "whole_ratio": ("time of the last", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
@@ -143,7 +143,7 @@ def _values(mine: Sequence[Sequence[Row]], name: str) -> list[Float64]:
 
 
 def _mean(mine: Sequence[Sequence[Row]], name: str) -> str:
-    return _short(float(np.mean([values.mean() for values in _values(mine, name)])))
+    return short(float(np.mean([values.mean() for values in _values(mine, name)])))
 
 
 def _with_interval(sets: Sequence[Float64]) -> str:
@@ -152,9 +152,4 @@ def _with_interval(sets: Sequence[Float64]) -> str:
     for k in range(_RESAMPLES):
         means[k] = np.mean([values[rng.integers(len(values), size=len(values))].mean() for values in sets])
     low, high = np.percentile(means, (2.5, 97.5))
-    return f"{_short(float(np.mean([values.mean() for values in sets])))} [{_short(low)}, {_short(high)}]"
-
-
-def _short(share: float) -> str:
-    """Two digits after the point, without a zero before it."""
-    return f"{share:.2f}".replace("0.", ".", 1)
+    return f"{short(float(np.mean([values.mean() for values in sets])))} [{short(low)}, {short(high)}]"

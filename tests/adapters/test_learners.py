@@ -141,9 +141,9 @@ def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monk
 
 def test_the_page_shows_the_trainings_that_all_learners_have():
     curves, rows = invented()
-    assert page.whole(curves, rows) == (curves, rows)
+    assert page.complete(curves, rows) == (curves, rows)
     lacking = [row for row in curves if (row["task"], row["learner"], row["training"]) != ("hard_water", "ppo", "3")]
-    shown = page.whole(lacking, rows)
+    shown = page.complete(lacking, rows)
     assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
     assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
     assert "too few to tell anyone apart" in page._apart(page.found_in(shown[1]))

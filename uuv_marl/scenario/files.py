@@ -15,7 +15,7 @@ from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario.documents import File, items, merged, read_toml
 from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
-from uuv_marl.scenario.overrides import assign, plain
+from uuv_marl.scenario.overrides import assign, leaves, plain
 from uuv_marl.scenario.scale import Scale, in_scale
 from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.vehicle_files import left_out, load_vehicle, variant_comments, vehicle_file
@@ -115,20 +115,10 @@ def to_toml(scenario: Scenario) -> str:
 def differences(scenario: Scenario) -> list[str]:
     """``field=value`` wherever a scenario differs from the shipped one of its name; everything where there is none."""
     shipped = load_scenario(scenario.name) if scenario.name in scenario_names() else None
-    before = _leaves(shipped.model_dump(mode="json")) if shipped else {}
-    now = _leaves(scenario.model_dump(mode="json"))
+    before = leaves(shipped.model_dump(mode="json")) if shipped else {}
+    now = leaves(scenario.model_dump(mode="json"))
     changed = [f"{field}={value}" for field, value in now.items() if before.get(field) != value]
     return changed + [f"{field} removed" for field in before if field not in now]
-
-
-def _leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
-    leaves: dict[str, object] = {}
-    for key, value in data.items():
-        if isinstance(value, dict):
-            leaves |= _leaves(cast(dict[str, Any], value), f"{prefix}{key}.")
-        else:
-            leaves[prefix + key] = value
-    return leaves
 
 
 def show(name: UserPath) -> str:

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario.documents import replaced
 from uuv_marl.scenario.messages import short, shown
+from uuv_marl.scenario.task import named_task
 
 _PLAIN: tuple[tuple[type, Callable[[Any], object]], ...] = (
     (os.PathLike, os.fspath), (Integral, int), (Real, float), (Decimal, float),
@@ -48,6 +49,8 @@ def assign(data: dict[str, Any], field: str, value: Any) -> None:
         ScenarioError: a key lies in what is no table, or there is no such entry.
     """
     *path, last = field.split(".")
+    if path[:1] == ["task"]:
+        data["task"] = named_task(data.get("task", {}))
     place: Any = data
     for part in path:
         place = _step(place, part, field)
@@ -60,6 +63,15 @@ def assign(data: dict[str, Any], field: str, value: Any) -> None:
         table[last] = replaced(table.get(last), value)
     else:
         raise ScenarioError(f"{short(field)} is unknown: {short('.'.join(path))} is a value, not a table")
+
+
+def leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Fields by the names that ``assign`` takes, instead of tables within tables."""
+    found: dict[str, Any] = {}
+    for key, value in data.items():
+        table = isinstance(value, dict)
+        found |= leaves(cast(dict[str, Any], value), f"{prefix}{key}.") if table else {prefix + key: value}
+    return found
 
 
 def plain(value: object) -> Any:

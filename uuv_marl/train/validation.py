@@ -2,14 +2,15 @@
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import load_scenario
+from uuv_marl.scenario.overrides import leaves
 from uuv_marl.train.rows import TRAINING_SEEDS
 from uuv_marl.train.training import Part, Training, overrides_for
 
@@ -87,31 +88,14 @@ def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
     return (own["untouched_share"] if share is None else share) or 0.0, own["whole"] == 1.0
 
 
-def _flat(fields: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Fields by names with dots, instead of tables; ``task``, which may also be a name, stays a table."""
-    found: dict[str, Any] = {}
-    for name, value in fields.items():
-        table = isinstance(value, Mapping) and name != "task"
-        found |= _flat(cast(Mapping[str, Any], value), f"{before}{name}.") if table else {before + name: value}
-    return found
-
-
-def _toml(value: Any) -> str:
-    """A value as TOML in one line."""
-    if isinstance(value, Mapping):
-        table = cast(Mapping[str, Any], value)
-        return "{" + ", ".join(f"{name} = {_toml(each)}" for name, each in table.items()) + "}"
-    return json.dumps(value)
-
-
 def replay_command(policy: Path, training: Training, worst: Worst) -> str:
     """The command that shows an episode of a validation."""
     name, n, seed = worst
     own = training.overrides if name == training.scenario else {}
-    changes = {**_flat(overrides_for(name, own)), "swarm.num_vehicles": n}
+    changes = {**leaves(overrides_for(name, own)), "swarm.num_vehicles": n}
     if n == load_scenario(name).swarm.num_vehicles:
         del changes["swarm.num_vehicles"]
     kept = {field: value for field, value in changes.items() if field not in _EVERY_POLICYS_OWN}
-    sets = [f" --set {shlex.quote(f'{field}={_toml(value)}')}" for field, value in kept.items()]
+    sets = [f" --set {shlex.quote(f'{field}={json.dumps(value)}')}" for field, value in kept.items()]
     scenario, path = shlex.quote(name), shlex.quote(str(policy))
     return f"uuv-marl replay --scenario {scenario} --policy {path} --seed {seed}{''.join(sets)}"
