@@ -8,8 +8,8 @@ PYTEST := -m pytest --durations=15
 HALVES := -n 2 --dist loadfile
 
 .DELETE_ON_ERROR:
-.PHONY: help benchmark reproduce test tests docs-check test-bounds test-lowest test-light test-adapters test-benchmarl test-rllib
-.PHONY: docs notebooks test-docs docs-links check size dist test-release test-attacks perf perf-training clean
+.PHONY: help benchmark reproduce test tests docs-check test-bounds test-lowest test-newest test-light test-adapters test-benchmarl
+.PHONY: test-rllib docs notebooks test-docs docs-links check size dist test-release test-attacks perf perf-training clean
 
 help:
 	@echo "make benchmark [ARGS='--seeds 5']   the paper's comparison: table, results and pictures"
@@ -24,6 +24,7 @@ help:
 	@echo "make test-attacks                   hostile inputs, kills and crash points: SECURITY.md"
 	@echo "make test-release                   a wheel, installed into an empty environment, and its commands there"
 	@echo "make test-lowest                    tests with the oldest libraries that pyproject.toml allows, without torch"
+	@echo "make test-newest PYTHON=python3.14  tests with today's newest libraries, without torch"
 	@echo "make test-light PYTHON=python3.13   tests without torch, on another Python"
 	@echo "make test-adapters                  tests of BenchMARL and RLlib, each in an environment of its own"
 	@echo "make check                          ruff, pyright and import-linter only"
@@ -80,10 +81,11 @@ test-attacks: .venv/dev.stamp
 test-adapters: test-benchmarl test-rllib
 
 test-lowest: .venv-lowest/lowest.stamp
+test-newest: .venv-newest/newest.stamp
 test-light: .venv-light/light.stamp
 # What is old is deprecated by newer libraries beneath it.
 test-lowest: PYTEST += -W default::DeprecationWarning
-test-lowest test-light: test-%:
+test-lowest test-newest test-light: test-%:
 	.venv-$*/bin/python $(PYTEST) $(HALVES) -m "not docs and not release" $(ARGS)
 
 test-benchmarl: .venv-benchmarl/benchmarl.stamp
@@ -116,7 +118,7 @@ perf-training: .venv/dev.stamp .venv-perf-supersuit/perf-supersuit.stamp .venv-r
 versions: .venv/dev.stamp
 	$(BIN)/python perf/versions.py $(OTHER) $(ARGS)
 
-ENVIRONMENTS := docs light lowest benchmarl rllib perf-supersuit $(PEERS)
+ENVIRONMENTS := docs light lowest newest benchmarl rllib perf-supersuit $(PEERS)
 STAMPS := .venv/base.stamp .venv/dev.stamp $(foreach name,$(ENVIRONMENTS),.venv-$(name)/$(name).stamp)
 $(STAMPS): pyproject.toml $(wildcard constraints*.txt) tools/setup_venv.py
 	@command -v "$(PYTHON)" >/dev/null || { echo "There is no '$(PYTHON)' here. Install Python 3.11 or later, or name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }

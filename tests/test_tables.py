@@ -1,9 +1,11 @@
 """Arrays are declared once; memory, documentation and checks follow, whatever the scenario."""
 
 import itertools
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
+from typing_extensions import TypeAliasType
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
@@ -12,6 +14,7 @@ from uuv_marl.sim.arrays import Course, Facts, Senses, State
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
 from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, scratch, workspace
+from uuv_marl.types import Float32
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
           "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0, "actuators.max_astern_n": 0.0}  # fmt: skip
@@ -42,6 +45,17 @@ def test_a_desk_leaves_no_column_unused_and_has_the_declared_types(desks):
             assert len(array) >= LENGTHS[spec.axes[0]], name
     columns = sum(block.shape[1] for block in room)
     assert columns == sum(len(table._fields) for table in TABLES)
+
+
+def test_an_array_may_be_declared_by_any_alias_of_its_type():
+    number = TypeVar("number", bound=np.generic)
+    newer = TypeAliasType("newer", np.ndarray[tuple[Any, ...], np.dtype[number]], type_params=(number,))  # from 2.5 on
+    for alias in (Float32, newer[np.float32]):
+
+        class Heights(NamedTuple):
+            height: Annotated[alias, "world", "How high [m]."]
+
+        assert array_specs(Heights)["height"].dtype is np.float32
 
 
 def test_a_table_tells_shapes_types_and_meaning():

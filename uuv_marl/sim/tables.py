@@ -47,7 +47,9 @@ def array_specs(table: type[Any]) -> dict[str, ArraySpec]:
     found: dict[str, ArraySpec] = {}
     for name, hint in get_type_hints(table, include_extras=True).items():
         axes, meaning, *bounds = hint.__metadata__
-        dtype = get_args(get_args(hint.__origin__)[1])[0]
+        dtype = hint.__origin__
+        while told := get_args(dtype):  # the number's type is the last and innermost, in NumPy 2.5's new NDArray, too
+            dtype = told[-1]
         found[name] = ArraySpec(dtype, tuple(axes.split()), meaning, bounds[0] if bounds else None)
     return found
 
