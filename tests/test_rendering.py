@@ -12,7 +12,7 @@ from uuv_marl.baselines import granted, make
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim
-from uuv_marl.envs.drawing.frame import _numbers, pixels
+from uuv_marl.envs.drawing.frame import Frame, Panel, _numbers, pixels
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.envs.drawing.scene import TRAIL_S, SceneHistory
 from uuv_marl.envs.solo import SoloEnv
@@ -88,6 +88,17 @@ def test_cameras_show_what_they_promise(scenario):
     away = scene.position.copy()
     away[0] += 1e5  # one that has run away does not shrink the others to a dot
     assert aim("follow", [scene._replace(position=away)], SIZE).scale > whole.scale
+
+
+def test_a_long_title_stays_in_its_own_panel():
+    scene, _, _ = played(seconds=0.0)
+    pictures = [
+        pixels(Frame((800, 400), 2).draw([Panel(name, scene), Panel("scout", scene)], "follow"))
+        for name in ("scout", "a/very/long/path/to/a/checkpoint/of/a/policy.safetensors at 101 s")
+    ]
+    right = np.s_[:, 400:]
+    np.testing.assert_array_equal(pictures[0][right], pictures[1][right])
+    assert (pictures[0] != pictures[1]).any()
 
 
 def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():

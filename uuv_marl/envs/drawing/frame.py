@@ -81,10 +81,11 @@ class Frame:
     def _head(self, panel: Panel, at: tuple[int, int], room: int) -> None:
         """The title, and the numbers in two rows."""
         x, y = at
-        ink.write(self._surface, panel.title, (x, y + 4 * self._unit), self._title, bold=True)
+        title = ink.fitting(panel.title, room, self._title, bold=True)
+        ink.write(self._surface, title, (x, y + 4 * self._unit), self._title, bold=True)
         roomy = room > 480 * self._unit
         if roomy:
-            after = x + ink.text(panel.title, self._title, bold=True).get_width() + self._text
+            after = x + ink.text(title, self._title, bold=True).get_width() + self._text
             ink.write(self._surface, panel.scene.scenario.title, (after, y + 8 * self._unit), self._text, ink.QUIET)
         for k, (label, short, value, colour) in enumerate(_numbers(panel.scene)):
             row, column = divmod(k, 3)
