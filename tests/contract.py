@@ -268,7 +268,6 @@ def sb3(case):
                 run.last[at] = infos[row]["terminal_observation"]
                 run.truncated[at] = infos[row]["TimeLimit.truncated"]
                 run.terminated[at] = not infos[row]["TimeLimit.truncated"]
-                assert infos[row]["is_success"] == run.terminated[at]
     return run
 
 

@@ -251,6 +251,16 @@ def test_without_a_display_a_window_is_refused_with_the_remedy(monkeypatch):
     env.close()
 
 
+def test_the_last_window_takes_the_display_with_it():
+    first, second = (uuv_marl.parallel_env(STARTER, render_mode="human", max_cycles=3) for _ in range(2))
+    for env in (first, second):
+        env.reset(seed=0)
+    first.close()
+    second.step(idle(second))
+    second.close()
+    assert not pygame.display.get_init()
+
+
 def test_closing_the_window_ends_no_run():
     env = uuv_marl.parallel_env(num_vehicles=2, render_mode="human", max_cycles=3, decision_period=0.1)
     env.reset(seed=0)

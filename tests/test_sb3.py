@@ -16,7 +16,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
-from uuv_marl import load_scenario
+from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.train import run
@@ -195,6 +195,35 @@ def test_the_example_trains_a_policy(tmp_path):
     assert PPO.load(tmp_path / "model").num_timesteps > 100
     scenario = granted(str(tmp_path), load_scenario("starter"))
     assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0
+
+
+def test_a_reset_or_a_refusal_leaves_no_action_behind():
+    env = swarm()
+    env.reset()
+    env.step_async(np.ones((8, 2)))
+    env.reset()
+    with pytest.raises(RuntimeError, match="step_wait came before step_async"):
+        env.step_wait()
+    with pytest.raises(ValueError, match="must be finite, got nan"):
+        env.step(np.full((8, 2), np.nan))
+    with pytest.raises(RuntimeError, match="step_wait came before step_async"):
+        env.step_wait()
+    with pytest.raises(NotImplementedError, match="a reset has no options"):
+        env.set_options({"a": 1})
+
+
+def test_a_row_succeeds_by_itself():
+    task = {"name": "reach", "near_m": 133.95}  # some vehicles start there
+    env = SwarmVecEnv("starter", 1, task=task, max_cycles=1)
+    env.seed(0)
+    env.reset()
+    *_, infos = env.step(np.zeros((5, 2)))
+    single = parallel_env("starter", task=task, max_cycles=1)
+    single.reset(seed=0)
+    *_, told = single.step(dict.fromkeys(single.agents, np.zeros(2)))
+    there = [told[f"uuv_{i}"]["is_success"] for i in range(5)]
+    assert [info["is_success"] for info in infos] == there
+    assert 0 < sum(there) < 5
 
 
 def test_sb3_evaluates_rows_without_a_wrapper():

@@ -159,7 +159,7 @@ def test_a_task_that_can_not_be_is_refused_by_field_value_and_remedy(task, messa
 
 
 def test_numbers_that_a_task_needs_are_missed_when_a_swarm_is_made():
-    with pytest.raises(ScenarioError, match="task.kinds Field required"):
+    with pytest.raises(ScenarioError, match="task.kinds is missing; a task by name takes it as in"):
         uuv_marl.parallel_env("starter", task="hard_water")
 
 

@@ -64,7 +64,8 @@ def test_without_autoreset_an_ended_world_waits_unpaid():
     for world in range(3):
         np.testing.assert_array_equal(observation[world], infos["final_obs"][world])
     mask = np.array([False, True, False])
-    again, _ = env.reset(options={"reset_mask": mask})
+    again, infos_after = env.reset(options={"reset_mask": mask})
+    np.testing.assert_array_equal(infos_after["agent_mask"].any(axis=1), mask)
     np.testing.assert_array_equal(again[1], resetting.swarm.percept.to_observation()[1])
     np.testing.assert_array_equal(again[0], observation[0])
     *_, truncated, _ = env.step(random_actions(env, 1)[0])
@@ -180,6 +181,9 @@ def test_what_cannot_be_done_is_named():
             env.step(wrong)
     with pytest.raises(ValueError, match=r"render_mode must be one of \['rgb_array'\] or None, got 'human'"):
         short(render_mode="human")
+    assert short(autoreset_mode="NEXT_STEP").metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    with pytest.raises(ValueError, match="autoreset_mode must be one of 'NextStep', 'SameStep', 'Disabled', got 'no'"):
+        short(autoreset_mode="no")
     with pytest.raises(baselines.PolicyError, match=r"SwarmVectorEnv has no agents by name; make the policy with make"):
         baselines.make("bio_inspired", env)
 
@@ -240,11 +244,16 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
         ("bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: with 'bio_inspired' the learner has no"),
         ("bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: with 'bio_inspired' all vehicles have 0"),
         ("mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: with 'mappo' all vehicles have 0.5; leave"),
+        ("mappo", {"timing": {"decision_period_s": 0.1}}, "can't be 0.1: with 'mappo' all vehicles have 0.5; leave"),
     ],
 )
 def test_solo_drops_no_override(others, overrides, message):
     with pytest.raises(ScenarioError, match=message):
         SoloEnv(STARTER, others, overrides=overrides)
+    with pytest.raises(ScenarioError, match="can't be 0.1: with 'mappo' all vehicles have 0.5"):  # though it is usual
+        SoloEnv(STARTER, "mappo", decision_period=0.1)
+    with pytest.raises(TypeError, match="others must be the name of a policy, or module:Class, got None"):
+        SoloEnv(STARTER, None)
     with pytest.raises(baselines.PolicyError, match="another vehicle"):  # and not for a period that nobody asked for
         SoloEnv("tracking", "mappo", overrides={"vehicle": "lauv", "scale": "vehicle"})
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
@@ -263,6 +272,12 @@ def test_solo_takes_actions_that_can_t_be_written_to(monkeypatch):
 def test_an_argument_that_is_not_there_is_named(make):
     with pytest.raises(TypeError, match="no argument num_vehicle; did you mean num_vehicles"):
         make("starter", num_vehicle=3)
+    with pytest.raises(TypeError, match="no argument max_episode_steps; did you mean max_cycles"):
+        make("starter", max_episode_steps=3)
+    with pytest.raises(ScenarioError, match=r"decision_period = 0.2 and the override timing.decision_period_s = 0.5"):
+        make("starter", decision_period=0.2, overrides={"timing": {"decision_period_s": 0.5}})
+    with pytest.raises(ScenarioError, match=r"overrides must be a dictionary of fields and values, got \['a'\]"):
+        make("starter", overrides=["a"])
 
 
 class Three:
@@ -334,7 +349,9 @@ def test_a_spec_with_a_scenario_goes_through_json():
     again = gymnasium.make(EnvSpec.from_json(one.spec.to_json()))
     assert again.unwrapped.scenario == one.unwrapped.scenario
     assert again.spec.max_episode_steps == 5
-    many = gymnasium.make_vec("uuv_marl/Swarm-v1", 2, scenario=scenario)
-    assert gymnasium.make_vec(EnvSpec.from_json(many.spec.to_json())).scenario == scenario
+    mode, three = AutoresetMode.NEXT_STEP, np.int64(3)
+    many = gymnasium.make_vec("uuv_marl/Swarm-v1", 2, scenario=scenario, autoreset_mode=mode, max_cycles=three)
+    again = gymnasium.make_vec(EnvSpec.from_json(many.spec.to_json()))
+    assert (again.scenario, again.metadata["autoreset_mode"]) == (scenario, mode)
     with pytest.raises(ScenarioError, match="swarm.num_vehicles must be a whole number, got 'x'"):
         uuv_marl.load_scenario({**scenario.model_dump(), "swarm": {"num_vehicles": "x"}})

@@ -3,7 +3,7 @@
 import difflib
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple, TypedDict, Unpack
+from typing import Literal, NamedTuple, TypedDict, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
+from uuv_marl.scenario.overrides import given_in
 from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.observation import Observe, observation_layout, observer
 from uuv_marl.sim.swarm import Swarm
@@ -148,7 +149,8 @@ class BatchedEnv:
     def step(self, action: ArrayLike) -> StepResult:
         """One decision of every world; ``action`` has shape (world, vehicle, 2).
 
-        A world whose episode is over keeps its state and its flags, and its reward is 0, until it is reset.
+        A world whose episode is over keeps its state, ``world_terminated`` and ``world_truncated``, and its reward is
+        0, until it is reset.
         """
         self.need_reset("step")
         swarm = self.swarm
@@ -233,6 +235,10 @@ class EnvOptions(Changes, total=False):
     observe: Observe
 
 
+_FIELDS = {"num_vehicles": "swarm.num_vehicles", "decision_period": "timing.decision_period_s", "task": "task"}
+"""Fields that arguments stand for."""
+
+
 def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
     """The scenario, changed by the arguments of an environment.
 
@@ -244,17 +250,23 @@ def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
 
     Raises:
         TypeError: there is no such argument.
+        ScenarioError: an argument and the override of its field differ.
     """
     for name in changes.keys() - Changes.__annotations__.keys():
-        near = difflib.get_close_matches(name, EnvOptions.__annotations__, n=1)
+        usual = {"max_episode_steps": ["max_cycles"]}  # Gymnasium's name
+        near = usual.get(name) or difflib.get_close_matches(name, EnvOptions.__annotations__, n=1)
         hint = f"did you mean {near[0]}? " if near else ""
         raise TypeError(f"this environment has no argument {name}; {hint}fields of the scenario go into overrides")
-    period, task = changes.get("decision_period"), changes.get("task")
-    more: dict[str, object] = {} if period is None else {"timing.decision_period_s": period}
-    more |= {} if task is None else {"task": task}
-    return load_scenario(
-        scenario, num_vehicles=changes.get("num_vehicles"), overrides={**(changes.get("overrides") or {}), **more}
-    )
+    overrides = changes.get("overrides") or {}
+    if not isinstance(cast(object, overrides), Mapping):
+        return load_scenario(scenario, overrides=overrides)  # which says what overrides must be
+    for name, field in _FIELDS.items():
+        own, other = changes.get(name), given_in(overrides, field)
+        if own is not None and other is not None and own != other:
+            raise ScenarioError(f"{name} = {own} and the override {field} = {other} differ; leave one out")
+    more = {field: changes.get(name) for name, field in _FIELDS.items() if name != "num_vehicles"}
+    more = {field: value for field, value in more.items() if value is not None}
+    return load_scenario(scenario, num_vehicles=changes.get("num_vehicles"), overrides={**overrides, **more})
 
 
 def make_batched_env(

@@ -5,6 +5,13 @@ from typing import Any
 from uuv_marl.envs.core import BatchedEnv
 
 
+def succeeded(batch: BatchedEnv, world: int, vehicle: int | None = None) -> bool:
+    """``is_success`` of ``ending``."""
+    alive, diverged = batch.swarm.state.alive[world], batch.swarm.facts.diverged[world] >= 0
+    there = alive.any() if vehicle is None else alive[vehicle]
+    return bool(there and not diverged and batch.task.success(world, vehicle))
+
+
 def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:
     """Why the episode of a world, or of one vehicle, ended, or that it goes on; as plain Python values.
 
@@ -34,7 +41,7 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
     else:
         reason = task.ending if done else "time_limit"
     return {
-        "is_success": task.success(world, vehicle) and reason not in ("lost", "diverged"),
+        "is_success": succeeded(batch, world, vehicle),
         "ending": reason,
         "arrived": arrived,
         "time_s": float(swarm.facts.time_s[world]),

@@ -54,7 +54,7 @@ class EnvMixin:
 
 
 class SpecMixin:
-    """Gymnasium's ``spec`` in a form that JSON can hold: a scenario in it is its fields, a path is text."""
+    """Gymnasium's ``spec`` in a form that JSON can hold: a scenario in it is its fields, a path or a mode is text."""
 
     _spec: EnvSpec | None = None
 
@@ -65,8 +65,9 @@ class SpecMixin:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        if spec is not None and "scenario" in spec.kwargs:
-            spec = replace(spec, kwargs={**spec.kwargs, "scenario": plain(spec.kwargs["scenario"])})
+        if spec is not None:
+            told = {name: getattr(value, "value", value) for name, value in spec.kwargs.items()}  # of an enumeration
+            spec = replace(spec, kwargs={name: plain(value) for name, value in told.items()})
         self._spec = spec
 
 

@@ -23,7 +23,7 @@ ENV_NAME = "uuv_swarm_v1"
 class SwarmMultiAgentEnv(MultiAgentEnv):
     """The PettingZoo environment in RLlib's form: the same observations and rewards, bit for bit.
 
-    A lost vehicle is terminated alone, with its last observation, and never appears again. ``__all__`` is set in
+    A lost vehicle is terminated alone, with an observation of zeros, and never appears again. ``__all__`` is set in
     ``terminateds`` once the swarm has arrived or no vehicle is left, in ``truncateds`` at the time limit.
 
     Args:
@@ -37,6 +37,7 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
         self.metadata = dict(self._env.metadata)  # RLlib writes into it
         self.possible_agents = list(self._env.possible_agents)
         self.agents = list(self.possible_agents)
+        self._late = False
         self.observation_spaces = self._env.observation_spaces
         self.action_spaces = self._env.action_spaces
 
@@ -50,6 +51,7 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
     ) -> tuple[dict[str, Float32], Infos]:
         """Start an episode, as ``SwarmParallelEnv.reset``."""
         observations, infos = self._env.reset(seed, options)
+        self._late = False
         self.agents = list(self._env.agents)
         return observations, infos
 
@@ -63,9 +65,9 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
         """
         observations, rewards, terminateds, truncateds, infos = self._env.step(action_dict)
         self.agents = list(self._env.agents)
-        late = any(truncateds.values())
-        terminateds["__all__"] = not self.agents and not late
-        return observations, rewards, terminateds, {"__all__": late}, infos
+        self._late |= any(truncateds.values())
+        terminateds["__all__"] = not self.agents and not self._late
+        return observations, rewards, terminateds, {"__all__": self._late}, infos
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the swarm as ``SwarmParallelEnv.render`` does."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.envs.core import EnvOptions, ScenarioLike, StepResult, make_batched_env, refuse_losses
 from uuv_marl.envs.drawing.options import RenderOptions
-from uuv_marl.envs.ending import ending
+from uuv_marl.envs.ending import ending, succeeded
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.sim.arguments import action_array, rounding, whole_number
@@ -79,7 +79,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
     def reset(self) -> Float32:
         """Start all worlds, shape (row, entry). Unless ``seed`` was called before, their random streams go on."""
         observation = self._batch.reset(self._seed)
-        self._seed = None
+        self._seed = self._actions = None
         self._forget(np.ones(self._shape[0], np.bool_))
         self._renderer.update()
         self.reset_infos = [{} for _ in range(self.num_envs)]
@@ -94,7 +94,8 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         """Observations, rewards, dones and infos of every row."""
         if self._actions is None:
             raise RuntimeError("step_wait came before step_async; call step(actions)")
-        result, self._actions = self._batch.step(self._actions), None
+        actions, self._actions = self._actions, None
+        result = self._batch.step(actions)
         self._returns += result.reward
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -123,6 +124,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
             infos[world * self._shape[1] + i] = {
                 "terminal_observation": result.observation[world, i],
                 **shared,
+                "is_success": succeeded(self._batch, world, i),
                 "episode": {"r": float(self._returns[world, i]), "l": int(self._lengths[world]), "t": seconds},
             }
 
@@ -138,6 +140,11 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         raise NotImplementedError(
             f"rows are vehicles of shared worlds; set {attr_name!r} when you make the environment"
         )
+
+    def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """Not possible: a reset has no options."""
+        if options:
+            raise NotImplementedError(f"a reset has no options, got {options}; set them when you make the environment")
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any

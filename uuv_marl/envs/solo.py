@@ -14,6 +14,7 @@ from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
 from uuv_marl.scenario import Scenario, ScenarioError
+from uuv_marl.scenario.overrides import given_in
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
 from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32
@@ -59,7 +60,12 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         observe: Observe = "positions",
         **changes: Unpack[Changes],
     ) -> None:
-        suited = _suited(others, changed(scenario), changed(scenario, **changes))
+        if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
+        asked, overrides = changed(scenario, **changes), changes.get("overrides") or {}
+        given = {field for field in (_LOOP, _CLOCK) if given_in(overrides, field) is not None}
+        given |= {_CLOCK} if changes.get("decision_period") is not None else set()
+        suited = _suited(others, changed(scenario), asked, given)
         batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
@@ -110,22 +116,25 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         return info
 
 
-def _suited(others: str, plain: Scenario, asked: Scenario) -> Scenario:
-    """The scenario as the others need it. Raises ScenarioError where that would drop what the overrides ask for."""
+_LOOP, _CLOCK = "actuators.yaw_damping_nms", "timing.decision_period_s"
+
+
+def _suited(others: str, bare: Scenario, asked: Scenario, given: set[str]) -> Scenario:
+    """The scenario as the others need it. Raises ScenarioError where that would drop fields that were given."""
     suited = granted(others, asked)
     remedy = "leave it out, or choose other others"
     heard = suited.sonar.channels
     dropped = {*asked.sonar.channels} - {*heard} - ({"link"} if "modem" in heard else set())
-    if dropped and asked.sonar.channels != plain.sonar.channels:
+    if dropped and asked.sonar.channels != bare.sonar.channels:
         raise ScenarioError(
             f"sonar.channels can't hold {', '.join(sorted(dropped))}: with {others!r} the learner has "
             f"{', '.join(heard) or 'no channels'}; {remedy}"
         )
-    for section, field in (("actuators", "yaw_damping_nms"), ("timing", "decision_period_s")):
-        usual, wanted, given = (getattr(getattr(each, section), field) for each in (plain, asked, suited))
-        usual *= asked.scale.units.time / plain.scale.units.time
-        if not any(math.isclose(wanted, each, rel_tol=1e-9) for each in (usual, given)):
+    for name in (_LOOP, _CLOCK):
+        section, field = name.split(".")
+        wanted, granted_now = (getattr(getattr(each, section), field) for each in (asked, suited))
+        if name in given and not math.isclose(wanted, granted_now, rel_tol=1e-9):
             raise ScenarioError(
-                f"{section}.{field} can't be {wanted:g}: with {others!r} all vehicles have {given:g}; {remedy}"
+                f"{name} can't be {wanted:g}: with {others!r} all vehicles have {granted_now:g}; {remedy}"
             )
     return suited

@@ -31,7 +31,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
     * ``SAME_STEP``: the world is reset in the step in which its episode ends. ``infos["final_obs"][world]`` is the last
       observation. ``infos["final_info"]`` has the ending (``uuv_marl.envs.ending.ending``) and the last ``state``.
     * ``NEXT_STEP``: the world is reset in the next step, which ignores the world's actions and gives the reward 0.
-    * ``DISABLED``: the world stays as it is, its flags too, until you reset it.
+    * ``DISABLED``: the world stays as it is, ``terminated`` and ``truncated`` too, until you reset it.
 
     In the last two modes the last step returns the episode's last observation, and ``infos`` itself has the ending.
 
@@ -60,7 +60,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
     ) -> None:
         self._wrap(batch, render_mode, render_options)
         self._info_terms = info_terms
-        self.autoreset_mode = self.metadata["autoreset_mode"] = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = self.metadata["autoreset_mode"] = _autoreset_mode(autoreset_mode)
         self.num_envs = batch.swarm.num_worlds
         self._due = np.zeros(self.num_envs, np.bool_)
         """Worlds that the next step resets."""
@@ -88,7 +88,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
             super().reset(seed=seeds[0])
         self._due = self._due & ~mask
         self._renderer.update()
-        return observation, _masked({"agent_mask": self.swarm.state.alive.copy()}, mask)
+        return observation, _masked({"agent_mask": self.swarm.state.alive & ~self._batch.over[:, None]}, mask)
 
     def step(self, actions: ArrayLike) -> tuple[Float32, Float64, Bool, Bool, Infos]:
         """One decision of every vehicle of every world, and the resets that ``autoreset_mode`` asks for."""
@@ -157,6 +157,15 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         self._renderer.close()
 
 
+def _autoreset_mode(told: AutoresetMode | str) -> AutoresetMode:
+    """The mode of this name or value."""
+    found = next((mode for mode in AutoresetMode if told in (mode, mode.value, mode.name)), None)
+    if found is None:
+        known = ", ".join(repr(mode.value) for mode in AutoresetMode)
+        raise ValueError(f"autoreset_mode must be one of {known}, got {told!r}")
+    return found
+
+
 def _masked(infos: Infos, mask: Bool) -> Infos:
     """Gymnasium's form: every key with a mask of the worlds that have it."""
     return infos | {f"_{key}": mask.copy() for key in infos}
@@ -183,11 +192,11 @@ def vector_env(
         render_mode: ``rgb_array`` or None.
         render_options: as for ``uuv_marl.parallel_env``.
         info_terms: put the reward's terms into the infos.
-        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its value; see
+        autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its name; see
             ``SwarmVectorEnv``.
         options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
             ``overrides``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each
-            vehicle; the reward of a row is the mean over all vehicles.
+            vehicle; the reward of a row is the mean over all vehicles, with ``team`` that of ``dense``.
     """
     batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

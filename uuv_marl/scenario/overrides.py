@@ -74,6 +74,14 @@ def leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return found
 
 
+def given_in(overrides: Mapping[str, object], field: str) -> object | None:
+    """What overrides give a field, by its name with a dot or in its section's table; None if nothing."""
+    section, _, name = field.partition(".")
+    table = overrides.get(section)
+    inside = cast(Mapping[str, object], table).get(name) if name and isinstance(table, Mapping) else None
+    return overrides.get(field, inside)
+
+
 def plain(value: object) -> Any:
     """A value as TOML would give it, in tables and lists of its own: NumPy's, torch's and OmegaConf's are as good.
 

@@ -91,4 +91,7 @@ def task_numbers(task: TaskSettings) -> Any:
             raise ScenarioError(f"{field} is unknown; the numbers of task {task.name!r} are {there}") from None
         if "ctx" in first and first["type"] == "value_error":
             raise ScenarioError(str(first["ctx"]["error"])) from None
+        if first["type"] == "missing":
+            told = f"a task by name takes it as in {{'name': {task.name!r}, '{first['loc'][-1]}': ...}}"
+            raise ScenarioError(f"{field} is missing; {told}") from None
         raise ScenarioError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None

@@ -4,6 +4,7 @@ import math
 import os
 import warnings
 from collections.abc import Callable
+from weakref import WeakSet
 
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
@@ -41,6 +42,7 @@ class Window:
         self._camera, self._sonar_of = look.camera, look.sonar_of
         self._fps, self._speed, self._clock = fps, 1.0, pygame.time.Clock()
         self._paused, self._once, self._left_out = False, False, 0
+        _OPEN.add(self)
 
     def show(self, scene: Callable[[int | None], Scene], *, wait: bool) -> None:
         """Draw a step, and ``wait`` while it lasts or the window is paused; nothing once the user has closed it."""
@@ -62,9 +64,12 @@ class Window:
 
     def close(self) -> None:
         """Close the window."""
-        if self._shown is not None:
+        if self._shown is None:
+            return
+        self._shown = None
+        _OPEN.discard(self)
+        if not _OPEN:
             pygame.display.quit()
-            self._shown = None
 
     def _act_on(self, event: pygame.Event) -> bool:
         """Whether a key was pressed or the window closed."""
@@ -100,6 +105,10 @@ class Window:
         )
         ink.write(shown, keys, (8, height - _KEYS_PX + 5), 12 if width >= 560 else 8, ink.WHITE)
         pygame.display.flip()
+
+
+_OPEN: WeakSet[Window] = WeakSet()
+"""Windows that are open: pygame has one display for all of a process, which the last one closes."""
 
 
 def _open(size: tuple[int, int], name: str) -> pygame.Surface:
