@@ -177,11 +177,16 @@ def test_the_command_line_from_end_to_end(tmp_path):
         (["benchmark", "--policy=:"], "policy ':' can't be imported"),
         (["benchmark", "--policy=math:pi"], "must be a subclass"),
         (["benchmark", "--set=name=../up"], "name must hold letters"),
+        (["benchmark", "--set=seed=1", "--set=seed=2"], "--set seed is given twice, as 1 and as 2; leave one out"),
+        (["train", "starter", "--seed=1", "--set=seed=2"], "--seed and --set seed are both given; leave one out"),
+        (["robustness", "--scenario=hard_water"], "has the task 'hard_water', and the suite scores 'follow' alone"),
+        (["robustness", "--axis=X", "--level=2"], "axis X has the levels 1, "),
         (["tune", "--policy=idle"], "no free gains"),
+        (["tune", "--policy=apf.two_swarms", "--vehicle=lauv"], "is tuned for a task with the paper's vehicle; leave"),
     ],
 )
 def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path):
-    done = CliRunner().invoke(app, [*arguments, *([f"--output={tmp_path}"] if arguments[0] == "benchmark" else [])])
+    done = CliRunner().invoke(app, [*arguments, *([f"--output={tmp_path}"] if arguments[0] != "list" else [])])
     assert done.exit_code == 2
     assert message in " ".join(done.output.split())
     assert "Traceback" not in done.output

@@ -111,7 +111,7 @@ def test_there_is_along_the_free_way():
 @pytest.mark.parametrize(("changes", "message"), [
     ({"task.kinds": ["gates"]}, "task.kinds must name some of pocket, bar, .*got .'gates'."),
     ({"task.kinds": []}, "task.kinds must name some of"),
-    ({"task.gate.gap_m": [20.0, 10.0]}, r"a range must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
+    ({"task.gate.gap_m": [20.0, 10.0]}, r"task.gate.gap_m must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
     ({"task.bar.hole_m": 3.0}, "task.bar.hole_m is unknown"),
     ({"task.length_m": [150.0, 400.0]}, r"task.length_m must leave room for walls .* raise it to at least 167"),
     ({"task.piles.apart_m": [0.0, 0.0]}, "task.piles.apart_m.0 must lie within 0.001"),

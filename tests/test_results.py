@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from uuv_marl import atomic, load_scenario
 from uuv_marl.atomic import locked
 from uuv_marl.benchmark import load, load_trace, runner
-from uuv_marl.benchmark.evaluate import Routes
+from uuv_marl.benchmark.evaluate import Routes, Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics, Sample, Shares
 from uuv_marl.benchmark.results import Content, Knowledge, ResultRow, Results, trace_path
 from uuv_marl.benchmark.tables import markdown_table
@@ -74,6 +74,20 @@ def test_a_folder_in_the_place_of_the_file_is_refused(tmp_path):
         Results(tmp_path, [quick()])
 
 
+def test_results_of_another_task_of_the_user_s_are_refused(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    file = tmp_path / "my_task.py"
+    file.write_text("from uuv_marl.tasks import Task\n\n\nclass Mine(Task):\n    pass\n")
+    scenario = load_scenario("starter", overrides={"task": "my_task:Mine"})
+    (run,) = (run for run in evaluate(quick(), "idle", [0]) if isinstance(run, Run))
+    Results(tmp_path / "out", [scenario]).add("starter", "idle", run)
+    assert Results(tmp_path / "out", [scenario]).has("starter", "idle", 0)
+    assert Results(tmp_path / "out", [quick()]).has("starter", "idle", 0)
+    file.write_text(file.read_text() + "# other\n")
+    with pytest.raises(ResultsError, match=r"comes from my_task:Mine \w+, and here is \w+; move it away"):
+        Results(tmp_path / "out", [scenario])
+
+
 @pytest.mark.parametrize("library", ["numpy", "uuv_marl"])
 def test_results_of_other_versions_are_refused(tmp_path, library):
     made(tmp_path)
@@ -125,6 +139,7 @@ def test_a_broken_trace_is_explained_and_run_again(tmp_path):
         again = Results(tmp_path, [quick()])
         assert again.has("single_obstacle", "idle", 0)
         assert not again.has("single_obstacle", "idle", 1)
+        assert [row.seed for row in again.select("single_obstacle", "idle", (0, 1))] == [0, 1]  # no other run drops it
     made(tmp_path)
     np.testing.assert_array_equal(load_trace(path)["time_s"], results.trace("single_obstacle", "idle", 1)["time_s"])
     path.write_bytes(whole[:400] + bytes(200) + whole[600:])  # whole to look at, and broken inside

@@ -1,6 +1,8 @@
 """The room for tasks: what the water does for them, what is refused, and a user's task through the tools."""
 
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -22,6 +24,38 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import Task
 
 EXAMPLE = "examples.extending.task:Rendezvous"
+
+
+DRAWS = """
+import hashlib, uuv_marl
+for name in ("few_informed", "hard_water", "two_swarms", "silent_targets", "random_field"):
+    swarm = uuv_marl.vector_env(4, name).swarm
+    swarm.reset(0)
+    print(name, hashlib.sha256(swarm.course.obstacles.tobytes() + swarm.state.eta.tobytes()).hexdigest())
+"""
+
+
+def test_draws_do_not_depend_on_the_processor_s_own_instructions():
+    """Matrix products, and NumPy's functions, are other code on processors without them."""
+    older = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
+    now, before = (
+        subprocess.run(
+            [sys.executable, "-W", "ignore", "-c", DRAWS], env={**os.environ, **more}, capture_output=True, text=True,
+            check=True,
+        ).stdout
+        for more in ({}, older)
+    )  # fmt: skip
+    assert len(now.splitlines()) == 5
+    assert now == before
+
+
+def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
+    sea = load_scenario("sea_trial", num_vehicles=3, overrides={"vehicle": "lauv", "task": "reach"})
+    assert sea.arrival.by == "passage"
+    batch = BatchedEnv(sea)
+    assert np.isfinite(batch.reset(0)).all()
+    assert np.isfinite(batch.step(np.ones((1, 3, 2))).reward).all()
+    assert not batch.swarm.facts.reference[..., 2:].any()
 
 
 class TwoWays(Task):

@@ -219,6 +219,11 @@ def test_interfaces_agree_and_the_global_state_tells_the_velocity():
     ("name", "changes", "message"),
     [
         ("hard_water", {}, "traffic.speed_mps must be 0 for task 'hard_water', .* got 2; leave it out"),
+        (
+            "two_swarms",
+            {"swarm.num_vehicles": 10},
+            "traffic.speed_mps must be 0 for task 'two_swarms', .* got 2; leave",
+        ),
         ("starter", {"way_m": 0.1}, "traffic.way_m must be at least 0.2, .* got 0.1; raise it or lower the speed"),
         ("random_field", {"way_m": 55.1}, r"traffic.way_m must be at most .* = 55, so .*, got 55.1; lower it"),
         ("starter", {"way_m": 90.0}, "lies on the trajectory's end; keep 95 m"),

@@ -763,7 +763,7 @@ def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation)
     list(train(tmp_path, small(steps=168)))
     refused = CliRunner().invoke(app, ["train", "hard_water", "--resume", f"--output={tmp_path}"])
     assert refused.exit_code == 2
-    assert "goes on with the training that the folder holds; leave out hard_water" in " ".join(
+    assert "goes on with the training that the folder holds; leave out the scenario" in " ".join(
         refused.output.replace("│", " ").split()
     )
     done = CliRunner().invoke(app, ["train", "--resume", f"--output={tmp_path}", "--steps=336"])

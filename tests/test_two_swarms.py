@@ -212,7 +212,9 @@ def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
 @pytest.mark.parametrize(("changes", "message"), [
     ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
      "task.half_width_m = 120, got 128"),
-    ({"task.gap_m": [20.0, 10.0]}, r"a range must be \[low, high\]"),
+    ({"task.gap_m": [20.0, 10.0]}, r"task.gap_m must be \[low, high\] with low <= high"),
+    ({"task.gap_m": [1.0, 2.0]}, r"task.gap_m must be above 2, two times contact.hull_radius_m, got \[1.0, 2.0\]"),
+    ({"task.apart_m": 30.0}, "task.apart_m must be at least .*, so that groups .* m long start before the wall"),
     ({"start.width_m": 210.0}, "the groups must start in the water of task 'two_swarms'"),
 ])  # fmt: skip
 def test_numbers_that_can_not_be_are_refused(changes, message):

@@ -78,8 +78,8 @@ def evaluate(
         parameters: keyword arguments of the policy.
 
     Raises:
-        DivergenceError: the integration step was too long for a vehicle. This run has no metrics; the runs of the other
-            seeds are yielded first.
+        DivergenceError: the integration step was too long for a vehicle. This run has no metrics; those of the other
+            seeds of its batch of ``BATCH`` are yielded first.
     """
     seeds = [whole_number("seed", seed, 0) for seed in seeds]
     for first in range(0, len(seeds), BATCH):

@@ -35,7 +35,8 @@ from uuv_marl.types import Float32
 FILE = "results.json"
 _PACKAGE = Path(__file__).resolve().parent.parent
 _SOURCES = (
-    "*.py", "scenario/**/*.py", "sim/**/*.py", "baselines/**/*.py", "baselines/tuned/*.json", "benchmark/**/*.py",
+    "*.py", "scenario/**/*.py", "sim/**/*.py", "tasks/**/*.py", "baselines/**/*.py", "baselines/tuned/*.json",
+    "benchmark/**/*.py",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
 _LONGEST_NAME = 200
@@ -124,8 +125,10 @@ class Results:
         self.policies: dict[str, Knowledge] = {}
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
         self._route_seeds = route_seeds
-        self._fingerprint, self._versions = source_fingerprint(), _versions()
+        self._fingerprint, self._versions = source_fingerprint(), _versions() | _tasks(self.scenarios.values())
         self._runs: dict[tuple[str, str, int], Metrics] = {}
+        self._untraced: set[tuple[str, str, int]] = set()
+        """Runs whose time series are gone."""
         self._path = folder / FILE
         with writing(folder):
             (folder / "traces" if traces else folder).mkdir(parents=True, exist_ok=True)
@@ -139,7 +142,7 @@ class Results:
                 f"{self._path} comes from other code of uuv_marl; {elsewhere}, so that no table mixes the two"
             )
         for library, here in self._versions.items():
-            if (there := content["versions"].get(library)) != here:
+            if (there := content["versions"].get(library, here)) != here:
                 raise ResultsError(
                     f"{self._path} comes from {library} {there}, and here is {here}; {elsewhere}, so that no table "
                     "mixes the two"
@@ -151,8 +154,10 @@ class Results:
                 )
         self.policies = content["policies"]
         self._dumps = {**content["scenarios"], **self._dumps}
-        whole = (row for row in content["runs"] if not self._traces or zipfile.is_zipfile(self.trace_path(*row[:3])))
-        self._runs = {row[:3]: row.metrics for row in whole}
+        self._versions = content["versions"] | self._versions
+        self._runs = {row[:3]: row.metrics for row in content["runs"]}
+        if self._traces:
+            self._untraced = {key for key in self._runs if not zipfile.is_zipfile(self.trace_path(*key))}
 
     @property
     def rows(self) -> list[ResultRow]:
@@ -175,8 +180,9 @@ class Results:
             self._runs = {key: metrics for key, metrics in self._runs.items() if key[1] != policy}
 
     def has(self, scenario: str, policy: str, seed: int) -> bool:
-        """Whether this run is done."""
-        return (scenario, policy, seed) in self._runs
+        """Whether this run is done, and its time series are there."""
+        key = scenario, policy, seed
+        return key in self._runs and key not in self._untraced
 
     def add(self, scenario: str, policy: str, run: Run) -> None:
         """Keep a run, on disk at once. Raises ResultsError if the policy's file has changed: no table mixes two."""
@@ -184,6 +190,7 @@ class Results:
         if self._traces:
             self._add_trace(self.trace_path(scenario, policy, run.seed), run)
         self._runs[scenario, policy, run.seed] = run.metrics
+        self._untraced.discard((scenario, policy, run.seed))
         content = Content(
             schema=1,
             fingerprint=self._fingerprint,
@@ -294,6 +301,13 @@ def _unknown() -> str:
 
 def _hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
+
+
+def _tasks(scenarios: Iterable[Scenario]) -> dict[str, str]:
+    """A hash of the file of each task that is a user's, by its name."""
+    named = {scenario.task.name: scenario.task_class for scenario in scenarios if ":" in scenario.task.name}
+    files = {name: inspect.getsourcefile(task) for name, task in named.items()}
+    return {name: _hash(Path(file).read_bytes()) if file else _unknown() for name, file in files.items()}
 
 
 def _versions() -> dict[str, str]:

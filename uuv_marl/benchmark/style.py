@@ -16,6 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
+from uuv_marl.atomic import replacing
+
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
 """Okabe and Ito's palette, as ``house.mplstyle`` has it."""
 BLUE, ORANGE, GREEN, PINK, AMBER, SKY, BLACK, GREY = COLOURS
@@ -69,5 +71,6 @@ def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | N
 def save(figure: Figure, path: Path) -> Path:
     """Save a figure as PNG, the same bytes for the same picture."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    FigureCanvasAgg(figure).print_png(str(path), metadata={"Software": None})
+    with replacing(path) as partial:
+        FigureCanvasAgg(figure).print_png(str(partial), metadata={"Software": None})
     return path

@@ -106,7 +106,7 @@ class Suite:
 
     def results(self, case: Case) -> Results:
         """The results in the case's folder."""
-        if case.name not in self._open:
+        if case.folder not in self._open:
             routes = self.seeds if case.routes else ()
-            self._open[case.name] = Results(self.folder / case.folder, [case.load()], routes, self._traces)
-        return self._open[case.name]
+            self._open[case.folder] = Results(self.folder / case.folder, [case.load()], routes, self._traces)
+        return self._open[case.folder]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import quote
 
 from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import granted
@@ -19,6 +20,7 @@ from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 from uuv_marl.baselines.scout import seeker
 from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.errors import PolicyError
 from uuv_marl.extras import silenced
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario, load_scenario
@@ -192,7 +194,7 @@ def tune(
     journal beside them, which Optuna unpickles: continue only a journal that you trust.
 
     Args:
-        policy: a name of ``SPACES``.
+        policy: a name of ``SPACES``; with ``vehicle`` none for a task, ``POLICY.TASK``.
         output: folder of the files.
         trials: to reach in all, those before an interruption included.
         report: called with the number of trials done and the best cost [s].
@@ -208,7 +210,9 @@ def tune(
     own_task = where not in (SCENARIO, SCALED)
     seeds = SEEDS if not own_task else MAPS[: FEWER.get(where, len(MAPS))]
     if vehicle is not None:
-        name = f"{policy}.{vehicle}"
+        if "." in name:
+            raise PolicyError(f"{name!r} is tuned for a task with the paper's vehicle; leave out the vehicle")
+        name = f"{policy}.{quote(vehicle, safe='')}"
 
     def objective(trial: optuna.Trial) -> float:
         drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.free.items()}

@@ -19,6 +19,7 @@ from uuv_marl.cli.console import (
     find_modules,
     path_option,
     progress_line,
+    say,
     working,
 )
 
@@ -95,16 +96,16 @@ def benchmark(
             tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
             console.print(runner.terminal_table(table, console.width))
-        console.print(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
+        say(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
         for path in pictures:
-            console.print(f"  {path}", highlight=False)
+            say(f"  {path}")
         worst = runner.worst(results, scenarios, policies, wanted)
         again = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
-        console.print(_WORST.format(worst=worst), markup=False, highlight=False)
-        console.print(f"  {again}", markup=False, highlight=False, soft_wrap=True)
-        console.print(_NEXT.format(output=output), markup=False, highlight=False)
+        say(_WORST.format(worst=worst))
+        say(f"  {again}")
+        say(_NEXT.format(output=output))
         if set(policies) <= {*POLICIES} and names == ["starter"] and not overrides:
-            console.print(_TRAIN.format(scenario=files[0]), markup=False, highlight=False)
+            say(_TRAIN.format(scenario=files[0]))
 
 
 def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
@@ -139,12 +140,15 @@ def tune_command(
         from uuv_marl.baselines import PolicyError
         from uuv_marl.benchmark.tuning import SPACES, tune
 
-        for name in policy or SPACES:
+        names = policy or [
+            name for name in SPACES if vehicle is None or "." not in name
+        ]  # these have scenarios of their own
+        for name in names:
             if name not in SPACES:
                 raise PolicyError(f"policy {name!r} has no free gains to tune; choose one of {', '.join(SPACES)}")
         with extra("tune", "tuning"), working(f"The finished trials are in {output}", alone=output) as bar:
-            for name in policy or SPACES:
+            for name in names:
                 line = progress_line(bar, name, trials)
                 report = lambda done, best, line=line, name=name: line(done, f"{name}: best {best:.1f} s")  # noqa: E731
                 path = tune(name, output, trials, report, vehicle)
-                bar.console.print(f"{path}", highlight=False)
+                say(path)

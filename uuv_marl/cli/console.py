@@ -48,6 +48,11 @@ _NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "p
 _MOST_FRAMES = 5
 
 
+def say(words: object) -> None:
+    """Print words with paths and commands in them, which no end of a line and no brackets may change."""
+    console.print(str(words), markup=False, highlight=False, soft_wrap=True)
+
+
 def print_everywhere() -> None:
     """Print a question mark for what the terminal's encoding lacks: no finished work fails while it is told of."""
     for stream in (sys.stdout, sys.stderr):
@@ -93,7 +98,7 @@ def explained(*ours: str) -> Iterator[None]:
             )
         else:
             raise
-        errors.print(f"[bold red]Error:[/] {escape(message)}", highlight=False)
+        errors.print(f"[bold red]Error:[/] {escape(message)}", highlight=False, soft_wrap=True)
         for frame in frames[-_MOST_FRAMES:]:
             where = f"  {frame.filename}:{frame.lineno}, in {frame.name}\n    {frame.line}"
             errors.print(escape(where), highlight=False, soft_wrap=True)
@@ -132,15 +137,25 @@ def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
         with nullcontext() if alone is None else locked(alone), progress_bar() as bar:
             yield bar
     except KeyboardInterrupt:
-        console.print(f"Stopped. {kept}; the same command continues.")
+        say(f"Stopped. {kept}; the same command continues.")
         raise typer.Exit(130) from None
+
+
+def overridden(overrides: Sequence[str]) -> dict[str, object]:
+    """The fields that ``--set`` changes. Raises ScenarioError, also where one is given twice."""
+    from uuv_marl.scenario import ScenarioError, parse_override
+
+    changes: dict[str, object] = {}
+    for field, value in map(parse_override, overrides):
+        if field in changes:
+            raise ScenarioError(f"--set {field} is given twice, as {changes[field]} and as {value}; leave one out")
+        changes[field] = value
+    return changes
 
 
 def changes_of(overrides: Sequence[str]) -> dict[str, object]:
     """The fields that ``--set`` changes in scenarios that policies run on. Raises ScenarioError, PolicyError."""
-    from uuv_marl.scenario import parse_override
-
-    changes = dict(parse_override(text) for text in overrides)
+    changes = overridden(overrides)
     for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
         raise PolicyError(f"{field} can't be set here: every policy has its own (uuv-marl list policies); leave it out")
     return changes

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import console, explained, extra, path_argument
+from uuv_marl.cli.console import explained, extra, path_argument, say
 
 
 def export(
@@ -33,4 +33,4 @@ def export(
         told = load_checkpoint(policy).card.training
         name, own = scenario or told.get("scenario", "starter"), told.get("overrides", {}) if scenario is None else {}
         write_onnx(policy, load_scenario(name, overrides=overrides_for(name, own)), output)
-        console.print(f"Model: {output}")
+        say(f"Model: {output}")

@@ -9,13 +9,13 @@ import typer
 
 from uuv_marl.cli.console import (
     changes_of,
-    console,
     explained,
     find_modules,
     path_argument,
     path_option,
     progress_bar,
     progress_line,
+    say,
 )
 from uuv_marl.replay import FILMS, MOST_EPISODES
 
@@ -93,9 +93,9 @@ def replay(
                 write(recordings, path, report)
                 report(1.0)
         except KeyboardInterrupt:
-            console.print("Stopped; nothing was written.")
+            say("Stopped; nothing was written.")
             raise typer.Exit(130) from None
-        console.print(f"Replay: {path} ({path.stat().st_size / 1000:,.0f} kB)", highlight=False, soft_wrap=True)
+        say(f"Replay: {path} ({path.stat().st_size / 1000:,.0f} kB)")
 
 
 def _writer(output: Path | None, inspect: Sequence[int]) -> Write:

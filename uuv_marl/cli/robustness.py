@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl.cli.benchmark import evaluator_at
-from uuv_marl.cli.console import Anew, Ray, console, explained, find_modules, path_option, working
+from uuv_marl.cli.console import Anew, Ray, explained, find_modules, path_option, say, working
 
 
 def robustness(
@@ -39,9 +39,9 @@ def robustness(
 
     Each axis is one disturbance in five levels (uuv_marl/benchmark/robustness/axes.toml, with sources). The command
     writes robustness.md (scores by group and axis), a picture of each scenario (in figures) and episodes.csv (a row for
-    each episode). Without --quick it runs what docs/robustness.md shows: 30 to 50 minutes of one core for each of its
-    policies with memory. It needs the extra "analysis". Ctrl-C keeps the finished
-    episodes, and the same command continues.
+    each episode), all of what this command names, whatever else the folder holds. Without --quick it runs what
+    docs/robustness.md shows: 30 to 50 minutes of one core for each of its policies with memory. It needs the extra
+    "analysis". Ctrl-C keeps the finished episodes, and the same command continues.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """
@@ -58,7 +58,7 @@ def robustness(
             scenarios=list(dict.fromkeys(scenario)) if scenario else plan.scenarios,
             seeds=seeds or plan.seeds,
         )
-        find_modules(plan.policies)
+        find_modules([*plan.policies, *plan.scenarios])
         evaluator, cluster = evaluator_at(ray, plan.policies)
         with working(f"The finished episodes are in {output}", alone=output) as bar, cluster:
             task = bar.add_task("robustness", total=1.0)
@@ -70,4 +70,4 @@ def robustness(
             written = [*page.write_robustness_report(output), episodes]
             report("robustness", 1.0)
         for path in written:
-            console.print(f"  {path}", highlight=False)
+            say(f"  {path}")

@@ -16,9 +16,11 @@ from uuv_marl.cli.console import (
     explained,
     extra,
     find_modules,
+    overridden,
     path_option,
     progress_bar,
     progress_line,
+    say,
 )
 
 _TOLD = "swarms whole {whole:.0%}, vehicles {share:.0%}, contacts {contacts:.1f} an episode"
@@ -84,7 +86,7 @@ def train_command(
     with explained():
         with extra("train", "training"):
             from uuv_marl.train import run
-        from uuv_marl.scenario import parse_override
+        from uuv_marl.errors import TrainingError
         from uuv_marl.train.folder import TrainingFolder
         from uuv_marl.train.training import Training, changed_fields, told_by
 
@@ -99,27 +101,35 @@ def train_command(
             told = told_by(scenario)
             for name in {"minutes", "steps"} & changes.keys():
                 told.pop("steps" if name == "minutes" else "minutes", None)
-            training = Training(**changed_fields(told, {**dict(map(parse_override, overrides or [])), **changes}))
+            fields = overridden(overrides or [])
+            if twice := next((name for name in changes if name in fields), None):
+                raise TrainingError(f"--{twice} and --set {twice} are both given; leave one out")
+            training = Training(**changed_fields(told, {**fields, **changes}))
             until = training.budget
         with _stoppable(output) as stop:
-            how: Any = {"say": console.print, "stop": stop}
+            how: Any = {"say": say, "stop": stop}
             records = run.resume(output, until, **how) if resume else run.train(output, training, **how)
             last = _follow(records, training, until)
-        console.print(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png", highlight=False)
+        say(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png")
         if (output / "best").is_dir():
             best, worst = run.best_of(output)
             told = f"{_TOLD.format(**best._asdict())}, after {best.seconds / 60.0:.1f} min"
-            console.print(f"Its validation was the best: {told}. The worst episode of it:", highlight=False)
-            console.print(f"  {worst}", highlight=False, soft_wrap=True)
+            say(f"Its validation was the best: {told}. The worst episode of it:")
+            say(f"  {worst}")
+
+
+_GIVEN = {"overrides": "--set", "scenario": "the scenario"}
 
 
 def _alone(context: typer.Context) -> None:
     """Refuse what the folder says already."""
-    for name, value in context.params.items():
+    for name in context.params:
         source = context.get_parameter_source(name)
         told = source is not None and source.name == "COMMANDLINE"
         if told and name not in ("resume", "output", "steps", "minutes"):
-            raise typer.BadParameter(f"--resume goes on with the training that the folder holds; leave out {value}")
+            raise typer.BadParameter(
+                f"--resume goes on with the training that the folder holds; leave out {_GIVEN.get(name, f'--{name}')}"
+            )
 
 
 def _follow(records: Iterator[Any], training: Any, until: float) -> str:
@@ -163,5 +173,5 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
             rest = f"There is no checkpoint yet: {again} begins again."
         else:
             rest = "Nothing was written yet; the same command begins again."
-        console.print(f"Stopped. {rest}")
+        say(f"Stopped. {rest}")
         raise typer.Exit(130)

@@ -90,8 +90,9 @@ def task_numbers(task: TaskSettings) -> Any:
             there = ", ".join(numbers.model_fields) or "none of its own"
             raise ScenarioError(f"{field} is unknown; the numbers of task {task.name!r} are {there}") from None
         if "ctx" in first and first["type"] == "value_error":
-            raise ScenarioError(str(first["ctx"]["error"])) from None
-        if first["type"] == "missing":
+            told = str(first["ctx"]["error"])
+            raise ScenarioError(f"{field} {told}" if first["loc"] else told) from None
+        if first["type"] == "missing" and len(first["loc"]) == 1:
             told = f"a task by name takes it as in {{'name': {task.name!r}, '{first['loc'][-1]}': ...}}"
             raise ScenarioError(f"{field} is missing; {told}") from None
         raise ScenarioError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None

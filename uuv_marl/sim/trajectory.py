@@ -23,9 +23,10 @@ def reference(
         waypoints: corners of the trajectory, north and east [m], shape (point, 2).
         times: when l(t) passes them [s], shape (point,).
         last: index of the last corner; those beyond it are padding.
-        passes: whether it goes on along the last leg beyond the end, where it else rests (``arrival.by``).
+        passes: whether it goes on along the last leg beyond the end, where it else rests (``arrival.by``); where it
+            is at the end from the start it rests.
     """
-    if t >= times[last] and not passes:
+    if t >= times[last] and (not passes or times[last] == 0.0):
         return waypoints[last, 0], waypoints[last, 1], 0.0, 0.0
     k = 0
     while k < last - 1 and t >= times[k + 1]:

@@ -190,7 +190,7 @@ class SilentTargets(Reach):
         half, clear = 0.5 * self.numbers.side_m, self.numbers.clear_m
         while True:
             place = rng.uniform(-half, half, 2)
-            if place @ place > clear * clear:
+            if place[0] * place[0] + place[1] * place[1] > clear * clear:
                 return place
 
     def begin(self, world: int) -> None:

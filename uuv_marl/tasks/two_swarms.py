@@ -65,6 +65,19 @@ class TwoSwarmsNumbers(ReachNumbers):
                 f"{self.half_width_m:g}, got {least:g} for it"
             )
 
+    def need_room(self, hull: float, length: float) -> None:
+        """Raise ScenarioError where hulls of this radius don't fit through, or groups so long start in the wall."""
+        if self.gap_m[0] <= 2.0 * hull:
+            raise ScenarioError(
+                f"task.gap_m must be above {2.0 * hull:g}, two times contact.hull_radius_m, got {list(self.gap_m)}; "
+                "widen it"
+            )
+        if self.apart_m < (least := 0.5 * length + self.radius_m + hull):
+            raise ScenarioError(
+                f"task.apart_m must be at least {least:g}, so that groups {length:g} m long start before the wall, "
+                f"got {self.apart_m:g}; raise it, or shrink start"
+            )
+
     def discs(self, gap: float, at: float) -> Float64:
         """Wall and banks around the wall's middle, x ahead, y along the wall and radius [m], shape (disc, 3)."""
         end, beyond, radius = self.half_width_m + INTO_BANK_M, self.apart_m + self.behind_m, self.radius_m
@@ -101,6 +114,7 @@ class TwoSwarms(Reach):
         "time_ratio": "mean over vehicles there, of the time until then over the straight way at full speed [1]",
         "whole_ratio": "the same of the last vehicle, if all came there [1]",
     }
+    traffic: ClassVar[bool] = False
     place: ClassVar[str] = "goal of a vehicle"
     marked: ClassVar[str] = "where a vehicle is there"
     guide: ClassVar[str] = "tangent_bug"
@@ -108,6 +122,7 @@ class TwoSwarms(Reach):
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
         numbers, (length, width) = self.numbers, swarm.scenario.start.sides(swarm.num_vehicles)
+        numbers.need_room(swarm.scenario.contact.hull_radius_m, length)
         if length / 2 > numbers.behind_m or width / 2 + numbers.aside_m > numbers.half_width_m:
             raise ScenarioError(
                 f"the groups must start in the water of task 'two_swarms': {length:g} x {width:g} m each, moved by "

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from uuv_marl.atomic import replacing
 from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.frame import need_pandas
@@ -11,6 +12,7 @@ from uuv_marl.benchmark.robustness.axes import AXES, CALM, overrides
 from uuv_marl.benchmark.runner import Evaluate
 from uuv_marl.benchmark.suite import Case, Report, Suite
 from uuv_marl.scenario import ScenarioError, load_scenario
+from uuv_marl.tasks import Follow
 
 EPISODES = "episodes.csv"
 METRICS = (
@@ -84,12 +86,22 @@ def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate
 
     Raises:
         PolicyError: a policy does not exist, or cannot be run on one of the scenarios.
-        ScenarioError: two scenarios have the same name.
+        ScenarioError: two scenarios have the same name, or one has another task than ``follow``.
         ResultsError: the folder holds other results.
     """
     names = [load_scenario(scenario).name for scenario in plan.scenarios]
     if len(set(names)) < len(names):
         raise ScenarioError(f"scenarios of one report need different names, got {', '.join(names)}; rename a file")
+    for name in plan.scenarios:
+        if not issubclass((scenario := load_scenario(name)).task_class, Follow):
+            raise ScenarioError(
+                f"scenario {scenario.name!r} has the task {scenario.task.name!r}, and the suite scores 'follow' alone; "
+                "choose another scenario"
+            )
+    for axis in plan.axes:
+        if not {*plan.levels} & {*AXES[axis].levels}:
+            levels = ", ".join(map(str, AXES[axis].levels))
+            raise ScenarioError(f"axis {axis} has the levels {levels}, and none of them is to be run; give --level")
     planned = cells(plan)
     for cell in planned:
         make(cell.case.policy, granted(cell.case.policy, cell.case.load()))  # refused now, not after hours
@@ -111,7 +123,8 @@ def _rows(suite: Suite, cell: Cell) -> Iterator[dict[str, Any]]:
 def write_episodes(path: Path, rows: Iterator[dict[str, Any]]) -> None:
     """Rows of scenario, axis, level, policy, seed and metrics as CSV, six significant digits, NaN as nothing."""
     pandas = need_pandas("uuv-marl robustness")
-    pandas.DataFrame.from_records(list(rows)).to_csv(path, index=False, float_format=f"%{DIGITS}")
+    with replacing(path) as partial:
+        pandas.DataFrame.from_records(list(rows)).to_csv(partial, index=False, float_format=f"%{DIGITS}")
 
 
 def read_episodes(path: Path) -> Any:

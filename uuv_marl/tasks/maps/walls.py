@@ -14,14 +14,15 @@ from uuv_marl.scenario.fields import NonNegative, Positive, Section, within
 from uuv_marl.types import Float64
 
 STEP = 1.6
-"""Distance of two discs of a wall, in radii; the gap between them is a fifth of a radius deep. Assumed: as piloted."""
+"""Distance of two discs of a wall, in radii; notches between them are 0.4 radii deep. Assumed: as piloted."""
 INTO_BANK_M = 4.0
-"""How far a wall goes on into a bank [m], so that nothing passes between them."""
+"""How far a wall goes on into a bank [m]. Assumed: as piloted; a hull passes behind about one in thirty piers of a
+harbour, whose foot meets a notch of the bank, and behind no other wall of the shipped numbers."""
 
 
 def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
     if pair[0] > pair[1]:
-        raise ValueError(f"a range must be [low, high] with low <= high, got {list(pair)}")
+        raise ValueError(f"must be [low, high] with low <= high, got {list(pair)}")
     return pair
 
 
@@ -79,7 +80,7 @@ def wall(start: tuple[float, float], end: tuple[float, float], radius: float) ->
     """A row of discs from one point to another, both their centres, shape (disc, 3)."""
     a, b = np.array(start), np.array(end)
     way = b - a
-    num = max(1, int(np.ceil(np.sqrt(way @ way) / (STEP * radius))))
+    num = max(1, int(np.ceil(np.sqrt(way[0] * way[0] + way[1] * way[1]) / (STEP * radius))))
     places = a + way * (np.arange(num + 1)[:, None] / num)
     return np.concatenate([places, np.full((num + 1, 1), radius)], axis=1)
 
