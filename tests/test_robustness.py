@@ -76,6 +76,13 @@ def test_an_axis_is_the_mean_over_its_levels():
     assert scores.axis_score(table(calm=[1.0] * 6), "W1") is None
 
 
+def test_the_whole_counts_no_group_that_some_policies_lack():
+    cells = {"calm": [1.0] * 6, "W1_1": [1.0] * 6, "A1_1": [0.5] * 6}
+    without = scores.group_score(table(**cells), scores.EVERY)
+    assert without.value == 0.75
+    assert scores.group_score(table(**cells, C1_1=[0.0] * 6, X_1=[0.0] * 6), scores.EVERY) == without
+
+
 @pytest.mark.parametrize(
     ("cells", "text"),
     [

@@ -156,6 +156,39 @@ def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
     assert json.loads((FOLDER / "docs" / "learners_marl_eval.json").read_text()) == marl_eval(curves, rows)
 
 
+def test_what_the_page_finds_is_in_the_shipped_rows():
+    files = ("research/learners/curves.csv.gz", "docs/learners.csv.gz")
+    curves, rows = page.complete(*(read_rows(FOLDER / file) for file in files))
+    found = page.found_in(rows)
+    every = page.scores(found)
+    laws = {name: float(page._values(found, name, task.policies[0])[0, 0]) for name, task in TASKS.items()}
+    means = {who: dict(zip(TASKS, own.mean(axis=0), strict=True)) for who, own in every.items()}
+    for task in ("random_field", "hard_water", "silent_targets"):
+        assert max(means, key=lambda who: means[who][task]) == "mappo"
+    for who in LEARNERS:
+        assert (abs(means[who]["hard_water"] - laws["hard_water"]) < 0.03) == (who in ("mappo", "ppo"))
+        for k, task in enumerate(TASKS):
+            assert task == "hard_water" or every[who][:, k].max() < laws[task]
+        assert means[who]["few_informed"] < 0.05
+    for task in ("random_field", "hard_water"):
+        assert means["mappo_gru"][task] < means["mappo"][task] - 0.03
+
+    def early(who):
+        own = [row for row in curves if (row["task"], row["learner"]) == ("hard_water", who)]
+        return np.mean([float(row["share"]) for row in own if 0.8e6 < float(row["agent_steps"]) < 1.2e6])
+
+    assert all(early("isac") > early(who) + 0.1 for who in LEARNERS if who != "isac")
+
+    def at_sea(task, who):
+        return float(page._values(found, task, who, each=f"{task}-sea").mean())
+
+    assert all(at_sea(task, TASKS[task].policies[0]) < 0.1 for task in ("hard_water", "two_swarms", "silent_targets"))
+    for task in ("hard_water", "silent_targets"):
+        assert all(at_sea(task, who) > 0.9 * means[who][task] - 0.01 for who in LEARNERS if who != "isac")
+    for task in ("random_field", "few_informed"):
+        assert all(at_sea(task, TASKS[task].policies[0]) > at_sea(task, who) for who in LEARNERS)
+
+
 def test_estimates_are_what_they_say():
     scores = np.linspace(0.0, 1.0, 40).reshape(8, 5)
     found = interquartile_mean(scores)

@@ -132,7 +132,10 @@ def critical_text(axis: str, score: AxisScore) -> str:
 
 
 def group_score(table: Any, group: str) -> Score | None:
-    """A policy's mean over the axes of a group that were run; ``EVERY``: over the groups but X. None for none."""
+    """A policy's mean over the axes of a group that were run; None for none.
+
+    ``EVERY``: over the groups, but X and those that concern only policies with some channel.
+    """
     seeds = _group(table, group)
     return None if seeds is None else scored(seeds[~np.isnan(seeds)])
 
@@ -140,7 +143,8 @@ def group_score(table: Any, group: str) -> Score | None:
 def _group(table: Any, group: str) -> Float64 | None:
     """The mean over a group's axes for each seed, NaN where one of its cells is missing; ``EVERY`` over the groups."""
     if group == EVERY:
-        parts = [_group(table, name) for name in dict.fromkeys(axis.group for axis in AXES.values()) if name != "X"]
+        usual = dict.fromkeys(axis.group for axis in AXES.values() if not axis.channels)
+        parts = [_group(table, name) for name in usual if name != "X"]
         found = [part for part in parts if part is not None]
         return np.mean(np.stack(found), axis=0) if found else None
     axes = [name for name, axis in AXES.items() if axis.group == group and name in table]
