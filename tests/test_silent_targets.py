@@ -105,6 +105,13 @@ def test_a_vehicle_knows_where_it_is_in_the_box():
     assert np.hypot(*np.moveaxis(swarm.course.obstacles[:, :, :2], -1, 0)).min() > swarm.task.numbers.clear_m
 
 
+def test_the_heading_in_the_box_is_by_compass():
+    swarm = water(2, **{"navigation.compass_bias_deg": 30.0, "sonar.channels": ["compass"]})
+    for percept in (swarm.reset(TUNING), swarm.step(np.zeros((2, 8, 2)))):
+        np.testing.assert_allclose(percept["box"], percept["compass"], atol=1e-6)
+        assert np.abs(percept["box"] - swarm.heading).max() > 0.1
+
+
 def test_the_held_share_is_that_of_the_last_half():
     """Of four targets one is held all along, one from three quarters on, one in the first half, one never."""
     batch = BatchedEnv(load_scenario("silent_targets_easy"))

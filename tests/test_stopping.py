@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.vehicle import Plant
 
 STOPS = {"contact.stops": True, "obstacles": [{"centre_m": [0.0, 0.0], "radius_m": 20.0}]}
 STOPS |= {"trajectory.waypoints_m": [[200.0, 0.0], [400.0, 0.0]]}
@@ -82,6 +83,21 @@ def test_energy_never_rises_and_two_hulls_keep_their_momentum(pose, first, secon
     if x_g == 0.0:  # else a push at the origin also turns the hull
         np.testing.assert_allclose(momentum(on), momentum(off), atol=1e-6)
     assert on.facts.spacing[0, 0] >= min(off.facts.spacing[0, 0], 1.998)
+
+
+def test_hulls_of_other_masses_than_the_nominal_one_keep_their_momentum_too():
+    """Masses are drawn (mismatch); beside the same hulls that pass through each other, as above."""
+    start, nu = ((300.0, 0.0, 0.0), (302.02, 0.0, 0.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    drawn = {"mismatch.mass": 0.8, "mismatch.added_mass": 0.8, "timing.integration_step_s": 0.00625}
+    on, off = (two(*start, nu=nu, **drawn, **{"contact.stops": stops}) for stops in (True, False))
+    mass = 1.0 / on._sea.hull.plants[0, :, Plant._fields.index("inverse_11")]
+    assert mass.max() > 1.2 * mass.min()
+    for swarm in (on, off):
+        swarm.step(NOTHING)
+    u_on, u_off = on.state.nu[0, :, 0], off.state.nu[0, :, 0]
+    assert on.facts.contacts[0].all()
+    assert mass @ u_on == pytest.approx(mass @ u_off, abs=1e-9)
+    assert mass @ u_on**2 < mass @ u_off**2
 
 
 def test_two_hulls_head_on_share_their_momentum():

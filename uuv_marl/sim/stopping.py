@@ -11,6 +11,7 @@ from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.motion import load_one
 from uuv_marl.sim.nearby import ROUND_M, nearest_surface
+from uuv_marl.sim.sea.actuation import own_plant
 from uuv_marl.sim.sea.sea import Sea
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
@@ -39,7 +40,7 @@ def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, own: Workspace,
                 give_way(w, i, n_x, n_y, max(near - d - SINK_M, 0.0), world)
                 speed, yields = along(w, i, n_x, n_y, world, plant, sea)
                 speed -= n_x * course.obstacle_velocity[w, k, 0] + n_y * course.obstacle_velocity[w, k, 1]
-                push(w, i, n_x, n_y, max(-speed, 0.0) / yields, world, plant)
+                push(w, i, n_x, n_y, max(-speed, 0.0) / yields, world, plant, sea)
         for j in range(i):
             dx, dy = state.eta[w, i, 0] - state.eta[w, j, 0], state.eta[w, i, 1] - state.eta[w, j, 1]
             if state.alive[w, j] and dx * dx + dy * dy < touch * touch:
@@ -50,8 +51,8 @@ def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, own: Workspace,
                 speed_i, yields_i = along(w, i, n_x, n_y, world, plant, sea)
                 speed_j, yields_j = along(w, j, n_x, n_y, world, plant, sea)
                 impulse = max(speed_j - speed_i, 0.0) / (yields_i + yields_j)
-                push(w, i, n_x, n_y, impulse, world, plant)
-                push(w, j, -n_x, -n_y, impulse, world, plant)
+                push(w, i, n_x, n_y, impulse, world, plant, sea)
+                push(w, j, -n_x, -n_y, impulse, world, plant, sea)
     for i in range(state.eta.shape[1]):
         load_one(w, i, state, own.now)
 
@@ -78,12 +79,17 @@ def along(w: int, i: int, n_x: float, n_y: float, world: World, plant: Plant, se
     speed = ahead * world.state.nu[w, i, 0] + abeam * world.state.nu[w, i, 1]
     if sea is not None:
         speed += n_x * sea.flow.flow[w, i, 0] + n_y * sea.flow.flow[w, i, 1]
+        plant = own_plant(w, i, sea.hull)
     return speed, ahead * ahead * plant.inverse_11 + abeam * abeam * plant.inverse_22
 
 
 @compiled_inner
-def push(w: int, i: int, n_x: float, n_y: float, impulse: float, world: World, plant: Plant) -> None:
-    """Give a vehicle an impulse along a direction [N s], as Eq. 2's inertia answers it."""
+def push(
+    w: int, i: int, n_x: float, n_y: float, impulse: float, world: World, plant: Plant, sea: Sea | None
+) -> None:  # fmt: skip
+    """Give a vehicle an impulse along a direction [N s], as its own inertia (Eq. 2) answers it."""
+    if sea is not None:
+        plant = own_plant(w, i, sea.hull)
     c, s = cos_sin(world.state.eta[w, i, 2])
     abeam = impulse * (c * n_y - s * n_x)
     world.state.nu[w, i, 0] += plant.inverse_11 * impulse * (c * n_x + s * n_y)

@@ -118,6 +118,14 @@ class Swarm:
         return self.state.nu[:, :, :2] + drift * self.state.alive[:, :, None]
 
     @property
+    def compass(self) -> Float64:
+        """Cosine and sine of every vehicle's heading as its own compass has it, shape (world, vehicle, 2)."""
+        if self._sea is None:
+            return self.heading
+        (c, s), (x, y) = np.moveaxis(self._sea.track.bias, -1, 0), np.moveaxis(self.heading, -1, 0)
+        return np.stack([c * x - s * y, c * y + s * x], axis=-1)
+
+    @property
     def duration_s(self) -> Float64:
         """Time that l(t) takes to its end [s], no task time is shorter; shape (world,)."""
         return self._duration_s

@@ -123,7 +123,9 @@ class SilentTargets(Reach):
     Numbers = SilentTargetsNumbers
     Memory: ClassVar[type[Any] | None] = SilentTargetsMemory
     observed: ClassVar[Table] = (
-        PerceptField("box", (2,), DIRECTION, "cosine and sine of the heading from the first axis of the targets' box"),
+        PerceptField(
+            "box", (2,), DIRECTION, "cosine and sine of the heading by compass from the first axis of the targets' box"
+        ),
     )
     channels: ClassVar[Mapping[str, Table]] = {"way": WAY}
     terms: ClassVar[Mapping[str, str]] = {
@@ -244,7 +246,7 @@ class SilentTargets(Reach):
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The heading in the box, and where it is granted the way to one's own target."""
         swarm = self.swarm
-        told = {"box": swarm.heading}
+        told = {"box": swarm.compass}
         return told | self._ways() if "way" in swarm.scenario.sonar.channels else told
 
     def _ways(self) -> dict[str, Float64]:
