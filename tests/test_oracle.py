@@ -21,7 +21,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.trigonometry import cos_sin, turned
+from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.sim.workspace import Columns
 
 BASE = load_scenario("tracking")
@@ -128,7 +128,7 @@ def test_an_action_of_any_size_is_projected_onto_the_unit_disc(size):
 # --- Sine and cosine ---
 
 
-def test_turned_points_are_rounded_twice_as_a_fused_product_is():
+def test_rotated_points_are_rounded_twice_as_a_fused_product_is():
     rng = np.random.default_rng(0)
     points, angles = rng.uniform(-300.0, 300.0, (200, 2)), rng.uniform(-np.pi, np.pi, 200)
     for (x, y), angle in zip(points.tolist(), angles.tolist(), strict=True):
@@ -137,9 +137,9 @@ def test_turned_points_are_rounded_twice_as_a_fused_product_is():
             float(Fraction(y) * Fraction(-s) + Fraction(x * c)),
             float(Fraction(y) * Fraction(c) + Fraction(x * s)),
         ]
-        assert turned(np.array([x, y]), c, s).tolist() == wanted
-    many = turned(points, *cos_sin(0.7))
-    np.testing.assert_array_equal(many, [turned(point, *cos_sin(0.7)) for point in points])
+        assert rotated(np.array([x, y]), c, s).tolist() == wanted
+    many = rotated(points, *cos_sin(0.7))
+    np.testing.assert_array_equal(many, [rotated(point, *cos_sin(0.7)) for point in points])
 
 
 def test_cos_sin_is_the_library_s_even_and_odd():

@@ -41,13 +41,13 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
 
 
 def draw_profiles(scores: Mapping[str, Float64], path: Path) -> Path:
-    """The share of trainings and tasks that reach a headline, for each learner, with 95 % intervals."""
-    levels = np.linspace(0.0, 1.0, 51)
+    """The share of trainings and tasks above a score, 1 being the best law's, for each learner, with 95 % intervals."""
+    levels = np.linspace(0.0, 1.2, 61)
     figure, (ax, *_) = panels(1, 1, (5.0, 3.4))
     for k, (learner, (share, low, high)) in enumerate(profiles(scores, levels).items()):
         ax.plot(levels, share, color=f"C{k}", label=learner)
         ax.fill_between(levels, low, high, color=f"C{k}", alpha=0.15, linewidth=0)
-    ax.set(xlabel="headline", ylabel="share of trainings above it", ylim=(-0.02, 1.02))
+    ax.set(xlabel="headline, 0: random, 1: the best law", ylabel="share of trainings above it", ylim=(-0.02, 1.02))
     ax.legend()
     figure.savefig(path)
     return path

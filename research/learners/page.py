@@ -13,8 +13,8 @@ from research.data import read_text
 from research.episodes import Row, measured, short, write_rows
 from research.learners.figures import draw_curves, draw_profiles
 from research.learners.layout import marl_eval
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, SEA, TASKS, TRAININGS
-from research.learners.statistics import Estimate, improvement, interquartile_mean
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRAININGS
+from research.learners.statistics import Estimate, improvement, interquartile_mean, mean
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style
 from uuv_marl.benchmark.tables import markdown_table
@@ -23,6 +23,8 @@ from uuv_marl.types import Float64
 _ENOUGH = 4
 """Of pairs that are alike a fifth would be told apart with three trainings of each, a twelfth with four or five (3,000
 simulated)."""
+_FEW = 100
+"""Of fewer episodes no mean is told."""
 Found = Mapping[tuple[str, str], Mapping[str, Mapping[str, Sequence[Row]]]]
 """Rows by task and learner or policy, then by training, then by set."""
 
@@ -33,10 +35,11 @@ def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list
     write_rows(folder / "learners_curves.csv.gz", curves)
     write_text(folder / "learners_marl_eval.json", json.dumps(marl_eval(curves, rows)) + "\n")
     write_text(folder / "learners.md", report(curves, rows))
+    shown, pictures = complete(curves, rows), folder / "figures"
     with house_style():
         drawn = [
-            draw_curves(*complete(curves, rows), folder / "figures" / "learners_curves.png"),
-            draw_profiles(scores(found_in(complete(curves, rows)[1])), folder / "figures" / "learners_profiles.png"),
+            draw_curves(*shown, pictures / "learners_curves.png"),
+            draw_profiles(against_law(found_in(shown[1])), pictures / "learners_profiles.png"),
         ]
     names = ("learners.md", "learners.csv.gz", "learners_curves.csv.gz", "learners_marl_eval.json")
     return [*(folder / name for name in names), *drawn]
@@ -75,10 +78,23 @@ def scores(found: Found) -> dict[str, Float64]:
     return {who: np.concatenate([_values(found, task, who) for task in TASKS], axis=1) for who in LEARNERS}
 
 
-def _values(found: Found, task: str, who: str, sets: Sequence[str] = (), name: str = "share") -> Float64:
-    """A measure of each training, mean over the episodes and then the sets, shape (training, 1); on unseen seeds."""
-    names, trainings = sets or [each.name for each in TASKS[task].tiers[0]], found[task, who].values()
-    return np.array([[float(np.mean([_mean(sets[each], name) for each in names]))] for sets in trainings], np.float64)
+def ranked(found: Found) -> dict[str, Float64]:
+    """The same in two digits: smaller differences are ties."""
+    return {who: every.round(2) for who, every in scores(found).items()}
+
+
+def against_law(found: Found) -> dict[str, Float64]:
+    """The headline over the best law's, both above what ``random`` has."""
+    law, least = (
+        np.array([_values(found, task, who).mean() for task, who in zip(TASKS, names, strict=True)], np.float64)
+        for names in ([task.policies[0] for task in TASKS.values()], ["random"] * len(TASKS))
+    )
+    return {who: (every - least) / (law - least) for who, every in scores(found).items()}
+
+
+def _values(found: Found, task: str, who: str, name: str = "share", each: str = "") -> Float64:
+    """A measure of each training, mean over the episodes of a set, shape (training, 1); on unseen seeds if none."""
+    return np.array([[_mean(sets[each or task], name)] for sets in found[task, who].values()], np.float64)
 
 
 def _mean(rows: Sequence[Row], name: str) -> float:
@@ -87,29 +103,32 @@ def _mean(rows: Sequence[Row], name: str) -> float:
 
 
 def _told(found: Estimate) -> str:
-    interval = "" if found.low == found.high else f" [{short(found.low)}, {short(found.high)}]"
-    return short(found.point) + interval
+    return f"{short(found.point)} [{short(found.low)}, {short(found.high)}]"
+
+
+def _over_episodes(rows: Sequence[Row]) -> Estimate:
+    """The mean headline of episodes, with a 95 % interval."""
+    values = measured(rows, "share")
+    point, half = float(np.mean(values)), 1.96 * float(np.std(values)) / len(values) ** 0.5
+    return Estimate(point, max(point - half, 0.0), min(point + half, 1.0))
 
 
 def _first(found: Found) -> str:
-    """Headline and whole swarms on unseen seeds, a column for each task."""
-    table: list[tuple[str, ...]] = []
-    for who, every in scores(found).items():
-        own = [
-            f"{_told(interquartile_mean(every[:, k : k + 1]))}, "
-            f"{short(float(_values(found, task, who, name='whole').mean()))}"
-            for k, task in enumerate(TASKS)
-        ]
-        table.append((who, *own, _told(interquartile_mean(every))))
+    """Headline and whole swarms on unseen seeds, a column for each task, then all tasks."""
+    every, table = against_law(found), list[tuple[str, ...]]()
+    for who, own in scores(found).items():
+        whole = [_values(found, task, who, "whole").mean() for task in TASKS]
+        cells = [f"{_told(mean(own[:, k : k + 1]))}, {short(float(share))}" for k, share in enumerate(whole)]
+        table.append((who, *cells, _told(interquartile_mean(every[who])), _told(mean(every[who]))))
     for words in ("the best law", "oracle", "random"):
         named = {name: task.policies[0] if words == "the best law" else words for name, task in TASKS.items()}
         cells = [
-            ", ".join(short(float(_values(found, task, who, name=name).mean())) for name in ("share", "whole"))
+            _told(_over_episodes(found[task, who][""][task])) + f", {short(_mean(found[task, who][''][task], 'whole'))}"
             if (task, who) in found else "–"
             for task, who in named.items()
         ]  # fmt: skip
-        table.append((words, *cells, ""))
-    return markdown_table(("", *TASKS, "all tasks"), table)
+        table.append((words, *cells, "", ""))
+    return markdown_table(("", *TASKS, "all, IQM", "all, mean"), table)
 
 
 def _everyone(found: Found, task: str) -> list[str]:
@@ -118,16 +137,16 @@ def _everyone(found: Found, task: str) -> list[str]:
 
 
 def _tiers(found: Found) -> str:
-    """The headline in each tier, of the last without the sea and in it."""
-    table: list[tuple[str, ...]] = []
+    """The headline in each set, a table for each task."""
+    tables: list[str] = []
     for task in TASKS.values():
-        seeds, sizes, last = ([each.name for each in tier] for tier in task.tiers)
-        sea = [name for name in last if name.endswith(SEA)]
-        columns = (seeds, sizes, [name for name in last if name not in sea], sea)
-        for who in _everyone(found, task.name):
-            shares = (_values(found, task.name, who, names).mean() if names else None for names in columns)
-            table.append((task.name, who, *("–" if share is None else short(float(share)) for share in shares)))
-    return markdown_table(("task", "", "unseen seeds", "unseen sizes and ranges", "unseen maps", "sea"), table)
+        names = [each.name for each in task.sets]
+        rows = [
+            (who, *(short(float(_values(found, task.name, who, each=name).mean())) for name in names))
+            for who in _everyone(found, task.name)
+        ]
+        tables.append(markdown_table(("", *names), rows))
+    return "\n".join(tables)
 
 
 def _safety(found: Found) -> str:
@@ -136,18 +155,23 @@ def _safety(found: Found) -> str:
     table: list[tuple[str, ...]] = []
     for task in TASKS:
         for who in _everyone(found, task):
-            values = {name: _values(found, task, who, name=name) for name in ways}
             cells = [
-                "–" if np.isnan(mine).all() else ways[name].format(float(np.nanmean(mine)))
-                for name, mine in values.items()
-            ]
+                way.format(float(np.nanmean(_values(found, task, who, name))))
+                if _number(found, task, who, name) >= _FEW else "–"
+                for name, way in ways.items()
+            ]  # fmt: skip
             table.append((task, who, *cells))
     return markdown_table(("task", "", *(name.replace("_", " ") for name in ways)), table)
 
 
+def _number(found: Found, task: str, who: str, name: str) -> int:
+    """How many episodes on unseen seeds have this measure."""
+    return sum(len(measured(sets[task], name)) for sets in found[task, who].values())
+
+
 def _pairs(found: Found) -> str:
     """Probability of improvement over all tasks."""
-    every = scores(found)
+    every = ranked(found)
     table = [(f"{one} over {other}", _told(improvement(every[one], every[other])))
              for one, other in combinations(LEARNERS, 2)]  # fmt: skip
     return markdown_table(("", "probability"), table)
@@ -155,7 +179,7 @@ def _pairs(found: Found) -> str:
 
 def _apart(found: Found) -> str:
     """Pairs that are told apart on each task: the interval holds no one half."""
-    every, table = scores(found), list[tuple[str, ...]]()
+    every, table = ranked(found), list[tuple[str, ...]]()
     if (num := min(map(len, every.values()))) < _ENOUGH:
         return f"Each learner has {num} of {TRAININGS} trainings so far, too few to tell anyone apart.\n"
     for k, task in enumerate(TASKS):

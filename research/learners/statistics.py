@@ -4,17 +4,17 @@
 # pyright: reportUnknownArgumentType=false, reportUnknownLambdaType=false
 # It lives in the environment of ``make test-benchmarl``.
 
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from rliable.library import create_performance_profile, get_interval_estimates
-from rliable.metrics import aggregate_iqm, probability_of_improvement
+from rliable.metrics import aggregate_iqm, aggregate_mean, probability_of_improvement
 
 from uuv_marl.types import Float64
 
-_RESAMPLES, _OF_PAIRS, _OF_PROFILES = 2000, 500, 200
+_RESAMPLES, _OF_PAIRS, _OF_PROFILES = 2000, 500, 1000
 
 
 class Estimate(NamedTuple):
@@ -25,10 +25,19 @@ class Estimate(NamedTuple):
     high: float
 
 
-def interquartile_mean(scores: Float64) -> Estimate:
+def mean(scores: Float64) -> Estimate:
     """Over trainings and tasks, ``scores`` (training, task)."""
+    return _aggregated(scores, aggregate_mean)
+
+
+def interquartile_mean(scores: Float64) -> Estimate:
+    """The same of the middle half of the scores."""
+    return _aggregated(scores, aggregate_iqm)
+
+
+def _aggregated(scores: Float64, aggregate: Callable[[Float64], float]) -> Estimate:
     with _seeded():
-        return _estimate(*get_interval_estimates({"": scores}, lambda x: np.array([aggregate_iqm(x)]), reps=_RESAMPLES))
+        return _estimate(*get_interval_estimates({"": scores}, lambda x: np.array([aggregate(x)]), reps=_RESAMPLES))
 
 
 def improvement(one: Float64, other: Float64) -> Estimate:

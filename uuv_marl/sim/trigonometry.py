@@ -37,7 +37,7 @@ def cos_sin(angle: float) -> tuple[float, float]:
     return sign * cosine, sign * sine
 
 
-def turned(points: Float64, c: float, s: float) -> Float64:
+def rotated(points: Float64, c: float, s: float) -> Float64:
     """Points (..., 2) turned by the angle that has this cosine and sine, with the same bits on every machine.
 
     As a matrix product of processors with fused multiply-add has it, and one of other processors has not.

@@ -9,7 +9,7 @@ from uuv_marl.percept import FLAG, PerceptField, Table
 from uuv_marl.scenario.fields import Positive, within
 from uuv_marl.sim.draw import Draw
 from uuv_marl.sim.start import start_state
-from uuv_marl.sim.trigonometry import cos_sin, turned
+from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Task, Terms
 from uuv_marl.types import Bool
@@ -51,7 +51,7 @@ class FewInformed(Reach):
         """As the scenario says; the start is turned, obstacles in it are left out, and the informed are drawn."""
         drawn, scenario, n = Task.draw(self, world, rng), self.swarm.scenario, self.swarm.num_vehicles
         (first, second), (c, s) = drawn.waypoints[0][:2], cos_sin(rng.uniform(-np.pi, np.pi))
-        ahead = first + turned(second - first, c, s)
+        ahead = first + rotated(second - first, c, s)
         block = (n, (float(first[0]), float(first[1])), (float(ahead[0]), float(ahead[1])))
         gap = 2.0 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)  # as between the obstacles of a field
         clear = [scenario.start.distance(*block, (x, y)) >= radius + gap for x, y, radius in drawn.obstacles]

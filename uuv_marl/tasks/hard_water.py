@@ -13,7 +13,7 @@ from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.draw import Draw
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.trigonometry import cos_sin, turned
+from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
 from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, tell_way
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
@@ -151,8 +151,8 @@ class HardWater(Reach):
         """A map that can be passed, turned at random; the start is the scenario's."""
         scenario, memory, made = self.swarm.scenario, self.memory, self.draw_map(rng)
         c, s = memory.turn[world] = cos_sin(rng.uniform(-np.pi, np.pi))
-        discs, goal = made.discs.copy(), turned(np.array([[0.0, 0.0], [made.length, 0.0]]), c, s)
-        discs[:, :2] = turned(made.discs[:, :2], c, s)
+        discs, goal = made.discs.copy(), rotated(np.array([[0.0, 0.0], [made.length, 0.0]]), c, s)
+        discs[:, :2] = rotated(made.discs[:, :2], c, s)
         eta, nu = start_state(scenario, goal, rng)
         free = free_cells(made.discs, self._grid, scenario.contact.hull_radius_m)
         memory.way[world] = np.minimum(distances(free, *self._grid.cell(made.length, 0.0)), FAR_M)
