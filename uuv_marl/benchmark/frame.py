@@ -34,9 +34,8 @@ def load(path: UserPath) -> Any:
     path = user_path(path)
     file = path / FILE if path.is_dir() else path
     records: list[dict[str, Any]] = []
-    for row in sorted(
-        read_content(file, "give a results.json of this version, or its folder")["runs"], key=lambda row: row[:3]
-    ):
+    content = read_content(file, "give a results.json of this version, or its folder")
+    for row in sorted(content["runs"], key=lambda row: row[:3]):
         metrics: dict[str, Any] = {**row.metrics}
         shares = {f"constraint_share_{name}": share for name, share in metrics.pop("constraint_share").items()}
         own = metrics.pop("task", {})

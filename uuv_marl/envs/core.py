@@ -264,9 +264,8 @@ def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
         own, other = changes.get(name), given_in(overrides, field)
         if own is not None and other is not None and own != other:
             raise ScenarioError(f"{name} = {own} and the override {field} = {other} differ; leave one out")
-    more = {field: changes.get(name) for name, field in _FIELDS.items() if name != "num_vehicles"}
-    more = {field: value for field, value in more.items() if value is not None}
-    return load_scenario(scenario, num_vehicles=changes.get("num_vehicles"), overrides={**overrides, **more})
+    more = {field: changes[name] for name, field in _FIELDS.items() if changes.get(name) is not None}
+    return load_scenario(scenario, overrides={**overrides, **more})
 
 
 def make_batched_env(

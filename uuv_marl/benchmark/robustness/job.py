@@ -89,11 +89,12 @@ def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate
         ScenarioError: two scenarios have the same name, or one has another task than ``follow``.
         ResultsError: the folder holds other results.
     """
-    names = [load_scenario(scenario).name for scenario in plan.scenarios]
+    scenarios = [load_scenario(scenario) for scenario in plan.scenarios]
+    names = [scenario.name for scenario in scenarios]
     if len(set(names)) < len(names):
         raise ScenarioError(f"scenarios of one report need different names, got {', '.join(names)}; rename a file")
-    for name in plan.scenarios:
-        if not issubclass((scenario := load_scenario(name)).task_class, Follow):
+    for scenario in scenarios:
+        if not issubclass(scenario.task_class, Follow):
             raise ScenarioError(
                 f"scenario {scenario.name!r} has the task {scenario.task.name!r}, and the suite scores 'follow' alone; "
                 "choose another scenario"

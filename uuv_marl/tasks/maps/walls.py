@@ -16,8 +16,8 @@ from uuv_marl.types import Float64
 STEP = 1.6
 """Distance of two discs of a wall, in radii; notches between them are 0.4 radii deep. Assumed: as piloted."""
 INTO_BANK_M = 4.0
-"""How far a wall goes on into a bank [m]. Assumed: as piloted; a hull passes behind about one in thirty piers of a
-harbour, whose foot meets a notch of the bank, and behind no other wall of the shipped numbers."""
+"""How far a wall goes on into a bank [m]. Assumed: as piloted; where the foot of a harbour's pier meets a notch of the
+bank, a hull may pass behind it."""
 
 
 def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
