@@ -19,7 +19,7 @@ from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
 
 SHORT = {"trajectory.waypoints_m": [[0.0, 0.0], [40.0, 0.0]], "time_limit.extra_s": 1.0, "time_limit.factor": 1.0}
-KINDS = [("mlp", False), ("sectors", False), ("mlp", True), ("sectors", True)]
+KINDS = [(kind, memory) for kind in ("mlp", "sectors", "moments") for memory in (False, True)]
 """What networks are made of."""
 
 
@@ -78,6 +78,21 @@ def test_an_encoder_reads_sub_sectors_in_any_order_with_their_places():
         assert np.abs(Network(made, sizes, t, NumpyOps).features(turned) - seen).max() > 1e-3
         widths.add(seen.shape[1])
     assert widths == {2 + 2 * ENCODED}
+
+
+def test_moments_are_sums_over_sub_sectors_in_any_order():
+    sizes = {"velocity": 2, "closeness": 5, "neighbour_direction": 10, "echo_closeness": 2, "echo_direction": 4}
+    sizes = [*sizes.items()]
+    made, rng = Architecture(kind="moments"), np.random.default_rng(0)
+    x, order = rng.standard_normal((3, 23)).astype(np.float32), rng.permutation(5)
+    seen, near, way = Network(made, sizes, {}, NumpyOps).features(x), x[:, 2:7], x[:, 7:17].reshape(3, 5, 2)
+    assert seen.shape[1] == shapes(made, sizes)["0.weight"][0] == 23 + 16
+    np.testing.assert_array_equal(seen[:, :23], x)
+    for k, power in enumerate((0, 1, 2, 4)):
+        total = np.einsum("rs,rsk->rk", near**power, way)
+        np.testing.assert_allclose(seen[:, 23 + 2 * k : 25 + 2 * k], total, atol=1e-5)
+    x[:, 2:7], x[:, 7:17] = near[:, order], way[:, order].reshape(3, 10)
+    np.testing.assert_allclose(Network(made, sizes, {}, NumpyOps).features(x)[:, 23:], seen[:, 23:], atol=1e-5)
 
 
 @pytest.mark.needs("torch")

@@ -172,6 +172,8 @@ def test_what_the_page_finds_is_in_the_shipped_rows():
         assert means[who]["few_informed"] < 0.05
     for task in ("random_field", "hard_water"):
         assert means["mappo_gru"][task] < means["mappo"][task] - 0.03
+    apart = {who: np.ptp(own[:, list(TASKS).index("hard_water")]) for who, own in every.items()}
+    assert max(apart, key=lambda who: apart[who]) == "mappo_gru"
 
     def early(who):
         own = [row for row in curves if (row["task"], row["learner"]) == ("hard_water", who)]
