@@ -73,6 +73,10 @@ class Toy:
     def _draw(self):
         self.observation = self._rng.uniform(-1, 1, (self.rows, self.size)).astype(np.float32)
 
+    def taught(self, action):
+        """The teacher does (x2, -x1), and lets the network act."""
+        return self.observation[:, 1::-1] * np.array([1.0, -1.0], np.float32), action
+
     def step(self, action):
         self._t += 1
         reward = np.asarray(self._pay(self.observation, action), np.float32)
@@ -132,6 +136,17 @@ def test_a_one_step_task_is_solved():
     x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)
     action = learner.act(torch.from_numpy(x), torch.zeros(500, 0))[0].numpy()
     assert np.sqrt(np.mean((action - x[:, :2] * (0.5, -0.5)) ** 2)) < 0.1
+
+
+def test_a_lesson_is_learned_whatever_pays():
+    toy = Toy(lambda observation, action: 10.0 * observation[:, 0] * action[:, 0])
+    learner = learner_for(toy, Ppo(horizon=8))
+    learner.lesson = True
+    for _ in range(120):
+        learner.update(learner.sample(toy, 0.2)[0], 0.2, 3e-3)
+    x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)
+    action = learner.act(torch.from_numpy(x), torch.zeros(500, 0))[0].numpy()
+    assert np.sqrt(np.mean((action - x[:, 1::-1] * (1.0, -1.0)) ** 2)) < 0.1
 
 
 @pytest.mark.parametrize("memory", [True, False])
@@ -322,6 +337,50 @@ def test_rows_act_as_the_policy_will(beside, tmp_path):
         np.testing.assert_allclose(taken[0], expected, atol=1e-5)
 
 
+@pytest.mark.parametrize("beside", [{}, {"filter": True}, RUDDER], ids=["alone", "filter", "rudder"])
+def test_a_teacher_is_told_what_was_done_and_acts_as_it_would_alone(beside):
+    """It says what it would do; where it teaches, that is done; its memory is that of one who did what was done."""
+    told = {"scenario": "starter", **beside, "teacher": "scout"}
+    training = Training(sizes=[(4, 2)], ppo=TINY, **told)
+    env, taken = Rows(training, lambda num: range(100_000, 100_000 + num)), []
+    group = env.groups[0]
+    group._teaches[1] = False
+    alone = make("scout", group.env.swarm.scenario, 2)
+    step = group.env.step
+    group.env.step = lambda action: taken.append(action) or step(action)
+    for _ in range(12):
+        expected = alone.act(group.env.swarm.percept).copy()
+        said, done = env.taught(np.full((env.rows, 2), 0.3, np.float32))
+        np.testing.assert_array_equal(said, expected.reshape(-1, 2))
+        np.testing.assert_array_equal(done, [*said[:4], *np.full((4, 2), np.float32(0.3))])
+        env.step(done)
+        alone.taken(taken[-1])
+    assert np.abs(taken[-1][0] - expected[0]).max() < 1e-6 or beside.get("filter")
+    assert np.abs(taken[-1][1] - expected[1]).max() > 1e-3
+
+
+def test_fewer_and_fewer_worlds_are_the_teachers():
+    training = Training(scenario="starter", sizes=[(1, 400)], teacher="random", overrides={"time_limit.factor": 0.001})
+    drawn = np.random.default_rng(0)
+    env = Rows(training, lambda num: drawn.integers(*TRAINING_SEEDS, num))
+    for share in (1.0, 0.6, 0.0, -0.3):
+        env.teach(share)
+        ended = np.zeros(env.rows, np.bool_)
+        while not ended.all():
+            env.taught(np.zeros((env.rows, 2), np.float32))
+            came = env.step(np.zeros((env.rows, 2), np.float32))
+            ended |= came.terminated | came.truncated
+        assert abs(env.groups[0]._teaches.mean() - max(share, 0.0)) < 0.1
+
+
+def test_rewards_count_after_the_lesson(tmp_path, no_validation):
+    """In a lesson of nine tenths the network is far from who acts, the teacher; then PPO is near itself."""
+    fields = {"scenario": "starter", "sizes": [(4, 2)], "steps": 20 * 64, "lesson": 0.9, "teacher": "scout"}
+    records = list(train(tmp_path, Training(ppo=TINY, **fields)))
+    assert len(records) == 20
+    assert max(record.kl for record in records[18:]) < 0.1 < min(record.kl for record in records[:18])
+
+
 def test_training_worlds_are_not_those_of_validation():
     seeds = []
     trainer = Trainer(Training(scenario="starter", sizes=[(1, 2)], ppo=TINY))
@@ -386,8 +445,15 @@ def rows(folder):
 
 @pytest.mark.parametrize(
     "kind",
-    [{}, {"network": {"kind": "sectors", "hidden": (8,)}}, {"filter": True}, {"around": "random"}, {"around": "scout"}],
-    ids=["gru", "sectors", "filter", "random", "scout"],
+    [
+        {},
+        {"network": {"kind": "sectors", "hidden": (8,)}},
+        {"filter": True},
+        {"around": "random"},
+        {"around": "scout"},
+        {"teacher": "scout", "lesson": 0.7},
+    ],
+    ids=["gru", "sectors", "filter", "random", "scout", "lesson"],
 )
 def test_a_resumed_training_equals_an_uninterrupted_one(kind, tmp_path, no_validation):
     """Bit for bit: weights, optimiser, memories, worlds and random numbers; stopped after a checkpoint, and between."""
@@ -692,10 +758,14 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
     [
         ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 should be a finite number, got inf"),
         ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'noise'?"),
-        ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp' or 'sectors', got 'cnn'"),
+        ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp', 'sectors' or 'moments', got 'cnn'"),
         ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
         ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
+        (
+            {"around": "scout", "teacher": "scout"},
+            "teacher = 'scout' and around = 'scout' are both given; leave one out",
+        ),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
         ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
         ({"sizes": [[5, -1]]}, "sizes.0.1 should be greater than or equal to 0, got -1"),

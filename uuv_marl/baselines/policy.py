@@ -183,10 +183,10 @@ class Policy:
         """The actions for what ``decide`` gave, shape (world, vehicle, 2), which may be overwritten; after it."""
         if self.rudder is not None:
             steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, wish)
-        self._taken(wish)
+        self.taken(wish)
         return wish
 
-    def _taken(self, action: Float32) -> None:
+    def taken(self, action: Float32) -> None:
         """Remember the actions that are taken, if ``Memory`` has a place for them."""
         if "action" in getattr(self.Memory, "_fields", ()):
             self.memory.action[self.active] = action[self.active]

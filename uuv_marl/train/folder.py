@@ -45,7 +45,7 @@ class Record(NamedTuple):
     reward: float | None = None
     """Mean per decision and vehicle, of this iteration's samples, less what contacts cost by then."""
     kl: float | None = None
-    """Divergence from the policy that sampled to the one that learned."""
+    """Divergence from the policy that sampled, or in a lesson from the teacher, to the one that learned."""
     explained: float | None = None
     """Share of the returns' variance that the critic explains."""
     best: float | None = None

@@ -26,6 +26,8 @@ with extra("train", "training"):
 
 _CRITIC = (64, 64)
 """Units of the critic's layers, tanh."""
+_LESSON_EPOCHS = 2
+"""Passes over a batch in a lesson."""
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
 """What the optimiser keeps of each tensor."""
 
@@ -48,6 +50,10 @@ class Environment(Protocol):
         """One decision of every row."""
         ...
 
+    def taught(self, action: Float32) -> tuple[Float32, Float32]:
+        """In a lesson: what a teacher would do, and what is done where the network does ``action``."""
+        ...
+
 
 class Rollout(NamedTuple):
     """Samples, shape (time, row, ...)."""
@@ -55,7 +61,7 @@ class Rollout(NamedTuple):
     observation: Tensor
     action: Tensor
     mean: Tensor
-    """Mean action of the policy that sampled."""
+    """Mean action of the policy that sampled; in a lesson what the teacher would have done."""
     advantage: Tensor
     returns: Tensor
     goes_on: Tensor
@@ -158,6 +164,8 @@ class Learner:
         self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
         self.state = torch.zeros(rows, self.actor.units)
+        self.lesson = False
+        """Whether the actor imitates a teacher, instead of what paid."""
 
     def _judged(self, x: Tensor, state: Tensor) -> Tensor:
         """The critic's output (row,), in the scale of returns, for what it sees (row, entry) and the memory's state."""
@@ -189,8 +197,10 @@ class Learner:
         for t in range(by.horizon):
             observation[t] = torch.from_numpy(env.observation)
             mean[t], states[t] = self.act(observation[t], self.state)
-            drawn = self._rng.standard_normal((env.rows, 2), np.float32)
-            action[t] = mean[t] + noise * torch.from_numpy(drawn)
+            drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t]
+            if self.lesson:
+                mean[t], acts = map(torch.from_numpy, env.taught(acts.numpy()))
+            action[t] = acts + noise * torch.from_numpy(drawn)
             came = env.step(action[t].numpy())
             paid += float(came.reward.mean()) / by.horizon
             reward[t], ended[t + 1] = came.reward, came.terminated | came.truncated
@@ -209,7 +219,7 @@ class Learner:
         return Rollout(observation[:-1], action, mean, *arrays, goes_on, first), paid
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
-        """Some epochs of PPO on a batch, and of regression to its returns."""
+        """Some epochs of PPO on a batch, or of its lesson, and of regression to its returns."""
         self._optimiser.param_groups[0]["lr"] = learning_rate
         error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
@@ -220,30 +230,31 @@ class Learner:
             batch = Rollout(**mixed, state=torch.zeros(batch.action[..., 0].numel(), 0))
         (mean, std), kl = self._scale(), 0.0
         batch = batch._replace(returns=(batch.returns - mean) / std)
-        for _ in range(self.by.epochs):
+        for _ in range(_LESSON_EPOCHS if self.lesson else self.by.epochs):
             order = torch.from_numpy(self._rng.permutation(batch.action.shape[1]))
             found = [self._descend(batch, rows, noise) for rows in order.chunk(self.by.minibatches)]
             kl = sum(found) / len(found)
-            if kl > self.by.kl_stop:
+            if kl > self.by.kl_stop and not self.lesson:
                 break
         return Update(kl, 1.0 - error)
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
-        """One gradient step on some rows; the divergence from the policy that sampled."""
+        """One gradient step on some rows; the divergence from the policy that sampled, or from the teacher."""
         x, action, old, advantage, returns, goes_on = (array.index_select(1, rows) for array in batch[:6])
         new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], goes_on)
         action, old, advantage = action.reshape(-1, 2), old.reshape(-1, 2), advantage.reshape(-1)
         double = 2.0 * noise * noise
         ratio = (((action - old).square() - (action - new).square()).sum(-1) / double).exp()
         clipped = ratio.clamp(1.0 - self.by.clip, 1.0 + self.by.clip)
-        loss = -torch.minimum(ratio * advantage, clipped * advantage).mean()
+        apart = (new - old).square().sum(-1).mean()
+        loss = apart if self.lesson else -torch.minimum(ratio * advantage, clipped * advantage).mean()
         judged = self._judged(x.reshape(-1, x.shape[2]), states.detach())
         self._optimiser.zero_grad()
         (loss + (judged - returns.reshape(-1)).square().mean()).backward()
         for part in self._parts:
             nn.utils.clip_grad_norm_(part, self.by.max_gradient)
         self._optimiser.step()
-        return (new.detach() - old).square().sum(-1).mean().item() / double
+        return apart.item() / double
 
     def _scale(self) -> tuple[float, float]:
         """Mean and standard deviation of returns; 0 and 1 before the first."""

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.learned.actor import bound, in_disc
 from uuv_marl.baselines.learned.checkpoint import Card
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
-from uuv_marl.baselines.registry import beside
+from uuv_marl.baselines.registry import beside, make
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -62,11 +62,20 @@ class Group:
         self._shape, self._state = (part.worlds, part.vehicles), training.critic == "state"
         self.contact_cost = 0.0
         """What a contact that begins costs beyond the reward."""
+        self._teacher = make(training.teacher, scenario, part.worlds) if training.teacher else None
+        self.teaching = 1.0
+        """The share of worlds that start in which the teacher acts."""
+        self._teaches = np.ones(part.worlds, np.bool_)
 
     def seen(self, observation: Float32) -> Float32:
         """What the critic sees with these observations (world, vehicle, entry), shape (row, entry)."""
         parts = [observation, privileged(self.env.swarm)] if self._state else [observation]
         return np.concatenate(parts, axis=2).reshape(self._shape[0] * self._shape[1], -1)
+
+    def taught(self, action: Float32) -> tuple[Float32, Float32]:
+        """What the teacher would do, and what is done: that, in its own worlds, or ``action``; shape (row, 2)."""
+        said = cast(Policy, self._teacher).act(self.env.swarm.percept).reshape(-1, 2).copy()
+        return said, np.where(np.repeat(self._teaches, self._shape[1])[:, None], said, action)
 
     def step(self, action: Float32, seeds: Seeds) -> tuple[Float32, Bool, Bool, Float32, Float32]:
         """Reward, done and cut off by row, what the critic sees now, and saw last of rows that were cut off."""
@@ -77,24 +86,32 @@ class Group:
         if self._acting is not self._told:
             self._told.action[...] = action
             action = self._acting.act(env.swarm.percept)
+        if self._teacher is not None:
+            self._teacher.taken(action)
         came = env.step(action)
         reward = came.reward - self.contact_cost * env.swarm.facts.contacts
         done, cut = np.repeat(came.world_terminated, n), np.repeat(came.world_truncated, n)
         observation, over = came.observation, np.flatnonzero(came.over)
         final = self.seen(observation)[cut] if cut.any() else np.zeros((0, 0), np.float32)
         if len(over):
-            observation = env.reset([int(seed) for seed in seeds(len(over))], over.tolist())
+            drawn = [int(seed) for seed in seeds(len(over))]
+            observation = env.reset(drawn, over.tolist())
+            self._teaches[over] = [seed % 100 < 100.0 * self.teaching for seed in drawn]
         return reward.reshape(-1).astype(np.float32), done, cut, self.seen(observation), final
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that ``restore`` needs, but what was observed."""
-        return self.env.swarm.snapshot() | parts_of(acting=self._acting)
+        lesson = {"teaches": self._teaches.copy()} | parts_of(teacher=self._teacher) if self._teacher else {}
+        return self.env.swarm.snapshot() | parts_of(acting=self._acting) | lesson
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot of a group of the same size."""
         self.env.reset(0)
         self.env.swarm.restore(snapshot)
         self._acting.restore(part_of(snapshot, "acting"))
+        if self._teacher is not None:
+            self._teacher.restore(part_of(snapshot, "teacher"))
+            self._teaches[...] = snapshot["teaches"]
 
 
 class Rows:
@@ -124,6 +141,16 @@ class Rows:
         """From now on a contact that begins costs so much beyond the reward."""
         for group in self.groups:
             group.contact_cost = contact_cost
+
+    def teach(self, share: float) -> None:
+        """From now on the teacher acts in so many of the worlds that start."""
+        for group in self.groups:
+            group.teaching = share
+
+    def taught(self, action: Float32) -> tuple[Float32, Float32]:
+        """What the teacher would do, and what is done where the network does ``action``; shape (row, 2)."""
+        told = [group.taught(action[rows]) for group, rows in zip(self.groups, self._rows, strict=True)]
+        return np.concatenate([said for said, _ in told]), np.concatenate([done for _, done in told])
 
     def step(self, action: Float32) -> Transition:
         """Act, shape (row, 2)."""

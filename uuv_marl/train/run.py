@@ -33,6 +33,10 @@ from uuv_marl.train.validation import Judged, Worst, replay_command, validate
 with extra("train", "training"):
     import torch
 
+_TEACHER_ACTS, _NETWORK_ACTS = 0.15, 0.45
+"""Shares of a lesson until which the teacher acts in all worlds, and from which in none that starts."""
+_LESSON_NOISE, _LESSON_RATE = 0.2, (2e-3, 3e-4)
+"""Noise of actions, and learning rates at the start and at the end of a lesson."""
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
 
 
@@ -134,11 +138,17 @@ class Trainer:
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
         started, by = time.process_time(), self.training.ppo
-        share = before.spent(self.training) / self.training.budget
-        noise = annealed(by.noise, share)
+        share, lesson = before.spent(self.training) / self.training.budget, self.training.lesson_share
+        self.learner.lesson = share < lesson
+        if self.learner.lesson:
+            self.rows.teach((_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS))
+            noise, rate, share = _LESSON_NOISE, annealed(_LESSON_RATE, share / lesson), 0.0
+        else:
+            share = (share - lesson) / (1.0 - lesson)
+            noise, rate = annealed(by.noise, share), annealed(by.learning_rate, share)
         self.rows.charge(annealed(by.contact_cost, share))
         batch, reward = self.learner.sample(self.rows, noise)
-        update = self.learner.update(batch, noise, annealed(by.learning_rate, share))
+        update = self.learner.update(batch, noise, rate)
         return Record(
             iteration=before.iteration + 1,
             agent_steps=before.agent_steps + by.horizon * self.rows.rows,

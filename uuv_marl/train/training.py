@@ -119,6 +119,11 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """Whether actions pass the safety filter, in training as in use."""
     around: str = ""
     """Name of a law to whose actions the network's are added, at half the force; none if empty."""
+    teacher: str = ""
+    """Name of a policy that the network imitates before it learns from its reward; none if empty. At first the teacher
+    acts, then the network more and more, always told what the teacher would do (DAgger, Ross et al. 2011)."""
+    lesson: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.4
+    """How much of the budget it imitates, if there is a teacher; ``ppo`` begins after it."""
     ppo: Ppo = Ppo()
     """Numbers of the algorithm."""
     minutes: Positive | None = None
@@ -143,6 +148,11 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     @pydantic.model_validator(mode="after")
     def _whole(self) -> Self:
         """Fill in what is left out, and refuse what can't be run."""
+        if self.teacher and self.around:
+            raise TrainingError(
+                f"teacher = {self.teacher!r} and around = {self.around!r} are both given; leave one out, since who "
+                "imitates a whole action can't add to another's"
+            )
         if self.minutes is not None and self.steps is not None:
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
         if self.minutes is None and self.steps is None:
@@ -167,6 +177,11 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     def budget(self) -> float:
         """Agent-steps, or seconds of processor time."""
         return self.steps or 60.0 * (self.minutes or 0.0)
+
+    @property
+    def lesson_share(self) -> float:
+        """How much of the budget the network imitates a teacher."""
+        return self.lesson if self.teacher else 0.0
 
     @cached_property
     def loaded(self) -> Scenario:

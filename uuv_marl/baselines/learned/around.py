@@ -49,11 +49,11 @@ class Around(Policy):
         self.clamps[...] = self.law.clamps
         return action
 
-    def _taken(self, action: Float32) -> None:
+    def taken(self, action: Float32) -> None:
         """Both are told."""
-        super()._taken(action)
+        super().taken(action)
         for each in (self.law, self.inner):
-            each._taken(action)
+            each.taken(action)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """Those of both, too."""

@@ -1,6 +1,6 @@
 """The networks of learned policies, written once: NumPy, torch and ONNX run the same lines, each by its operations."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -16,6 +16,8 @@ _HEARD = (
     "modem_velocity", "modem_age",
 )  # fmt: skip
 _ECHO = ("echo_closeness", "echo_direction")
+_POWERS = 4
+"""Powers of closeness in ``moments``: 0, 1, 2 and 4."""
 Sizes = Sequence[tuple[str, int]]
 """Name and entries of every row of an observation, in order."""
 
@@ -23,9 +25,10 @@ Sizes = Sequence[tuple[str, int]]
 class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
     """What a network is made of."""
 
-    kind: Literal["mlp", "sectors"] = "mlp"
+    kind: Literal["mlp", "sectors", "moments"] = "mlp"
     """How it reads an observation: ``mlp``, as it is; ``sectors``, by one encoder that all sub-sectors share, and the
-    sum over them."""
+    sum over them; ``moments``, as it is and by sums over all sub-sectors of direction times a power of closeness, which
+    tell a memory how neighbours move, whatever sub-sectors they pass."""
     memory: bool = False
     """Whether a recurrent layer (GRU) stands between; what follows sees its state beside what it saw."""
     hidden: Annotated[tuple[pydantic.PositiveInt, ...], pydantic.Field(min_length=1)] = (64, 64)
@@ -65,6 +68,8 @@ def shapes(made: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...]]:
         for kind, entries in where.sectors.items():
             num, size = entries.shape
             found |= {f"{kind}.weight": (size, ENCODED), f"{kind}.place": (num, ENCODED)}
+    elif made.kind == "moments":
+        width += 2 * _POWERS * len(columns(sizes).sectors)
     if made.memory:
         units = made.hidden[-1]
         found |= {"gru.weight": (width, 3 * units), "gru.bias": (3 * units,)}
@@ -93,8 +98,8 @@ class Network:
 
     def features(self, x: Any) -> Any:
         """What the layers see of observations (row, entry): the same, or the rest and the sub-sectors encoded."""
-        if self.made.kind == "mlp":
-            return x
+        if self.made.kind != "sectors":
+            return self._ops.joined([x, *self._moments(x)]) if self.made.kind == "moments" else x
         ops, parts = self._ops, [self._ops.take(x, self._columns.rest)]
         for kind, entries in self._columns.sectors.items():
             num, size = entries.shape
@@ -103,6 +108,15 @@ class Network:
             place = self._tensors[f"{kind}.place"]
             parts.append(ops.total(ops.relu(code + place) - ops.relu(place)))  # 0 where nothing is heard
         return ops.joined(parts)
+
+    def _moments(self, x: Any) -> Iterator[Any]:
+        """Sums over the sub-sectors that hear neighbours, and over those that hear echoes, shape (row, 2) each."""
+        ops = self._ops
+        for entries in self._columns.sectors.values():
+            near = ops.shaped(ops.take(x, entries[:, 0]), (-1, len(entries), 1))
+            way = ops.shaped(ops.take(x, entries[:, 1:3].reshape(-1)), (-1, len(entries), 2))
+            square = near * near
+            yield from (ops.total(each) for each in (way, near * way, square * way, square * square * way))
 
     def gates(self, z: Any) -> Any:
         """What features (row, entry) tell the recurrent layer, shape (row, 3 x unit)."""

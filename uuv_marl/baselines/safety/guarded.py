@@ -57,10 +57,10 @@ class Guarded(Filtered):
         self.clamps[...] = self.inner.clamps
         return action
 
-    def _taken(self, action: Float32) -> None:
+    def taken(self, action: Float32) -> None:
         """The policy inside is told too."""
-        super()._taken(action)
-        self.inner._taken(action)
+        super().taken(action)
+        self.inner.taken(action)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """That of the policy inside, too."""
