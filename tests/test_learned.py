@@ -66,12 +66,12 @@ def test_an_encoder_reads_sub_sectors_in_any_order_with_their_places():
     for num in (3, 7):
         sizes = [("velocity", 2), ("closeness", num), ("neighbour_direction", 2 * num), ("echo_closeness", 2),
                  ("echo_direction", 4)]  # fmt: skip
-        where, t = columns(sizes), {}
+        (sectors, _), t = columns(sizes), {}
         for name, shape in shapes(made, sizes).items():
             t[name] = rng.standard_normal(shape).astype(np.float32)
         x, order = rng.standard_normal((4, 8 + 3 * num)).astype(np.float32), rng.permutation(num)
         turned = x.copy()
-        turned[:, where.sectors["heard"].ravel()] = x[:, where.sectors["heard"][order].ravel()]
+        turned[:, sectors["heard"].ravel()] = x[:, sectors["heard"][order].ravel()]
         seen = Network(made, sizes, t, NumpyOps).features(x)
         again = Network(made, sizes, {**t, "heard.place": t["heard.place"][order]}, NumpyOps).features(turned)
         np.testing.assert_allclose(seen, again, atol=1e-6)

@@ -364,7 +364,7 @@ def test_fewer_and_fewer_worlds_are_the_teachers():
     drawn = np.random.default_rng(0)
     env = Rows(training, lambda num: drawn.integers(*TRAINING_SEEDS, num))
     for share in (1.0, 0.6, 0.0, -0.3):
-        env.teach(share)
+        env.charge(1.0, share)
         ended = np.zeros(env.rows, np.bool_)
         while not ended.all():
             env.taught(np.zeros((env.rows, 2), np.float32))
@@ -764,7 +764,7 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         (
             {"around": "scout", "teacher": "scout"},
-            "teacher = 'scout' and around = 'scout' are both given; leave one out",
+            "teacher 'scout' and around 'scout' are both given; leave one out",
         ),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
         ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),

@@ -137,15 +137,10 @@ class Rows:
             started = group.env.reset([int(seed) for seed in seeds(group.env.swarm.num_worlds)])
             self.observation[rows] = group.seen(started)
 
-    def charge(self, contact_cost: float) -> None:
-        """From now on a contact that begins costs so much beyond the reward."""
+    def charge(self, contact_cost: float, teaching: float = 0.0) -> None:
+        """From now on a contact that begins costs so much beyond the reward, and so many new worlds are a teacher's."""
         for group in self.groups:
-            group.contact_cost = contact_cost
-
-    def teach(self, share: float) -> None:
-        """From now on the teacher acts in so many of the worlds that start."""
-        for group in self.groups:
-            group.teaching = share
+            group.contact_cost, group.teaching = contact_cost, teaching
 
     def taught(self, action: Float32) -> tuple[Float32, Float32]:
         """What the teacher would do, and what is done where the network does ``action``; shape (row, 2)."""

@@ -138,15 +138,16 @@ class Trainer:
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
         started, by = time.process_time(), self.training.ppo
-        share, lesson = before.spent(self.training) / self.training.budget, self.training.lesson_share
+        share, teaching = before.spent(self.training) / self.training.budget, 0.0
+        lesson = self.training.lesson if self.training.teacher else 0.0
         self.learner.lesson = share < lesson
         if self.learner.lesson:
-            self.rows.teach((_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS))
+            teaching = (_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS)
             noise, rate, share = _LESSON_NOISE, annealed(_LESSON_RATE, share / lesson), 0.0
         else:
             share = (share - lesson) / (1.0 - lesson)
             noise, rate = annealed(by.noise, share), annealed(by.learning_rate, share)
-        self.rows.charge(annealed(by.contact_cost, share))
+        self.rows.charge(annealed(by.contact_cost, share), teaching)
         batch, reward = self.learner.sample(self.rows, noise)
         update = self.learner.update(batch, noise, rate)
         return Record(

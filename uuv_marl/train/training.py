@@ -149,10 +149,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     def _whole(self) -> Self:
         """Fill in what is left out, and refuse what can't be run."""
         if self.teacher and self.around:
-            raise TrainingError(
-                f"teacher = {self.teacher!r} and around = {self.around!r} are both given; leave one out, since who "
-                "imitates a whole action can't add to another's"
-            )
+            raise TrainingError(f"teacher {self.teacher!r} and around {self.around!r} are both given; leave one out")
         if self.minutes is not None and self.steps is not None:
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
         if self.minutes is None and self.steps is None:
@@ -177,11 +174,6 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     def budget(self) -> float:
         """Agent-steps, or seconds of processor time."""
         return self.steps or 60.0 * (self.minutes or 0.0)
-
-    @property
-    def lesson_share(self) -> float:
-        """How much of the budget the network imitates a teacher."""
-        return self.lesson if self.teacher else 0.0
 
     @cached_property
     def loaded(self) -> Scenario:

@@ -1,7 +1,7 @@
 """The networks of learned policies, written once: NumPy, torch and ONNX run the same lines, each by its operations."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pydantic
@@ -35,17 +35,11 @@ class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
     """Units of the layers, tanh; those of the recurrent layer as of the last."""
 
 
-class SectorColumns(NamedTuple):
-    """Where the sub-sectors' entries stand in an observation."""
+def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
+    """Where an observation with these rows has the sub-sectors' entries, and all others.
 
-    sectors: dict[str, Int64]
-    """By kind: ``heard`` of all arrays, ``echo`` of active ones; shape (sub-sector, entry)."""
-    rest: Int64
-    """All others."""
-
-
-def columns(sizes: Sizes) -> SectorColumns:
-    """Where the sub-sectors' entries stand in an observation with these rows."""
+    The first by kind, ``heard`` of all arrays and ``echo`` of active ones, of shape (sub-sector, entry).
+    """
     at: dict[str, Int64] = {}
     sectors: dict[str, Int64] = {}
     first = 0
@@ -56,20 +50,20 @@ def columns(sizes: Sizes) -> SectorColumns:
         if num:
             sectors[kind] = np.concatenate([at[name].reshape(num, -1) for name in names if name in at], axis=1)
     rest = [at[name] for name in at if name not in (*_HEARD, *_ECHO)]
-    return SectorColumns(sectors, np.concatenate(rest))
+    return sectors, np.concatenate(rest)
 
 
 def shapes(made: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...]]:
     """Shape of each tensor of a network for such observations, by name; weights are (in, out)."""
     width, found = sum(size for _, size in sizes), dict[str, tuple[int, ...]]()
     if made.kind == "sectors":
-        where = columns(sizes)
-        width = len(where.rest) + ENCODED * len(where.sectors)
-        for kind, entries in where.sectors.items():
+        sectors, rest = columns(sizes)
+        width = len(rest) + ENCODED * len(sectors)
+        for kind, entries in sectors.items():
             num, size = entries.shape
             found |= {f"{kind}.weight": (size, ENCODED), f"{kind}.place": (num, ENCODED)}
     elif made.kind == "moments":
-        width += 2 * _POWERS * len(columns(sizes).sectors)
+        width += 2 * _POWERS * len(columns(sizes)[0])
     if made.memory:
         units = made.hidden[-1]
         found |= {"gru.weight": (width, 3 * units), "gru.bias": (3 * units,)}
@@ -94,14 +88,14 @@ class Network:
 
     def __init__(self, made: Architecture, sizes: Sizes, tensors: Mapping[str, Any], ops: Any) -> None:
         self.made, self._tensors, self._ops = made, tensors, ops
-        self._columns = columns(sizes)
+        self._sectors, self._rest = columns(sizes)
 
     def features(self, x: Any) -> Any:
         """What the layers see of observations (row, entry): the same, or the rest and the sub-sectors encoded."""
         if self.made.kind != "sectors":
             return self._ops.joined([x, *self._moments(x)]) if self.made.kind == "moments" else x
-        ops, parts = self._ops, [self._ops.take(x, self._columns.rest)]
-        for kind, entries in self._columns.sectors.items():
+        ops, parts = self._ops, [self._ops.take(x, self._rest)]
+        for kind, entries in self._sectors.items():
             num, size = entries.shape
             seen = ops.shaped(ops.take(x, entries.reshape(-1)), (-1, size))
             code = ops.shaped(ops.dense(seen, self._tensors[f"{kind}.weight"]), (-1, num, ENCODED))
@@ -112,7 +106,7 @@ class Network:
     def _moments(self, x: Any) -> Iterator[Any]:
         """Sums over the sub-sectors that hear neighbours, and over those that hear echoes, shape (row, 2) each."""
         ops = self._ops
-        for entries in self._columns.sectors.values():
+        for entries in self._sectors.values():
             near = ops.shaped(ops.take(x, entries[:, 0]), (-1, len(entries), 1))
             way = ops.shaped(ops.take(x, entries[:, 1:3].reshape(-1)), (-1, len(entries), 2))
             square = near * near
@@ -160,7 +154,7 @@ class NumpyOps:
 
     @staticmethod
     def joined(parts: Sequence[Float32]) -> Float32:
-        """SectorColumns side by side."""
+        """Columns side by side."""
         return np.concatenate(parts, axis=1)
 
     @staticmethod
