@@ -20,7 +20,7 @@ RING = {
 
 
 @pytest.mark.parametrize("memory", [False, True], ids=["mlp", "gru"])
-@pytest.mark.parametrize("kind", ["mlp", "sectors"])
+@pytest.mark.parametrize("kind", ["mlp", "sectors", "moments"])
 @pytest.mark.parametrize("arrays", [None, [BOW, RING], [RING]], ids=["suite", "two", "passive"])
 def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_path):
     scenario = load_scenario("starter", overrides={"sonar.arrays": arrays} if arrays else {})
