@@ -7,7 +7,6 @@ import numpy as np
 
 from uuv_marl.percept import PerceptLayout, Starts
 from uuv_marl.scenario import Scenario, growth
-from uuv_marl.sim.disturbance import loss_ticks
 from uuv_marl.sim.sonar import SonarSuite, suite
 from uuv_marl.sim.vehicle import Plant, plant
 from uuv_marl.types import Float64, Int64
@@ -65,7 +64,7 @@ def model(scenario: Scenario) -> Model:
 def rules(scenario: Scenario) -> Rules:
     """Clocks, thresholds and losses of a scenario."""
     timing, arrival = scenario.timing, scenario.arrival
-    passes = arrival.by == "passage"
+    passes, losses_s = arrival.by == "passage", np.array(scenario.disturbance.loss_times_s, np.float64)
     return Rules(
         hold_s=timing.control_hold_s,
         step_s=timing.integration_step_s,
@@ -78,6 +77,6 @@ def rules(scenario: Scenario) -> Rules:
         dwell_ticks=0 if passes else round(arrival.dwell_s / timing.control_hold_s),
         spread=arrival.spread_m * growth(scenario.swarm.num_vehicles),
         arrival_radii=np.array([math.inf if passes else arrival.radius_m, *ARRIVAL_RADII_M]),
-        loss_ticks=loss_ticks(scenario),
+        loss_ticks=np.maximum(np.ceil(losses_s / timing.control_hold_s - 1e-9), 1).astype(np.int64),
         cell_side=_CELL_SPACINGS * scenario.start.spacing_m,
     )

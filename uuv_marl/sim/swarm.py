@@ -11,7 +11,6 @@ from uuv_marl.percept import Clock, Percept, PerceptLayout, told_rows
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
-from uuv_marl.sim.disturbance import draw_losses
 from uuv_marl.sim.draw import Draw
 from uuv_marl.sim.engine import Engine
 from uuv_marl.sim.model import ARRIVAL_RADII_M
@@ -210,7 +209,7 @@ class Swarm:
         state.eta[w], state.nu[w] = drawn.eta, drawn.nu
         state.before[w] = state.eta[w, :, :2]
         state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, drawn.obstacles
-        course.losses[w] = draw_losses(self.scenario, rng)
+        course.losses[w] = rng.permutation(self.num_vehicles)[: course.losses.shape[1]]
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
         if self._sea is not None:

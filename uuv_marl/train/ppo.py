@@ -197,7 +197,7 @@ class Learner:
         for t in range(by.horizon):
             observation[t] = torch.from_numpy(env.observation)
             mean[t], states[t] = self.act(observation[t], self.state)
-            drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t]
+            drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t].clone()
             if self.lesson:
                 mean[t], acts = map(torch.from_numpy, env.taught(acts.numpy()))
             action[t] = acts + noise * torch.from_numpy(drawn)

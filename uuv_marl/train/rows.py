@@ -12,6 +12,7 @@ from uuv_marl.baselines.learned.checkpoint import Card
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
 from uuv_marl.baselines.registry import beside, make
 from uuv_marl.envs.core import BatchedEnv
+from uuv_marl.errors import PolicyError, TrainingError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
@@ -62,7 +63,11 @@ class Group:
         self._shape, self._state = (part.worlds, part.vehicles), training.critic == "state"
         self.contact_cost = 0.0
         """What a contact that begins costs beyond the reward."""
-        self._teacher = make(training.teacher, scenario, part.worlds) if training.teacher else None
+        try:
+            self._teacher = make(training.teacher, scenario, part.worlds) if training.teacher else None
+        except PolicyError as error:
+            told = f"teacher = {training.teacher!r} can't teach on {part.name}: {error}"
+            raise TrainingError(told) from None
         self.teaching = 1.0
         """The share of worlds that start in which the teacher acts."""
         self._teaches = np.ones(part.worlds, np.bool_)
@@ -71,6 +76,13 @@ class Group:
         """What the critic sees with these observations (world, vehicle, entry), shape (row, entry)."""
         parts = [observation, privileged(self.env.swarm)] if self._state else [observation]
         return np.concatenate(parts, axis=2).reshape(self._shape[0] * self._shape[1], -1)
+
+    def start(self, seeds: Sequence[int], worlds: Sequence[int]) -> Float32:
+        """Start these worlds; what all observe."""
+        if self._teacher is not None:
+            self._teacher.reset(seeds, worlds)
+        self._teaches[worlds] = [seed % 100 < 100.0 * self.teaching for seed in seeds]
+        return self.env.reset(seeds, worlds)
 
     def taught(self, action: Float32) -> tuple[Float32, Float32]:
         """What the teacher would do, and what is done: that, in its own worlds, or ``action``; shape (row, 2)."""
@@ -94,9 +106,7 @@ class Group:
         observation, over = came.observation, np.flatnonzero(came.over)
         final = self.seen(observation)[cut] if cut.any() else np.zeros((0, 0), np.float32)
         if len(over):
-            drawn = [int(seed) for seed in seeds(len(over))]
-            observation = env.reset(drawn, over.tolist())
-            self._teaches[over] = [seed % 100 < 100.0 * self.teaching for seed in drawn]
+            observation = self.start([int(seed) for seed in seeds(len(over))], over.tolist())
         return reward.reshape(-1).astype(np.float32), done, cut, self.seen(observation), final
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
@@ -134,7 +144,8 @@ class Rows:
         self.size = self.features + PRIVILEGED_SIZE * (training.critic == "state")
         self.observation = np.zeros((self.rows, self.size), np.float32)
         for group, rows in zip(self.groups, self._rows, strict=True):
-            started = group.env.reset([int(seed) for seed in seeds(group.env.swarm.num_worlds)])
+            worlds = [*range(group.env.swarm.num_worlds)]
+            started = group.start([int(seed) for seed in seeds(len(worlds))], worlds)
             self.observation[rows] = group.seen(started)
 
     def charge(self, contact_cost: float, teaching: float = 0.0) -> None:

@@ -121,7 +121,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """Name of a law to whose actions the network's are added, at half the force; none if empty."""
     teacher: str = ""
     """Name of a policy that the network imitates before it learns from its reward; none if empty. At first the teacher
-    acts, then the network more and more, always told what the teacher would do (DAgger, Ross et al. 2011)."""
+    acts, then the network more and more, always told what the teacher would do (as in DAgger, Ross et al. 2011)."""
     lesson: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.4
     """How much of the budget it imitates, if there is a teacher; ``ppo`` begins after it."""
     ppo: Ppo = Ppo()

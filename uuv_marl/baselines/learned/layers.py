@@ -17,7 +17,7 @@ _HEARD = (
 )  # fmt: skip
 _ECHO = ("echo_closeness", "echo_direction")
 _POWERS = 4
-"""Powers of closeness in ``moments``: 0, 1, 2 and 4."""
+"""Powers of closeness in ``moments``, by which directions, as long as closeness already, are multiplied: 0, 1, 2, 4."""
 Sizes = Sequence[tuple[str, int]]
 """Name and entries of every row of an observation, in order."""
 
