@@ -187,7 +187,7 @@ class Policy:
         return wish
 
     def taken(self, action: Float32) -> None:
-        """Remember the actions taken, if ``Memory`` has a place for them; again if they are others than ``act`` gave."""
+        """Remember the actions taken, if ``Memory`` has a place for them; again if others than ``act`` gave."""
         if "action" in getattr(self.Memory, "_fields", ()):
             self.memory.action[self.active] = action[self.active]
 
