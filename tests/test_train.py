@@ -141,7 +141,7 @@ def test_a_one_step_task_is_solved():
 def test_a_lesson_is_learned_whatever_pays():
     toy = Toy(lambda observation, action: 10.0 * observation[:, 0] * action[:, 0])
     learner = learner_for(toy, Ppo(horizon=8))
-    learner.lesson = True
+    learner.teach(lesson=True)
     batch, _ = learner.sample(toy, 1e-3)
     assert (batch.action - batch.mean).abs().mean() > 0.2  # the network acts
     for _ in range(120):
@@ -467,7 +467,7 @@ def rows(folder):
         {"filter": True},
         {"around": "random"},
         {"around": "scout"},
-        {"teacher": "scout", "lesson": 0.7},
+        {"teacher": "scout", "lesson": 0.3},
     ],
     ids=["gru", "sectors", "filter", "random", "scout", "lesson"],
 )

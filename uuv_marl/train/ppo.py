@@ -165,7 +165,13 @@ class Learner:
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
         self.state = torch.zeros(rows, self.actor.units)
         self.lesson = False
-        """Whether the actor imitates a teacher, instead of what paid."""
+        """Whether the actor imitates a teacher, instead of what paid; set by ``teach``."""
+
+    def teach(self, lesson: bool) -> None:
+        """From now on the actor imitates a teacher, or does what pays: by a new optimiser, as gradients are larger."""
+        if self.lesson and not lesson:
+            self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
+        self.lesson = lesson
 
     def _judged(self, x: Tensor, state: Tensor) -> Tensor:
         """The critic's output (row,), in the scale of returns, for what it sees (row, entry) and the memory's state."""
@@ -286,7 +292,8 @@ class Learner:
         tensors |= {f"critic.{k}": x for k, x in enumerate(self.critic)}
         for k, moments in self._optimiser.state_dict()["state"].items():
             tensors |= {f"adam.{k}.{name}": x for name, x in moments.items()}
-        return {"moments": self._moments.copy()} | {name: x.detach().numpy().copy() for name, x in tensors.items()}
+        told = {"moments": self._moments.copy(), "lesson": np.array([self.lesson])}
+        return told | {name: x.detach().numpy().copy() for name, x in tensors.items()}
 
     @torch.no_grad()
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -298,7 +305,7 @@ class Learner:
         if not begun and np.array(arrays["moments"]).any():
             raise ValueError("the optimiser's arrays adam.* are missing")
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
-        self._moments = np.array(arrays["moments"])
+        self._moments, self.lesson = np.array(arrays["moments"]), bool(arrays["lesson"][0])
         for name, x in [("state", self.state), *((f"actor.{name}", x) for name, x in self.actor.tensors.items()),
                         *((f"critic.{k}", x) for k, x in enumerate(self.critic))]:  # fmt: skip
             if tensors[name].shape != x.shape:

@@ -140,7 +140,7 @@ class Trainer:
         started, by = time.process_time(), self.training.ppo
         share, teaching = before.spent(self.training) / self.training.budget, 0.0
         lesson = self.training.lesson if self.training.teacher else 0.0
-        self.learner.lesson = share < lesson
+        self.learner.teach(share < lesson)
         if self.learner.lesson:
             teaching = (_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS)
             noise, rate, share = _LESSON_NOISE, annealed(_LESSON_RATE, share / lesson), 0.0
