@@ -277,7 +277,7 @@ def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
     assert found > 0
     costs = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Rows, "charge", lambda self, cost, _: costs.append(cost))
+        patch.setattr(Rows, "charge", lambda self, cost: costs.append(cost))
         list(train(tmp_path, small(steps=5 * 168)))
     assert costs[0] == 1.0
     assert costs == sorted(costs)
@@ -379,7 +379,7 @@ def test_fewer_and_fewer_worlds_are_the_teachers():
     drawn = np.random.default_rng(0)
     env = Rows(training, lambda num: drawn.integers(*TRAINING_SEEDS, num))
     for share in (1.0, 0.6, 0.0, -0.3):
-        env.charge(1.0, share)
+        env.teach(share)
         ended = np.zeros(env.rows, np.bool_)
         while not ended.all():
             env.taught(np.zeros((env.rows, 2), np.float32))

@@ -58,7 +58,7 @@ class Policy:
       changes them; ``decide`` reads ``self.memory``. They are made, cleared, saved and restored here.
     - ``act`` is ``hear`` (remember, once for each time), ``decide``, ``drive`` (to the actuators), in this order.
     - A filter is a policy with a policy inside: its ``decide`` calls the other's ``hear`` and ``decide`` and changes
-      what comes of it. A training calls ``hear``, lets its actor decide, and calls ``drive``.
+      what comes of it. A teacher that is not obeyed is told so (``taken``).
 
     Args:
         scenario: gives the vehicle's limits, the decision period and the percept's layout.

@@ -11,7 +11,6 @@ from uuv_marl.types import Bool, Float64
 RewardFunction = Callable[[Swarm], Float64]
 """A user's own reward: from the swarm after a step to an array (world, vehicle)."""
 
-
 MOST_REWARD = 1e9
 """Larger sizes of a reward overflow where learners square them in single precision."""
 

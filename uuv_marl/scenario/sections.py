@@ -15,7 +15,6 @@ from uuv_marl.types import Float64
 NOMINAL_VEHICLES = 54
 """The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
 
-
 Seconds = TypeVar("Seconds", float, Float64)
 """A time or an array of times [s]."""
 Legs = Annotated[int, within(1, 8)]

@@ -19,7 +19,6 @@ from uuv_marl.types import Bool, Float32
 _LEAST = 200
 """Vehicles that a thread must have to be worth waking: that takes as long as moving about as many."""
 
-
 _HEAD = 200
 """Vehicles that are moved while a thread wakes, and some more: the caller, who would have to be woken, ends last."""
 

@@ -26,7 +26,6 @@ _LIBRARIES = ("torch", "numpy", "numba", "safetensors")
 Say = Callable[[str], object]
 """Tells whoever started a training how it goes on."""
 
-
 Stop = Callable[[], bool]
 """Asked after every iteration; where it says so, the training ends with a checkpoint."""
 

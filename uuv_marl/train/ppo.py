@@ -1,6 +1,6 @@
 """PPO for all vehicles at once, which share one actor (Yu et al. 2022): MAPPO, or IPPO, by what the critic sees.
 
-The actor is that of ``uuv_marl.baselines.learned.layers`` in torch, and so runs without torch. With a memory a
+The actor runs without torch, too (``uuv_marl.train.network``). With a memory a
 minibatch is the whole horizon of a part of the vehicles, so that it is trained through time; its state at the horizon's
 start is the one that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for
 bit. Needs ``train``.
@@ -8,15 +8,16 @@ bit. Needs ``train``.
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.learned.layers import Architecture, Network, Sizes, shapes
+from uuv_marl.baselines.learned.layers import Architecture, Sizes
 from uuv_marl.extras import extra
-from uuv_marl.train.rows import Transition
+from uuv_marl.train.network import TorchActor, started
+from uuv_marl.train.rows import Rows
 from uuv_marl.train.training import Ppo
 from uuv_marl.types import Bool, Float32
 
@@ -39,22 +40,6 @@ class Update(NamedTuple):
     explained: float
 
 
-class Environment(Protocol):
-    """What sampling needs: ``Rows``, or a problem with a known answer."""
-
-    size: int
-    rows: int
-    observation: Float32
-
-    def step(self, action: Float32) -> Transition:
-        """One decision of every row."""
-        ...
-
-    def taught(self, action: Float32) -> tuple[Float32, Float32]:
-        """In a lesson: what a teacher would do, and what is done where the network does ``action``."""
-        ...
-
-
 class Rollout(NamedTuple):
     """Samples, shape (time, row, ...)."""
 
@@ -68,76 +53,6 @@ class Rollout(NamedTuple):
     """0 where an episode begins, else 1."""
     state: Tensor
     """The memory's before the first decision, shape (row, unit)."""
-
-
-class TorchOps:
-    """Operations of ``layers.Network`` on tensors."""
-
-    tanh, sigmoid, relu = staticmethod(torch.tanh), staticmethod(torch.sigmoid), staticmethod(torch.relu)
-    shaped = staticmethod(torch.reshape)
-
-    @staticmethod
-    def dense(x: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
-        """A layer without its activation: (row, out) for (row, in)."""
-        return x @ weight if bias is None else torch.addmm(bias, x, weight)
-
-    @staticmethod
-    def take(x: Tensor, columns: NDArray[np.int64]) -> Tensor:
-        """Some columns."""
-        return x.index_select(1, torch.from_numpy(columns))
-
-    @staticmethod
-    def joined(parts: Sequence[Tensor]) -> Tensor:
-        """Columns side by side."""
-        return torch.cat(list(parts), 1)
-
-    @staticmethod
-    def parts(x: Tensor) -> tuple[Tensor, ...]:
-        """Thirds of the columns."""
-        return x.chunk(3, 1)
-
-    @staticmethod
-    def total(x: Tensor) -> Tensor:
-        """Sum over the middle axis."""
-        return x.sum(1)
-
-
-class TorchActor:
-    """The policy's network, and its memory through time."""
-
-    def __init__(self, made: Architecture, sizes: Sizes, rng: np.random.Generator) -> None:
-        last = f"{len(made.hidden)}.weight"
-        self.tensors = {
-            name: started(shape, rng, 0.01 if name == last else 1.0 if name.startswith("gru") else math.sqrt(2.0))
-            for name, shape in shapes(made, sizes).items()
-        }
-        if made.memory:  # of each gate by itself
-            own = self.tensors["gru.state_weight"]
-            gates = [started((len(own), len(own)), rng, 1.0) for _ in range(3)]
-            self.tensors["gru.state_weight"] = torch.cat(gates, 1).detach().requires_grad_()
-        self.units = made.hidden[-1] if made.memory else 0
-        self.network = Network(made, sizes, self.tensors, TorchOps)
-
-    def act(self, x: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Actions (row, 2) for observations (row, entry) and the memory's state, and its next state (row, unit)."""
-        z = self.network.features(x)
-        if not self.units:
-            return self.network.output(z), state
-        state = self.network.step(self.network.gates(z), state)
-        return self.network.output(z, state), state
-
-    def through(self, x: Tensor, state: Tensor, goes_on: Tensor) -> tuple[Tensor, Tensor]:
-        """The same for a horizon: actions (time x row, 2), and the states after each decision (time x row, unit)."""
-        flat = x.reshape(-1, x.shape[2])
-        z = self.network.features(flat)
-        if not self.units:
-            return self.network.output(z), z[:, :0]
-        states: list[Tensor] = []
-        for gates, alike in zip(self.network.gates(z).split(x.shape[1]), goes_on[:, :, None], strict=True):
-            state = self.network.step(gates, state * alike)
-            states.append(state)
-        after = torch.cat(states)
-        return self.network.output(z, after), after
 
 
 class Learner:
@@ -168,8 +83,8 @@ class Learner:
         """Whether the actor imitates a teacher, instead of what paid; set by ``teach``."""
 
     def teach(self, lesson: bool) -> None:
-        """From now on the actor imitates a teacher, or does what pays: by a new optimiser, as gradients are larger."""
-        if self.lesson and not lesson:
+        """From now on the actor imitates a teacher, or learns what pays."""
+        if self.lesson and not lesson:  # with the old optimiser the first updates went twice as far, by ``Update.kl``
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self.lesson = lesson
 
@@ -192,7 +107,7 @@ class Learner:
         """Actions without noise (row, 2), and the memory's next state, for what the critic sees."""
         return self.actor.act(seen[:, : self._features], state)
 
-    def sample(self, env: Environment, noise: float) -> tuple[Rollout, float]:
+    def sample(self, env: Rows, noise: float) -> tuple[Rollout, float]:
         """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
         by, shape = self.by, (self.by.horizon, env.rows)
         observation = torch.empty((by.horizon + 1, env.rows, env.size))
@@ -316,15 +231,6 @@ class Learner:
             _, k, key = name.split(".")
             state.setdefault(int(k), {})[key] = tensors[name]
         self._optimiser.load_state_dict({**self._optimiser.state_dict(), "state": state})
-
-
-def started(shape: tuple[int, ...], rng: np.random.Generator, gain: float) -> Tensor:
-    """A new weight, orthogonal, or a bias, zero; with no draw from torch's global generator."""
-    tensor = torch.zeros(shape)
-    if len(shape) > 1:
-        generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
-        nn.init.orthogonal_(tensor, gain, generator=generator)
-    return tensor.requires_grad_()
 
 
 def gae(reward: Float32, value: Float32, ended: Bool, gamma: float, lam: float) -> Float32:

@@ -66,8 +66,7 @@ class Group:
         try:
             self._teacher = make(training.teacher, scenario, part.worlds) if training.teacher else None
         except PolicyError as error:
-            told = f"teacher = {training.teacher!r} can't teach on {part.name}: {error}"
-            raise TrainingError(told) from None
+            raise TrainingError(f"teacher = {training.teacher!r} can't teach on {part.name}: {error}") from None
         self.teaching = 1.0
         """The share of worlds that start in which the teacher acts."""
         self._teaches = np.ones(part.worlds, np.bool_)
@@ -81,6 +80,7 @@ class Group:
         """Start these worlds; what all observe."""
         if self._teacher is not None:
             self._teacher.reset(seeds, worlds)
+        # By their seeds, which are drawn: it takes no random number of its own.
         self._teaches[worlds] = [seed % 100 < 100.0 * self.teaching for seed in seeds]
         return self.env.reset(seeds, worlds)
 
@@ -148,10 +148,15 @@ class Rows:
             started = group.start([int(seed) for seed in seeds(len(worlds))], worlds)
             self.observation[rows] = group.seen(started)
 
-    def charge(self, contact_cost: float, teaching: float = 0.0) -> None:
-        """From now on a contact that begins costs so much beyond the reward, and so many new worlds are a teacher's."""
+    def charge(self, contact_cost: float) -> None:
+        """From now on a contact that begins costs so much beyond the reward."""
         for group in self.groups:
-            group.contact_cost, group.teaching = contact_cost, teaching
+            group.contact_cost = contact_cost
+
+    def teach(self, share: float) -> None:
+        """From now on the teacher acts in so many of the worlds that start."""
+        for group in self.groups:
+            group.teaching = share
 
     def taught(self, action: Float32) -> tuple[Float32, Float32]:
         """What the teacher would do, and what is done where the network does ``action``; shape (row, 2)."""

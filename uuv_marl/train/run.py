@@ -57,6 +57,7 @@ def train(
     Raises:
         ResultsError: the folder is used, by another process too, or can't be written; the last checkpoint is whole.
         RewardError: the reward can't be imported, or gives what is no reward.
+        TrainingError: the teacher can't teach on a scenario.
     """
     with opened(user_path(output), training or Training(), say) as folder:
         yield from _run(folder, folder.until, say, stop)
@@ -138,16 +139,17 @@ class Trainer:
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
         started, by = time.process_time(), self.training.ppo
-        share, teaching = before.spent(self.training) / self.training.budget, 0.0
+        share = before.spent(self.training) / self.training.budget
         lesson = self.training.lesson if self.training.teacher else 0.0
         self.learner.teach(share < lesson)
         if self.learner.lesson:
-            teaching = (_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS)
+            self.rows.teach((_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS))
             noise, rate, share = _LESSON_NOISE, annealed(_LESSON_RATE, share / lesson), 0.0
         else:
+            self.rows.teach(0.0)
             share = (share - lesson) / (1.0 - lesson)
             noise, rate = annealed(by.noise, share), annealed(by.learning_rate, share)
-        self.rows.charge(annealed(by.contact_cost, share), teaching)
+        self.rows.charge(annealed(by.contact_cost, share))
         batch, reward = self.learner.sample(self.rows, noise)
         update = self.learner.update(batch, noise, rate)
         return Record(

@@ -17,7 +17,7 @@ _HEARD = (
 )  # fmt: skip
 _ECHO = ("echo_closeness", "echo_direction")
 _POWERS = 4
-"""Powers of closeness in ``moments``, by which directions, as long as closeness already, are multiplied: 0, 1, 2, 4."""
+"""Sums of a kind in ``moments``: of directions, whose length is closeness, times its powers 0, 1, 2 and 4."""
 Sizes = Sequence[tuple[str, int]]
 """Name and entries of every row of an observation, in order."""
 
@@ -36,10 +36,7 @@ class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
 
 
 def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
-    """Where an observation with these rows has the sub-sectors' entries, and all others.
-
-    The first by kind, ``heard`` of all arrays and ``echo`` of active ones, of shape (sub-sector, entry).
-    """
+    """Where sub-sectors' entries are, shape (sub-sector, entry), ``heard`` and ``echo``; and all others."""
     at: dict[str, Int64] = {}
     sectors: dict[str, Int64] = {}
     first = 0
@@ -91,9 +88,11 @@ class Network:
         self._sectors, self._rest = columns(sizes)
 
     def features(self, x: Any) -> Any:
-        """What the layers see of observations (row, entry): the same, or the rest and the sub-sectors encoded."""
-        if self.made.kind != "sectors":
-            return self._ops.joined([x, *self._moments(x)]) if self.made.kind == "moments" else x
+        """What the layers see of observations (row, entry): the same, also with moments, or sub-sectors encoded."""
+        if self.made.kind == "mlp":
+            return x
+        if self.made.kind == "moments":
+            return self._ops.joined([x, *self._moments(x)])
         ops, parts = self._ops, [self._ops.take(x, self._rest)]
         for kind, entries in self._sectors.items():
             num, size = entries.shape
