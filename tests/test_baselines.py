@@ -177,11 +177,7 @@ def test_tuned_gains_come_from_shipped_trials(file):
     policy = chosen.get(file, f"{name},tuned_for={what}" if what else name)
     changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
     made = make(policy, granted(policy, load_scenario("sea_trial" if hull else "tracking", overrides=changes)))
-    numbers = (
-        vars(made)
-        | getattr(made, "seeker", made.gains)._asdict()
-        | (made.barrier._asdict() if hasattr(made, "barrier") else {})
-    )
+    numbers = vars(made) | made.gains._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 
 

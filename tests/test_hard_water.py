@@ -5,11 +5,8 @@ import pytest
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks import HardWater
 from uuv_marl.tasks.maps import KINDS
 from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
 
@@ -127,21 +124,3 @@ def test_knobs_that_leave_no_way_are_refused_with_the_remedy():
         ScenarioError, match="of gate, and none can be passed with task.clearance_m = 3; widen the gaps"
     ):
         water("gate", **{"task.gate.gap_m": [1.0, 2.0]}).reset(0)
-
-
-def test_the_guide_beats_the_floors_and_terms_are_those_documented():
-    """On tuning seeds; whoever goes ahead until a wall stops him is paid for the way."""
-    scenario, returns = load_scenario("hard_water"), {}
-    for name in (HardWater.guide, "idle", "random"):
-        batch, policy = BatchedEnv(scenario, 16), make(name, scenario, 16)
-        batch.reset(10_000)
-        policy.reset(10_000)
-        total = np.zeros(16)
-        while not batch.over.all():
-            policy.active[:] = ~batch.over
-            result = batch.step(policy.act(batch.swarm.percept))
-            total += result.world_reward
-            assert list(result.terms) == list(HardWater.terms)
-            np.testing.assert_allclose(sum(result.terms.values()), result.reward, atol=1e-9)
-        returns[name] = total.mean()
-    assert returns[HardWater.guide] > max(returns["idle"], returns["random"])

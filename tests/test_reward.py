@@ -13,51 +13,74 @@ from uuv_marl.scenario.task import task_class
 
 PUPPETS = ("follow", "reach")
 """Tasks that any scenario can have."""
-GUIDED = [("starter", "dense", 100), ("starter", "sparse", 30), ("single_obstacle", "dense", 2)]
+PLACES = {
+    "follow": ("single_obstacle", {"arrival.dwell_s": 0.3}), "reach": ("single_obstacle", {"task": "reach"}),
+    "hard_water": ("hard_water_easy", {}), "two_swarms": ("two_swarms_easy", {}),
+    "few_informed": ("few_informed_easy", {}), "silent_targets": ("silent_targets_easy", {}),
+}  # fmt: skip
+"""A scenario of each task."""
+AT_REST = [task for task in PLACES if task != "silent_targets"]
+"""Tasks that have a place to be at."""
+PAID = [(task, reward) for task in PLACES for reward in task_class(task).rewards]
+ONCE = {"arrival", "stay", "held"}
+"""Terms that pay for being where one should be; ``progress`` pays or costs, and all others cost."""
+GUIDED = [
+    ("follow", "starter", 5, "dense", 100), ("follow", "starter", 5, "sparse", 30),
+    ("follow", "single_obstacle", 54, "dense", 2), ("reach", "starter", 5, "dense", 100),
+    ("reach", "single_obstacle", 54, "dense", 2), ("hard_water", "hard_water", 10, "dense", 100),
+    ("hard_water", "hard_water", 10, "geodesic", 100), ("two_swarms", "two_swarms_easy", 10, "dense", 100),
+    ("few_informed", "few_informed_easy", 10, "dense", 100), ("silent_targets", "silent_targets_easy", 8, "dense", 100),
+]  # fmt: skip
+"""Task, scenario, vehicles, reward, and how many seeds, from 0 on."""
 REACH = {"task": "reach"}
 
 
-def mean_returns(name, scenario, reward, worlds):
-    batch = BatchedEnv(scenario, worlds, reward)
-    policy = make(name, scenario, worlds)
+def mean_return(name, scenario, reward, worlds):
+    batch, policy = BatchedEnv(scenario, worlds, reward), make(name, scenario, worlds)
     batch.reset(0)
     policy.reset(0)
     total = np.zeros(worlds)
     while not batch.over.all():
         policy.active[:] = ~batch.over
-        total += batch.step(policy.act(batch.swarm.percept)).world_reward
-    return total
+        result = batch.step(policy.act(batch.swarm.percept))
+        total += result.world_reward
+        np.testing.assert_allclose(sum(result.terms.values()), result.reward, atol=1e-9)
+    return total.mean()
 
 
-@pytest.mark.parametrize("task", PUPPETS)
-@pytest.mark.parametrize(("scenario", "reward", "seeds"), GUIDED)
-def test_the_guide_of_a_task_beats_the_floors(task, scenario, reward, seeds):
-    if reward not in task_class(task).rewards:
-        pytest.skip(f"{task} has no such reward")
-    loaded = load_scenario(scenario, overrides={"task": task})
-    best = mean_returns(task_class(task).guide, loaded, reward, seeds).mean()
+@pytest.mark.parametrize(("task", "scenario", "vehicles", "reward", "seeds"), GUIDED)
+def test_the_guide_of_a_task_beats_the_floors(task, scenario, vehicles, reward, seeds):
+    loaded, guide = (
+        load_scenario(scenario, num_vehicles=vehicles, overrides={"task.name": task}),
+        task_class(task).guide,
+    )
+    best = mean_return(guide, loaded, reward, seeds)
     for floor in ("random", "idle"):
-        assert best > mean_returns(floor, loaded, reward, seeds).mean(), floor
+        assert best > mean_return(floor, loaded, reward, seeds), floor
 
 
 class Puppets:
     """A swarm that is put where the test wants it, at the end of l(t); the reward looks at nothing else."""
 
-    def __init__(self, reward="dense", n=4, **overrides):
-        scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"arrival.dwell_s": 0.3, **overrides})
-        self.batch, self.n = BatchedEnv(scenario, reward=reward), n
-        self.batch.reset(0)
-        self.swarm, course = self.batch.swarm, self.batch.swarm.course
-        self.end = course.waypoints[0, 0, course.last[0, 0]]
+    def __init__(self, task="follow", reward="dense", n=4, **overrides):
+        scenario, own = PLACES[task]
+        batch = BatchedEnv(load_scenario(scenario, num_vehicles=n, overrides={**own, **overrides}), reward=reward)
+        batch.reset(0)
+        self.batch, self.n, self.swarm, course = batch, n, batch.swarm, batch.swarm.course
+        group = course.group[0]
+        self.end = course.waypoints[0, group, course.last[0, group]]
+        rank = np.array([(group[:i] == group[i]).sum() for i in range(n)])
+        apart = (6.0 if group.any() else 10.0) * (rank - (np.bincount(group)[group] - 1) / 2)
+        self.block = np.stack([apart, np.zeros(n)], axis=1)
+        self.rests = int(np.ceil(10.0 * self.swarm.duration_s[0])) if task in ("follow", "few_informed") else 100
         self.paid = np.zeros(n)
 
-    def put(self, offset, tick=2000):
-        """Everybody 10 m apart around the end of l(t), moved by ``offset`` [m]; nothing is paid."""
-        apart = 10.0 * (np.arange(self.n) - (self.n - 1) / 2)
-        self.swarm.state.eta[0, :, :2] = self.end + np.asarray(offset) + np.stack([apart, np.zeros(self.n)], axis=1)
+    def put(self, offset, step=0):
+        """Everybody near to his group's end of l(t), but for ``offset`` [m], when l(t) is there; nothing is paid."""
+        self.swarm.state.eta[0, :, :2] = self.end + self.block + np.asarray(offset)
         self.swarm.state.before[0] = self.swarm.state.eta[0, :, :2]
         self.swarm.state.nu[0] = 0.0
-        self.swarm.state.tick[0] = tick
+        self.swarm.state.tick[0] = self.rests + step
 
     def step(self):
         result = self.batch.step(np.zeros((1, self.n, 2), np.float32))
@@ -67,26 +90,50 @@ class Puppets:
 
 @settings(max_examples=20, deadline=None)
 @given(way=st.lists(st.tuples(st.floats(-900, 900), st.floats(-900, 900)), min_size=1, max_size=6))
-@pytest.mark.parametrize("task", PUPPETS)
+@pytest.mark.parametrize("task", AT_REST)
 def test_who_moves_and_comes_back_gains_nothing(task, way):
     """Progress is a potential's change: around a closed way it sums to zero, and all else costs."""
-    swarm = Puppets(task=task)
+    swarm = Puppets(task)
     swarm.put((300.0, 0.0))
     swarm.step()
     swarm.paid[:] = 0.0
-    for place in [*way, (300.0, 0.0)]:
-        if task == "reach" and np.hypot(*place) < 100.0:
-            continue  # an arrival pays, once
-        swarm.put(place)
+    for k, place in enumerate([*way, (300.0, 0.0)]):
+        if task != "follow" and np.hypot(*place) < 100.0:
+            continue  # who is there is paid for it
+        swarm.put(place, k + 1)
         swarm.step()
     assert (swarm.paid <= 1e-9).all()
 
 
-def arrival(at, reward, bump_at=None, steps=60):
+def left(batch):
+    """What progress counts [m]."""
+    away = batch.task.left()[0] if hasattr(batch.task, "left") else batch.swarm.facts.away
+    return np.minimum(away, batch.swarm.scenario.reward.progress_far_m)
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(100_000, 200_000))
+@pytest.mark.parametrize(("task", "reward"), [pair for pair in PAID if pair[1] != "sparse"])
+def test_progress_sums_to_what_the_way_has_shortened_by_and_but_for_being_there_all_else_costs(task, reward, seed):
+    scenario, own = PLACES[task]
+    batch = BatchedEnv(load_scenario(scenario, num_vehicles=6, overrides=own), reward=reward)
+    batch.reset(seed)
+    first, total = left(batch), 0.0
+    push = np.random.default_rng(seed).uniform(-1.0, 1.0, (1, 6, 2)) * (0.7, 0.1)
+    for _ in range(30):
+        terms = batch.step(push).terms
+        total = total + terms["progress"]
+        assert all((paid <= 0.0).all() for name, paid in terms.items() if name not in ONCE | {"progress"})
+        assert all((paid >= 0.0).all() for name, paid in terms.items() if name in ONCE)
+    shorter = (first - left(batch)) / batch.swarm.scenario.reward.progress_m
+    np.testing.assert_allclose(total, shorter, atol=1e-9)
+
+
+def arrival(at, task, reward, bump_at=None, steps=60):
     """What is paid on a way that comes to the end at one step, and with ``bump_at`` meets a neighbour before."""
-    swarm = Puppets(reward)
+    swarm = Puppets(task, reward)
     for k in range(steps):
-        swarm.put((0.0, 0.0) if at is not None and k >= at else (300.0, 0.0), 2000 + k)
+        swarm.put((0.0, 0.0) if at is not None and k >= at else (300.0, 0.0), k)
         if k == bump_at:
             state = swarm.swarm.state
             state.eta[0, 0] = (*(state.eta[0, 1, :2] + (2.1, 0.0)), np.pi)
@@ -96,16 +143,16 @@ def arrival(at, reward, bump_at=None, steps=60):
     return swarm.paid
 
 
-@pytest.mark.parametrize("reward", ["dense", "sparse"])
-def test_an_earlier_arrival_of_the_same_way_never_lowers_the_return(reward):
-    totals = [arrival(k, reward).mean() for k in (5, 20, 40, None)]
+@pytest.mark.parametrize(("task", "reward"), [pair for pair in PAID if pair[0] in AT_REST])
+def test_an_earlier_arrival_of_the_same_way_never_lowers_the_return(task, reward):
+    totals = [arrival(k, task, reward).mean() for k in (5, 20, 40, None)]
     assert totals == sorted(totals, reverse=True)
     assert totals[2] > totals[3]
 
 
-@pytest.mark.parametrize("reward", ["dense", "sparse"])
-def test_a_contact_lowers_the_return_of_both(reward):
-    whole, bumped = arrival(40, reward), arrival(40, reward, bump_at=20)
+@pytest.mark.parametrize(("task", "reward"), PAID)
+def test_a_contact_lowers_the_return_of_both(task, reward):
+    whole, bumped = arrival(40, task, reward), arrival(40, task, reward, bump_at=20)
     assert (bumped[:2] <= whole[:2] - 9.0).all()
     assert bumped.mean() < whole.mean()
 
@@ -132,12 +179,12 @@ def test_dying_never_pays_the_one_who_dies(reward, task):
     assert dead.mean() < whole.mean()
 
 
-@pytest.mark.parametrize("task", PUPPETS)
+@pytest.mark.parametrize("task", ["follow", "reach", "few_informed"])
 def test_the_mean_does_not_depend_on_the_number_of_vehicles(task):
     """Vehicles that all see the same have the same reward, however many they are."""
     means = []
     for n in (3, 30):
-        swarm = Puppets(n=n, task=task, **{"constraints.s_u_m": 1000.0})
+        swarm = Puppets(task, n=n, **{"constraints.s_u_m": 1000.0})
         swarm.put((300.0, 0.0))
         swarm.step()
         swarm.paid[:] = 0.0
@@ -149,10 +196,11 @@ def test_the_mean_does_not_depend_on_the_number_of_vehicles(task):
     assert means[0] == pytest.approx(means[1], rel=1e-6)
 
 
-@pytest.mark.parametrize("task", PUPPETS)
+@pytest.mark.parametrize("task", PLACES)
 def test_terms_are_those_documented_and_sum_to_the_reward_whose_mean_the_team_has(task):
+    scenario, changes = PLACES[task]
     env, team = (
-        uuv_marl.parallel_env("starter", task=task, **own) for own in ({"info_terms": True}, {"reward": "team"})
+        uuv_marl.parallel_env(scenario, overrides=changes, **own) for own in ({"info_terms": True}, {"reward": "team"})
     )
     env.reset(seed=0)
     team.reset(seed=0)

@@ -192,6 +192,21 @@ def test_the_oracle_holds_all_and_the_guide_beats_the_floors():
     assert found[SilentTargets.guide][1] > max(found["idle"][1], found["random"][1])
 
 
+def way_of(policy, decisions=300):
+    swarm = water(2, "silent_targets_easy")
+    policy, percept = make(policy, swarm.scenario, 2), swarm.reset(TUNING)
+    policy.reset(TUNING)
+    for _ in range(decisions):
+        percept = swarm.step(policy.act(percept))
+    return swarm.state.eta.copy()
+
+
+def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
+    gains, usual = make("nearest_target", load_scenario("silent_targets_easy")).gains, way_of("nearest_target")
+    for name, value in gains._asdict().items():
+        assert not np.array_equal(way_of(f"nearest_target,{name}={0.1 * value}"), usual), name
+
+
 @pytest.mark.parametrize(("changes", "message"), [
     ({"task.speed_share": [0.5, 1.5]}, r"task.speed_share must be at most 1, .* got \[0.5, 1.5\]; lower it"),
     ({"task.turn_s": [20.0, 10.0]}, r"task.turn_s must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),

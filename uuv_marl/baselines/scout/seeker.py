@@ -16,7 +16,9 @@ from uuv_marl.baselines.memory.pose import to_map, to_map_axes
 from uuv_marl.baselines.memory.table import with_surroundings
 from uuv_marl.baselines.policy import Limits, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
-from uuv_marl.baselines.scout.law import Scout, decide_all, pushed
+from uuv_marl.baselines.safety.remembering import Filtered
+from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
+from uuv_marl.baselines.scout.law import Scout, decide_all, grown, pushed
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -68,7 +70,7 @@ _AHEAD_M = 40.0
 """Who is beside its lane comes back to it so far ahead [m]. Assumed."""
 
 
-class NearestTarget(Scout):
+class NearestTarget(Filtered):
     """Search, then keep near the nearest target heard that no other is nearer to; in other tasks it is ``scout``.
 
     Args:
@@ -78,19 +80,25 @@ class NearestTarget(Scout):
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
+    yaw_damping_nms: ClassVar[float] = Scout.yaw_damping_nms
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
         barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
         found, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
-        super().__init__(scenario, num_worlds, barrier=barrier or safe)
-        self.seeker = SeekerGains(*map(float, gains or found))
+        super().__init__(scenario, num_worlds, barrier or safe)
+        self.gains = gains or found
         self._seeks = "box" in self.layout.starts
         self._half_m = 0.5 * scenario.task_numbers.side_m if self._seeks else 0.0
         self._lanes = scenario.swarm.num_vehicles if lanes else 0
         split = len(Surroundings._fields)
         self._kept, self._track = Surroundings(*self.memory[:split]), Sighted(*self.memory[split:])
+
+    @property
+    def kept_s(self) -> float:
+        """For how long a neighbour is remembered that is heard no more [s]."""
+        return PRESETS[DEFAULT_PRESET].gains.kept_s
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Remember the targets, and a percept without them, since they are nothing to go round."""
@@ -101,7 +109,7 @@ class NearestTarget(Scout):
         if self._seeks:
             stay_behind(
                 self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
-                self.seeker, self._kept, self._track,
+                SeekerGains(*map(float, self.gains)), self._kept, self._track,
             )  # fmt: skip
 
     def decide(self, percept: Percept) -> Float32:
@@ -110,12 +118,13 @@ class NearestTarget(Scout):
         if self._seeks:
             seek(
                 self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self._half_m, self._lanes,
-                self.seeker, self.barrier, self.limits, self.gain, self._kept, self._track, self.planes, action,
+                SeekerGains(*map(float, self.gains)), self.barrier, self.limits, self.gain, self._kept, self._track,
+                self.planes, action,
             )  # fmt: skip
         else:
             decide_all(
-                self.active, period, self.grown(), self.barrier, self.limits, self.gain, self._kept, self.planes,
-                action,
+                self.active, period, grown(PRESETS[DEFAULT_PRESET].gains, self.scenario), self.barrier, self.limits,
+                self.gain, self._kept, self.planes, action,
             )  # fmt: skip
         return action
 
