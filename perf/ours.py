@@ -85,7 +85,7 @@ def adapter(name: str, agents: int, worlds: int) -> Case:
         data = env.reset().set(("uuv", "action"), torch.from_numpy(action))
         return repeated(lambda _: env.step(data.copy()), agents * worlds)
     if name in ("swarm_idle", "task_idle"):
-        from uuv_marl.envs.core import make_batched_env  # 0.1.0, which versions.py runs too, has none
+        from uuv_marl.envs.core import make_batched_env  # older checkouts, which versions.py runs too, have none
 
         env = make_batched_env(num_worlds=worlds, **how)
         env.reset(0)

@@ -45,7 +45,7 @@ METRICS = (
     "min_obstacle_distance_m", "min_spacing_m", "mean_min_spacing_m", "max_spacing_m", "centre_error_m",
     "order_parameter", "collisions", "constraint_share", "effort", "clamps", "saturation_share", "vehicles_lost",
 )  # fmt: skip
-"""Those of 0.1.0."""
+"""Those that older checkouts have, too."""
 STATE = ("eta", "nu", "before", "alive", "tick", "dwell")
 FACTS = (
     "time_s", "reference", "centre", "spacing", "min_spacing", "max_spacing", "clearance", "obstacle_clearance",

@@ -40,7 +40,7 @@ def ppo_config(scenario: str, vehicles: int | None, runners: int, seed: int) -> 
             minibatch_size=512,
             num_epochs=10,
             lr=1e-3,
-            gamma=0.99,  # a horizon of 50 s
+            gamma=0.99,  # rewards fade over 50 s
             lambda_=0.95,
             clip_param=0.2,
             use_kl_loss=False,

@@ -139,9 +139,14 @@ class Policy:
         """Forget the past of these worlds (default all); world w draws from ``seed + w``, or one seed for each."""
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
         world_seeds(seed, chosen)  # refuses what is no seed
-        self.clamps[chosen], self._time_s[chosen] = 0, np.nan
+        self.clamps[chosen] = 0
+        self._forget(chosen)
+
+    def _forget(self, worlds: Any) -> None:
+        """Clear what is remembered of these worlds; networks in training clear their own (``train/ppo.py``)."""
+        self._time_s[worlds] = np.nan
         for array in self.memory:
-            array[chosen] = 0
+            array[worlds] = 0
 
     @final
     def act(self, percept: Percept) -> Float32:
@@ -169,7 +174,7 @@ class Policy:
         """Remember what is perceived, in the policy's units, where it is new: before ``decide``."""
         if self.Memory is not None:
             self.flat(percept)
-            self.remember(percept, self._gone_on(percept.clock))
+            self.remember(percept, self._advance(percept.clock))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Hook: take what these worlds perceive, shape (world,), into ``memory``."""
@@ -191,15 +196,15 @@ class Policy:
         if "action" in getattr(self.Memory, "_fields", ()):
             self.memory.action[self.active] = action[self.active]
 
-    def _gone_on(self, clock: Clock | None) -> Bool:
-        """Worlds that have gone on since the latest call, shape (world,); those that were reset are forgotten."""
+    def _advance(self, clock: Clock | None) -> Bool:
+        """Forget worlds that were reset; those that have gone on since the latest call, shape (world,)."""
         if clock is None:
             return self.active.copy()
         now, then, period = clock.time_s, self._time_s, self.scenario.timing.decision_period_s
         fresh = self.active & ((clock.episode != self._episode) | (now == 0.0) & (then > 0.0))
-        for array in self.memory if fresh.any() else ():
-            array[fresh] = 0
-        then[fresh], self._episode[fresh] = np.nan, clock.episode[fresh]
+        if fresh.any():
+            self._forget(fresh)
+            self._episode[fresh] = clock.episode[fresh]
         passed = now - then
         late = self.active & ((passed > 1.5 * period) | (passed < 0.0))
         if late.any():

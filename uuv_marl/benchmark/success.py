@@ -25,7 +25,7 @@ TOGETHER = 0.95
 
 
 class Success(TypedDict, total=False):
-    """Keys of ``Metrics`` that files of version 0.1.0 lack.
+    """Keys of ``Metrics`` that the task ``follow`` alone has.
 
     None if the episode ended earlier than ``GRACE_S`` after l(t) stopped, or if no vehicle stayed healthy.
     """

@@ -60,7 +60,7 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Numbers of the algorithm, see ``uuv_marl.train.ppo``."""
 
     gamma: Share = 0.99
-    """Discount per decision; with 0.5 s a horizon of 50 s."""
+    """Discount per decision; with 0.5 s rewards fade over 50 s."""
     gae_lambda: Share = 0.95
     """Weight of longer returns in advantages [1]."""
     horizon: Count = 64
