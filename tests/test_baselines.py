@@ -176,7 +176,8 @@ def test_tuned_gains_come_from_shipped_trials(file):
     chosen = {"scout": "scout,preset=closed", "nearest_target.lanes": "nearest_target,lanes=true"}
     policy = chosen.get(file, f"{name},tuned_for={what}" if what else name)
     changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
-    made = make(policy, granted(policy, load_scenario("sea_trial" if hull else "tracking", overrides=changes)))
+    flown_in = "sea_trial" if hull else "silent_targets" if name == "nearest_target" else "tracking"
+    made = make(policy, granted(policy, load_scenario(flown_in, overrides=changes)))
     numbers = vars(made) | made.gains._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 

@@ -8,7 +8,7 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.errors import ScenarioError
+from uuv_marl.errors import PolicyError, ScenarioError
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import SilentTargets
@@ -205,6 +205,11 @@ def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
     gains, usual = make("nearest_target", load_scenario("silent_targets_easy")).gains, way_of("nearest_target")
     for name, value in gains._asdict().items():
         assert not np.array_equal(way_of(f"nearest_target,{name}={0.1 * value}"), usual), name
+
+
+def test_the_search_refuses_what_has_no_box():
+    with pytest.raises(PolicyError, match="searches a box, of which task 'follow' tells nothing; run it on silent"):
+        make("nearest_target", granted("nearest_target", load_scenario("starter")))
 
 
 @pytest.mark.parametrize(("changes", "message"), [

@@ -59,19 +59,18 @@ class Scout(Filtered):
         """Actions of shape (world, vehicle, 2)."""
         action = np.zeros((self.num_worlds, self.scenario.swarm.num_vehicles, 2), np.float32)
         decide_all(
-            self.active, self.model.own.period_s, grown(self.gains, self.scenario), self.barrier, self.limits,
-            self.gain, self.memory, self.planes, action,
+            self.active, self.model.own.period_s, self._grown(), self.barrier, self.limits, self.gain, self.memory,
+            self.planes, action,
         )  # fmt: skip
         return action
 
-
-def grown(gains: ScoutGains, scenario: Scenario) -> ScoutGains:
-    """The gains for as many vehicles as the swarm has, all float: else compiled code would be made anew."""
-    by, g = ScoutGains(*map(float, gains)), growth(scenario.swarm.num_vehicles)
-    return by._replace(
-        pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
-        together=by.together / g**3,
-    )  # fmt: skip
+    def _grown(self) -> ScoutGains:
+        """The gains for as many vehicles as the swarm has, all float: else compiled code would be made anew."""
+        by, g = ScoutGains(*map(float, self.gains)), growth(self.scenario.swarm.num_vehicles)
+        return by._replace(
+            pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
+            together=by.together / g**3,
+        )  # fmt: skip
 
 
 @compiled

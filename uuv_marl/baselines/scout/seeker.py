@@ -14,11 +14,10 @@ import numpy as np
 from uuv_marl.baselines.memory import Surroundings, update_memory
 from uuv_marl.baselines.memory.pose import to_map, to_map_axes
 from uuv_marl.baselines.memory.table import with_surroundings
-from uuv_marl.baselines.policy import Limits, tuned
+from uuv_marl.baselines.policy import Limits, PolicyError, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
 from uuv_marl.baselines.safety.remembering import Filtered
-from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
-from uuv_marl.baselines.scout.law import Scout, decide_all, grown, pushed
+from uuv_marl.baselines.scout.law import Scout, pushed
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -71,12 +70,15 @@ _AHEAD_M = 40.0
 
 
 class NearestTarget(Filtered):
-    """Search, then keep near the nearest target heard that no other is nearer to; in other tasks it is ``scout``.
+    """Search a box, then keep near the nearest target heard that no other is nearer to.
 
     Args:
         lanes: whether to search in lanes across the box, one for each vehicle, instead of straight on.
         gains: free parameters, instead of those that were tuned for this search.
         barrier: margins and rates of the filter, instead of the tuned ones.
+
+    Raises:
+        PolicyError: the scenario's task tells nothing of a box.
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
@@ -89,43 +91,35 @@ class NearestTarget(Filtered):
         found, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
         super().__init__(scenario, num_worlds, barrier or safe)
         self.gains = gains or found
-        self._seeks = "box" in self.layout.starts
-        self._half_m = 0.5 * scenario.task_numbers.side_m if self._seeks else 0.0
+        if "box" not in self.layout.starts:
+            raise PolicyError(
+                f"nearest_target searches a box, of which task {scenario.task.name!r} tells nothing; run it on "
+                "silent_targets"
+            )
+        self._half_m = 0.5 * scenario.task_numbers.side_m
         self._lanes = scenario.swarm.num_vehicles if lanes else 0
         split = len(Surroundings._fields)
         self._kept, self._track = Surroundings(*self.memory[:split]), Sighted(*self.memory[split:])
 
-    @property
-    def kept_s(self) -> float:
-        """For how long a neighbour is remembered that is heard no more [s]."""
-        return PRESETS[DEFAULT_PRESET].gains.kept_s
-
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Remember the targets, and a percept without them, since they are nothing to go round."""
         seen, period = dataclasses.replace(percept, flat=percept.flat.copy()), self.model.own.period_s
-        for name in ("echo", "echo_range", "echo_position") if self._seeks else ():
+        for name in ("echo", "echo_range", "echo_position"):
             seen[name][:] = 0.0
         update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.kept_s, self._kept)
-        if self._seeks:
-            stay_behind(
-                self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
-                SeekerGains(*map(float, self.gains)), self._kept, self._track,
-            )  # fmt: skip
+        stay_behind(
+            self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
+            SeekerGains(*map(float, self.gains)), self._kept, self._track,
+        )  # fmt: skip
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         action, period = np.zeros((*self._track.heard_s.shape, 2), np.float32), self.model.own.period_s
-        if self._seeks:
-            seek(
-                self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self._half_m, self._lanes,
-                SeekerGains(*map(float, self.gains)), self.barrier, self.limits, self.gain, self._kept, self._track,
-                self.planes, action,
-            )  # fmt: skip
-        else:
-            decide_all(
-                self.active, period, grown(PRESETS[DEFAULT_PRESET].gains, self.scenario), self.barrier, self.limits,
-                self.gain, self._kept, self.planes, action,
-            )  # fmt: skip
+        seek(
+            self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self._half_m, self._lanes,
+            SeekerGains(*map(float, self.gains)), self.barrier, self.limits, self.gain, self._kept, self._track,
+            self.planes, action,
+        )  # fmt: skip
         return action
 
 
