@@ -34,7 +34,6 @@ class TangentBug(Filtered):
         barrier: margins and rates of the filter, instead of the tuned ones.
     """
 
-    yaw_damping_nms: ClassVar[float] = 600.0
     Memory: ClassVar[type[Any] | None] = WallsMemory
 
     def __init__(

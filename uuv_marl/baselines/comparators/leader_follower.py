@@ -45,7 +45,9 @@ class LeaderFollowerGains(NamedTuple):
     stop: float = 37.0
     """And stops here, to go back beyond [m]."""
     speed: float = 4.0
-    """Largest speed that either wishes, but for gathering and pushes [m/s]."""
+    """Largest speed that a leader wishes, but for pushes [m/s]."""
+    cruise: float = 4.0
+    """Largest that a follower wishes, but for gathering and pushes [m/s]: where ``follow`` is large, a swarm's own."""
     push: float = 10.0
     """Away from a neighbour at no distance [m/s]."""
     push_range: float = 15.0
@@ -60,8 +62,6 @@ _BACK = -0.3
 
 class LeaderFollower(Filtered):
     """Who perceives l(t) leads and waits; the others go with whom they hear, by remembered positions alone."""
-
-    yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, gains: LeaderFollowerGains | None = None,
@@ -146,7 +146,7 @@ def at_most(x: float, y: float, length: float) -> tuple[float, float]:
 @compiled
 def _following(others: Others, g: LeaderFollowerGains) -> tuple[float, float]:
     """The velocity that a follower wishes [m/s]."""
-    w_x, w_y = at_most(g.follow * others.v_x, g.follow * others.v_y, g.speed)
+    w_x, w_y = at_most(g.follow * others.v_x, g.follow * others.v_y, g.cruise)
     g_x, g_y = at_most(g.gather * others.x, g.gather * others.y, g.gather_mps)
     return w_x + g_x, w_y + g_y
 

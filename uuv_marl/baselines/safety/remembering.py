@@ -33,6 +33,7 @@ def turnable(barrier: Barrier, scenario: Scenario) -> Barrier:
 class Filtered(Policy):
     """A policy that remembers, and whose velocities are made safe. A subclass defines ``decide``."""
 
+    yaw_damping_nms: ClassVar[float] = 600.0
     wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = Surroundings
 

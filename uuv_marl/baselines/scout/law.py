@@ -5,7 +5,6 @@ round remembered obstacles and made safe; the vehicle then steers to it.
 """
 
 import math
-from typing import ClassVar
 
 import numpy as np
 
@@ -37,8 +36,6 @@ class Scout(Filtered):
     Raises:
         PolicyError: no preset has that name.
     """
-
-    yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: ScoutGains | None = None,

@@ -17,7 +17,7 @@ from uuv_marl.baselines.memory.table import with_surroundings
 from uuv_marl.baselines.policy import Limits, PolicyError, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
 from uuv_marl.baselines.safety.remembering import Filtered
-from uuv_marl.baselines.scout.law import Scout, pushed
+from uuv_marl.baselines.scout.law import pushed
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -82,7 +82,6 @@ class NearestTarget(Filtered):
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
-    yaw_damping_nms: ClassVar[float] = Scout.yaw_damping_nms
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
