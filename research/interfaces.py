@@ -121,13 +121,16 @@ def main(
     Example: python -m research.interfaces recurrent_ppo --seed 2
     """
     with explained(FOLDER):
-        began = time.perf_counter()
+        began, used = time.perf_counter(), time.process_time()
         with tempfile.TemporaryDirectory() as folder:
             block = Path(folder, "block.py")
             block.write_text(printed(learner, seed), encoding="utf-8")
             made = runpy.run_path(str(block), run_name="page")
-        took = time.perf_counter() - began
-        print(f"{learner}, seed {seed}: {whole(acting(learner, made))} of {EPISODES} whole, {took:.0f} s")
+        took, used = time.perf_counter() - began, time.process_time() - used
+        good = whole(acting(learner, made))
+        print(
+            f"{learner}, seed {seed}: {good} of {EPISODES} whole; {took:.0f} s, this process {used:.0f} s of all cores"
+        )
 
 
 if __name__ == "__main__":
