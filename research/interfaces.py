@@ -37,10 +37,17 @@ class Learner(StrEnum):
     RECURRENT = "recurrent_ppo"
     MAPPO = "mappo"
     IPPO = "ippo"
+    TORCHRL = "torchrl"
     RLLIB = "rllib"
 
 
-_WORDS = {"ppo": "import PPO\n", "recurrent_ppo": "RecurrentPPO(", "mappo": "MappoConfig.", "rllib": "from ray.rllib."}
+_WORDS = {
+    "ppo": "import PPO\n",
+    "recurrent_ppo": "RecurrentPPO(",
+    "mappo": "MappoConfig.",
+    "rllib": "from ray.rllib.",
+    "torchrl": "from torchrl.objectives",
+}
 app = typer.Typer(add_completion=False)
 
 
@@ -48,8 +55,8 @@ def printed(learner: Learner, seed: int) -> str:
     """The page's block with another seed; IPPO's is MAPPO's, changed as the page says."""
     word = _WORDS["mappo" if learner is Learner.IPPO else learner]
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.S)
-    block, count = re.subn(r"\bseed=\d+", f"seed={seed}", next(each for each in blocks if word in each))
-    if count != 1:
+    block, count = re.subn(r"seed(=|\()\d+", rf"seed\g<1>{seed}", next(each for each in blocks if word in each))
+    if count != (2 if learner is Learner.TORCHRL else 1):
         raise ResultsError(f"{PAGE.name} must print one seed of {learner}, got {count}; mend it there")
     if learner is Learner.IPPO:
         block = block.replace("MappoConfig", "IppoConfig").replace(
@@ -62,7 +69,9 @@ def acting(learner: Learner, made: dict[str, Any]) -> Act:
     """The mean actions of what the block has made."""
     if learner in (Learner.PPO, Learner.RECURRENT):
         return _remembering(made["model"])
-    return _of_rllib(made["network"]) if learner is Learner.RLLIB else _of_benchmarl(made["experiment"].policy)
+    if learner is Learner.RLLIB:
+        return _of_rllib(made["network"])
+    return _of_torchrl(made["policy"] if learner is Learner.TORCHRL else made["experiment"].policy)
 
 
 def _of_rllib(network: Any) -> Act:
@@ -73,7 +82,7 @@ def _of_rllib(network: Any) -> Act:
     return act
 
 
-def _of_benchmarl(policy: Any) -> Act:
+def _of_torchrl(policy: Any) -> Act:
     from tensordict import TensorDict  # noqa: PLC0415 - not where RLlib is
     from torchrl.envs.utils import ExplorationType, set_exploration_type  # noqa: PLC0415 - likewise
 
