@@ -151,6 +151,18 @@ def test_followers_come_along_only_with_the_law_that_is_made_for_it():
     assert share["scout"] < 0.2
 
 
+def test_who_leads_is_paid_for_who_follows():
+    usual, led = (BatchedEnv(load_scenario("few_informed_easy"), 2, reward) for reward in ("dense", "led"))
+    for batch in (usual, led):
+        batch.reset(7)
+    informed, rng = usual.swarm.course.informed, np.random.default_rng(0)
+    for _ in range(20):
+        action = rng.uniform(-1.0, 1.0, (2, 20, 2))
+        own, paid = usual.step(action).reward, led.step(action).reward
+        np.testing.assert_array_equal(paid[~informed], own[~informed])
+        np.testing.assert_allclose(paid[informed], np.repeat(own.mean(axis=1), 4), atol=1e-12)
+
+
 def test_who_has_no_gamma_agent_keeps_its_velocity():
     """The uninformed of Su, Wang and Lin neither brake nor go anywhere by themselves."""
     swarm = Swarm(load_scenario("few_informed", num_vehicles=2, overrides={"task.informed": 1}))

@@ -20,7 +20,7 @@ from uuv_marl.tasks.task import Payment, Task, paid
 from uuv_marl.types import Bool, Float32, Float64
 
 ScenarioLike = UserPath | Scenario | Mapping[str, object]
-Reward = Literal["dense", "sparse", "team", "geodesic"] | RewardFunction
+Reward = Literal["dense", "sparse", "team", "geodesic", "led"] | RewardFunction
 
 
 class StepResult(NamedTuple):
@@ -68,9 +68,9 @@ class BatchedEnv:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
         reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress) and
-            ``geodesic`` (progress along the free way) where the task has them, ``team`` (every vehicle gets the mean of
-            ``dense`` over all vehicles; a lost vehicle also pays its own loss), or a function from the swarm to an
-            array (world, vehicle).
+            ``geodesic`` (progress along the free way) and ``led`` (the informed get the mean) where the task has them,
+            ``team`` (every vehicle gets the mean of ``dense`` over all; a lost vehicle also pays its own loss), or a
+            function from the swarm to an array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
         observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
         keep_terms: whether steps tell the reward's terms, which takes time in large batches.
@@ -284,7 +284,7 @@ def make_batched_env(
         scenario: a name, a TOML file or a ``Scenario``.
         num_worlds: worlds stepped together.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
-        reward: ``dense``, ``sparse``, ``team``, ``geodesic`` or a function from the swarm to an array (world, vehicle).
+        reward: ``dense``, ``sparse``, one of the task's, ``team``, or a function from the swarm to an array (world, vehicle).
         observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
         keep_terms: whether steps tell the reward's terms.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.

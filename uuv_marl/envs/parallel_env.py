@@ -192,8 +192,8 @@ def parallel_env(
         render_options: how to draw: a dictionary with any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or
             ``map``) and ``sonar_of`` (index of the vehicle whose sonar is shown).
         reward: ``dense`` (progress, costs and arrival), ``sparse`` (without progress; only in ``follow``), ``geodesic``
-            (progress along the free way; only in ``hard_water``), ``team`` (the mean of ``dense`` over all vehicles)
-            or a function from the swarm to an array (world, vehicle).
+            (progress along the free way; only in ``hard_water``), ``led`` (the informed get the mean; only in
+            ``few_informed``), ``team`` (all get the mean of ``dense``) or a function from the swarm to (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
         observe: ``positions``, or ``closeness``: the same percept, the larger the nearer a thing is, which networks
             learn from sooner; docs/environment.md has both tables.

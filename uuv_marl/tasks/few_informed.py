@@ -37,6 +37,7 @@ class FewInformed(Reach):
     observed: ClassVar[Table] = (
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )
+    rewards: ClassVar[tuple[str, ...]] = ("dense", "led")
     terms: ClassVar[Mapping[str, str]] = {
         **Reach.terms,
         "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
@@ -63,6 +64,13 @@ class FewInformed(Reach):
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """Who is informed."""
         return {"informed": self.swarm.course.informed[:, :, None].astype(np.float64)}
+
+    def reward(self, running: Bool) -> Terms:
+        """With the reward ``led`` the informed are paid the mean of all, so that who leads is paid for who follows."""
+        terms, informed = super().reward(running), self.swarm.course.informed
+        if self.paying != "led":
+            return terms
+        return {name: np.where(informed, own.mean(axis=1, keepdims=True), own) for name, own in terms.items()}
 
     def there(self) -> Bool:
         """Vehicles within ``near_m`` of l(t), once it rests at its end."""
