@@ -143,7 +143,7 @@ def test_a_lesson_is_learned_whatever_pays():
     learner = learner_for(toy, Ppo(horizon=8))
     learner.teach(lesson=True)
     batch, _ = learner.sample(toy, 1e-3)
-    assert (batch.action - batch.mean).abs().mean() > 0.2  # the network acts
+    assert (batch.action - batch.mean).abs().max() < 0.01  # the network acts
     for _ in range(120):
         learner.update(learner.sample(toy, 0.2)[0], 0.2, 3e-3)
     x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)

@@ -284,7 +284,7 @@ def make_batched_env(
         scenario: a name, a TOML file or a ``Scenario``.
         num_worlds: worlds stepped together.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
-        reward: ``dense``, ``sparse``, one of the task's, ``team``, or a function from the swarm to an array (world, vehicle).
+        reward: ``dense``, ``sparse``, ``team``, one of the task's, or a function from the swarm to (world, vehicle).
         observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
         keep_terms: whether steps tell the reward's terms.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.

@@ -193,7 +193,7 @@ def parallel_env(
             ``map``) and ``sonar_of`` (index of the vehicle whose sonar is shown).
         reward: ``dense`` (progress, costs and arrival), ``sparse`` (without progress; only in ``follow``), ``geodesic``
             (progress along the free way; only in ``hard_water``), ``led`` (the informed get the mean; only in
-            ``few_informed``), ``team`` (all get the mean of ``dense``) or a function from the swarm to (world, vehicle).
+            ``few_informed``), ``team`` (all get the mean of ``dense``) or a function from swarm to (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
         observe: ``positions``, or ``closeness``: the same percept, the larger the nearer a thing is, which networks
             learn from sooner; docs/environment.md has both tables.

@@ -46,7 +46,9 @@ class Rollout(NamedTuple):
     observation: Tensor
     action: Tensor
     mean: Tensor
-    """Mean action of the policy that sampled; in a lesson what the teacher would have done."""
+    """Mean action of the policy that sampled."""
+    told: Tensor
+    """What the teacher would have done, if it was asked."""
     advantage: Tensor
     returns: Tensor
     goes_on: Tensor
@@ -79,14 +81,14 @@ class Learner:
         self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
         self.state = torch.zeros(rows, self.actor.units)
-        self.lesson = False
-        """Whether the actor imitates a teacher, instead of what paid; set by ``teach``."""
+        self.lesson, self.pull = False, 0.0
+        """Whether the actor imitates a teacher, instead of what paid, and how much beside it; set by ``teach``."""
 
-    def teach(self, lesson: bool) -> None:
-        """From now on the actor imitates a teacher, or learns what pays."""
+    def teach(self, lesson: bool, pull: float = 0.0) -> None:
+        """From now on the actor imitates a teacher, or learns what pays, ``pull``ed to what the teacher would do."""
         if self.lesson and not lesson:  # with the old optimiser the first updates went twice as far, by ``Update.kl``
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
-        self.lesson = lesson
+        self.lesson, self.pull = lesson, pull
 
     def _judged(self, x: Tensor, state: Tensor) -> Tensor:
         """The critic's output (row,), in the scale of returns, for what it sees (row, entry) and the memory's state."""
@@ -111,16 +113,16 @@ class Learner:
         """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
         by, shape = self.by, (self.by.horizon, env.rows)
         observation = torch.empty((by.horizon + 1, env.rows, env.size))
-        action, mean = torch.empty((2, *shape, 2))
+        action, mean, told = torch.empty((3, *shape, 2))
         states = torch.empty((by.horizon + 1, env.rows, self.actor.units))
         reward, paid, ended = np.empty(shape, np.float32), 0.0, np.zeros((by.horizon + 1, env.rows), np.bool_)
         first = self.state
         for t in range(by.horizon):
             observation[t] = torch.from_numpy(env.observation)
             mean[t], states[t] = self.act(observation[t], self.state)
-            drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t].clone()
-            if self.lesson:
-                mean[t], acts = map(torch.from_numpy, env.taught(acts.numpy()))
+            drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t]
+            if self.lesson or self.pull:
+                told[t], acts = map(torch.from_numpy, env.taught(acts.numpy()))
             action[t] = acts + noise * torch.from_numpy(drawn)
             came = env.step(action[t].numpy())
             paid += float(came.reward.mean()) / by.horizon
@@ -137,7 +139,7 @@ class Learner:
         advantage = gae(reward, value, ended[1:], by.gamma, by.gae_lambda)
         goes_on = torch.from_numpy(~ended[:-1]).float()
         arrays = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1])
-        return Rollout(observation[:-1], action, mean, *arrays, goes_on, first), paid
+        return Rollout(observation[:-1], action, mean, told, *arrays, goes_on, first), paid
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
         """Some epochs of PPO on a batch, or of its lesson, and of regression to its returns."""
@@ -161,14 +163,16 @@ class Learner:
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
         """One gradient step on some rows; the divergence from the policy that sampled, or from the teacher."""
-        x, action, old, advantage, returns, goes_on = (array.index_select(1, rows) for array in batch[:6])
+        x, action, old, told, advantage, returns, goes_on = (array.index_select(1, rows) for array in batch[:7])
         new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], goes_on)
         action, old, advantage = action.reshape(-1, 2), old.reshape(-1, 2), advantage.reshape(-1)
         double = 2.0 * noise * noise
         ratio = (((action - old).square() - (action - new).square()).sum(-1) / double).exp()
         clipped = ratio.clamp(1.0 - self.by.clip, 1.0 + self.by.clip)
-        apart = (new - old).square().sum(-1).mean()
+        apart = (new - (told.reshape(-1, 2) if self.lesson else old)).square().sum(-1).mean()
         loss = apart if self.lesson else -torch.minimum(ratio * advantage, clipped * advantage).mean()
+        if self.pull:
+            loss = loss + self.pull * (new - told.reshape(-1, 2)).square().sum(-1).mean()
         judged = self._judged(x.reshape(-1, x.shape[2]), states.detach())
         self._optimiser.zero_grad()
         (loss + (judged - returns.reshape(-1)).square().mean()).backward()

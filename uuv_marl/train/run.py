@@ -33,7 +33,7 @@ from uuv_marl.train.validation import Judged, Worst, replay_command, validate
 with extra("train", "training"):
     import torch
 
-_TEACHER_ACTS, _NETWORK_ACTS = 0.15, 0.45
+_TEACHER_ACTS, _NETWORK_ACTS = 0.2, 0.8
 """Shares of a lesson until which the teacher acts in all worlds, and from which in none that starts."""
 _LESSON_NOISE, _LESSON_RATE = 0.2, (2e-3, 3e-4)
 """Noise of actions, and learning rates at the start and at the end of a lesson."""
@@ -141,7 +141,7 @@ class Trainer:
         started, by = time.process_time(), self.training.ppo
         share = before.spent(self.training) / self.training.budget
         lesson = self.training.lesson if self.training.teacher else 0.0
-        self.learner.teach(share < lesson)
+        self.learner.teach(share < lesson, self.training.pull if share >= lesson else 0.0)
         if self.learner.lesson:
             self.rows.teach((_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS))
             noise, rate, share = _LESSON_NOISE, annealed(_LESSON_RATE, share / lesson), 0.0

@@ -124,6 +124,8 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     acts, then the network more and more, always told what the teacher would do (as in DAgger, Ross et al. 2011)."""
     lesson: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.4
     """How much of the budget it imitates, if there is a teacher; ``ppo`` begins after it."""
+    pull: NotNegative = 0.0
+    """Weight in PPO's loss, after the lesson, of the mean squared distance from what the teacher would do [1]."""
     ppo: Ppo = Ppo()
     """Numbers of the algorithm."""
     minutes: Positive | None = None
@@ -150,6 +152,8 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
         """Fill in what is left out, and refuse what can't be run."""
         if self.teacher and self.around:
             raise TrainingError(f"teacher {self.teacher!r} and around {self.around!r} are both given; leave one out")
+        if self.pull and not self.teacher:
+            raise TrainingError(f"pull = {self.pull:g} is to a teacher, and none is given; name one, or leave pull out")
         if self.minutes is not None and self.steps is not None:
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
         if self.minutes is None and self.steps is None:
