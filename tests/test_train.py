@@ -151,6 +151,20 @@ def test_a_lesson_is_learned_whatever_pays():
     assert np.sqrt(np.mean((action - x[:, 1::-1] * (1.0, -1.0)) ** 2)) < 0.1
 
 
+@pytest.mark.parametrize(("pull", "near"), [(0.0, (0.5, -0.5, 0, 0)), (1e4, (0, 0, 1.0, -1.0))])
+def test_a_pull_holds_at_the_teacher_against_what_pays(pull, near):
+    """Half of what is seen pays, and the teacher swaps it."""
+    toy = Toy(lambda observation, action: -np.square(action - observation[:, :2] * (0.5, -0.5)).sum(axis=1))
+    learner = learner_for(toy, Ppo(horizon=8))
+    learner.teach(lesson=False, pull=pull)
+    for _ in range(150):
+        learner.update(learner.sample(toy, 0.2)[0], 0.2, 3e-3)
+    x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)
+    action = learner.act(torch.from_numpy(x), torch.zeros(500, 0))[0].numpy()
+    held = x[:, :2] * near[:2] + x[:, 1::-1] * near[2:]
+    assert np.sqrt(np.mean((action - held) ** 2)) < 0.15
+
+
 @pytest.mark.parametrize("memory", [True, False])
 def test_only_a_memory_recalls(memory):
     """Paid -0.5 every fourth step by who says nothing, that is -0.125; a memory comes near 0, but for its noise."""
@@ -781,6 +795,10 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         (
             {"around": "scout", "teacher": "scout"},
             "teacher 'scout' and around 'scout' are both given; leave one out",
+        ),
+        (
+            {"pull": 2.0},
+            "pull = 2 is to a teacher, and none is given; name one, or leave pull out",
         ),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
         ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
