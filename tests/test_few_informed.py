@@ -143,11 +143,11 @@ def test_where_all_are_informed_there_is_no_headline():
 def test_followers_come_along_only_with_the_law_that_is_made_for_it():
     """On tuning seeds of the easy tier: ``scout`` brings the informed alone, the law nearly all."""
     share = {}
-    for name in ("leader_follower", "leader_follower_informed", "scout"):
+    for name in ("leader_follower", "scout"):
         scenario = granted(name, load_scenario("few_informed_easy"))
         runs = [run for run in evaluate(scenario, name, range(10_000, 10_004)) if isinstance(run, Run)]
         share[name] = np.mean([run.metrics["task"]["uninformed_share"] for run in runs])
-    assert min(share["leader_follower"], share["leader_follower_informed"]) > 0.7
+    assert share["leader_follower"] > 0.7
     assert share["scout"] < 0.2
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from uuv_marl.baselines.bug.law import TangentBug
 from uuv_marl.baselines.comparators.apf import Apf
-from uuv_marl.baselines.comparators.leader_follower import LeaderFollower, LeaderFollowerInformed
+from uuv_marl.baselines.comparators.leader_follower import LeaderFollower
 from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
@@ -59,7 +59,6 @@ POLICIES: dict[str, Kind] = {
     "olfati_saber_informed": OlfatiSaberInformed,
     "orca_informed": OrcaInformed,
     "leader_follower": LeaderFollower,
-    "leader_follower_informed": LeaderFollowerInformed,
     "pull": Pull,
     "oracle": Oracle,
     "tangent_bug": TangentBug,

@@ -8,20 +8,18 @@ groups on the move, Nature 433, 2005; waiting is ours.
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.memory import Surroundings
-from uuv_marl.baselines.memory.pose import to_map_axes
 from uuv_marl.baselines.policy import Limits, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
 from uuv_marl.baselines.safety.remembering import Filtered
 from uuv_marl.baselines.scout.law import modulated, pushed
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Bool, Float32, Float64
 
 
@@ -82,16 +80,10 @@ class LeaderFollower(Filtered):
         leads = percept["informed"] if "informed" in percept.names else np.ones((*flat.shape[:2], 1), np.float32)
         action = np.zeros((*flat.shape[:2], 2), np.float32)
         _act(
-            flat, self.at, leads, self.active, self.model.own.period_s, LeaderFollowerGains(*map(float, self.gains)),
-            self.barrier, self.limits, self.gain, self.memory, self.planes, action,
+            leads, self.active, self.model.own.period_s, LeaderFollowerGains(*map(float, self.gains)), self.barrier,
+            self.limits, self.gain, self.memory, self.planes, action,
         )  # fmt: skip
         return action
-
-
-class LeaderFollowerInformed(LeaderFollower):
-    """``LeaderFollower`` with the true velocities of whom it hears, which no sonar gives."""
-
-    channels: ClassVar[tuple[str, ...]] = ("link",)
 
 
 class Others(NamedTuple):
@@ -117,22 +109,6 @@ def remembered(w: int, i: int, g: LeaderFollowerGains, kept: Surroundings) -> Ot
                 weight = math.exp(-kept.away[w, i, k] / g.near)
                 v_x, v_y = v_x + weight * kept.velocity[w, i, k, 0], v_y + weight * kept.velocity[w, i, k, 1]
                 weights += weight
-    return Others(v_x / weights, v_y / weights, x / max(num, 1), y / max(num, 1))
-
-
-@compiled
-def told(w: int, i: int, g: LeaderFollowerGains, see: Fields, kept: Surroundings) -> Others:
-    """What it makes of those that it hears now, whose velocities it is told."""
-    v_x, v_y, weights, x, y, num = 0.0, 0.0, 1e-9, 0.0, 0.0, 0
-    for k in range(see.heard.shape[2]):
-        if see.heard[w, i, k] > 0.0:
-            p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
-            x, y, num = x + p_x, y + p_y, num + 1
-            if see.link_identity[w, i, k] >= 1.0:
-                weight = math.exp(-math.hypot(p_x, p_y) / g.near)
-                v_x, v_y = v_x + weight * see.link_velocity[w, i, k, 0], v_y + weight * see.link_velocity[w, i, k, 1]
-                weights += weight
-    (v_x, v_y), (x, y) = to_map_axes(v_x, v_y, kept.pose[w, i]), to_map_axes(x, y, kept.pose[w, i])
     return Others(v_x / weights, v_y / weights, x / max(num, 1), y / max(num, 1))
 
 
@@ -164,15 +140,14 @@ def _leading(w: int, i: int, others: Others, g: LeaderFollowerGains, kept: Surro
 
 @compiled
 def _act(
-    flat: Float32, at: Starts, leads: Float32, worlds: Bool, period: float, g: LeaderFollowerGains, barrier: Barrier,
-    limits: Limits, gain: float, kept: Surroundings, planes: Float64, action: Float32,
+    leads: Float32, worlds: Bool, period: float, g: LeaderFollowerGains, barrier: Barrier, limits: Limits, gain: float,
+    kept: Surroundings, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle; ``leads`` has shape (world, vehicle, 1)."""
-    see = fields(flat, at)
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and kept.begun[w, i] > 0.0:
-                others = told(w, i, g, see, kept) if see.link_identity.shape[2] > 0 else remembered(w, i, g, kept)
+                others = remembered(w, i, g, kept)
                 wish = _leading(w, i, others, g, kept) if leads[w, i, 0] > 0.0 else _following(others, g)
                 w_x, w_y = pushed(wish[0], wish[1], w, i, g.push, g.push_range, kept)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
