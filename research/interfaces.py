@@ -1,6 +1,6 @@
-"""``python -m research.interfaces ppo --seed 3``: what a learner of docs/interfaces.md reaches, as the page prints it.
+"""``python -m research.interfaces ppo --training 3``: what a learner of docs/interfaces.md reaches, as printed there.
 
-It runs the page's block with that seed, in an environment that has the library, and counts whole swarms on the
+It runs the block with a seed of that training, in an environment that has the library, and counts whole swarms on the
 validation seeds.
 """
 
@@ -31,7 +31,7 @@ Act = Callable[[Float32, Bool], Float32]
 
 
 class Learner(StrEnum):
-    """What the page trains, by a name that is in its block alone."""
+    """What the page trains."""
 
     PPO = "ppo"
     RECURRENT = "recurrent_ppo"
@@ -42,26 +42,26 @@ class Learner(StrEnum):
 
 
 _WORDS = {
-    "ppo": "import PPO\n",
-    "recurrent_ppo": "RecurrentPPO(",
-    "mappo": "MappoConfig.",
-    "rllib": "from ray.rllib.",
-    "torchrl": "from torchrl.objectives",
-}
+    "ppo": 'PPO("MlpPolicy", SwarmVecEnv("starter"), seed=0)', "recurrent_ppo": "RecurrentPPO(",
+    "mappo": "MappoConfig.", "ippo": "MappoConfig.", "torchrl": "from torchrl.objectives", "rllib": "from ray.rllib.",
+}  # fmt: skip
+"""What is in a learner's block alone."""
+_IPPO = {"MappoConfig": "IppoConfig", "max_n_iters, config.lr = 15": "max_n_iters, config.lr = 25"}
+"""What the page says to change in MAPPO's block."""
+APART = 1000
+"""Trainings' seeds are so far apart that none starts from another's worlds."""
 app = typer.Typer(add_completion=False)
 
 
-def printed(learner: Learner, seed: int) -> str:
-    """The page's block with another seed; IPPO's is MAPPO's, changed as the page says."""
-    word = _WORDS["mappo" if learner is Learner.IPPO else learner]
+def printed(learner: Learner, training: int) -> str:
+    """The page's block for a training: the first has the printed seed. Raises ResultsError where it is not there."""
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.S)
-    block, count = re.subn(r"seed(=|\()\d+", rf"seed\g<1>{seed}", next(each for each in blocks if word in each))
-    if count != (2 if learner is Learner.TORCHRL else 1):
-        raise ResultsError(f"{PAGE.name} must print one seed of {learner}, got {count}; mend it there")
-    if learner is Learner.IPPO:
-        block = block.replace("MappoConfig", "IppoConfig").replace(
-            "max_n_iters, config.lr = 15", "max_n_iters, config.lr = 25"
-        )
+    (block,) = [each for each in blocks if _WORDS[learner] in each] or [""]
+    for was, now in _IPPO.items() if learner is Learner.IPPO else ():
+        block = block.replace(was, now) if was in block else ""
+    block, count = re.subn(r"(seed[=(])(\d[\d_]*)", lambda at: f"{at[1]}{int(at[2]) + APART * training}", block)
+    if not count:
+        raise ResultsError(f"{PAGE.name} must print a block of {learner} with a seed; mend it there")
     return block
 
 
@@ -123,22 +123,22 @@ def whole(act: Act) -> int:
 @app.command()
 def main(
     learner: Annotated[Learner, typer.Argument(help="What is trained.")],
-    seed: Annotated[int, typer.Option(min=0, help="Of the training.")] = 0,
+    training: Annotated[int, typer.Option(min=0, help="Which one; each has another seed.")] = 0,
 ) -> None:
     """Train by the page's block, and count whole swarms of 100 validation episodes.
 
-    Example: python -m research.interfaces recurrent_ppo --seed 2
+    Example: python -m research.interfaces recurrent_ppo --training 2
     """
     with explained(FOLDER):
         began, used = time.perf_counter(), time.process_time()
         with tempfile.TemporaryDirectory() as folder:
             block = Path(folder, "block.py")
-            block.write_text(printed(learner, seed), encoding="utf-8")
+            block.write_text(printed(learner, training), encoding="utf-8")
             made = runpy.run_path(str(block), run_name="page")
         took, used = time.perf_counter() - began, time.process_time() - used
         good = whole(acting(learner, made))
         print(
-            f"{learner}, seed {seed}: {good} of {EPISODES} whole; {took:.0f} s, this process {used:.0f} s of all cores"
+            f"{learner}, training {training}: {good} of {EPISODES} whole; {took:.0f} s, {used:.0f} s of processors here"
         )
 
 

@@ -17,6 +17,7 @@ NEEDS = {
     "test_env.py": "pygame",
     "test_export.py": "onnx",
     "test_film.py": "av",
+    "test_first_tries.py": "torch",
     "test_train.py": "torch",
     "test_rendering.py": "pygame",
     "test_sb3.py": "stable_baselines3",

@@ -29,7 +29,9 @@ GUIDED = [
     ("follow", "single_obstacle", 54, "dense", 2), ("reach", "starter", 5, "dense", 100),
     ("reach", "single_obstacle", 54, "dense", 2), ("hard_water", "hard_water", 10, "dense", 100),
     ("hard_water", "hard_water", 10, "geodesic", 100), ("two_swarms", "two_swarms_easy", 10, "dense", 100),
-    ("few_informed", "few_informed_easy", 10, "dense", 100), ("silent_targets", "silent_targets_easy", 8, "dense", 100),
+    ("few_informed", "few_informed_easy", 10, "dense", 100), ("few_informed", "few_informed_easy", 10, "led", 30),
+    ("few_informed", "few_informed", 20, "dense", 8), ("two_swarms", "two_swarms", 40, "dense", 4),
+    ("silent_targets", "silent_targets_easy", 8, "dense", 100),
 ]  # fmt: skip
 """Task, scenario, vehicles, reward, and how many seeds, from 0 on."""
 REACH = {"task": "reach"}
@@ -150,21 +152,23 @@ def test_an_earlier_arrival_of_the_same_way_never_lowers_the_return(task, reward
     assert totals[2] > totals[3]
 
 
-@pytest.mark.parametrize(("task", "reward"), [pair for pair in PAID if pair[1] != "led"])
+@pytest.mark.parametrize(("task", "reward"), PAID)
 def test_a_contact_lowers_the_return_of_both(task, reward):
     whole, bumped = arrival(40, task, reward), arrival(40, task, reward, bump_at=20)
-    assert (bumped[:2] <= whole[:2] - 9.0).all()
-    assert bumped.mean() < whole.mean()
+    share = 0.25 if reward == "led" else 1.0  # of the informed; the others pay it whole, too
+    assert (bumped[:2] <= whole[:2] - 9.0 * share).all()
+    assert bumped.mean() < whole.mean() - 1.0
 
 
-@pytest.mark.parametrize("task", PUPPETS)
-@pytest.mark.parametrize("reward", ["dense", "sparse", "team"])
+@pytest.mark.parametrize("task", [*PUPPETS, "few_informed"])
+@pytest.mark.parametrize("reward", ["dense", "sparse", "team", "led"])
 def test_dying_never_pays_the_one_who_dies(reward, task):
     """Idle vehicles are left behind for minutes: dying at once must cost more than that."""
     if reward not in (*task_class(task).rewards, "team"):
         pytest.skip(f"{task} has no such reward")
-    changes = {"time_limit.factor": 0.5, "task": task}
-    base = load_scenario("single_obstacle", num_vehicles=6, overrides=changes)
+    scenario, own = PLACES[task]
+    changes = {**own, "time_limit.factor": 0.5} | ({"task.informed": 6} if task == "few_informed" else {})
+    base = load_scenario(scenario, num_vehicles=6, overrides=changes)
     totals, lost = [], []
     for losses in ([], [1.0]):
         batch = BatchedEnv(load_scenario(base, overrides={"disturbance.loss_times_s": losses}), reward=reward)

@@ -151,7 +151,7 @@ def test_a_lesson_is_learned_whatever_pays():
     assert np.sqrt(np.mean((action - x[:, 1::-1] * (1.0, -1.0)) ** 2)) < 0.1
 
 
-@pytest.mark.parametrize(("pull", "near"), [(0.0, (0.5, -0.5, 0, 0)), (1e4, (0, 0, 1.0, -1.0))])
+@pytest.mark.parametrize(("pull", "near"), [(0.0, (0.5, -0.5, 0, 0)), (30.0, (0, 0, 1.0, -1.0))])
 def test_a_pull_holds_at_the_teacher_against_what_pays(pull, near):
     """Half of what is seen pays, and the teacher swaps it."""
     toy = Toy(lambda observation, action: -np.square(action - observation[:, :2] * (0.5, -0.5)).sum(axis=1))
@@ -411,6 +411,15 @@ def test_rewards_count_after_the_lesson(tmp_path, no_validation):
     assert 1e-6 < min(after) <= max(after) < 0.1 < min(record.kl for record in records[:18])
 
 
+def test_after_the_lesson_the_network_acts_and_is_told_what_the_teacher_would_do():
+    """In worlds that began while the teacher acted, too."""
+    trainer = Trainer(Training(scenario="starter", sizes=[(4, 2)], ppo=TINY, teacher="scout", lesson=0.0, pull=2.0))
+    trainer.learner.teach(lesson=False, pull=2.0)
+    batch, _ = trainer.learner.sample(trainer.rows, 1e-3)
+    assert (batch.action - batch.mean).abs().max() < 0.01
+    assert (batch.action - batch.told).abs().mean() > 0.1
+
+
 def test_training_worlds_are_not_those_of_validation():
     seeds = []
     trainer = Trainer(Training(scenario="starter", sizes=[(1, 2)], ppo=TINY))
@@ -482,8 +491,9 @@ def rows(folder):
         {"around": "random"},
         {"around": "scout"},
         {"teacher": "scout", "lesson": 0.3},
+        {"teacher": "scout", "lesson": 0.3, "pull": 2.0},
     ],
-    ids=["gru", "sectors", "filter", "random", "scout", "lesson"],
+    ids=["gru", "sectors", "filter", "random", "scout", "lesson", "pull"],
 )
 def test_a_resumed_training_equals_an_uninterrupted_one(kind, tmp_path, no_validation):
     """Bit for bit: weights, optimiser, memories, worlds and random numbers; stopped after a checkpoint, and between."""

@@ -143,7 +143,7 @@ class Policy:
         self._forget(chosen)
 
     def _forget(self, worlds: Any) -> None:
-        """Clear what is remembered of these worlds; networks in training clear their own (``train/ppo.py``)."""
+        """Clear what is remembered of these worlds."""
         self._time_s[worlds] = np.nan
         for array in self.memory:
             array[worlds] = 0
@@ -197,7 +197,7 @@ class Policy:
             self.memory.action[self.active] = action[self.active]
 
     def _advance(self, clock: Clock | None) -> Bool:
-        """Forget worlds that were reset; those that have gone on since the latest call, shape (world,)."""
+        """Forget worlds that were reset, and give those that have gone on since the latest call, shape (world,)."""
         if clock is None:
             return self.active.copy()
         now, then, period = clock.time_s, self._time_s, self.scenario.timing.decision_period_s

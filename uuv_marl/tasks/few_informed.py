@@ -66,11 +66,12 @@ class FewInformed(Reach):
         return {"informed": self.swarm.course.informed[:, :, None].astype(np.float64)}
 
     def reward(self, running: Bool) -> Terms:
-        """With the reward ``led`` the informed are paid the mean of all, so that who leads is paid for who follows."""
+        """With the reward ``led`` the informed are paid the mean of all, but for their own loss; the others as ever."""
         terms, informed = super().reward(running), self.swarm.course.informed
         if self.paying != "led":
             return terms
-        return {name: np.where(informed, own.mean(axis=1, keepdims=True), own) for name, own in terms.items()}
+        mean = {name: np.where(informed, own.mean(axis=1, keepdims=True), own) for name, own in terms.items()}
+        return mean | {"loss": terms["loss"]}
 
     def there(self) -> Bool:
         """Vehicles within ``near_m`` of l(t), once it rests at its end."""

@@ -57,9 +57,9 @@ def paid(task: "Task", running: Bool) -> Payment:
 class Task:
     """What a swarm is to do: who goes where, what is paid, when it is done and well done, and what is measured.
 
-    A subclass overrides hooks. They take ``running``, the worlds that they are about, shape (world,), and give arrays
-    over all worlds and vehicles; what they give for other worlds is not used. ``self.swarm`` is the simulation, in its
-    present state, and ``self.numbers`` the task's own numbers.
+    A subclass overrides hooks. Those with ``running`` are told which worlds go on, shape (world,), and give arrays over
+    all worlds and vehicles; what they give for other worlds is not used. Those with ``world`` are about one.
+    ``self.swarm`` is the simulation, in its present state, and ``self.numbers`` the task's own numbers.
 
     Without an override the swarm starts, and its reference moves, as the scenario says; nothing is paid; the episode
     runs to its time limit.

@@ -81,11 +81,13 @@ class Learner:
         self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
         self.state = torch.zeros(rows, self.actor.units)
-        self.lesson, self.pull = False, 0.0
-        """Whether the actor imitates a teacher, instead of what paid, and how much beside it; set by ``teach``."""
+        self.lesson = False
+        """Whether the actor imitates a teacher, instead of what paid; set by ``teach``."""
+        self.pull = 0.0
+        """Weight in PPO's loss of the squared distance from what the teacher would do [1]; set by ``teach``."""
 
     def teach(self, lesson: bool, pull: float = 0.0) -> None:
-        """From now on the actor imitates a teacher, or learns what pays, ``pull``ed to what the teacher would do."""
+        """From now on the actor imitates a teacher, or learns what pays, with a ``pull`` to the teacher."""
         if self.lesson and not lesson:  # with the old optimiser the first updates went twice as far, by ``Update.kl``
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self.lesson, self.pull = lesson, pull
@@ -122,7 +124,8 @@ class Learner:
             mean[t], states[t] = self.act(observation[t], self.state)
             drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t]
             if self.lesson or self.pull:
-                told[t], acts = map(torch.from_numpy, env.taught(acts.numpy()))
+                told[t], done = map(torch.from_numpy, env.taught(acts.numpy()))
+                acts = done if self.lesson else acts
             action[t] = acts + noise * torch.from_numpy(drawn)
             came = env.step(action[t].numpy())
             paid += float(came.reward.mean()) / by.horizon

@@ -45,7 +45,7 @@ class LeaderFollowerGains(NamedTuple):
     speed: float = 4.0
     """Largest speed that a leader wishes, but for pushes [m/s]."""
     cruise: float = 4.0
-    """Largest that a follower wishes, but for gathering and pushes [m/s]: where ``follow`` is large, a swarm's own."""
+    """Largest that a follower wishes, but for gathering and pushes [m/s]; a large ``follow`` keeps a swarm at it."""
     push: float = 10.0
     """Away from a neighbour at no distance [m/s]."""
     push_range: float = 15.0
