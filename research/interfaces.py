@@ -4,6 +4,8 @@ It runs the block with a seed of that training, in an environment that has the l
 validation seeds.
 """
 
+# pyright: reportUnknownMemberType=false, reportMissingTypeStubs=false
+
 import re
 import runpy
 import tempfile
