@@ -151,6 +151,22 @@ def test_followers_come_along_only_with_the_law_that_is_made_for_it():
     assert share["scout"] < 0.2
 
 
+def test_a_swarm_that_amplifies_what_it_hears_goes_at_the_cruise_of_its_followers():
+    """Without pulls and pushes, after 50 s."""
+    speeds = []
+    for cruise in (1.0, 2.0):
+        name = f"leader_follower,follow=2,cruise={cruise},gather=0,push=0"
+        swarm = Swarm(load_scenario("few_informed"), 4)
+        policy, percept = make(name, swarm.scenario, 4), swarm.reset(10_000)
+        policy.reset(10_000)
+        for _ in range(100):
+            percept = swarm.step(policy.act(percept))
+        speed = np.hypot(swarm.state.nu[..., 0], swarm.state.nu[..., 1])[~swarm.course.informed]
+        assert speed.max() < cruise + 0.4
+        speeds.append(np.median(speed) / cruise)
+    assert min(speeds) > 0.8
+
+
 def test_who_leads_is_paid_for_who_follows():
     usual, led = (BatchedEnv(load_scenario("few_informed_easy"), 2, reward) for reward in ("dense", "led"))
     for batch in (usual, led):

@@ -70,6 +70,8 @@ POLICIES: dict[str, Kind] = {
     "mappo_two_swarms_2": shipped("mappo_two_swarms_2", "A second training of mappo_two_swarms, with another seed."),
     "mappo_few_informed": shipped("mappo_few_informed", "Taught by leader_follower, then MAPPO on few_informed."),
     "mappo_few_informed_2": shipped("mappo_few_informed_2", "A second training of mappo_few_informed."),
+    "mappo_silent_targets": shipped("mappo_silent_targets", "Trained by MAPPO on silent_targets, end to end."),
+    "mappo_silent_targets_2": shipped("mappo_silent_targets_2", "A second training of mappo_silent_targets."),
     "mappo_all": shipped("mappo_all", "One network, trained by MAPPO on random_field, hard_water and two_swarms."),
     "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on short random fields, end to end."),
     "random": Random,
