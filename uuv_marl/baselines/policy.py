@@ -142,7 +142,7 @@ class Policy:
         self.clamps[chosen] = 0
         self._forget(chosen)
 
-    def _forget(self, worlds: Any) -> None:
+    def _forget(self, worlds: list[int] | Bool) -> None:
         """Clear what is remembered of these worlds."""
         self._time_s[worlds] = np.nan
         for array in self.memory:

@@ -1,6 +1,6 @@
 """PPO for all vehicles at once, which share one actor (Yu et al. 2022): MAPPO, or IPPO, by what the critic sees.
 
-The actor runs without torch, too (``uuv_marl.train.network``). With a memory a
+The actor (``uuv_marl.train.network``) is one that also runs without torch. With a memory a
 minibatch is the whole horizon of a part of the vehicles, so that it is trained through time; its state at the horizon's
 start is the one that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for
 bit. Needs ``train``.

@@ -46,6 +46,7 @@ class Scout(Filtered):
         numbers = PRESETS[preset]
         super().__init__(scenario, num_worlds, barrier or numbers.barrier)
         self.gains = gains or numbers.gains
+        self._growth = growth(scenario.swarm.num_vehicles)
 
     @property
     def kept_s(self) -> float:
@@ -63,7 +64,7 @@ class Scout(Filtered):
 
     def _grown(self) -> ScoutGains:
         """The gains for as many vehicles as the swarm has, all float: else compiled code would be made anew."""
-        by, g = ScoutGains(*map(float, self.gains)), growth(self.scenario.swarm.num_vehicles)
+        by, g = ScoutGains(*map(float, self.gains)), self._growth
         return by._replace(
             pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
             together=by.together / g**3,
