@@ -218,6 +218,8 @@ class Clock(NamedTuple):
     """Since the reset, shape (world,)."""
     episode: UInt64
     """A number that every reset changes, except one with the same seed, shape (world,)."""
+    seed: UInt64
+    """Seed of the episode, or ``episode`` where its reset had none, shape (world,), for policies that draw."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

@@ -31,7 +31,6 @@ print("yaw damping:", scenario.actuators.yaw_damping_nms, "N m s")
 env = uuv_marl.parallel_env(scenario)
 policy = baselines.make("bio_inspired_plus", env)
 observations, infos = env.reset(seed=0)
-policy.reset(seed=0)
 print(env.agents)
 print("one observation:", observations["uuv_0"].shape, observations["uuv_0"].dtype)
 

@@ -25,7 +25,6 @@ if __name__ == "__main__":
     env = uuv_marl.parallel_env(scenario, reward=close_and_careful)
     policy = baselines.make("bio_inspired_plus", env)
     observations, _ = env.reset(seed=0)
-    policy.reset(seed=0)
     total = 0.0
     while env.agents:
         observations, rewards, *_ = env.step(policy(observations))

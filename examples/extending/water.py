@@ -45,7 +45,6 @@ if __name__ == "__main__":
     env = uuv_marl.parallel_env(baselines.granted("bio_inspired_plus", changed))
     tidal, policy, eastward = Tide(env), baselines.make("bio_inspired_plus", env), list[float]()
     observations, infos = tidal.reset(seed=0)
-    policy.reset(seed=0)
     while tidal.agents:
         observations, _, _, _, infos = tidal.step(policy(observations))
         eastward.append(env.swarm.flow_field().at([0.0, 0.0])[1])

@@ -21,7 +21,8 @@ Arguments of compiled functions have the same names and the same meaning everywh
 ==========================  =========================================================================================
 """
 
+from uuv_marl.baselines.env_policy import EnvPolicy
 from uuv_marl.baselines.policy import Policy, PolicyError
-from uuv_marl.baselines.registry import POLICIES, EnvPolicy, granted, make
+from uuv_marl.baselines.registry import POLICIES, granted, make
 
 __all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "granted", "make"]

@@ -135,8 +135,14 @@ class Policy:
         for name in ("channels", "yaw_damping_nms", "full_torque_nm", "decides_every_s", "wishes_force"):
             setattr(self, name, getattr(other, name))
 
-    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
-        """Forget the past of these worlds (default all); world w draws from ``seed + w``, or one seed for each."""
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
+        """Forget the past of these worlds, default all. Not needed where percepts have a clock, as a swarm's have.
+
+        Args:
+            seed: of the policy's own random numbers in the next episode, for world w ``seed + w``, or one seed for
+                each of ``worlds``; None for that of the episode.
+            worlds: indices of the worlds.
+        """
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
         world_seeds(seed, chosen)  # refuses what is no seed
         self.clamps[chosen] = 0

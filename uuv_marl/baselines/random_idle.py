@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +12,56 @@ from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.streams import packed, unpacked
-from uuv_marl.types import Float32
+from uuv_marl.types import Bool, Float32
+
+
+class RandomMemory(NamedTuple):
+    """The latest random forces."""
+
+    force: Annotated[Float32, "world vehicle 2", "Shares of full force [1]."]
+    started: Annotated[Bool, "world", "Whether the world's random stream has started in this episode."]
 
 
 class Random(Policy):
-    """A new force, uniform on the disc of possible ones, for every vehicle at every decision."""
+    """A new force, uniform on the disc of possible ones, for every vehicle at every decision.
+
+    An episode's stream starts from its seed, or from that of an earlier ``reset(seed)``; never the stream that the
+    world itself draws from.
+    """
+
+    Memory: ClassVar[type[Any] | None] = RandomMemory
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         super().__init__(scenario, num_worlds)
-        self._rngs = [np.random.default_rng()] * num_worlds
-        self.reset()
+        self._rngs: list[np.random.Generator | None] = [None] * num_worlds
 
-    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
-        """Start the random streams of these worlds; never the stream that the world itself draws from."""
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
+        """Forget the past of these worlds; with a seed, their next episodes draw from it."""
         super().reset(seed, worlds)
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
         for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
-            self._rngs[w] = np.random.default_rng((own or 0, 1))
+            self._rngs[w] = None if own is None else _stream(own)
+
+    def _forget(self, worlds: list[int] | Bool) -> None:
+        chosen = np.zeros(self.num_worlds, np.bool_)
+        chosen[worlds] = True
+        for w in np.flatnonzero(chosen & self.memory.started).tolist():
+            self._rngs[w] = None  # but not one that ``reset`` has just seeded
+        super()._forget(worlds)
+
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Draw the forces of these worlds."""
+        force, clock = self.memory.force, percept.clock
+        for w in np.flatnonzero(worlds).tolist():
+            rng = self._rngs[w] = self._rngs[w] or _stream(0 if clock is None else int(clock.seed[w]))
+            drawn = rng.random((force.shape[1], 2))
+            radius, angle = np.sqrt(drawn[:, 0]), 2.0 * math.pi * drawn[:, 1]
+            force[w] = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+        self.memory.started[worlds] = True
+
+    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - random actions see nothing
+        """Actions of shape (world, vehicle, 2)."""
+        return self.memory.force.copy()
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """A copy of all that later decisions depend on, random streams included."""
@@ -38,17 +71,13 @@ class Random(Policy):
         """Continue from a snapshot. Raises PolicyError if it is another policy's."""
         super().restore(snapshot)
         try:
-            streams = unpacked(snapshot["streams"], self.num_worlds)
+            self._rngs = unpacked(snapshot["streams"], self.num_worlds)
         except (KeyError, ValueError) as error:
             raise PolicyError(f"the snapshot is of another policy than {self.name}: {error}") from None
-        self._rngs = [stream or np.random.default_rng() for stream in streams]
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        n = self.flat(percept).shape[1]
-        drawn = np.stack([rng.random((n, 2)) for rng in self._rngs])
-        radius, angle = np.sqrt(drawn[..., 0]), 2.0 * math.pi * drawn[..., 1]
-        return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1).astype(np.float32)
+
+def _stream(seed: int) -> np.random.Generator:
+    return np.random.default_rng((seed, 1))
 
 
 class Idle(Policy):

@@ -4,10 +4,8 @@ import difflib
 import inspect
 import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, overload
-
-import numpy as np
+from collections.abc import Sequence
+from typing import Any, NamedTuple, overload
 
 from uuv_marl.baselines.bug.law import TangentBug
 from uuv_marl.baselines.comparators.apf import Apf
@@ -16,6 +14,7 @@ from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaber
 from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
 from uuv_marl.baselines.comparators.pull import Pull
+from uuv_marl.baselines.env_policy import EnvPolicy, HasSwarm, environment
 from uuv_marl.baselines.grants import channels_in, inner_loop_nms, need_granted, period_s
 from uuv_marl.baselines.learned.around import Around
 from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
@@ -34,11 +33,8 @@ from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.errors import ScenarioError
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
-from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import plain
-from uuv_marl.sim.arguments import rounding
-from uuv_marl.types import Float32
 
 Kind = type[Policy] | Trained
 """A class of policies: a call with a scenario makes a policy. It has what a policy declares."""
@@ -78,41 +74,6 @@ POLICIES: dict[str, Kind] = {
     "idle": Idle,
 }
 """Every policy that ships with the package."""
-
-
-class HasSwarm(Protocol):
-    """The part of an environment that ``make`` needs. A wrapper has it, if its ``unwrapped`` is our environment."""
-
-    @property
-    def unwrapped(self) -> Any:
-        """The environment below all wrappers, with ``scenario`` and ``possible_agents``."""
-        ...
-
-
-class EnvPolicy:
-    """A policy that drives a PettingZoo parallel environment from its observations alone.
-
-    ``policy.reset(seed)`` after every ``env.reset``; then ``actions = policy(observations)``.
-    """
-
-    def __init__(self, policy: Policy, agents: Sequence[str]) -> None:
-        self.policy = policy
-        self._agents = list(agents)
-
-    def reset(self, seed: int = 0) -> None:
-        """Forget the previous episode. The seed matters only for policies that draw random numbers."""
-        self.policy.reset(seed)
-
-    def __call__(self, observations: Mapping[str, Float32]) -> dict[str, Float32]:
-        """An action for every agent that has an observation."""
-        layout = self.policy.layout
-        rows = np.zeros((1, len(self._agents), layout.size), np.float32)
-        with rounding():
-            for i, agent in enumerate(self._agents):
-                if agent in observations:
-                    rows[0, i] = observations[agent]
-        actions = self.policy.act(Percept.from_observation(rows, layout))[0]
-        return {agent: actions[i] for i, agent in enumerate(self._agents) if agent in observations}
 
 
 GUARDED = "guarded:"
@@ -226,9 +187,9 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
         name: one of ``POLICIES``, the path of a checkpoint (``runs/starter/best``), or ``module:Class``; parameters and
             gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``; ``guarded:`` before it
             puts the policy inside the safety filter.
-        target: a scenario, for a policy that maps ``Percept`` to actions; or our parallel environment, wrapped or not,
-            for a policy that maps the environment's observation dictionaries to action dictionaries.
-        num_worlds: worlds stepped together; 1 for an environment.
+        target: a scenario, for a policy that maps ``Percept`` to actions (``Policy``); or one of our environments,
+            wrapped or not, for a policy that maps its observations to its actions (``EnvPolicy``).
+        num_worlds: worlds stepped together; an environment has its own number.
         parameters: keyword arguments of the policy, such as ``gains``, or single gains by name.
 
     Raises:
@@ -238,17 +199,9 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
     kind, written = parse_policy(name)
     if isinstance(target, Scenario):
         return _in_units(name, kind, target, num_worlds, {**written, **parameters})
-    env: Any = getattr(target, "unwrapped", None)
-    if not isinstance(getattr(env, "scenario", None), Scenario):
-        raise PolicyError(f"a policy is made for a Scenario (see load_scenario) or our parallel_env, got {target!r}")
-    if not hasattr(env, "possible_agents"):
-        raise PolicyError(
-            f"{type(env).__name__} has no agents by name; make the policy with make(name, env.scenario, num_worlds) "
-            "and call policy.act(env.swarm.percept)"
-        )
-    if not getattr(env, "observes_positions", True):
-        raise PolicyError(f"policy {name!r} reads positions; make the environment with observe='positions'")
-    return EnvPolicy(_in_units(name, kind, env.scenario, 1, {**written, **parameters}), env.possible_agents)
+    scenario, swarm, agents = environment(target, name)
+    policy = _in_units(name, kind, scenario, swarm.num_worlds, {**written, **parameters})
+    return EnvPolicy(policy, swarm, agents)
 
 
 def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:

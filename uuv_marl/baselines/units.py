@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import Clock, Percept, PerceptLayout
+from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.dimensions import NUMBER, Dimension, converted
 from uuv_marl.scenario.scale import Scale
@@ -53,5 +53,5 @@ class Reader(NamedTuple):
         """A percept in the policy's units; one that has other entries comes back as it is, to be refused."""
         if percept.flat.shape[-1] != len(self.factors):
             return percept
-        clock = percept.clock and Clock(percept.clock.time_s / self.time, percept.clock.episode)
+        clock = percept.clock and percept.clock._replace(time_s=percept.clock.time_s / self.time)
         return Percept(percept.flat * self.factors, percept.layout, clock, percept.alive)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from uuv_marl.envs.parallel_env import Infos, parallel_env
 from uuv_marl.extras import extra
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
 
 with extra("distributed", "SwarmMultiAgentEnv"):
@@ -43,8 +44,18 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
 
     @property
     def scenario(self) -> Scenario:
-        """What is simulated; ``uuv_marl.baselines.make(name, env)`` reads it."""
+        """What is simulated."""
         return self._env.scenario
+
+    @property
+    def swarm(self) -> Swarm:
+        """The simulation; ``uuv_marl.baselines.make(name, env)`` follows it."""
+        return self._env.swarm
+
+    @property
+    def observes_positions(self) -> bool:
+        """Whether policies can read the observations: ``observe="positions"``."""
+        return self._env.observes_positions
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -82,8 +82,6 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         (own,) = world_seeds(seed, [0])
         super().reset(seed=own, options=options)
         observation = self._batch.reset(own)
-        # Policies that draw follow the world's seed, and go on from the environment's stream where there is none.
-        self._others.reset(int(self.np_random.integers(2**31)) if own is None else own)
         self._renderer.update()
         self._running = True
         return observation[0, 0], ending(self._batch, 0, 0)

@@ -50,6 +50,7 @@ class Swarm:
         self._duration_s = np.zeros(num_worlds)
         self.keys = np.zeros(num_worlds, np.uint64)
         """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
+        self._seeds = np.zeros(num_worlds, np.uint64)
         kind = scenario.task_class
         self._sizes = _sizes(scenario, num_worlds, self.layout.size) | kind.sizes(scenario)
         self.state, self.course = allocate(State, self._sizes), allocate(Course, self._sizes)
@@ -65,7 +66,9 @@ class Swarm:
     @property
     def percept(self) -> Percept:
         """What every vehicle knows now, shape (world, vehicle, ...)."""
-        return Percept(self._senses.percept, self.layout, Clock(self.facts.time_s, self.keys), self.state.alive)
+        return Percept(
+            self._senses.percept, self.layout, Clock(self.facts.time_s, self.keys, self._seeds), self.state.alive
+        )
 
     @property
     def heard(self) -> Int32:
@@ -182,6 +185,7 @@ class Swarm:
         for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
             stream = self._rngs[w] if own is None else np.random.default_rng(own)
             self._reset_world(w, stream or np.random.default_rng())
+            self._seeds[w] = self.keys[w] if own is None or own >= 2**64 else own
         self._tell(np.isin(np.arange(self.num_worlds), list(chosen)))
         return self.percept
 
@@ -261,6 +265,7 @@ class Swarm:
         return {
             "duration_s": self._duration_s,
             "keys": self.keys,
+            "seeds": self._seeds,
             **{k: array for table in (*self._world, *sea_tables(self._sea)) for k, array in table._asdict().items()},
             **{f"task.{name}": array for name, array in self._task_memory.items()},
         }

@@ -31,7 +31,7 @@ class Around(Policy):
         self.declare_as(law)
         super().__init__(scenario, num_worlds)
 
-    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
         """Reset both."""
         super().reset(seed, worlds)
         for each in (self.law, self.inner):

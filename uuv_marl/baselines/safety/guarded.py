@@ -40,7 +40,7 @@ class Guarded(Filtered):
         self.declare_as(inner)
         super().__init__(scenario, num_worlds, barrier)
 
-    def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
+    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
         """Reset the policy inside, too."""
         super().reset(seed, worlds)
         self.inner.reset(seed, worlds)
