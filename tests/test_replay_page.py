@@ -10,11 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import granted
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.replay.encode import CODINGS
+from uuv_marl.cli import app
+from uuv_marl.replay import demo
+from uuv_marl.replay.encode import CODINGS, payload
 from uuv_marl.replay.page import page_html, write_page
 from uuv_marl.replay.record import record
 
@@ -227,3 +230,17 @@ def test_page_of_54_vehicles_is_small_and_asks_for_nothing(tmp_path):
     assert "default-src 'none'" in text
     assert "The MIT License" in text
     assert not re.findall(r"""(?:src|href)=["'](?!data:)|url\(|@import""", re.sub(r"<script.*?</script>", "", text))
+
+
+def test_the_demo_is_a_recording_in_the_form_of_today(tmp_path):
+    told = CliRunner().invoke(app, ["demo", "--output", str(tmp_path / "demo.html")])
+    assert told.exit_code == 0
+    assert "uuv-marl replay --scenario hard_water" in told.output.replace("\n", " ")
+    recorded = json.loads(demo.RECORDED.read_text())
+    fresh = payload([record(load_scenario(demo.SCENARIO, overrides={"time_limit.extra_s": 1.0}), "idle", demo.SEED)])
+    assert recorded["schema"] == fresh["schema"]
+    assert [episode["policy"] for episode in recorded["episodes"]] == list(demo.POLICIES)
+    for episode in recorded["episodes"]:
+        assert episode.keys() == fresh["episodes"][0].keys()
+        assert episode["arrays"].keys() >= fresh["episodes"][0]["arrays"].keys()
+        assert episode["seed"] == demo.SEED

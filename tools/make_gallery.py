@@ -1,10 +1,13 @@
-"""Write docs/gallery.md and its films, of each task and kind of map: ``python tools/make_gallery.py [NAME ...]``."""
+"""Write docs/gallery.md, its films and the recorded demo: ``python tools/make_gallery.py [NAME ...]``."""
 
+import json
 import sys
 import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from uuv_marl.replay import demo
+from uuv_marl.replay.encode import payload
 from uuv_marl.replay.film import write_film
 from uuv_marl.replay.record import record
 from uuv_marl.scenario import load_scenario
@@ -50,8 +53,13 @@ def page() -> str:
 
 
 def main() -> None:
-    """Make the page and the films: all, or those whose names are given."""
+    """Make the page, and films and demo: all, or those whose names are given."""
     (ROOT / "docs" / "gallery.md").write_text(page(), encoding="utf-8")
+    if len(sys.argv) == 1 or "demo" in sys.argv[1:]:
+        episodes = [record(load_scenario(demo.SCENARIO), policy, demo.SEED) for policy in demo.POLICIES]
+        demo.RECORDED.write_text(
+            json.dumps(payload(episodes), allow_nan=False, separators=(",", ":")), encoding="utf-8"
+        )
     for film in FILMS:
         if len(sys.argv) == 1 or film.name in sys.argv[1:]:
             changes: dict[str, Any] = {"task.kinds": [film.kind]} if film.kind else {}

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl import __version__
-from uuv_marl.cli import benchmark, export, lists, replay, robustness, train
+from uuv_marl.cli import benchmark, demo, export, lists, replay, robustness, train
 from uuv_marl.cli.console import console, print_everywhere
 
 app = typer.Typer(
@@ -13,6 +13,7 @@ app = typer.Typer(
 
     Try first:
 
+    - `uuv-marl demo`: three policies on a hard map, at once;
     - `uuv-marl list`: what there is;
     - `uuv-marl replay --scenario hard_water --policy tangent_bug`: an episode to watch;
     - `uuv-marl benchmark --scenario starter`: policies on the same seeds, in a table;
@@ -24,6 +25,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command()(demo.demo)
 app.command()(benchmark.benchmark)
 app.command()(robustness.robustness)
 app.command("tune")(benchmark.tune_command)

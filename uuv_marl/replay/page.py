@@ -9,8 +9,9 @@ import html
 import json
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from uuv_marl.atomic import write_text
 from uuv_marl.errors import ReplayError
@@ -30,14 +31,16 @@ def page_html(recordings: Sequence[Recording]) -> str:
     Raises:
         ReplayError: there are none, or more than four.
     """
-    if not 1 <= len(recordings) <= MOST_EPISODES:
-        raise ReplayError(f"a page shows 1 to {MOST_EPISODES} episodes, got {len(recordings)}; make several pages")
-    data = json.dumps(payload(recordings), allow_nan=False, separators=(",", ":"))
+    return html_of(_coded(recordings))
+
+
+def html_of(data: Mapping[str, Any]) -> str:
+    """The page of episodes that are coded as a ``payload``."""
     parts = {
-        "title": html.escape(_title(recordings)),
+        "title": html.escape(_title(data)),
         "style": f"{_asset('uPlot.min.css')}\n{_asset('page.css')}",
         "licence": html.escape(_asset("uPlot.LICENSE")),
-        "episodes": data.replace("<", "\\u003c"),
+        "episodes": json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         "uplot": _deflated(_asset("uPlot.iife.min.js")),
         "scripts": _scripts(),
     }
@@ -58,8 +61,8 @@ class Replay:
     """
 
     def __init__(self, recordings: Sequence[Recording], height_px: int = 640) -> None:
-        self._page = page_html(recordings)
-        self._title = _title(recordings)
+        data = _coded(recordings)
+        self._page, self._title = html_of(data), _title(data)
         self._height_px = height_px
 
     def __repr__(self) -> str:
@@ -72,8 +75,15 @@ class Replay:
         )
 
 
-def _title(recordings: Sequence[Recording]) -> str:
-    return f"{recordings[0].scenario.name}: {', '.join(recording.policy for recording in recordings)}"
+def _coded(recordings: Sequence[Recording]) -> dict[str, Any]:
+    if not 1 <= len(recordings) <= MOST_EPISODES:
+        raise ReplayError(f"a page shows 1 to {MOST_EPISODES} episodes, got {len(recordings)}; make several pages")
+    return payload(recordings)
+
+
+def _title(data: Mapping[str, Any]) -> str:
+    episodes = data["episodes"]
+    return f"{episodes[0]['scenario']}: {', '.join(episode['policy'] for episode in episodes)}"
 
 
 def _asset(name: str) -> str:

@@ -1,0 +1,27 @@
+"""``uuv-marl demo`` shows three policies on one hard map, at once: from a recording."""
+
+import sys
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+from uuv_marl.cli.console import explained, path_option, say
+
+
+def demo(
+    output: Annotated[Path, path_option("The page to write, an .html file.")] = Path("uuv_marl_demo.html"),
+) -> None:
+    """Show three policies on one hard map: a recorded replay as an HTML page, opened in the browser if there is one.
+
+    Example: uuv-marl demo --output demo.html
+    """
+    with explained():
+        from uuv_marl.replay.demo import POLICIES, SCENARIO, SEED, write_demo
+
+        write_demo(output)
+        say(f"Recorded replay: {output} ({output.stat().st_size / 1000:,.0f} kB)")
+        if sys.stdout.isatty():
+            webbrowser.open(output.resolve().as_uri())
+        policies = " ".join(f"--policy {policy}" for policy in POLICIES)
+        say("Simulate it yourself, or with another --seed (compiles for about a minute at first):")
+        say(f"uuv-marl replay --scenario {SCENARIO} {policies} --seed {SEED}")
