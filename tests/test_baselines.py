@@ -159,25 +159,21 @@ def test_slots_are_a_lattice_around_zero(n):
 
 
 FOLDER = resources.files("uuv_marl.baselines") / "tuned"
-HULLS = ("bluerov2_heavy", "lauv", "remus100")
 
 
-@pytest.mark.parametrize("file", [*SPACES, *(f"bio_inspired_plus.{hull}" for hull in HULLS)])
+@pytest.mark.parametrize("file", SPACES)
 def test_tuned_gains_come_from_shipped_trials(file):
     data = json.loads((FOLDER / f"{file}.json").read_text())
     trials = list(csv.DictReader((FOLDER / f"{file}.csv").read_text().splitlines()))
     name, _, what = file.partition(".")
-    hull = what if what in HULLS else ""
-    assert len(trials) == (100 if hull else TRIALS)
-    assert data.get("vehicle", "") == hull
+    assert len(trials) == TRIALS
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
     best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
     assert best == {"cost_s": data["best_cost_s"], **data["best"]}
     chosen = {"scout": "scout,preset=closed", "nearest_target.lanes": "nearest_target,lanes=true"}
     policy = chosen.get(file, f"{name},tuned_for={what}" if what else name)
-    changes = {"vehicle": hull, "scale": "vehicle"} if hull else {}
-    flown_in = "sea_trial" if hull else "silent_targets" if name == "nearest_target" else "tracking"
-    made = make(policy, granted(policy, load_scenario(flown_in, overrides=changes)))
+    flown_in = "silent_targets" if name == "nearest_target" else "tracking"
+    made = make(policy, granted(policy, load_scenario(flown_in)))
     numbers = vars(made) | made.gains._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 

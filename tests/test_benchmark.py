@@ -182,7 +182,6 @@ def test_the_command_line_from_end_to_end(tmp_path):
         (["robustness", "--scenario=hard_water"], "has the task 'hard_water', and the suite scores 'follow' alone"),
         (["robustness", "--axis=X", "--level=2"], "axis X has the levels 1, "),
         (["tune", "--policy=idle"], "no free gains"),
-        (["tune", "--policy=apf.two_swarms", "--vehicle=lauv"], "is tuned for a task with the paper's vehicle; leave"),
     ],
 )
 def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path):

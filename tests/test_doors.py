@@ -241,11 +241,12 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     shipped = Path(load_scenario.__code__.co_filename).parent
     shutil.copy(VEHICLES / "lauv.toml", home / "v.toml")
     (home / "base.toml").write_text(f"extends = '{shipped / 'starter.toml'}'", encoding="utf-8")
-    mine = "extends = '~/base.toml'\nvehicle = '~/v.toml'\nscale = 'vehicle'"
+    slow = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0}
+    mine = "\n".join(["extends = '~/base.toml'", "vehicle = '~/v.toml'", *(f"{k} = {v}" for k, v in slow.items())])
     (home / "mine.toml").write_text(mine, encoding="utf-8")
     assert load_scenario("~/mine.toml").vehicle.name == "lauv"
     assert load_scenario(Path("~/mine.toml")) == load_scenario("~/mine.toml")
-    assert load_scenario("starter", overrides={"vehicle": "~/v.toml", "scale": "vehicle"}).vehicle.name == "lauv"
+    assert load_scenario("starter", overrides={"vehicle": "~/v.toml", **slow}).vehicle.name == "lauv"
     assert "lauv" in show("~/mine.toml")
     assert "lauv" in show_vehicle("~/v.toml")
     for arguments in (["list", "--show", "~/mine.toml"], ["list", "vehicles", "--show", "~/v.toml"]):

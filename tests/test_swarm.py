@@ -190,6 +190,36 @@ def test_arrival_needs_rest_nearness_spread_and_dwell(place):
     assert swarm.facts.arrival_s[0, 2] <= swarm.facts.arrival_s[0, 0]  # within 5 m
 
 
+def passing(**changes):
+    base = {"arrival.by": "passage", "trajectory.waypoints_m": [[0.0, 0.0], [100.0, 0.0], [100.0, 60.0]]}
+    return load_scenario("tracking", num_vehicles=4, overrides={**base, "arrival.spread_m": 10.0, **changes})
+
+
+SPREAD = np.array([[-3.0, -3.0], [3.0, -3.0], [-3.0, 3.0], [3.0, 3.0]])
+
+
+@pytest.mark.parametrize(
+    ("centre", "scattered", "time_s", "arrives"),
+    [
+        ((100.0, 59.9), 1.0, 50.0, False),
+        ((100.0, 60.1), 1.0, 50.0, True),
+        ((104.0, 60.1), 1.0, 50.0, True),
+        ((108.0, 60.1), 1.0, 50.0, False),
+        ((100.0, 90.0), 1.0, 50.0, True),
+        ((100.0, 60.1), 3.0, 50.0, False),
+        ((100.0, 60.1), 1.0, 39.8, False),
+    ],
+)
+def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together(centre, scattered, time_s, arrives):
+    """And l(t) has: its way of 160 m takes 40 s."""
+    swarm = Swarm(passing())
+    swarm.reset(0)
+    swarm.state.eta[0, :, :2], swarm.state.tick[:] = np.array(centre) + scattered * SPREAD, round(10.0 * time_s)
+    swarm.observe()
+    assert swarm.arrived[0] == arrives
+    assert not arrives or swarm.facts.arrival_s[0, 0] == swarm.facts.time_s[0], "at that moment"
+
+
 def test_lost_vehicles_fall_silent_and_leave_the_centre():
     scenario = load_scenario("lossy", overrides={"disturbance.loss_times_s": [0.0, 0.25, 1.0]})
     swarm = Swarm(scenario)

@@ -50,8 +50,7 @@ def test_draws_do_not_depend_on_the_processor_s_own_instructions():
 
 
 def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
-    sea = load_scenario("sea_trial", num_vehicles=3, overrides={"vehicle": "lauv", "task": "reach"})
-    assert sea.arrival.by == "passage"
+    sea = load_scenario("single_obstacle", num_vehicles=3, overrides={"arrival.by": "passage", "task": "reach"})
     batch = BatchedEnv(sea)
     assert np.isfinite(batch.reset(0)).all()
     assert np.isfinite(batch.step(np.ones((1, 3, 2))).reward).all()

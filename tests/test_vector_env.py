@@ -254,8 +254,9 @@ def test_solo_drops_no_override(others, overrides, message):
         SoloEnv(STARTER, "mappo", decision_period=0.1)
     with pytest.raises(TypeError, match="others must be the name of a policy, or module:Class, got None"):
         SoloEnv(STARTER, None)
+    slow = {"trajectory.speed_mps": 1.5, "start.speed_max_mps": 1.5}
     with pytest.raises(baselines.PolicyError, match="another vehicle"):  # and not for a period that nobody asked for
-        SoloEnv("tracking", "mappo", overrides={"vehicle": "lauv", "scale": "vehicle"})
+        SoloEnv("tracking", "mappo", overrides={"vehicle": "lauv", **slow})
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
     assert both.scenario.sonar.channels == ("compass", "modem")
 

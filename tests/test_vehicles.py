@@ -13,6 +13,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import granted, make
 from uuv_marl.benchmark import handling
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, vehicle_names
+from uuv_marl.scenario.turning import turning_radius
 from uuv_marl.sim.swarm import Swarm
 
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
@@ -41,6 +42,14 @@ def test_presteros_sums_without_the_munk_moment_turn_as_lift_with_it():
     np.testing.assert_allclose(*eigenvalues, rtol=1e-6)
     with pytest.raises(ScenarioError, match="N_uv = -24 .* adds energy .* give the lift's part alone"):
         load_scenario("tracking", overrides={"vehicle": "remus100+munk_on+sums"})
+
+
+@pytest.mark.parametrize("name", ["lauv", "remus100", "remus100+munk_on", "remus100+small_rudder"])
+def test_the_turning_radius_is_that_of_the_acceptance_test(name):
+    """That one turns at full thrust, which loses speed to the turn; a hull with linear damping turns wider then."""
+    alone = handling.alone(name)
+    radius = turning_radius(alone.vehicle, alone.actuators, alone.vehicle.cruise_mps)
+    assert radius == pytest.approx(handling.turn(alone)[2], rel=0.02)
 
 
 # --- Against SciPy, the sources' equations written anew ---

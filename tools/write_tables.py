@@ -6,7 +6,7 @@ from decimal import Decimal
 from pathlib import Path
 
 import uuv_marl
-from research.dynamics import acceptance, sea_trials
+from research.dynamics import acceptance
 from research.episodes import measured, read_rows, select
 from research.heldout import page as heldout
 from research.tasks.studies import set_name
@@ -24,7 +24,6 @@ NAMES = ("environment", "results", "scenarios", "tasks", "vehicles")
 PAGES = (ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in NAMES))
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
-TRIALS = read_rows(ROOT / "docs" / "sea-trials.csv.gz")
 TIERS = {task: read_rows(ROOT / "docs" / f"{task}.csv.gz") for task in ("hard_water", "two_swarms")}
 IN_TASKS = {
     "tangent_bug": "`tangent_bug` with yaw damping",
@@ -143,10 +142,8 @@ TABLES = filled() | {
     "vehicles": rows(acceptance.measures()),
     "figures": rows(acceptance.figures()),
     "stability": rows(acceptance.stability()),
-    "scales": rows(sea_trials.scales()),
     "heldout": HELD[0].rstrip("\n"),
     "fields": HELD[1].rstrip("\n"),
-    "sea_trials": rows(sea_trials.table(TRIALS)),
     "history": table(("version", "what changed"), list(uuv_swarm_v1.HISTORY.items())),
 }
 """The tables by the names of their marks."""

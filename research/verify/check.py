@@ -135,9 +135,7 @@ def _rerun(row: Row, report: Callable[[float], None]) -> Run:
         raise ResultsError(f"seed must be a whole number, got {row.cells['seed']!r}")
     source, seed = row.kind.source(row.cells), int(row.cells["seed"])
     with blaming(source.policy):
-        for event in evaluate(
-            granted(source.policy, source.scenario), source.policy, [seed], None, **source.parameters
-        ):
+        for event in evaluate(granted(source.policy, source.scenario), source.policy, [seed], None):
             if isinstance(event, Run):
                 return event
             report(event.share)

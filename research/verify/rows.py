@@ -3,12 +3,11 @@
 import csv
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from research.dynamics import sea_trials
 from research.episodes import Row as Cells
 from research.episodes import cells as told
 from research.episodes import read_text
@@ -22,7 +21,7 @@ from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.results import FILE, Content, knowledge, read_content
 from uuv_marl.benchmark.robustness import job as robustness
 from uuv_marl.benchmark.robustness.axes import AXES, CALM
-from uuv_marl.benchmark.suite import NOTHING, Case
+from uuv_marl.benchmark.suite import Case
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError
 from uuv_marl.scenario import Scenario, load_scenario
 
@@ -39,8 +38,6 @@ class Source(NamedTuple):
     scenario: Scenario
     """The scenario before it grants what the policy declares."""
     policy: str
-    parameters: Mapping[str, object] = NOTHING
-    """Parameters of the policy."""
 
 
 class Kind(NamedTuple):
@@ -108,7 +105,6 @@ def _kind(head: Sequence[str]) -> Kind | None:
     kinds: tuple[tuple[tuple[str, ...], Callable[[Cells], Source], str], ...] = (
         (("set", "policy", "seed"), _set, DIGITS),
         (("scenario", "axis", "level", "policy", "seed"), _robustness, robustness.DIGITS),
-        (("scenario", "vehicle", "policy", "seed"), _sea_trial, sea_trials.DIGITS),
         (("scenario", "policy", "seed"), _paper, paper.DIGITS),
     )
     if tuple(head) == (*_OF_LEARNERS, *learners.MEASURES):
@@ -126,7 +122,7 @@ def _written(measured: Sequence[str], digits: str, _: Cells, metrics: Metrics) -
 
 
 def _of(case: Case) -> Source:
-    return Source(case.load(), case.policy, case.parameters)
+    return Source(case.load(), case.policy)
 
 
 def _set(cells: Cells) -> Source:
@@ -162,10 +158,6 @@ def _robustness(cells: Cells) -> Source:
     if level not in levels.get(axis, ()):
         raise ResultsError(f"there is no level {level!r} of axis {axis!r} in this version")
     return _of(robustness.case_of(scenario, axis, int(level), cells["policy"]))
-
-
-def _sea_trial(cells: Cells) -> Source:
-    return _of(sea_trials.case(cells["scenario"], cells["vehicle"], cells["policy"]))
 
 
 def _paper(cells: Cells) -> Source:

@@ -11,8 +11,8 @@ from uuv_marl.scenario import Scenario
 def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenario) -> float:
     """The inner loop that a policy gets on a scenario's vehicle [N m s]: the declared one, scaled with full torque.
 
-    So on every vehicle the loop takes all torque at the same yaw rate, in the scenario's scale. But it is no stiffer
-    than a loop that stops a yaw rate within one control hold. For a vehicle with a rudder the loop is 0.
+    So on every vehicle the loop takes all torque at the same yaw rate. But it is no stiffer than a loop that stops a
+    yaw rate within one control hold. For a vehicle with a rudder the loop is 0.
 
     Args:
         declared_nms: the policy's ``yaw_damping_nms``.
@@ -22,13 +22,8 @@ def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenari
     actuators = scenario.actuators
     if actuators.kind == "rudder":
         return 0.0
-    alike = declared_nms * (actuators.max_torque_nm / full_torque_nm) * scenario.scale.units.time
+    alike = declared_nms * (actuators.max_torque_nm / full_torque_nm)
     return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_hold_s)
-
-
-def period_s(declared_s: float | None, scenario: Scenario) -> float | None:
-    """The period between decisions that a policy gets [s], in the scenario's scale; None if it is made for any."""
-    return declared_s and declared_s * scenario.scale.units.time
 
 
 def channels_in(scenario: Scenario, declared: Sequence[str]) -> list[str]:
@@ -65,7 +60,7 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
     damping = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
     if not scenario.timing.fixed and not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
         needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
-    period = period_s(policy.decides_every_s, scenario)
+    period = policy.decides_every_s
     if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
         needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
     if needs:

@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.grants import need_granted
 from uuv_marl.baselines.rudder import Rudder, steer_by_rudder
-from uuv_marl.baselines.units import Reader
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Clock, Percept, PerceptLayout
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario.scale import Scale
 from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import allocate
@@ -27,7 +25,7 @@ degrees, for which the catalogue's torpedoes need a second or two."""
 
 
 class Limits(NamedTuple):
-    """What a vehicle knows of itself: actuators' limits and surge resistance. SI units, or those of its scale."""
+    """What a vehicle knows of itself: actuators' limits and surge resistance. SI units."""
 
     max_force: float
     max_torque: float
@@ -93,11 +91,6 @@ class Policy:
         """The policy's name in messages."""
         if type(self).act is not Policy.act or type(self).decide is Policy.decide:
             raise PolicyError(f"policy {self.name!r} must define decide(percept), and leave act, which calls it, alone")
-        if scenario.scale != Scale():
-            raise PolicyError(
-                f"{self.name} computes in the paper's units, and scenario {scenario.name!r} is in the scale of "
-                f"{scenario.vehicle.name}; make it with uuv_marl.baselines.make(name, scenario), which converts units"
-            )
         need_granted(self.name, self, scenario)
         if num_worlds < 1:
             raise PolicyError(f"num_worlds must be at least 1, got {num_worlds}")
@@ -110,8 +103,6 @@ class Policy:
         self.limits = Limits.of(scenario)
         self.rudder = Rudder.of(scenario) if self.wishes_force else None
         """Turns wished forces into actions; None where the policy gives actions itself."""
-        self.reader: Reader | None = None
-        """Takes percepts into the policy's units; None where they are in them. ``make`` sets it."""
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)
         """How often a numerical clamp bound since the reset, shape (world,)."""
         self.active: Bool = np.ones(num_worlds, np.bool_)
@@ -170,14 +161,12 @@ class Policy:
         Raises:
             PolicyError: the percept is of another swarm; or the policy has a memory and a decision was left out.
         """
-        if self.reader is not None:
-            percept = self.reader.read(percept)
         self.hear(percept)
         return self.drive(percept, self.decide(percept))
 
     @final
     def hear(self, percept: Percept) -> None:
-        """Remember what is perceived, in the policy's units, where it is new: before ``decide``."""
+        """Remember what is perceived, where it is new: before ``decide``."""
         if self.Memory is not None:
             self.flat(percept)
             self.remember(percept, self._advance(percept.clock))
@@ -306,8 +295,7 @@ def tuned(name: str, what: str = "") -> Mapping[str, float]:
 
     Args:
         name: the policy's name.
-        what: a vehicle, for parameters that were found in its scale, or a task; "" for the paper's vehicle and task, or
-            the task that the policy is made for.
+        what: the task for which they were found; "" for the paper's, or the one that the policy is made for.
 
     Raises:
         PolicyError: the policy was not tuned.

@@ -15,7 +15,7 @@ from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
 from uuv_marl.baselines.comparators.pull import Pull
 from uuv_marl.baselines.env_policy import EnvPolicy, HasSwarm, environment
-from uuv_marl.baselines.grants import channels_in, inner_loop_nms, need_granted, period_s
+from uuv_marl.baselines.grants import channels_in, inner_loop_nms
 from uuv_marl.baselines.learned.around import Around
 from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained, shipped
@@ -29,7 +29,6 @@ from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.baselines.scout.carrot import Carrot, CarrotInformed
 from uuv_marl.baselines.scout.law import Scout
 from uuv_marl.baselines.scout.seeker import NearestTarget
-from uuv_marl.baselines.units import Reader, in_own_units
 from uuv_marl.errors import ScenarioError
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
@@ -168,7 +167,7 @@ def granted_to(name: str, declared: Any, scenario: Scenario) -> Scenario:
         loop = inner_loop_nms(declared.yaw_damping_nms, declared.full_torque_nm, scenario)
         usual = timing.control_hold_s if timing.fixed else timing.decision_period_s
         changes["actuators.yaw_damping_nms"] = loop
-        changes["timing.decision_period_s"] = period_s(declared.decides_every_s, scenario) or usual
+        changes["timing.decision_period_s"] = declared.decides_every_s or usual
         changes["timing.fixed"] = False
     try:
         return load_scenario(scenario, overrides=changes)
@@ -198,21 +197,10 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
     """
     kind, written = parse_policy(name)
     if isinstance(target, Scenario):
-        return _in_units(name, kind, target, num_worlds, {**written, **parameters})
+        return _made(name, kind, target, num_worlds, {**written, **parameters})
     scenario, swarm, agents = environment(target, name)
-    policy = _in_units(name, kind, scenario, swarm.num_worlds, {**written, **parameters})
+    policy = _made(name, kind, scenario, swarm.num_worlds, {**written, **parameters})
     return EnvPolicy(policy, swarm, agents)
-
-
-def _in_units(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
-    """The policy, made for a scenario in the units of its scale, and reading percepts in them. See ``_made``."""
-    reader = Reader.of(scenario)
-    if reader is None:
-        return _made(name, kind, scenario, num_worlds, parameters)
-    need_granted(name, kind, scenario)
-    policy = _made(name, kind, in_own_units(scenario), num_worlds, parameters)
-    policy.reader = reader
-    return policy
 
 
 def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:

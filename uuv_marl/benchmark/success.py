@@ -51,8 +51,7 @@ class SuccessRecorder:
         """Look at the swarm after a reset or step of the ``active`` worlds."""
         swarm, facts = self._swarm, self._swarm.facts
         self._failed |= active[:, None] & facts.lost & (facts.contacts == 0)
-        grace = GRACE_S * swarm.scenario.scale.units.time
-        now = active & ~self._judged & (facts.time_s >= swarm.duration_s + grace - 1e-9)
+        now = active & ~self._judged & (facts.time_s >= swarm.duration_s + GRACE_S - 1e-9)
         there = now[:, None] & swarm.state.alive
         self._offset[there] = (swarm.state.eta[:, :, :2] - swarm.own_reference[:, :, :2])[there]
         self._judged |= now
@@ -67,7 +66,7 @@ class SuccessRecorder:
             )
         safe, offset = ~self._swarm.state.touched[world, healthy], self._offset[world, healthy]
         done = np.hypot(*offset.T) <= self._spread
-        centred = bool(np.hypot(*offset.mean(axis=0)) <= CENTRE_M * self._swarm.scenario.scale.length)
+        centred = bool(np.hypot(*offset.mean(axis=0)) <= CENTRE_M)
         return Success(
             success_share=float((safe & done).mean()),
             safe_share=float(safe.mean()),

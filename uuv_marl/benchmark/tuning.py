@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
-from urllib.parse import quote
 
 from uuv_marl.atomic import replacing, write_text
 from uuv_marl.baselines import granted
@@ -20,7 +19,6 @@ from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 from uuv_marl.baselines.scout import seeker
 from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.errors import PolicyError
 from uuv_marl.extras import silenced
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario, load_scenario
@@ -29,8 +27,6 @@ TRIALS = 300
 SEEDS = (10_000, 10_001, 10_002, 10_003)
 """Seeds of the tuning range 10,000-99,999; the benchmark never uses them."""
 SCENARIO = "single_obstacle"
-SCALED = "sea_trial"
-"""Where policies are tuned in the scale of a vehicle."""
 WALLS, GAP, FEW, SILENT = "hard_water", "two_swarms", "few_informed", "silent_targets"
 """Tasks that policies are tuned for."""
 MAPS = tuple(range(10_000, 10_024))
@@ -120,24 +116,21 @@ SPACES: dict[str, Space] = {
 def tuning_cost(run: Run, scenario: Scenario) -> float:
     """What tuning minimises for one seed [s]: the task time, or more than the time limit if the swarm fails.
 
-    A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. On a
-    scenario in a vehicle's scale these seconds and metres are those of its scale. In a task of its own it is the
-    episode's time, and 1000 s for the share of vehicles that touched something or did not come to the goal; where
-    targets are to be held, 1000 s for the share that is not.
+    A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. In a
+    task of its own it is the episode's time, and 1000 s for the share of vehicles that touched something or did not
+    come to the goal; where targets are to be held, 1000 s for the share that is not.
     """
-    unit = scenario.scale.units
     metrics = run.metrics
     own = metrics.get("task", {})
     if (share := own.get("held_share")) is not None:
         return _FAILURE_COST_S * (1.0 - share)
     if (share := own.get("untouched_share")) is not None:
-        return float(run.routes.time_s[-1]) / unit.time + _FAILURE_COST_S * (1.0 - share)
+        return float(run.routes.time_s[-1]) + _FAILURE_COST_S * (1.0 - share)
     time, clearance = metrics["task_time_s"], metrics["min_obstacle_distance_m"]
     if time is None:
-        time = scenario.time_limit.of(metrics["duration_s"])
-        time += (metrics["centre_error_m"] or 0.0) / unit.length * unit.time
+        time = scenario.time_limit.of(metrics["duration_s"]) + (metrics["centre_error_m"] or 0.0)
     short = 0.0 if clearance is None else max(0.0, scenario.constraints.s_o_m - clearance)
-    return time / unit.time + _COLLISION_COST_S * metrics["collisions"] + _CLEARANCE_COST_S_PER_M * short / unit.length
+    return time + _COLLISION_COST_S * metrics["collisions"] + _CLEARANCE_COST_S_PER_M * short
 
 
 def search(
@@ -185,34 +178,25 @@ def search(
     return study.get_trials(states=(TrialState.COMPLETE,))
 
 
-def tune(
-    policy: str, output: UserPath, trials: int, report: Callable[[int, float], None], vehicle: str | None = None
-) -> Path:
+def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, float], None]) -> Path:
     """Search a policy's parameters; after an interruption the same call continues. Needs the extra ``tune``.
 
     Writes ``output/POLICY.json`` with the best parameters and ``POLICY.csv`` with every trial, and keeps Optuna's
     journal beside them, which Optuna unpickles: continue only a journal that you trust.
 
     Args:
-        policy: a name of ``SPACES``; with ``vehicle`` none for a task, ``POLICY.TASK``.
+        policy: a name of ``SPACES``, which say the scenario.
         output: folder of the files.
         trials: to reach in all, those before an interruption included.
         report: called with the number of trials done and the best cost [s].
-        vehicle: the vehicle to tune for, in its scale (``sea_trial``); the files are then ``POLICY.VEHICLE.json``
-            and ``.csv``. None: the paper's vehicle on ``single_obstacle``, or on the scenario of the policy's space.
     """
     import optuna  # noqa: PLC0415 - an extra
 
     output = user_path(output)
     space, name, policy = SPACES[policy], policy, policy.partition(".")[0]
-    where, changes = (space.scenario, {}) if vehicle is None else (SCALED, {"vehicle": vehicle, "scale": "vehicle"})
-    scenario = granted(policy, load_scenario(where, overrides=changes))
-    own_task = where not in (SCENARIO, SCALED)
+    where, own_task = space.scenario, space.scenario != SCENARIO
+    scenario = granted(policy, load_scenario(where))
     seeds = SEEDS if not own_task else MAPS[: FEWER.get(where, len(MAPS))]
-    if vehicle is not None:
-        if "." in name:
-            raise PolicyError(f"{name!r} is tuned for a task with the paper's vehicle; leave out the vehicle")
-        name = f"{policy}.{quote(vehicle, safe='')}"
 
     def objective(trial: optuna.Trial) -> float:
         drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.free.items()}
@@ -228,7 +212,6 @@ def tune(
         "policy": policy,
         "objective": OBJECTIVES[own_task + (where == SILENT)],
         "scenario": where,
-        **({} if vehicle is None else {"vehicle": vehicle}),
         "seeds": list(seeds),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
         "space": {name: r._asdict() for name, r in space.free.items()},

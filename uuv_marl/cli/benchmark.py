@@ -126,9 +126,6 @@ def tune_command(
     policy: Annotated[list[str] | None, typer.Option(help="Name. Repeat it for several. Default: all.")] = None,
     trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
     output: Annotated[Path, path_option("Folder for the trials.")] = Path("results/tune"),
-    vehicle: Annotated[
-        str | None, typer.Option(help="Tune on this vehicle, in its scale. Default: the paper's vehicle.")
-    ] = None,
 ) -> None:
     """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
 
@@ -140,9 +137,7 @@ def tune_command(
         from uuv_marl.baselines import PolicyError
         from uuv_marl.benchmark.tuning import SPACES, tune
 
-        names = policy or [
-            name for name in SPACES if vehicle is None or "." not in name
-        ]  # these have scenarios of their own
+        names = policy or [*SPACES]
         for name in names:
             if name not in SPACES:
                 raise PolicyError(f"policy {name!r} has no free gains to tune; choose one of {', '.join(SPACES)}")
@@ -150,5 +145,5 @@ def tune_command(
             for name in names:
                 line = progress_line(bar, name, trials)
                 report = lambda done, best, line=line, name=name: line(done, f"{name}: best {best:.1f} s")  # noqa: E731
-                path = tune(name, output, trials, report, vehicle)
+                path = tune(name, output, trials, report)
                 say(path)

@@ -109,7 +109,6 @@ class SwarmTask(Task):
     FEW_INFORMED = None
     FEW_INFORMED_HARD = None
     TRAINING_FIELD = None
-    SEA_TRIAL = None
     TRACKING = None
     SINGLE_OBSTACLE = None
     MULTI_OBSTACLE = None

@@ -16,14 +16,11 @@ from uuv_marl.scenario.documents import File, items, merged, read_toml
 from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
 from uuv_marl.scenario.overrides import assign, leaves, plain
-from uuv_marl.scenario.scale import Scale, in_scale
 from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.vehicle_files import left_out, load_vehicle, variant_comments, vehicle_file
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
-_OWN = ("vehicle", "actuators")
-"""What a scenario's scale follows from, so that it is changed before all else."""
 
 
 def scenario_names() -> list[str]:
@@ -55,8 +52,6 @@ def load_scenario(
             may be those of NumPy, torch or OmegaConf. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and
             lags, and ``{"vehicle": "remus100+munk_on"}`` takes a variant of it; where the scenario fixes the inner
             loop for all (``timing.fixed``), another vehicle has none unless an override gives it.
-            ``{"scale": "vehicle"}`` multiplies lengths, speeds and times by the vehicle's
-            (``uuv_marl.scenario.scale``); what other overrides give is not multiplied.
 
     Raises:
         ScenarioError: names the field, the value and the remedy.
@@ -68,16 +63,12 @@ def load_scenario(
         data = _data(scenario)
         # Whole tables before their entries, and a vehicle before its numbers, however they are ordered.
         ordered = sorted((overrides or {}).items(), key=lambda one: (str(one[0]) != "vehicle", str(one[0]).count(".")))
-        changes = {str(field): plain(value) for field, value in ordered}
-        own = {field: changes.pop(field) for field in list(changes) if field.partition(".")[0] in _OWN}
-        for field, value in own.items():
+        for field, value in ((str(field), plain(value)) for field, value in ordered):
             if field == "vehicle" and isinstance(value, str):
                 data = _of_vehicle(merged(data, load_vehicle(value)), data)
-            else:
-                data["vehicle"] = (left_out(value) if field == "vehicle" else None) or data["vehicle"]
-                assign(data, field, value)
-        data = _scaled(data, changes)
-        for field, value in changes.items():
+                continue
+            if field == "vehicle" and (below := left_out(value)):
+                data["vehicle"] = below
             assign(data, field, value)
         if num_vehicles is not None:
             assign(data, "swarm.num_vehicles", plain(num_vehicles))
@@ -88,22 +79,6 @@ def load_scenario(
         raise ScenarioError(
             f"scenario {shown(scenario)} or its overrides are nested too deeply; flatten them"
         ) from None
-
-
-def _scaled(data: dict[str, Any], changes: dict[str, object]) -> dict[str, Any]:
-    """The fields in the vehicle's scale, where a file or an override (which is taken out) says so."""
-    before = data.get("scale", {})
-    wanted = changes.pop("scale") if isinstance(changes.get("scale"), str) else before
-    if not isinstance(wanted, str):
-        return data
-    if wanted != "vehicle":
-        raise ScenarioError(f"scale must be 'vehicle', or a table of fields, got {shown(wanted)}")
-    try:
-        return in_scale(data, Scale.model_validate(before if isinstance(before, dict) else {}))
-    except ValidationError:
-        return {**data, "scale": {}}  # the check of the whole names the field that is wrong
-    except ValueError as error:
-        raise ScenarioError(str(error)) from None
 
 
 def to_toml(scenario: Scenario) -> str:
@@ -198,8 +173,6 @@ def _data(scenario: Any) -> dict[str, Any]:
         before, below = data, left_out(file.data.get("vehicle"))
         if below is not None:
             data = {**data, "vehicle": below}
-        if isinstance(file.data.get("scale"), str) and isinstance(data.get("scale"), dict):
-            raise ScenarioError(f"{file.path} extends a scenario that is in scale already; leave scale out")
         data = _of_vehicle(merged(data, file.data), before)
     data.pop("extends", None)
     return {**data, "name": path.stem}

@@ -61,7 +61,7 @@ class Vehicle(Section):
     munk_moment: bool = True
     """Whether added masses count in C(nu) (Eq. 4), which turn a hull across its way. Inertia has them always."""
     length_m: Positive | None = None
-    """Length of the hull. This and the cruise speed give the vehicle's scale (``uuv_marl.scenario.scale``)."""
+    """Length of the hull."""
     cruise_mps: Speed | None = None
     """The speed that it is made for; a rudder's steerage way is a share of it."""
     max_mps: Speed | None = None

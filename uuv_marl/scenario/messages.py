@@ -51,7 +51,7 @@ def explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
 def _nearest(location: Sequence[str | int]) -> str:
     """What an unknown field may mean: the same name elsewhere, else a like one here, else a like one elsewhere."""
     last, prefix = str(location[-1]), "".join(f"{0 if isinstance(part, int) else part}." for part in location[:-1])
-    every = [field for field in _fields(Scenario) if not field.startswith("scale.")]  # which nobody writes by hand
+    every = list(_fields(Scenario))
     here = dict.fromkeys(field.removeprefix(prefix).partition(".")[0] for field in every if field.startswith(prefix))
     leaves = {field.rpartition(".")[2]: field for field in reversed(every)}
     told = ".".join(map(str, (*location[:-1], "")))

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from uuv_marl.scenario import fields, hardware, sea, sections
-from uuv_marl.scenario.scale import Scale
 from uuv_marl.scenario.task import TaskSettings, check_channels, check_task, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
@@ -36,8 +35,6 @@ class Scenario(fields.Section):
     """Where the scenario comes from."""
     version: Annotated[int, fields.within(1, 1_000_000)]
     """Raised by any change of its numbers."""
-    scale: Scale = Scale()
-    """Scale of its vehicle over the paper's, where the file says ``scale = "vehicle"``."""
     swarm: sections.SwarmSize
     start: sections.Start
     trajectory: sections.Trajectory

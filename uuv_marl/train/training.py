@@ -20,7 +20,6 @@ from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import assign, plain
-from uuv_marl.scenario.scale import Scale
 
 _PERIOD, _LOOP, _LOOP_NMS = "timing.decision_period_s", "actuators.yaw_damping_nms", 600.0
 OVERRIDES: Mapping[str, object] = {_PERIOD: 0.5, _LOOP: _LOOP_NMS}
@@ -235,17 +234,11 @@ def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]
         own: go before the others; they may name another vehicle.
 
     Raises:
-        ScenarioError: the scenario can't be loaded with them, or is in a vehicle's scale, in whose units learners do
-            not read percepts.
+        ScenarioError: the scenario can't be loaded with them.
     """
-    # Before the decision period, which is no multiple of a hold in another scale, so that the scale is what is named.
+    # With a hold of one's own the scenario's decision period may be no multiple of it; the training's takes its place.
     clock = OVERRIDES if "timing.control_hold_s" in own else {}
     bare = load_scenario(scenario, overrides={**clock, **own, _LOOP: own.get(_LOOP, 0.0)})
-    if bare.scale != Scale():
-        raise ScenarioError(
-            f"scale = 'vehicle' puts scenario {bare.name!r} into the scale of {bare.vehicle.name}, which training "
-            "does not know; leave scale out, and set trajectory.speed_mps and start.speed_max_mps"
-        )
     if bare.timing.fixed:
         return dict(own)
     return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, Policy.full_torque_nm, bare), **own}

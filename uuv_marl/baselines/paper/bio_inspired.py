@@ -80,20 +80,12 @@ class BioInspiredPlus(BioInspired):
 
     Args:
         gains: those that were tuned by default.
-        tuned_for: a vehicle of the catalogue, in whose scale they were tuned; "" for the paper's.
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        num_worlds: int = 1,
-        *,
-        gains: BioInspiredGains | None = None,
-        tuned_for: str = "",
-    ) -> None:
-        found = gains or BioInspiredGains(**tuned("bio_inspired_plus", tuned_for), feed_forward=FEED_FORWARD)
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: BioInspiredGains | None = None) -> None:
+        found = gains or BioInspiredGains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)
         super().__init__(scenario, num_worlds, gains=found)
 
 

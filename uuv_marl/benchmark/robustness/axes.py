@@ -65,17 +65,14 @@ def _axis(name: str, told: dict[str, Any]) -> Axis:
 _TOLD = tomllib.loads((resources.files("uuv_marl.benchmark.robustness") / "axes.toml").read_text(encoding="utf-8"))
 BASE: dict[str, Any] = _TOLD["base"]
 """Fields of every scenario of the suite, at level 0 too."""
-_EXTRA = "time_limit.extra_s"
-"""Success is judged so long after l(t) has ended, in a vehicle's scale longer (``benchmark.success``)."""
 AXES = {name: _axis(name, told) for name, told in _TOLD["axes"].items()}
 """All axes by name, in the order of the report."""
 
 
 def overrides(axis: str, level: int, scenario: str) -> dict[str, object]:
     """The fields of a scenario that a cell of the suite changes."""
-    loaded = load_scenario(scenario)
-    base = BASE | {_EXTRA: BASE[_EXTRA] * loaded.scale.units.time}
-    return base if axis == CALM else base | AXES[axis].overrides(level, loaded.trajectory.speed_mps)
+    speed_mps = load_scenario(scenario).trajectory.speed_mps
+    return BASE | ({} if axis == CALM else AXES[axis].overrides(level, speed_mps))
 
 
 def known(names: Sequence[str]) -> list[str]:

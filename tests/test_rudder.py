@@ -1,4 +1,4 @@
-"""Policies in the units of a vehicle's scale, and from a wished force to a rudder."""
+"""From a wished force to a rudder, and policies on vehicles other than the paper's."""
 
 import math
 import re
@@ -6,64 +6,25 @@ import re
 import numpy as np
 import pytest
 
-from tests.conftest import COUPLED, LIFT
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, granted, make
 from uuv_marl.baselines.grants import inner_loop_nms
-from uuv_marl.baselines.paper.bio_inspired import BioInspired
 from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.scenario.dimensions import converted
-from uuv_marl.scenario.scale import Scale
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.training import overrides_for
 
-POLICIES = (
-    "bio_inspired", "bio_inspired_plus", "scout", "sff", "sdc", "apf", "olfati_saber", "orca_informed",
-    "pull", "mappo", "guarded:bio_inspired_plus", "guarded:mappo",
-)  # fmt: skip
-RUDDER = LIFT | {
-    "actuators.kind": "rudder", "actuators.Y_uud": 100.0, "actuators.N_uud": -90.0, "actuators.rudder_max_deg": 20.0,
-    "actuators.max_astern_n": 100.0, "arrival.by": "passage",
-}  # fmt: skip
-LAGGING = COUPLED | {"current.speed_mps": 0.25, "actuators.thrust_lag_s": 0.25, "actuators.yaw_lag_s": 0.25}
-SHORT = {"random_field.legs": [1, 1], "random_field.leg_length_m": [250.0, 250.0]}
 
-
-def alike(scenario, length, speed, force):
-    """The scenario with a vehicle that is its own in all but its size, in that vehicle's scale."""
-    scale = Scale(length=length, speed=speed, force=force)
-    return converted(scenario, scale.units).model_copy(update={"scale": scale})
-
-
-# --- Similarity ---
-
-
-@pytest.mark.parametrize("scale", [(2.0, 2.0, 16.0), (0.5, 2.0, 1.0), (4.0, 0.5, 0.25)])
-@pytest.mark.parametrize(
-    ("policy", "vehicle"), [*((name, {}) for name in POLICIES), ("scout,preset=lead", LAGGING), ("scout", RUDDER)]
-)
-def test_a_vehicle_that_is_alike_swims_alike_bit_for_bit(policy, vehicle, scale):
-    """By powers of two, so that nothing is rounded otherwise: the same places over L and velocities over V."""
-    plain = load_scenario("random_field", num_vehicles=9, overrides={**SHORT, **vehicle})
-    scenarios = granted(policy, plain), granted(policy, alike(plain, *scale))
-    swarms = [Swarm(scenario) for scenario in scenarios]
-    policies = [make(policy, scenario) for scenario in scenarios[:1]]
-    policies.append(make(policy, scenarios[1]))
-    percepts = [swarm.reset(10_003) for swarm in swarms]
-    for actor in policies:
-        actor.reset(10_003)
-    length, speed, _ = scale
-    for _ in range(150):
-        actions = [actor.act(percept) for actor, percept in zip(policies, percepts, strict=True)]
-        np.testing.assert_array_equal(*actions)
-        percepts = [swarm.step(action) for swarm, action in zip(swarms, actions, strict=True)]
-        np.testing.assert_array_equal(swarms[1].state.eta, swarms[0].state.eta * [length, length, 1.0])
-        np.testing.assert_array_equal(swarms[1].state.nu, swarms[0].state.nu * [speed, speed, speed / length])
-    assert swarms[1].facts.time_s[0] == swarms[0].facts.time_s[0] * length / speed
-    np.testing.assert_array_equal(swarms[1].facts.effort, swarms[0].facts.effort)
+def with_vehicle(vehicle, num_vehicles=1, speed=1.5):
+    """The paper's obstacle at a speed of the vehicle."""
+    return load_scenario(
+        "single_obstacle", num_vehicles=num_vehicles, overrides={
+            "vehicle": vehicle, "trajectory.speed_mps": speed, "start.speed_max_mps": speed,
+            "timing.integration_step_s": 0.025, "arrival.by": "passage",
+        },
+    )  # fmt: skip
 
 
 # --- The rudder ---
@@ -79,7 +40,7 @@ def helm(scenario, force, u):
     return action[0, 0].tolist()
 
 
-LAUV = load_scenario("sea_trial", num_vehicles=1, overrides={"vehicle": "lauv", "scale": "vehicle"})
+LAUV = with_vehicle("lauv")
 
 
 @pytest.mark.parametrize("u", [0.75, 1.0, 1.5, 1.9])
@@ -102,8 +63,7 @@ def test_a_rudder_turns_the_bow_to_a_force_astern_and_keeps_steerage_way():
     resistance = (hull.X_u + hull.X_uu * STEERAGE * cruise) * STEERAGE * cruise
     assert thrust * LAUV.actuators.max_force_n == pytest.approx(resistance)
     assert helm(LAUV, (0.0, 0.1), 0.0)[1] == helm(LAUV, (0.0, 0.1), slow)[1] < 1.0, "flow is bounded below"
-    remus = load_scenario("sea_trial", num_vehicles=1, overrides={"vehicle": "remus100", "scale": "vehicle"})
-    assert helm(remus, (-0.7, 0.0), 1.5)[0] == pytest.approx(-0.7), "it has thrust astern"
+    assert helm(with_vehicle("remus100"), (-0.7, 0.0), 1.5)[0] == pytest.approx(-0.7), "it has thrust astern"
 
 
 @pytest.mark.parametrize("wished", [(1.0, 0.0), (1.0, 0.4), (-1.0, 0.5), (0.2, -3.0)])
@@ -120,11 +80,9 @@ def test_to_a_wished_velocity_a_rudder_turns_by_the_angle_whatever_the_hull_slip
 
 
 @pytest.mark.parametrize("name", ["lauv", "remus100"])
-@pytest.mark.parametrize("policy", ["bio_inspired", "scout"])
-def test_torpedoes_pass_the_sea_trial_without_a_collision(policy, name):
-    scenario = load_scenario("sea_trial", num_vehicles=12, overrides={"vehicle": name, "scale": "vehicle"})
-    scenario = granted(policy, scenario)
-    swarm, actor = Swarm(scenario), make(policy, scenario)
+def test_torpedoes_pass_an_obstacle_without_a_collision(name):
+    scenario = granted("scout", with_vehicle(name, num_vehicles=12))
+    swarm, actor = Swarm(scenario), make("scout", scenario)
     percept, collisions = swarm.reset(10_000), 0
     actor.reset(10_000)
     while not swarm.ended[0]:
@@ -143,15 +101,13 @@ class Acts(Policy):
 
 
 def test_bad_combinations_are_refused_with_the_remedy():
-    with pytest.raises(PolicyError, match="computes in the paper's units, .* make it with uuv_marl.baselines.make"):
-        BioInspired(LAUV)
     with pytest.raises(PolicyError, match=r"'Acts' must define decide\(percept\), and leave act, .* alone"):
-        make("tests.test_units:Acts", LAUV)
+        make("tests.test_rudder:Acts", LAUV)
     with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
         make("mappo", granted("mappo", LAUV))
-    rov = load_scenario("sea_trial", overrides={"vehicle": "bluerov2_heavy", "scale": "vehicle"})
+    rov = with_vehicle("bluerov2_heavy", speed=0.5)
     needed = re.escape(f"a yaw damping of {inner_loop_nms(600.0, 3000.0, rov):g} N m s")
-    with pytest.raises(PolicyError, match=f"scout needs {needed}"):
+    with pytest.raises(PolicyError, match=f"Scout needs {needed}"):
         make("scout", rov)
 
 
