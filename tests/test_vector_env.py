@@ -252,6 +252,11 @@ def test_solo_drops_no_override(others, overrides, message):
         SoloEnv(STARTER, others, overrides=overrides)
     with pytest.raises(ScenarioError, match="can't be 0.1: with 'mappo' all vehicles have 0.5"):  # though it is usual
         SoloEnv(STARTER, "mappo", decision_period=0.1)
+    with pytest.raises(ScenarioError, match="can't be 0.1: with 'mappo' all vehicles have 0.5"):
+        SoloEnv(STARTER, "mappo", overrides={"timing": uuv_marl.load_scenario(STARTER).timing})
+    hearing = uuv_marl.load_scenario(STARTER, overrides={"sonar.channels": ["compass"]})
+    with pytest.raises(ScenarioError, match="can't hold compass: with 'bio_inspired' the learner has no"):
+        SoloEnv(hearing, "bio_inspired", overrides={"sonar.channels": ["compass"]})
     with pytest.raises(TypeError, match="others must be the name of a policy, or module:Class, got None"):
         SoloEnv(STARTER, None)
     with pytest.raises(baselines.PolicyError, match="another vehicle"):  # and not for a period that nobody asked for
