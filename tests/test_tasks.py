@@ -330,6 +330,14 @@ def test_a_users_task_runs_in_other_libraries(library):
 
 
 @pytest.mark.needs("torch")
+def test_a_task_of_the_follow_kind_is_judged_as_follow_though_it_measures_more():
+    from uuv_marl.train.validation import shares_of
+
+    metrics = {"task_time_s": 30.0, "collisions": 0}
+    assert shares_of(metrics, "untouched_share") == shares_of(metrics | {"task": {"mine_m": 1.0}}, "untouched_share")
+
+
+@pytest.mark.needs("torch")
 def test_a_users_task_is_trained_and_the_policy_runs(tmp_path):
     from uuv_marl.train.run import train
     from uuv_marl.train.training import Training
