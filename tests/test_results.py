@@ -16,11 +16,12 @@ from uuv_marl import atomic, load_scenario
 from uuv_marl.atomic import locked
 from uuv_marl.benchmark import load, load_trace, runner
 from uuv_marl.benchmark.evaluate import Routes, Run, evaluate
-from uuv_marl.benchmark.metrics import Metrics, Sample, Shares
+from uuv_marl.benchmark.metrics import Metrics, Sample
 from uuv_marl.benchmark.results import Content, Knowledge, ResultRow, Results, trace_path
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
+from uuv_marl.tasks.measures import Shares
 
 QUICK = {"time_limit.factor": 0.01, "time_limit.extra_s": 2.0, "swarm.num_vehicles": 5}
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmark.md"
@@ -77,7 +78,7 @@ def test_a_folder_in_the_place_of_the_file_is_refused(tmp_path):
 def test_results_of_another_task_of_the_user_s_are_refused(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     file = tmp_path / "my_task.py"
-    file.write_text("from uuv_marl.tasks import Task\n\n\nclass Mine(Task):\n    pass\n")
+    file.write_text("from uuv_marl.tasks import Task\n\n\nclass Mine(Task):\n    there = Task.came\n")
     scenario = load_scenario("starter", overrides={"task": "my_task:Mine"})
     (run,) = (run for run in evaluate(quick(), "idle", [0]) if isinstance(run, Run))
     Results(tmp_path / "out", [scenario]).add("starter", "idle", run)

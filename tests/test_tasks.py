@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -19,9 +20,11 @@ from uuv_marl.benchmark.frame import load
 from uuv_marl.cli import app
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import RewardError, ScenarioError
+from uuv_marl.percept import FLAG, PerceptField
 from uuv_marl.sim.draw import usual_draw
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import Task
+from uuv_marl.tasks.measures import MEASURED
 
 EXAMPLE = "examples.extending.task:Rendezvous"
 
@@ -57,7 +60,14 @@ def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
     assert not batch.swarm.facts.reference[..., 2:].any()
 
 
-class TwoWays(Task):
+class Survive(Task):
+    """All are where they should be."""
+
+    def there(self):
+        return np.ones_like(self.swarm.state.alive)
+
+
+class TwoWays(Survive):
     """Two groups, the second led by the mirror image of l(t); a vehicle of each knows nothing; an obstacle drifts."""
 
     @classmethod
@@ -78,14 +88,14 @@ class TwoWays(Task):
         self.swarm.course.obstacle_velocity[running, 0] = (0.0, 2.0)
 
 
-class Endless(Task):
+class Endless(Survive):
     """Draws a longer way than it says."""
 
     def draw(self, world, rng):
         return usual_draw(self.swarm.scenario, rng)._replace(duration_s=1e4)
 
 
-class Broken(Task):
+class Broken(Survive):
     """Pays what it does not declare."""
 
     terms = {"one": "1"}  # noqa: RUF012
@@ -94,6 +104,7 @@ class Broken(Task):
         return {"two": np.zeros((1, 5))}
 
 
+BRIEF = {"time_limit.factor": 0.02, "time_limit.extra_s": 1.0}
 TWO = {"task": f"{__name__}:TwoWays"}
 
 
@@ -191,6 +202,43 @@ def test_a_task_that_can_not_be_is_refused_by_field_value_and_remedy(task, messa
         load_scenario("starter", overrides={"task": task})
 
 
+NEAR = PerceptField("near", (1,), FLAG, "1 within 10 m")
+
+
+@pytest.mark.parametrize(("base", "own", "message"), [
+    (Task, {}, "must define there(), the vehicles that are where they should be"),
+    (Survive, {"columns": {"collisions": "", "mine_m": ""}}, "can't have collisions in columns: the name is taken"),
+    (Survive, {"columns": {"constraint_share_all": ""}}, "can't have constraint_share_all in columns"),
+    (Survive, {"observed": (NEAR._replace(name="heard"),)}, "can't have heard in observed or channels"),
+    (Survive, {"observed": (NEAR,), "channels": {"sight": (NEAR,)}}, "can't have near in observed or channels"),
+    (Survive, {"channels": {"compass": (NEAR,)}}, "can't have compass in channels"),
+    (Survive, {"rewards": ("dense", "team")}, "can't have team in rewards"),
+])  # fmt: skip
+def test_a_task_that_says_nothing_of_success_or_takes_a_name_twice_is_refused_by_it(monkeypatch, base, own, message):
+    monkeypatch.setattr(sys.modules[__name__], "Unfit", type("Unfit", (base,), own), raising=False)
+    with pytest.raises(ScenarioError, match=re.escape(f"task Unfit {message}")):
+        load_scenario("starter", overrides={"task": f"{__name__}:Unfit"})
+
+
+def test_a_task_may_say_who_succeeds_without_saying_where(monkeypatch):
+    own = {"succeeded": lambda task: task.swarm.state.alive.copy()}
+    monkeypatch.setattr(sys.modules[__name__], "Fit", type("Fit", (Task,), own), raising=False)
+    assert load_scenario("starter", overrides={"task": f"{__name__}:Fit"}).task_class.headline == "untouched_share"
+
+
+@pytest.mark.parametrize(("own", "more", "message"), [
+    ({"min_spacing_m": 1.0, "untouched_share": 1.0, "whole": 1.0}, {}, "can't give min_spacing_m in metrics: the name"),
+    ({"mine_m": 1.0}, {}, "must give untouched_share, whole in metrics; add to super"),
+    ({"untouched_share": 1.0, "whole": 1.0}, {"headline": "mine_share"}, "must give mine_share in metrics"),
+])  # fmt: skip
+def test_metrics_that_would_be_hidden_or_missed_are_refused_at_the_first_episodes_end(monkeypatch, own, more, message):
+    wrong = type("Wrong", (Survive,), {"metrics": lambda task, world: own, **more})
+    monkeypatch.setattr(sys.modules[__name__], "Wrong", wrong, raising=False)
+    scenario = load_scenario("starter", overrides={"task": f"{__name__}:Wrong", **BRIEF})
+    with pytest.raises(ScenarioError, match=f"task Wrong {message}"):
+        list(evaluate(scenario, "idle", [0]))
+
+
 def test_numbers_that_a_task_needs_are_missed_when_a_swarm_is_made():
     with pytest.raises(ScenarioError, match="task.kinds is missing; a task by name takes it as in"):
         uuv_marl.parallel_env("starter", task="hard_water")
@@ -239,9 +287,9 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     text = (tmp_path / "out" / "table.md").read_text()
     assert "| spread_m |" in text
     assert "spread_m: mean distance from the centre at the end [m]." in text
-    np.testing.assert_array_equal(
-        load(tmp_path / "out")["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs]
-    )
+    frame = load(tmp_path / "out")
+    np.testing.assert_array_equal(frame["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs])
+    assert {*frame.columns} <= {"spread_m", "untouched_share", "whole", *MEASURED}
     assert _outcome(runs[0]["metrics"]).startswith("0% untouched and there, ")
     done = CliRunner().invoke(app, ["replay", *how, "--output", str(tmp_path / "replay.html")])
     assert done.exit_code == 0, done.output
@@ -278,6 +326,14 @@ def test_a_users_task_runs_in_other_libraries(library):
         assert (data["next", "uuv", "reward"] < 0.0).all()
         assert data["next", "truncated"][:, -1].all()
         assert not data["next", "terminated"].any()
+
+
+@pytest.mark.needs("torch")
+def test_a_task_of_the_follow_kind_is_judged_as_follow_though_it_measures_more():
+    from uuv_marl.train.validation import shares_of
+
+    metrics = {"task_time_s": 30.0, "collisions": 0}
+    assert shares_of(metrics, "untouched_share") == shares_of(metrics | {"task": {"mine_m": 1.0}}, "untouched_share")
 
 
 @pytest.mark.needs("torch")

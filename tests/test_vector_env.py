@@ -252,6 +252,11 @@ def test_solo_drops_no_override(others, overrides, message):
         SoloEnv(STARTER, others, overrides=overrides)
     with pytest.raises(ScenarioError, match="can't be 0.1: with 'mappo' all vehicles have 0.5"):  # though it is usual
         SoloEnv(STARTER, "mappo", decision_period=0.1)
+    with pytest.raises(ScenarioError, match="can't be 0.1: with 'mappo' all vehicles have 0.5"):
+        SoloEnv(STARTER, "mappo", overrides={"timing": uuv_marl.load_scenario(STARTER).timing})
+    hearing = uuv_marl.load_scenario(STARTER, overrides={"sonar.channels": ["compass"]})
+    with pytest.raises(ScenarioError, match="can't hold compass: with 'bio_inspired' the learner has no"):
+        SoloEnv(hearing, "bio_inspired", overrides={"sonar.channels": ["compass"]})
     with pytest.raises(TypeError, match="others must be the name of a policy, or module:Class, got None"):
         SoloEnv(STARTER, None)
     slow = {"trajectory.speed_mps": 1.5, "start.speed_max_mps": 1.5}
@@ -356,3 +361,30 @@ def test_a_spec_with_a_scenario_goes_through_json():
     assert (again.scenario, again.metadata["autoreset_mode"]) == (scenario, mode)
     with pytest.raises(ScenarioError, match="swarm.num_vehicles must be a whole number, got 'x'"):
         uuv_marl.load_scenario({**scenario.model_dump(), "swarm": {"num_vehicles": "x"}})
+
+
+@pytest.mark.parametrize(
+    ("place", "given", "message"),
+    [
+        ("parallel_env:parallel_env", (10,), "scenario must be .*, got 10; .* is scenario, the second num_vehicles"),
+        ("parallel_env:env", (np.int64(4), "starter"), "scenario must be .*; .* is scenario, the second num_vehicles"),
+        ("vector_env:vector_env", ("starter", 4), "scenario must be .*, got 4; .* is num_envs, the second scenario"),
+        ("vector_env:vector_env", ("starter",), "num_envs must be .*, got 'starter'; .* is num_envs, the second"),
+        (
+            "vector_env:vector_env",
+            (uuv_marl.load_scenario("starter"),),
+            "num_envs must be .*; .* is num_envs, the second",
+        ),
+        ("vector_env:vector_env", (4, 4), "scenario must be .*; .* is num_envs, the second scenario"),
+        ("core:make_batched_env", (2, "starter"), "scenario must be .*; .* is scenario, the second num_worlds"),
+        ("sb3:SwarmVecEnv", (2, "starter"), "scenario must be .*, got 2; .* is scenario, the second num_worlds"),
+        ("sb3:SwarmVecEnv", ("starter", "2"), "num_worlds must be .*, got '2'; .* is scenario, the second num_worlds"),
+        ("torchrl:SwarmEnv", ("starter", 4), "scenario must be .*, got 4; .* is num_worlds, the second scenario"),
+    ],
+)
+def test_arguments_in_another_order_are_refused_with_the_right_one(place, given, message):
+    module, _, name = place.partition(":")
+    pytest.importorskip({"sb3": "stable_baselines3", "torchrl": "torchrl"}.get(module, "gymnasium"))
+    make = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), name)
+    with pytest.raises((ScenarioError, TypeError), match=message.replace("; .* is ", "; the first argument is ")):
+        make(*given)

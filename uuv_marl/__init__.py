@@ -2,7 +2,8 @@
 
 ``parallel_env()``, ``env()`` and ``vector_env(num_envs)`` make environments, ``load_scenario(name)`` a configuration,
 ``baselines.make(name, env)`` a controller. ``uuv-marl --help`` shows the command line. Importing registers
-``uuv_marl/Swarm-v1`` and ``uuv_marl/Solo-v1`` with Gymnasium, and ``uuv_marl/uuv_swarm_v1`` with PettingZoo.
+``uuv_marl/Swarm-v1`` and ``uuv_marl/Solo-v1`` with Gymnasium, and ``uuv_marl/uuv_swarm_v1`` with PettingZoo;
+``gymnasium.make("uuv_marl:uuv_marl/Solo-v1")`` imports by itself, in worker processes, too.
 """
 
 import importlib

@@ -12,7 +12,7 @@
 #
 # A task is a class whose methods say what is drawn at the start, who is where it should be, when the episode is done,
 # and what a learner is paid. `self.swarm` is the simulation: `state` holds positions and velocities, `facts` distances
-# and contacts. What you leave out has a default. Look at `there`: it decides which vehicles succeed.
+# and contacts. All but `there` has a default. Look at `there`: it decides which vehicles succeed.
 
 # %%
 # %%writefile meet.py

@@ -3,46 +3,13 @@
 from typing import NamedTuple, NotRequired
 
 import numpy as np
-from typing_extensions import TypedDict
 
-from uuv_marl.benchmark.success import Success, SuccessRecorder
+from uuv_marl.benchmark.success import SuccessRecorder
+from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks import Follow
+from uuv_marl.tasks import Follow, Task
+from uuv_marl.tasks.measures import MEASURED, Measures, Success
 from uuv_marl.types import Bool, Float32, Float64
-
-
-class Shares(TypedDict):
-    """Shares of the samples at which Eq. 7's constraints held, each from 0 to 1."""
-
-    all: float
-    s_l: float
-    s_o: float
-    s_u: float
-
-
-class Measures(TypedDict):
-    """Measures of the swarm as a whole; None if there was nothing to measure.
-
-    Distances are in m and taken from the start to the episode's end; times are in s.
-    """
-
-    task_time_s: float | None
-    time_within_1_m_s: float | None
-    time_within_5_m_s: float | None
-    time_within_10_m_s: float | None
-    duration_s: float
-    min_obstacle_distance_m: float | None
-    min_spacing_m: float | None
-    mean_min_spacing_m: float | None
-    max_spacing_m: float | None
-    centre_error_m: float | None
-    order_parameter: float | None
-    collisions: int
-    constraint_share: Shares
-    effort: float
-    clamps: int
-    saturation_share: float
-    vehicles_lost: int
 
 
 class Metrics(Measures, Success):
@@ -129,7 +96,7 @@ class MetricsRecorder:
         table = self._table(world)
         clearance = min(float(clearance[world].min()) for clearance in self._clearances)
         all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
-        own: dict[str, float | None] = self._swarm.task.metrics(world)
+        own = _own(self._swarm.task, world)
         judged = self._success.metrics(world) if self._success else Success()
         times = facts.arrival_s[world] if self._swarm.task.leads else np.full(4, np.nan)
         arrived, within_1_m, within_5_m, within_10_m = map(_number, times)
@@ -167,6 +134,17 @@ class MetricsRecorder:
     def _table(self, world: int) -> dict[str, Float64]:
         """A world's samples over time, shape (time,) each."""
         return {name: np.array([getattr(s, name)[world] for s in self._samples]) for name in Sample._fields}
+
+
+def _own(task: Task, world: int) -> dict[str, float | None]:
+    """A task's own metrics. Raises ScenarioError where names are taken, or lack what tables and trainings read."""
+    own, name = task.metrics(world), type(task).__name__
+    needed = set[str]() if isinstance(task, Follow) else {"untouched_share", "whole", task.headline}
+    if taken := sorted(own.keys() & MEASURED):
+        raise ScenarioError(f"task {name} can't give {', '.join(taken)} in metrics: the name is taken; choose another")
+    if missing := sorted(needed - own.keys()):
+        raise ScenarioError(f"task {name} must give {', '.join(missing)} in metrics; add to super().metrics(world)")
+    return own
 
 
 def _mean(values: Float64) -> float | None:

@@ -9,10 +9,10 @@ Shares are over healthy vehicles: those that no fault has hit and that were not 
 """
 
 import numpy as np
-from typing_extensions import TypedDict
 
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.measures import Success
 from uuv_marl.types import Bool
 
 GRACE_S = 60.0
@@ -22,19 +22,6 @@ CENTRE_M = 20.0
 off by less in 1 m/s of current."""
 TOGETHER = 0.95
 """Share of the healthy that must be done in a swarm's success. Assumed: one straggler of twenty."""
-
-
-class Success(TypedDict, total=False):
-    """Keys of ``Metrics`` that the task ``follow`` alone has.
-
-    None if the episode ended earlier than ``GRACE_S`` after l(t) stopped, or if no vehicle stayed healthy.
-    """
-
-    success_share: float | None
-    safe_share: float | None
-    done_share: float | None
-    swarm_success: int | None
-    vehicles_faulty: int
 
 
 class SuccessRecorder:

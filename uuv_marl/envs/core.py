@@ -3,6 +3,7 @@
 import difflib
 import math
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Literal, NamedTuple, TypedDict, Unpack, cast
 
 import numpy as np
@@ -272,6 +273,7 @@ def make_batched_env(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
     *,
+    order: tuple[str, str] = ("scenario", "num_worlds"),
     max_cycles: int | None = None,
     reward: Reward = "dense",
     observe: Observe = "positions",
@@ -283,13 +285,22 @@ def make_batched_env(
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
         num_worlds: worlds stepped together.
+        order: names of the API's first two arguments, for errors: libraries begin with one or the other.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         reward: ``dense``, ``sparse``, ``team``, one of the task's, or a function from the swarm to (world, vehicle).
         observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
         keep_terms: whether steps tell the reward's terms.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
     """
-    return BatchedEnv(changed(scenario, **changes), num_worlds, reward, max_cycles, observe, keep_terms)
+    (number,) = {*order} - {"scenario"}
+    remedy = f"the first argument is {order[0]}, the second {order[1]}"
+    if isinstance(scenario, Real):
+        raise ScenarioError(f"scenario must be a name, a TOML file or a Scenario, got {scenario}; {remedy}")
+    try:
+        worlds = whole_number(number, num_worlds, 1)
+    except TypeError as error:
+        raise TypeError(f"{error}; {remedy}") from None
+    return BatchedEnv(changed(scenario, **changes), worlds, reward, max_cycles, observe, keep_terms)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

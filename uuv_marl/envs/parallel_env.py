@@ -204,8 +204,9 @@ def parallel_env(
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
     """
     batch = make_batched_env(
-        scenario, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms,
-        num_vehicles=num_vehicles, decision_period=decision_period, task=task, overrides=overrides,
+        scenario, order=("scenario", "num_vehicles"), max_cycles=max_cycles, reward=reward, observe=observe,
+        keep_terms=info_terms, num_vehicles=num_vehicles, decision_period=decision_period, task=task,
+        overrides=overrides,
     )  # fmt: skip
     return SwarmParallelEnv(batch, render_mode, info_terms, render_options)
 

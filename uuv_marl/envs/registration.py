@@ -1,4 +1,7 @@
-"""Entries in the registries of Gymnasium and PettingZoo, made when ``uuv_marl`` is imported."""
+"""Entries in the registries of Gymnasium and PettingZoo, made when ``uuv_marl`` is imported.
+
+Gymnasium loads no plugins; by an id that begins with ``uuv_marl:`` it imports the package itself.
+"""
 
 import gymnasium
 import pettingzoo

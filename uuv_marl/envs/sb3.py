@@ -55,7 +55,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         render_options: RenderOptions | None = None,
         **options: Unpack[EnvOptions],
     ) -> None:
-        batch = make_batched_env(scenario, whole_number("num_worlds", num_worlds, 1), keep_terms=False, **options)
+        batch = make_batched_env(scenario, num_worlds, keep_terms=False, **options)
         self._wrap(batch, render_mode, render_options)
         refuse_losses(self.scenario, "SwarmVecEnv")
         self._shape = (num_worlds, self.swarm.num_vehicles)

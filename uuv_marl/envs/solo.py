@@ -63,7 +63,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
         asked, overrides = changed(scenario, **changes), changes.get("overrides") or {}
-        given = {field for field in (_LOOP, _CLOCK) if given_in(overrides, field) is not None}
+        given = {field for field in (_HEARD, _LOOP, _CLOCK) if given_in(overrides, field) is not None}
         given |= {_CLOCK} if changes.get("decision_period") is not None else set()
         suited = _suited(others, changed(scenario), asked, given)
         batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms)
@@ -114,7 +114,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         return info
 
 
-_LOOP, _CLOCK = "actuators.yaw_damping_nms", "timing.decision_period_s"
+_HEARD, _LOOP, _CLOCK = "sonar.channels", "actuators.yaw_damping_nms", "timing.decision_period_s"
 
 
 def _suited(others: str, bare: Scenario, asked: Scenario, given: set[str]) -> Scenario:
@@ -123,9 +123,9 @@ def _suited(others: str, bare: Scenario, asked: Scenario, given: set[str]) -> Sc
     remedy = "leave it out, or choose other others"
     heard = suited.sonar.channels
     dropped = {*asked.sonar.channels} - {*heard} - ({"link"} if "modem" in heard else set())
-    if dropped and asked.sonar.channels != bare.sonar.channels:
+    if dropped and (_HEARD in given or asked.sonar.channels != bare.sonar.channels):
         raise ScenarioError(
-            f"sonar.channels can't hold {', '.join(sorted(dropped))}: with {others!r} the learner has "
+            f"{_HEARD} can't hold {', '.join(sorted(dropped))}: with {others!r} the learner has "
             f"{', '.join(heard) or 'no channels'}; {remedy}"
         )
     for name in (_LOOP, _CLOCK):

@@ -13,7 +13,7 @@ from uuv_marl.envs.core import BatchedEnv, EnvOptions, ScenarioLike, StepResult,
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin, SpecMixin
-from uuv_marl.sim.arguments import SeedLike, whole_number, world_seeds
+from uuv_marl.sim.arguments import SeedLike, world_seeds
 from uuv_marl.types import Bool, Float32, Float64
 
 Infos = dict[str, Any]
@@ -198,5 +198,5 @@ def vector_env(
             ``overrides``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each
             vehicle; the reward of a row is the mean over all vehicles, with ``team`` that of ``dense``.
     """
-    batch = make_batched_env(scenario, whole_number("num_envs", num_envs, 1), keep_terms=info_terms, **options)
+    batch = make_batched_env(scenario, num_envs, order=("num_envs", "scenario"), keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

@@ -77,8 +77,8 @@ def leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def given_in(overrides: Mapping[str, object], field: str) -> object | None:
     """What overrides give a field, by its name with a dot or in its section's table; None if nothing."""
     section, _, name = field.partition(".")
-    table = overrides.get(section)
-    inside = cast(Mapping[str, object], table).get(name) if name and isinstance(table, Mapping) else None
+    table = plain(overrides.get(section)) if name else None
+    inside = cast(Mapping[str, object], table).get(name) if isinstance(table, dict) else None
     return overrides.get(field, inside)
 
 

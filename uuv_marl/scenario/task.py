@@ -55,7 +55,7 @@ def task_class(name: str) -> Any:
     """The class of a task, by its name.
 
     Raises:
-        ScenarioError: there is none; the message gives the most similar name.
+        ScenarioError: there is none, and the message gives the most similar name; or it can't be a task.
     """
     tasks = shipped_tasks()
     if name not in tasks and ":" not in name:
@@ -71,6 +71,7 @@ def task_class(name: str) -> Any:
     base: Any = named_object("uuv_marl.tasks:Task")
     if not (isinstance(made, type) and issubclass(made, base)):
         raise ScenarioError(f"task {name!r} must be a subclass of uuv_marl.tasks.Task, got {made!r}")
+    cast(Any, made).check()
     return made
 
 

@@ -6,14 +6,15 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.errors import RewardError
-from uuv_marl.percept import Table
+from uuv_marl.errors import RewardError, ScenarioError
+from uuv_marl.percept import CHANNELS, Table, percept_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
 from uuv_marl.sim.draw import Draw, usual_draw
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
+from uuv_marl.tasks.measures import MEASURED
 from uuv_marl.types import Bool, Float64, Int64
 
 Terms = Mapping[str, NDArray[np.floating[Any]]]
@@ -61,8 +62,8 @@ class Task:
     all worlds and vehicles; what they give for other worlds is not used. Those with ``world`` are about one.
     ``self.swarm`` is the simulation, in its present state, and ``self.numbers`` the task's own numbers.
 
-    Without an override the swarm starts, and its reference moves, as the scenario says; nothing is paid; the episode
-    runs to its time limit.
+    A subclass must say who is ``there``. Without other overrides the swarm starts, and its reference moves, as the
+    scenario says; nothing is paid; the episode runs to its time limit.
 
     Args:
         swarm: of any number of worlds, before its first reset.
@@ -106,6 +107,26 @@ class Task:
         sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles, **self.sizes(swarm.scenario)}
         self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
         """What is remembered, the arrays of ``Memory``."""
+
+    @classmethod
+    def check(cls) -> None:
+        """Raise ScenarioError for a class that can't be a task: it doesn't say who succeeds, or takes a name twice."""
+        if cls.there is Task.there and cls.succeeded is Task.succeeded:
+            raise ScenarioError(
+                f"task {cls.__name__} must define there(), the vehicles that are where they should be: it decides who "
+                "succeeds and which policy a training keeps; where all are, return np.ones_like(self.swarm.state.alive)"
+            )
+        rows = [row.name for table in (cls.observed, *cls.channels.values()) for row in table]
+        usual = {row.name for row in percept_table(1, 1)}
+        for where, names, taken in (
+            ("columns", cls.columns, MEASURED), ("observed or channels", rows, usual),
+            ("channels", cls.channels, CHANNELS), ("rewards", cls.rewards, {"team"}),
+        ):  # fmt: skip
+            twice = sorted({name for name in names if name in taken or list(names).count(name) > 1})
+            if twice:
+                raise ScenarioError(
+                    f"task {cls.__name__} can't have {', '.join(twice)} in {where}: the name is taken; choose another"
+                )
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:  # noqa: ARG003 - for those who override it
@@ -153,7 +174,7 @@ class Task:
         return np.zeros(self.swarm.num_worlds, np.bool_)
 
     def there(self) -> Bool:
-        """Vehicles that are where they should be now, shape (world, vehicle)."""
+        """Vehicles that are where they should be now, shape (world, vehicle); a subclass without it is refused."""
         return np.ones_like(self.swarm.state.alive)
 
     def succeeded(self) -> Bool:
@@ -183,8 +204,8 @@ class Task:
     def metrics(self, world: int) -> dict[str, float | None]:
         """Measures of an episode that ends now, numbers by name; VMAS: ``info``.
 
-        A subclass adds its own to these: ``untouched_share``, the share of vehicles that succeeded, and ``whole``, 1 if
-        all did.
+        A subclass adds its own, by names not in ``uuv_marl.tasks.measures``, to these: ``untouched_share``, the share
+        of vehicles that succeeded, and ``whole``, 1 if all did.
         """
         share = float(self.succeeded()[world].mean())
         return {"untouched_share": share, "whole": float(share == 1.0)}

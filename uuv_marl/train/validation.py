@@ -80,10 +80,10 @@ def _end_s(run: Run) -> float:
 
 def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
     """An episode's headline, and whether the swarm was whole; in ``follow`` whether it came and touched nothing."""
-    if "task" not in metrics:
+    own = metrics.get("task", {})
+    if "whole" not in own:
         whole = metrics["task_time_s"] is not None and not metrics["collisions"]
         return float(whole), whole
-    own = metrics["task"]
     share = own.get(headline)
     return (own["untouched_share"] if share is None else share) or 0.0, own["whole"] == 1.0
 
