@@ -1,5 +1,6 @@
 """The trainer on problems with known answers, and trainings that can be stopped anywhere."""
 
+import contextlib
 import csv
 import errno
 import itertools
@@ -11,6 +12,8 @@ import re
 import shlex
 import shutil
 import signal
+import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -42,8 +45,8 @@ TINY = Ppo(horizon=8, minibatches=2)
 
 
 @pytest.fixture(autouse=True)
-def one_thread():
-    with trainings.one_thread():
+def fixed_torch():
+    with trainings.fixed_torch():
         yield
 
 
@@ -905,10 +908,94 @@ def test_options_that_cannot_work_are_explained(options, message, tmp_path):
     assert not (tmp_path / "a" / "config.json").exists()
 
 
+def how_torch_computes():
+    """What ``fixed_torch`` fixes; the last is whether there are numbers below the normal ones."""
+    modes = torch.is_grad_enabled(), torch.is_inference_mode_enabled(), torch.is_autocast_enabled("cpu")
+    numbers = torch.get_default_dtype(), torch.get_default_device(), torch.backends.mkldnn.enabled
+    return torch.get_num_threads(), *modes, *numbers, sys.float_info.min / 2.0 > 0.0
+
+
+FIXED = 1, True, False, False, torch.float32, torch.device("cpu"), False, True
+
+
 def global_state():
     """What a training may change of the process."""
-    numpys = str(np.random.get_state())  # noqa: NPY002 - that of others
-    return torch.get_num_threads(), torch.get_rng_state().tolist(), random.getstate(), numpys
+    numpys = str(np.random.get_state()), np.geterr()  # noqa: NPY002 - that of others
+    flags = torch.get_float32_matmul_precision(), torch.get_deterministic_debug_mode()
+    return *how_torch_computes(), *flags, torch.get_rng_state().tolist(), random.getstate(), *numpys
+
+
+@contextlib.contextmanager
+def put(set_to, value, before):
+    set_to(value)
+    try:
+        yield
+    finally:
+        set_to(before)
+
+
+@contextlib.contextmanager
+def low_precision():
+    """Where oneDNN may multiply, as it may at first."""
+    one_dnn = put(lambda on: setattr(torch.backends.mkldnn, "enabled", on), True, False)
+    with one_dnn, put(torch.set_float32_matmul_precision, "medium", "highest"):
+        yield
+
+
+@contextlib.contextmanager
+def warnings_raise():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+SETTINGS = {
+    "none": contextlib.nullcontext,
+    "float64": lambda: put(torch.set_default_dtype, torch.float64, torch.float32),
+    "half": lambda: put(torch.set_default_dtype, torch.bfloat16, torch.float32),
+    "device": lambda: put(torch.set_default_device, "meta", None),
+    "no gradients": lambda: put(torch.set_grad_enabled, False, True),
+    "inference": torch.inference_mode,
+    "autocast": lambda: torch.autocast("cpu", torch.bfloat16),
+    "precision": low_precision,
+    "deterministic": lambda: put(torch.use_deterministic_algorithms, True, False),
+    "denormals": lambda: put(torch.set_flush_denormal, True, False),
+    "threads": lambda: put(torch.set_num_threads, 2, 1),
+    "numpy raises": lambda: np.errstate(all="raise"),
+    "warnings raise": warnings_raise,
+}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Files of a training that nothing outside has changed."""
+    folder = tmp_path_factory.mktemp("whole") / "a"
+    with pytest.MonkeyPatch.context() as patch, trainings.fixed_torch():
+        patch.setattr(trainings, "validate", lambda *_: GOOD)
+        list(train(folder, small()))
+    return files(folder)
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_what_others_set_changes_no_training_and_holds_between_its_iterations(setting, whole, tmp_path, no_validation):
+    inside = []
+    with SETTINGS[setting]():
+        before = global_state()
+        for _ in train(tmp_path, small(), stop=lambda: inside.append(how_torch_computes())):
+            assert global_state() == before
+    assert inside == [FIXED] * 5
+    assert files(tmp_path) == whole
+
+
+def test_what_others_set_in_the_middle_of_a_training_changes_nothing(whole, tmp_path, no_validation):
+    records = train(tmp_path / "a", small())
+    for _ in range(3):
+        next(records)
+    with SETTINGS["float64"](), SETTINGS["no gradients"]():
+        next(records)
+        records.close()
+        list(resume(tmp_path / "a"))
+    assert files(tmp_path / "a") == whole
 
 
 @pytest.mark.parametrize("end", ["whole", "closed", "error"])
