@@ -646,6 +646,33 @@ def test_a_folder_that_is_used_or_empty_or_of_another_scenario_is_refused(tmp_pa
         next(resume(tmp_path / "b"))
 
 
+def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
+    """Behind a prefix of its name, too; a folder from before files were noted goes on."""
+    expert = tmp_path / "expert"
+    card = card_for(small().loaded)
+    weights = {name: 0.1 * array for name, array in tensors(card).items()}
+    save_checkpoint(expert / WEIGHTS_FILE, card, weights)
+    for k, name in enumerate((f"{expert}", f"guarded:{expert}")):
+        begun(tmp_path / f"{k}", 3, teacher=name)
+    shutil.copytree(tmp_path / "0", tmp_path / "same")
+    assert list(resume(tmp_path / "same"))
+    save_checkpoint(expert / WEIGHTS_FILE, card, {name: 2.0 * array for name, array in weights.items()})
+    for k, name in enumerate((f"{expert}", f"guarded:{expert}")):
+        told = (
+            rf"begun with teacher = {name} \(\w+\), and teacher is {name} \(\w+\) now; give {name} as it was, or begin"
+        )
+        with pytest.raises(ResultsError, match=told):
+            next(resume(tmp_path / f"{k}"))
+    config = tmp_path / "0" / "config.json"
+    noted = json.loads(config.read_text())
+    del noted["scenarios"][f"{expert}"]
+    config.write_text(json.dumps(noted))
+    assert list(resume(tmp_path / "0"))
+    shutil.rmtree(expert)
+    with pytest.raises(ResultsError, match="can't be made again here: policy .* can't be read"):
+        next(resume(tmp_path / "1"))
+
+
 def test_a_training_that_is_told_to_stop_ends_with_a_checkpoint(tmp_path, no_validation):
     """After the iteration under way, and a resume goes on exactly, though no checkpoint was due."""
     stop = 3
