@@ -34,6 +34,7 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import run as trainings
 from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
 from uuv_marl.train.folder import Record, TrainingFolder
+from uuv_marl.train.objective import objective
 from uuv_marl.train.ppo import Learner, annealed, gae
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows, Transition
 from uuv_marl.train.run import Trainer, resume, train
@@ -299,6 +300,73 @@ def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
     assert costs[0] == 1.0
     assert costs == sorted(costs)
     assert 50.0 < costs[-1] < 300.0
+
+
+OWN_TASK = """
+import numpy as np
+from uuv_marl.tasks import Task
+from uuv_marl.tasks.reach import Reach
+class Mine(Task):
+    terms = {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}
+    def reward(self, running):
+        slow = -np.hypot(*np.moveaxis(self.swarm.velocity, -1, 0))
+        return {"still": 0.5 * slow, "collision": -60.0 * self.swarm.facts.contacts}
+class Nearer(Reach):
+    pass
+def mine(swarm):
+    return np.zeros((swarm.num_worlds, swarm.num_vehicles))
+"""
+
+
+@pytest.fixture
+def own_task(tmp_path, monkeypatch):
+    (tmp_path / "own_task.py").write_text(OWN_TASK)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
+
+
+@pytest.mark.parametrize(
+    ("told", "cost"),
+    [
+        ({}, (1.0, 300.0)),
+        ({"scenario": "few_informed", "reward": "led"}, (1.0, 300.0)),
+        ({"reward": "own_task:mine"}, (0.0, 0.0)),
+        ({"overrides": {"task": "own_task:Mine"}}, (0.0, 0.0)),
+        ({"overrides": {"task": "own_task:Mine"}, "also": ["starter"]}, (0.0, 0.0)),
+        ({"overrides": {"task": NEARER}}, (0.0, 0.0)),
+        ({"overrides": {"task": NEARER}, "ppo": {"contact_cost": (2.0, 5.0)}}, (2.0, 5.0)),
+        ({"ppo": {"contact_cost": (0.0, 0.0)}}, (0.0, 0.0)),
+    ],
+)
+def test_contacts_cost_nothing_beyond_a_reward_of_ones_own(told, cost, own_task):
+    training = Training(**told)
+    assert training.ppo.contact_cost == cost
+    assert Training(**json.loads(training.model_dump_json())) == training
+    assert ("contact that begins costs" in objective(training)) == (cost[1] > 0.0)
+
+
+def test_a_training_begins_with_its_whole_objective(tmp_path, own_task, no_validation):
+    said = []
+    list(train(tmp_path / "a", small(steps=1, teacher="scout", lesson=0.3, pull=2.0), say=said.append))
+    assert said[1] == objective(small(teacher="scout", lesson=0.3, pull=2.0))
+    for part in (
+        "Reward dense of task follow on starter\n  tracking: -0.1 · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's",
+        "\n  arrival: +20 for every vehicle",
+        "d: the vehicle's distance to l(t), D: 500 m, c: 10 m\n",
+        "\nIn addition a contact that begins costs 1 at the start and 300 at the end (ppo.contact_cost); discount 0.99",
+        "For 30% of the budget the network first imitates scout, whatever is paid.",
+        "Then 2 times the mean squared distance from what it would do is added to PPO's loss.",
+    ):
+        assert part in said[1]
+    own = objective(small(overrides={"task": "own_task:Mine"}))
+    assert "Reward dense of task own_task:Mine on starter\n" in own
+    assert "\n  collision: -60 for each\nNothing is added to the reward; discount" in own
+    assert objective(small(reward="own_task:mine")).startswith("Reward own_task:mine on starter\nNothing is added")
+    several = objective(Training(scenario="hard_water", also=["hard_water_hard", "random_field"], sizes=[2, 3]))
+    assert several.count("Reward dense of task") == 2
+    assert "task hard_water on hard_water, hard_water_hard\n" in several
 
 
 def test_one_network_learns_on_several_scenarios(tmp_path):

@@ -26,6 +26,7 @@ from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import conditions
 from uuv_marl.train.curve import draw_curve
 from uuv_marl.train.folder import Record, Say, Stop, TrainingFolder, opened, quiet, versions
+from uuv_marl.train.objective import objective
 from uuv_marl.train.ppo import Learner, annealed
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows
 from uuv_marl.train.training import Training
@@ -97,6 +98,7 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
         for part in training.parts
     ]
     say(f"{training.card.policy_class}: swarms of {'; '.join(parts)}.")
+    say(objective(training))
     with fixed_torch():
         trainer = Trainer(training, folder.checkpoint)
     folder.begin(until)
@@ -151,7 +153,7 @@ class Trainer:
             self.rows.teach(0.0)
             share = (share - lesson) / (1.0 - lesson)
             noise, rate = annealed(by.noise, share), annealed(by.learning_rate, share)
-        self.rows.charge(annealed(by.contact_cost, share))
+        self.rows.charge(annealed(by.contact_cost or (0.0, 0.0), share))
         batch, reward = self.learner.sample(self.rows, noise)
         update = self.learner.update(batch, noise, rate)
         return Record(
