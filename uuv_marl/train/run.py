@@ -210,10 +210,10 @@ def fixed_torch() -> Iterator[None]:
         for get, put, value in _TORCH:
             stack.callback(put, get())
             put(value)
-        for mode in (torch.device("cpu"), torch.autocast("cpu", enabled=False), torch.inference_mode(False)):
+        modes = torch.device("cpu"), torch.autocast("cpu", enabled=False), torch.inference_mode(False)
+        for mode in (*modes, torch.enable_grad()):
             stack.enter_context(mode)
-        with torch.enable_grad():
-            yield
+        yield
 
 
 def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
