@@ -27,9 +27,9 @@ QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_
 
 
 @pytest.fixture(autouse=True)
-def one_thread():
+def fixed_torch():
     """Sums in another order give other bits."""
-    with run.one_thread():
+    with run.fixed_torch():
         yield
 
 

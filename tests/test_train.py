@@ -1,5 +1,6 @@
 """The trainer on problems with known answers, and trainings that can be stopped anywhere."""
 
+import contextlib
 import csv
 import errno
 import itertools
@@ -11,6 +12,8 @@ import re
 import shlex
 import shutil
 import signal
+import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -31,6 +34,7 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train import run as trainings
 from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
 from uuv_marl.train.folder import Record, TrainingFolder
+from uuv_marl.train.objective import objective
 from uuv_marl.train.ppo import Learner, annealed, gae
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows, Transition
 from uuv_marl.train.run import Trainer, resume, train
@@ -42,8 +46,8 @@ TINY = Ppo(horizon=8, minibatches=2)
 
 
 @pytest.fixture(autouse=True)
-def one_thread():
-    with trainings.one_thread():
+def fixed_torch():
+    with trainings.fixed_torch():
         yield
 
 
@@ -296,6 +300,73 @@ def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
     assert costs[0] == 1.0
     assert costs == sorted(costs)
     assert 50.0 < costs[-1] < 300.0
+
+
+OWN_TASK = """
+import numpy as np
+from uuv_marl.tasks import Task
+from uuv_marl.tasks.reach import Reach
+class Mine(Task):
+    terms = {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}
+    def reward(self, running):
+        slow = -np.hypot(*np.moveaxis(self.swarm.velocity, -1, 0))
+        return {"still": 0.5 * slow, "collision": -60.0 * self.swarm.facts.contacts}
+class Nearer(Reach):
+    pass
+def mine(swarm):
+    return np.zeros((swarm.num_worlds, swarm.num_vehicles))
+"""
+
+
+@pytest.fixture
+def own_task(tmp_path, monkeypatch):
+    (tmp_path / "own_task.py").write_text(OWN_TASK)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
+
+
+@pytest.mark.parametrize(
+    ("told", "cost"),
+    [
+        ({}, (1.0, 300.0)),
+        ({"scenario": "few_informed", "reward": "led"}, (1.0, 300.0)),
+        ({"reward": "own_task:mine"}, (0.0, 0.0)),
+        ({"overrides": {"task": "own_task:Mine"}}, (0.0, 0.0)),
+        ({"overrides": {"task": "own_task:Mine"}, "also": ["starter"]}, (0.0, 0.0)),
+        ({"overrides": {"task": NEARER}}, (0.0, 0.0)),
+        ({"overrides": {"task": NEARER}, "ppo": {"contact_cost": (2.0, 5.0)}}, (2.0, 5.0)),
+        ({"ppo": {"contact_cost": (0.0, 0.0)}}, (0.0, 0.0)),
+    ],
+)
+def test_contacts_cost_nothing_beyond_a_reward_of_ones_own(told, cost, own_task):
+    training = Training(**told)
+    assert training.ppo.contact_cost == cost
+    assert Training(**json.loads(training.model_dump_json())) == training
+    assert ("contact that begins costs" in objective(training)) == (cost[1] > 0.0)
+
+
+def test_a_training_begins_with_its_whole_objective(tmp_path, own_task, no_validation):
+    said = []
+    list(train(tmp_path / "a", small(steps=1, teacher="scout", lesson=0.3, pull=2.0), say=said.append))
+    assert said[1] == objective(small(teacher="scout", lesson=0.3, pull=2.0))
+    for part in (
+        "Reward dense of task follow on starter\n  tracking: -0.1 · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's",
+        "\n  arrival: +20 for every vehicle",
+        "d: the vehicle's distance to l(t), D: 500 m, c: 10 m\n",
+        "\nIn addition a contact that begins costs 1 at the start and 300 at the end (ppo.contact_cost); discount 0.99",
+        "For 30% of the budget the network first imitates scout, whatever is paid.",
+        "Then 2 times the mean squared distance from what it would do is added to PPO's loss.",
+    ):
+        assert part in said[1]
+    own = objective(small(overrides={"task": "own_task:Mine"}))
+    assert "Reward dense of task own_task:Mine on starter\n" in own
+    assert "\n  collision: -60 for each\nNothing is added to the reward; discount" in own
+    assert objective(small(reward="own_task:mine")).startswith("Reward own_task:mine on starter\nNothing is added")
+    several = objective(Training(scenario="hard_water", also=["hard_water_hard", "random_field"], sizes=[2, 3]))
+    assert several.count("Reward dense of task") == 2
+    assert "task hard_water on hard_water, hard_water_hard\n" in several
 
 
 def test_one_network_learns_on_several_scenarios(tmp_path):
@@ -643,6 +714,33 @@ def test_a_folder_that_is_used_or_empty_or_of_another_scenario_is_refused(tmp_pa
         next(resume(tmp_path / "b"))
 
 
+def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
+    """Behind a prefix of its name, too; a folder from before files were noted goes on."""
+    expert = tmp_path / "expert"
+    card = card_for(small().loaded)
+    weights = {name: 0.1 * array for name, array in tensors(card).items()}
+    save_checkpoint(expert / WEIGHTS_FILE, card, weights)
+    for k, name in enumerate((f"{expert}", f"guarded:{expert}")):
+        begun(tmp_path / f"{k}", 3, teacher=name)
+    shutil.copytree(tmp_path / "0", tmp_path / "same")
+    assert list(resume(tmp_path / "same"))
+    save_checkpoint(expert / WEIGHTS_FILE, card, {name: 2.0 * array for name, array in weights.items()})
+    for k, name in enumerate((f"{expert}", f"guarded:{expert}")):
+        told = (
+            rf"begun with teacher = {name} \(\w+\), and teacher is {name} \(\w+\) now; give {name} as it was, or begin"
+        )
+        with pytest.raises(ResultsError, match=told):
+            next(resume(tmp_path / f"{k}"))
+    config = tmp_path / "0" / "config.json"
+    noted = json.loads(config.read_text())
+    del noted["scenarios"][f"{expert}"]
+    config.write_text(json.dumps(noted))
+    assert list(resume(tmp_path / "0"))
+    shutil.rmtree(expert)
+    with pytest.raises(ResultsError, match="can't be made again here: policy .* can't be read"):
+        next(resume(tmp_path / "1"))
+
+
 def test_a_training_that_is_told_to_stop_ends_with_a_checkpoint(tmp_path, no_validation):
     """After the iteration under way, and a resume goes on exactly, though no checkpoint was due."""
     stop = 3
@@ -905,10 +1003,94 @@ def test_options_that_cannot_work_are_explained(options, message, tmp_path):
     assert not (tmp_path / "a" / "config.json").exists()
 
 
+def how_torch_computes():
+    """What ``fixed_torch`` fixes; the last is whether there are numbers below the normal ones."""
+    modes = torch.is_grad_enabled(), torch.is_inference_mode_enabled(), torch.is_autocast_enabled("cpu")
+    numbers = torch.get_default_dtype(), torch.get_default_device(), torch.backends.mkldnn.enabled
+    return torch.get_num_threads(), *modes, *numbers, sys.float_info.min / 2.0 > 0.0
+
+
+FIXED = 1, True, False, False, torch.float32, torch.device("cpu"), False, True
+
+
 def global_state():
     """What a training may change of the process."""
-    numpys = str(np.random.get_state())  # noqa: NPY002 - that of others
-    return torch.get_num_threads(), torch.get_rng_state().tolist(), random.getstate(), numpys
+    numpys = str(np.random.get_state()), np.geterr()  # noqa: NPY002 - that of others
+    flags = torch.get_float32_matmul_precision(), torch.get_deterministic_debug_mode()
+    return *how_torch_computes(), *flags, torch.get_rng_state().tolist(), random.getstate(), *numpys
+
+
+@contextlib.contextmanager
+def put(set_to, value, before):
+    set_to(value)
+    try:
+        yield
+    finally:
+        set_to(before)
+
+
+@contextlib.contextmanager
+def low_precision():
+    """Where oneDNN may multiply, as it may at first."""
+    one_dnn = put(lambda on: setattr(torch.backends.mkldnn, "enabled", on), True, False)
+    with one_dnn, put(torch.set_float32_matmul_precision, "medium", "highest"):
+        yield
+
+
+@contextlib.contextmanager
+def warnings_raise():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+SETTINGS = {
+    "none": contextlib.nullcontext,
+    "float64": lambda: put(torch.set_default_dtype, torch.float64, torch.float32),
+    "half": lambda: put(torch.set_default_dtype, torch.bfloat16, torch.float32),
+    "device": lambda: put(torch.set_default_device, "meta", None),
+    "no gradients": lambda: put(torch.set_grad_enabled, False, True),
+    "inference": torch.inference_mode,
+    "autocast": lambda: torch.autocast("cpu", torch.bfloat16),
+    "precision": low_precision,
+    "deterministic": lambda: put(torch.use_deterministic_algorithms, True, False),
+    "denormals": lambda: put(torch.set_flush_denormal, True, False),
+    "threads": lambda: put(torch.set_num_threads, 2, 1),
+    "numpy raises": lambda: np.errstate(all="raise"),
+    "warnings raise": warnings_raise,
+}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Files of a training that nothing outside has changed."""
+    folder = tmp_path_factory.mktemp("whole") / "a"
+    with pytest.MonkeyPatch.context() as patch, trainings.fixed_torch():
+        patch.setattr(trainings, "validate", lambda *_: GOOD)
+        list(train(folder, small()))
+    return files(folder)
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_what_others_set_changes_no_training_and_holds_between_its_iterations(setting, whole, tmp_path, no_validation):
+    inside = []
+    with SETTINGS[setting]():
+        before = global_state()
+        for _ in train(tmp_path, small(), stop=lambda: inside.append(how_torch_computes())):
+            assert global_state() == before
+    assert inside == [FIXED] * 5
+    assert files(tmp_path) == whole
+
+
+def test_what_others_set_in_the_middle_of_a_training_changes_nothing(whole, tmp_path, no_validation):
+    records = train(tmp_path / "a", small())
+    for _ in range(3):
+        next(records)
+    with SETTINGS["float64"](), SETTINGS["no gradients"]():
+        next(records)
+        records.close()
+        list(resume(tmp_path / "a"))
+    assert files(tmp_path / "a") == whole
 
 
 @pytest.mark.parametrize("end", ["whole", "closed", "error"])

@@ -14,6 +14,8 @@ from pydantic import TypeAdapter
 
 from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
+from uuv_marl.baselines.learned.trained import Trained
+from uuv_marl.baselines.registry import parse_policy
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError, TrainingError
 from uuv_marl.train.training import Training
 
@@ -96,7 +98,7 @@ class TrainingFolder:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
             before, self.until, made_by = dict(config["scenarios"]), float(config["until"]), dict(config["versions"])
             training = Training(**config["training"])
-            now_there = _scenarios(training)
+            now_there = _read_by(training)
         except (ScenarioError, PolicyError, TrainingError) as error:
             raise ResultsError(
                 f"the training in {self.path} can't be made again here: {error}; resume it where it was begun"
@@ -106,8 +108,8 @@ class TrainingFolder:
                 f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
                 "empty --output"
             ) from None
-        for name, scenario in now_there.items():
-            for field, then, now in _differences(before.get(name, {}), scenario):
+        for name, found in now_there.items():
+            for field, then, now in _differences(before.get(name, found), found):
                 raise ResultsError(
                     f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {name} as it was, or "
                     "begin anew with another --output"
@@ -165,7 +167,7 @@ class TrainingFolder:
         """Make the folder ready for the next iteration, and note how it comes about: budget, versions."""
         config = {
             "training": self.training.model_dump(mode="json"),
-            "scenarios": _scenarios(self.training),
+            "scenarios": _read_by(self.training),
             "until": until,
             "versions": versions(),
         }
@@ -232,9 +234,13 @@ def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[
         yield folder
 
 
-def _scenarios(training: Training) -> dict[str, Any]:
-    """What is trained on, whole, by name."""
-    return {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
+def _read_by(training: Training) -> dict[str, Any]:
+    """What a training reads besides its description, by name: scenarios, whole, and the digest of a teacher's file."""
+    found: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
+    kind = parse_policy(training.teacher).kind if training.teacher else None
+    if isinstance(kind, Trained):
+        found[training.teacher] = {"teacher": f"{training.teacher} ({kind.checkpoint.digest})"}
+    return found
 
 
 def versions() -> dict[str, str]:

@@ -7,9 +7,10 @@ the best validation; ``curve.png``. Needs ``train``.
 import json
 import math
 import shutil
+import sys
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import conditions
 from uuv_marl.train.curve import draw_curve
 from uuv_marl.train.folder import Record, Say, Stop, TrainingFolder, opened, quiet, versions
+from uuv_marl.train.objective import objective
 from uuv_marl.train.ppo import Learner, annealed
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows
 from uuv_marl.train.training import Training
@@ -46,7 +48,8 @@ def train(
     """Train to the end of the budget; a record for each iteration.
 
     Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
-    come without the break: with a budget of ``steps`` bit for bit. Uses one thread of torch.
+    come without the break: with a budget of ``steps`` bit for bit. Torch computes on one thread, and between iterations
+    its global settings are those of the caller.
 
     Args:
         output: a new or empty folder.
@@ -95,23 +98,24 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
         for part in training.parts
     ]
     say(f"{training.card.policy_class}: swarms of {'; '.join(parts)}.")
-    with one_thread():
+    say(objective(training))
+    with fixed_torch():
         trainer = Trainer(training, folder.checkpoint)
-        folder.begin(until)
-        with writing(folder.path):
-            while record.spent(training) < until and not stopped:
-                before, record = record, trainer.iterate(record)
-                done = record.spent(training) >= until
-                validated = done or _due(before, training) < _due(record, training)
-                if validated:
-                    record = _validated(trainer, record, folder.path)
-                folder.note(record)
-                stopped = stop()
-                if validated or stopped or record.iteration % training.checkpoint_every == 0:
-                    folder.keep(record, lambda path, record=record: trainer.save(path, record))
-                if validated:
-                    draw_curve(folder.rows(), folder.path / "curve.png", training.title or training.loaded.title)
-                yield record
+    folder.begin(until)
+    while record.spent(training) < until and not stopped:
+        with fixed_torch(), writing(folder.path):
+            before, record = record, trainer.iterate(record)
+            done = record.spent(training) >= until
+            validated = done or _due(before, training) < _due(record, training)
+            if validated:
+                record = _validated(trainer, record, folder.path)
+            folder.note(record)
+            stopped = stop()
+            if validated or stopped or record.iteration % training.checkpoint_every == 0:
+                folder.keep(record, lambda path, record=record: trainer.save(path, record))
+            if validated:
+                draw_curve(folder.rows(), folder.path / "curve.png", training.title or training.loaded.title)
+        yield record
 
 
 def _due(record: Record, training: Training) -> int:
@@ -149,7 +153,7 @@ class Trainer:
             self.rows.teach(0.0)
             share = (share - lesson) / (1.0 - lesson)
             noise, rate = annealed(by.noise, share), annealed(by.learning_rate, share)
-        self.rows.charge(annealed(by.contact_cost, share))
+        self.rows.charge(annealed(by.contact_cost or (0.0, 0.0), share))
         batch, reward = self.learner.sample(self.rows, noise)
         update = self.learner.update(batch, noise, rate)
         return Record(
@@ -189,15 +193,27 @@ class Trainer:
             self._rng.bit_generator.state = json.loads(data)
 
 
+_TORCH: Sequence[tuple[Callable[[], Any], Callable[[Any], object], Any]] = (
+    (torch.get_num_threads, torch.set_num_threads, 1),  # sums in another order give other bits
+    (torch.get_default_dtype, torch.set_default_dtype, torch.float32),
+    # oneDNN multiplies in half precision where torch.set_float32_matmul_precision or torch.backends allows it.
+    (lambda: torch.backends.mkldnn.enabled, lambda on: setattr(torch.backends.mkldnn, "enabled", on), False),
+    (lambda: sys.float_info.min / 2.0 == 0.0, torch.set_flush_denormal, False),
+)
+"""How each global setting of torch that changes numbers is read and set, and its value in a training."""
+
+
 @contextmanager
-def one_thread() -> Iterator[None]:
-    """Torch computes on one thread in this block: sums in another order give other bits."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
+def fixed_torch() -> Iterator[None]:
+    """Torch computes in this block in float32 on one thread of the CPU with gradients, whatever was set before."""
+    with ExitStack() as stack:
+        for get, put, value in _TORCH:
+            stack.callback(put, get())
+            put(value)
+        modes = torch.device("cpu"), torch.autocast("cpu", enabled=False), torch.inference_mode(False)
+        for mode in (*modes, torch.enable_grad()):
+            stack.enter_context(mode)
         yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def _validated(trainer: Trainer, record: Record, output: Path) -> Record:

@@ -25,6 +25,8 @@ _PERIOD, _LOOP, _LOOP_NMS = "timing.decision_period_s", "actuators.yaw_damping_n
 OVERRIDES: Mapping[str, object] = {_PERIOD: 0.5, _LOOP: _LOOP_NMS}
 """What training changes in a scenario that fixes neither (``timing.fixed``), with the paper's vehicle: a fifth of the
 decisions, and an inner loop, so that noise on the torque does not spin a vehicle."""
+CONTACT_COST = (1.0, 300.0)
+"""What contacts cost beyond the rewards of the package's tasks: little at first, so that vehicles learn where to go."""
 ROWS = 640
 """Vehicles at once, about."""
 
@@ -77,9 +79,9 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     noise: tuple[Positive, Positive] = (0.5, 0.1)
     """Standard deviation of actions [1], at the start and at the end. Noise is clipped at full force, and a policy that
     learned to make up for that overshoots without it: end with little."""
-    contact_cost: tuple[NotNegative, NotNegative] = (1.0, 300.0)
+    contact_cost: tuple[NotNegative, NotNegative] | None = None
     """What a contact that begins costs beyond the reward, at the start and at the end, in equal ratios, or evenly from
-    or to 0: little at first, so that vehicles learn where to go."""
+    or to 0. If None: ``CONTACT_COST`` with the package's tasks and their rewards; nothing with one of your own."""
     max_gradient: Positive = 0.5
     """Norm to which gradients of actor and critic are clipped."""
     value_decay: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.99
@@ -157,6 +159,10 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
         if self.minutes is None and self.steps is None:
             object.__setattr__(self, "minutes", 5.0)
+        if self.ppo.contact_cost is None:
+            own = ":" in "".join([self.reward or "", *(each.task.name for each in self._scenarios.values())])
+            ppo = self.ppo.model_copy(update={"contact_cost": (0.0, 0.0) if own else CONTACT_COST})
+            object.__setattr__(self, "ppo", ppo)
         for name, scenario in self._scenarios.items():
             refuse_losses(scenario, "training")
             known = (*scenario.task_class.rewards, "team")
