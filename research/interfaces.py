@@ -1,4 +1,4 @@
-"""``python -m research.interfaces ppo --training 3``: what a learner of docs/interfaces.md reaches, as printed there.
+"""``python -m research.interfaces SB3-PPO``: what a learner of docs/interfaces.md reaches, as printed there.
 
 It runs the block with a seed of that training, in an environment that has the library, and counts whole swarms on the
 validation seeds.
@@ -35,17 +35,18 @@ Act = Callable[[Float32, Bool], Float32]
 class Learner(StrEnum):
     """What the page trains."""
 
-    PPO = "ppo"
-    RECURRENT = "recurrent_ppo"
-    MAPPO = "mappo"
-    IPPO = "ippo"
-    TORCHRL = "torchrl"
-    RLLIB = "rllib"
+    PPO = "SB3-PPO"
+    RECURRENT = "SB3-RecurrentPPO"
+    MAPPO = "BenchMARL-MAPPO"
+    IPPO = "BenchMARL-IPPO"
+    TORCHRL = "TorchRL-PPO"
+    RLLIB = "RLlib-PPO"
 
 
 _WORDS = {
-    "ppo": 'PPO("MlpPolicy", SwarmVecEnv("starter"), seed=0)', "recurrent_ppo": "RecurrentPPO(",
-    "mappo": "MappoConfig.", "ippo": "MappoConfig.", "torchrl": "from torchrl.objectives", "rllib": "from ray.rllib.",
+    Learner.PPO: 'PPO("MlpPolicy", SwarmVecEnv("starter"), seed=0)', Learner.RECURRENT: "RecurrentPPO(",
+    Learner.MAPPO: "MappoConfig.", Learner.IPPO: "MappoConfig.", Learner.TORCHRL: "from torchrl.objectives",
+    Learner.RLLIB: "from ray.rllib.",
 }  # fmt: skip
 """What is in a learner's block alone."""
 _IPPO = {"MappoConfig": "IppoConfig", "max_n_iters, config.lr = 15": "max_n_iters, config.lr = 25"}
@@ -129,7 +130,7 @@ def main(
 ) -> None:
     """Train by the page's block, and count whole swarms of 100 validation episodes.
 
-    Example: python -m research.interfaces recurrent_ppo --training 2
+    Example: python -m research.interfaces SB3-RecurrentPPO --training 2
     """
     with explained(FOLDER):
         began, used = time.perf_counter(), time.process_time()

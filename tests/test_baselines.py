@@ -1,6 +1,7 @@
 """Laws of the policies, and what they demand."""
 
 import csv
+import dataclasses
 import json
 import math
 import pickle
@@ -12,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.golden import STARTER
-from tests.nets import ANYWHERE
-from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import Policy, PolicyError, granted, make
+from tests.nets import ANYWHERE, saved
+from uuv_marl import load_scenario, parallel_env, scenario_names
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, granted, make
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
+from uuv_marl.baselines.registry import uses_identity
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
@@ -303,3 +305,25 @@ def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, dampin
     any_vehicle = {"any_vehicle": True} if name == "mappo" else {}
     percept = Swarm(scenario).reset(0)
     assert np.isfinite(make(name, scenario, **any_vehicle).act(percept)).all()
+
+
+@pytest.mark.parametrize("name", [*POLICIES, "nearest_target,lanes=true", "guarded:sdc"])
+def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
+    """Of any other policy all vehicles act alike that perceive the same; ``random`` draws for each."""
+    plain = name.partition(",")[0].removeprefix("mappo_").removesuffix("_2")
+    homes = {"nearest_target": "silent_targets", "oracle": "hard_water", "carrot_informed": "hard_water"}
+    home = homes.get(plain, plain if plain in scenario_names() else "starter")
+    scenario = granted(name, load_scenario(home, num_vehicles=4))
+    policy, alike, swarm = make(name, scenario), make(name, scenario), Swarm(scenario)
+    percept, acted_alike = swarm.reset(3), True
+    for _ in range(12):
+        action = policy.act(percept).copy()
+        copies = dataclasses.replace(percept, flat=np.repeat(percept.flat[:, 2:3], 4, axis=1))
+        acted_alike &= np.allclose(alike.act(copies), action[:, 2:3], atol=1e-3)
+        percept = swarm.step(action)
+    assert uses_identity(name) == (not acted_alike and name != "random")
+
+
+def test_a_network_around_a_law_that_acts_by_the_index_does_so_too(tmp_path):
+    for law, told in {"nearest_target,lanes=true": True, "nearest_target,lanes=false": False}.items():
+        assert uses_identity(saved(tmp_path, load_scenario("silent_targets"), around=law)) is told

@@ -187,7 +187,9 @@ def test_the_table_of_policies_is_right():
     needs = {name: need for names, need in rows for name in re.findall(r"`(\w+)`", names)}
     assert set(needs) == set(POLICIES)
     for name, policy in POLICIES.items():
-        parts = [*policy.channels, *(["yaw damping"] if policy.yaw_damping_nms else [])]
+        by = getattr(policy, "identity", False)
+        told = [f"with `{by}=true` identity"] if isinstance(by, str) else ["identity"] * by
+        parts = [*policy.channels, *told, *(["yaw damping"] if policy.yaw_damping_nms else [])]
         assert needs[name] == (", ".join(parts) or "nothing"), name
 
 

@@ -8,9 +8,10 @@ from typer.testing import CliRunner
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, save_checkpoint
+from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
+from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.cli import app
 
 BOW = {"name": "bow", "kind": "active", "mounting_deg": 0.0, "aperture_deg": 90.0, "range_m": 80.0, "sub_sectors": 5}
@@ -72,3 +73,23 @@ def test_the_command(tmp_path):
     assert done.exit_code == 0, done.output
     unwritable = CliRunner().invoke(app, ["export", best, "/dev/null/policy.onnx"])
     assert unwritable.exit_code == 2
+
+
+@pytest.mark.parametrize("name", [name for name, kind in POLICIES.items() if isinstance(kind, Trained)])
+def test_a_shipped_network_is_exported_by_its_name(name, tmp_path, monkeypatch):
+    """Also where a folder of that name lies: a path to it is ./NAME."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).mkdir()
+    done = CliRunner().invoke(app, ["export", name, "policy.onnx"])
+    assert done.exit_code == 0, done.output
+    said = {entry.key: entry.value for entry in onnx.load("policy.onnx").metadata_props}
+    assert said["checkpoint"] == POLICIES[name].checkpoint.digest == load_checkpoint(name).digest
+    with pytest.raises(PolicyError, match=r"can't be read"):
+        load_checkpoint(f"./{name}")
+
+
+def test_the_command_names_what_it_can_not_export():
+    for policy, told in {"scout": "not laws", "mapo": "did you mean 'mappo'", "runs/none": "can't be read"}.items():
+        done = CliRunner().invoke(app, ["export", policy, "policy.onnx"])
+        assert done.exit_code == 2
+        assert told in done.output

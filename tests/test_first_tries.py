@@ -7,6 +7,8 @@ import pytest
 
 from research import interfaces
 from research.interfaces import Learner, printed
+from research.learners.protocol import LEARNERS
+from uuv_marl.baselines import POLICIES
 from uuv_marl.errors import ResultsError
 
 
@@ -17,6 +19,10 @@ def test_the_page_prints_every_learner_and_trainings_have_seeds_of_their_own(lea
     seeds = [[int(seed) for seed in re.findall(r"seed[=(]([\d_]+)", block)] for block in (first, third)]
     assert seeds[1] == [seed + 2000 for seed in seeds[0]]
     assert ("IppoConfig" in first) == (learner is Learner.IPPO)
+
+
+def test_no_learner_has_the_name_of_a_policy_that_ships():
+    assert not {*LEARNERS, *map(str, Learner)} & {*POLICIES}
 
 
 def test_a_page_without_the_block_is_refused(tmp_path, monkeypatch):

@@ -131,7 +131,7 @@ def test_every_kind_of_shipped_row_knows_what_it_is_made_of():
         ({"learner": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
         ({"learner": "research.blind:Blind,inner=evil:Law"}, "is not part of the package"),
         ({"learner": "other", "training": "0"}, "there is no training '0' of a learner 'other' in this version"),
-        ({"learner": "ippo", "training": "7"}, "of hard_water-ippo-7 no policy is kept"),
+        ({"learner": "IPPO", "training": "7"}, "of hard_water-IPPO-7 no policy is kept"),
         ({"set": "nowhere"}, "there is no set 'nowhere' of task 'hard_water' in this version"),
     ],
 )

@@ -33,12 +33,16 @@ class RewardError(ValueError):
     """A reward of a user's own that can't be imported, or gives what is no reward; the message says which."""
 
 
+class PictureError(ValueError):
+    """Pictures can't be drawn here; the message says why, and the remedy."""
+
+
 class MissingExtraError(ModuleNotFoundError):
     """A library is missing that one of the package's extras would install; the message says how."""
 
 
 MENDABLE = (
     ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, ClusterError, TrainingError,
-    RewardError, MissingExtraError,
+    RewardError, PictureError, MissingExtraError,
 )  # fmt: skip
 """All of them."""

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from uuv_marl.errors import MissingExtraError
+from uuv_marl.errors import MissingExtraError, PictureError
 
 
 @contextmanager
@@ -28,6 +28,20 @@ def extra(name: str, what: str | None = None) -> Iterator[None]:
         raise MissingExtraError(
             f"{what or 'this'} needs {library}, which comes with the extra {name!r}: pip install 'uuv_marl[{name}]'",
             name=library,
+        ) from None
+
+
+@contextmanager
+def pictures() -> Iterator[None]:
+    """Imports of Matplotlib belong into this block. Raises PictureError where it refuses the variable MPLBACKEND."""
+    try:
+        yield
+    except ValueError as error:
+        backend = os.environ.get("MPLBACKEND")
+        if not backend or backend not in str(error):
+            raise
+        raise PictureError(
+            f"MPLBACKEND must be a backend of Matplotlib, got {backend!r}; unset it, or set it to agg"
         ) from None
 
 

@@ -36,7 +36,7 @@ def main(
     Several processes may share the folder: run the command once for each core. Each takes the next training that
     nobody has begun, and whoever finds all of them done writes the page. A training that was cut off begins anew.
 
-    Example: python -m research.learners --task hard_water --learner mappo --trainings 1
+    Example: python -m research.learners --task hard_water --learner MAPPO --trainings 1
     """
     with explained(FOLDER):
         for name, known, what in ((task, TASKS, "task"), (learner, LEARNERS, "learner")):

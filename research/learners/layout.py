@@ -4,25 +4,26 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from research.episodes import Row, measured
-from research.learners.protocol import LEARNERS, TASKS
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MEASURES, TASKS
 
 ENVIRONMENT = "uuv_marl"
 _METRICS = ("share", "whole", "contacts")
+_STEPS = [AGENT_STEPS * (k + 1) // MEASURES for k in range(MEASURES)]
 
 
 def marl_eval(curves: Sequence[Row], rows: Sequence[Row]) -> dict[str, Any]:
     """By environment, task, algorithm and ``seed_K``: ``step_K`` and ``absolute_metrics``, lists of metrics.
 
-    A step also has ``step_count`` and ``elapsed_time`` [s]. The absolute metrics are those of the best policy in the
-    final episodes.
+    A step also has ``step_count``. Marl-eval draws all runs with one interval between steps, so for every run the steps
+    are the tenths of the budget in agent-steps. Each has the measure nearest to it: a training that time ended sooner
+    stays at its last one. The absolute metrics are those of the best policy in the final episodes.
     """
     found: dict[str, dict[str, dict[str, Any]]] = {task: {name: {} for name in LEARNERS} for task in TASKS}
+    runs: dict[tuple[str, str, str], list[Row]] = {}
     for row in curves:
-        run = found[row["task"]][row["learner"]].setdefault(f"seed_{row['training']}", {})
-        run[f"step_{len(run)}"] = {
-            "step_count": int(row["agent_steps"]), "elapsed_time": 60.0 * float(row["minutes"]),
-            **{name: [float(row[name])] for name in _METRICS},
-        }  # fmt: skip
+        runs.setdefault((row["task"], row["learner"], row["training"]), []).append(row)
+    for (task, learner, training), run in runs.items():
+        found[task][learner][f"seed_{training}"] = {f"step_{k}": _at(step, run) for k, step in enumerate(_STEPS)}
     first = {task: each.tiers[0][0].name for task, each in TASKS.items()}
     final: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
@@ -31,6 +32,12 @@ def marl_eval(curves: Sequence[Row], rows: Sequence[Row]) -> dict[str, Any]:
     for (task, learner, training), mine in final.items():
         found[task][learner][f"seed_{training}"]["absolute_metrics"] = _means(mine)
     return {ENVIRONMENT: found}
+
+
+def _at(step: int, run: Sequence[Row]) -> dict[str, Any]:
+    """A step of a training: its nearest measure."""
+    row = min(run, key=lambda row: abs(int(row["agent_steps"]) - step))
+    return {"step_count": step, **{name: [float(row[name])] for name in _METRICS}}
 
 
 def _means(rows: Sequence[Row]) -> Mapping[str, list[float]]:

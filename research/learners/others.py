@@ -18,7 +18,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def main(
-    policy: Annotated[str, typer.Argument(help="A checkpoint, or module:Class.")],
+    policy: Annotated[str, typer.Argument(help="Name, checkpoint or module:Class.")],
     rows: Annotated[Path, typer.Argument(help="File of its episodes, .csv or .csv.gz.")],
     task: Annotated[str, typer.Option(help=f"One of {', '.join(TASKS)}.")],
     sample: Annotated[int, typer.Option(min=1, help="Rows that are run again.")] = 20,

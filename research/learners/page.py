@@ -15,6 +15,7 @@ from research.learners.figures import draw_curves, draw_profiles
 from research.learners.layout import marl_eval
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRAININGS
 from research.learners.statistics import Estimate, improvement, interquartile_mean, mean
+from research.tasks.page import named
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style
 from uuv_marl.benchmark.tables import markdown_table
@@ -136,13 +137,18 @@ def _everyone(found: Found, task: str) -> list[str]:
     return [*LEARNERS, *(who for where, who in found if where == task and who not in LEARNERS)]
 
 
+def _called(who: str) -> str:
+    """A policy of the package with what it gets beyond sonar; learners and those from elsewhere by their names."""
+    return who if who in LEARNERS or who.endswith("(checked)") else named(who)
+
+
 def _tiers(found: Found) -> str:
     """The headline in each set, a table for each task."""
     tables: list[str] = []
     for task in TASKS.values():
         names = [each.name for each in task.sets]
         rows = [
-            (who, *(short(float(_values(found, task.name, who, each=name).mean())) for name in names))
+            (_called(who), *(short(float(_values(found, task.name, who, each=name).mean())) for name in names))
             for who in _everyone(found, task.name)
         ]
         tables.append(markdown_table(("", *names), rows))
@@ -160,7 +166,7 @@ def _safety(found: Found) -> str:
                 if _number(found, task, who, name) >= _FEW else "–"
                 for name, way in ways.items()
             ]  # fmt: skip
-            table.append((task, who, *cells))
+            table.append((task, _called(who), *cells))
     return markdown_table(("task", "", *(name.replace("_", " ") for name in ways)), table)
 
 

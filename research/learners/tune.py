@@ -30,7 +30,7 @@ def main(
     A trial's score is the mean over both tasks of its best validation: the mean of the headline and of the share of
     whole swarms. OUTPUT/LEARNER.csv holds them all.
 
-    Example: python -m research.learners.tune ppo
+    Example: python -m research.learners.tune SB3-PPO
     """
     with explained(FOLDER):
         if learner not in LEARNERS:

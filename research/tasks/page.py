@@ -8,7 +8,7 @@ import numpy as np
 from research.data import read_text
 from research.episodes import Row, measured, short
 from research.tasks.studies import STUDIES, Study, set_name
-from uuv_marl.baselines.registry import is_trained, policy_class
+from uuv_marl.baselines.registry import is_trained, policy_class, uses_identity
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.types import Float64
@@ -69,7 +69,7 @@ def _shares(found: Found, study: Study, columns: Columns, share: str = "") -> st
     """The headline, or another ``share``, with its interval, and whole swarms, for policies that ran on all sets."""
     share = share or study.headline
     table = [
-        (_named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'whole')}" for mine in cells))
+        (named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'whole')}" for mine in cells))
         for policy in _policies(found)
         if (cells := _cells(found, policy, columns))
     ]
@@ -85,7 +85,7 @@ def _measures(found: Found, study: Study, columns: Columns) -> str:
             shares = [[_mean([rows], name) for name in (study.headline, "whole")] if rows else ["–"] for rows in cells]
             own = [", ".join(two) for two in shares] if columns else shares[0]
             rest = (_MEASURES[name][1](measured(every, name), _size(every[0])) for name in _shown(study))
-            table.append((_named(policy), *own, *rest))
+            table.append((named(policy), *own, *rest))
     heads = (*columns,) if columns else (study.headline.replace("_", " "), "whole")
     return markdown_table(("policy", *heads, *(_MEASURES[name][0] for name in _shown(study))), table)
 
@@ -117,14 +117,14 @@ def _final(found: Found, study: Study) -> str:
         for policy, rows in mine.items():
             gain = _with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
             told = f"{_with_interval([shares[policy]])}, {_mean([rows], 'whole')}"
-            table.setdefault(policy, [_named(policy)]).extend((told, gain))
+            table.setdefault(policy, [named(policy)]).extend((told, gain))
     return markdown_table(heads, table.values())
 
 
-def _named(policy: str) -> str:
+def named(policy: str) -> str:
     """A policy with what it gets beyond sonar."""
-    channels = policy_class(policy).channels
-    return f"{policy} with {', '.join(channels)}" if channels else policy
+    beyond = [*policy_class(policy).channels, *(["identity"] if uses_identity(policy) else [])]
+    return f"{policy} with {', '.join(beyond)}" if beyond else policy
 
 
 def _policies(found: Found) -> list[str]:

@@ -87,7 +87,7 @@ def test_what_isac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
     monkeypatch.setattr(isac, "tensors_of", lambda actor: actors.append(actor) or usual(actor))
     monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
     task = TASKS["hard_water"]
-    isac.learn(watch.Asked(task, 0, tmp_path, LEARNERS["isac"].settings, 25_000, 1.0, quiet))
+    isac.learn(watch.Asked(task, 0, tmp_path, LEARNERS["ISAC"].settings, 25_000, 1.0, quiet))
     (tmp_path / "now").write_bytes(safetensors.numpy.save(usual(actors[0])))
     swarm = Swarm(task.scenario, 3)
     percept = swarm.reset(10_100)
@@ -128,21 +128,23 @@ def alike(rows):
 
 def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monkeypatch):
     monkeypatch.setattr(statistics, "_OF_PAIRS", 25)
-    curves, rows = invented(better=("isac",))
+    curves, rows = invented(better=("ISAC",))
     state = np.random.get_state()[1].copy()  # noqa: NPY002
     text = page.report(curves, rows)
     assert text == page.report(curves, rows)
     np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
     for task in TASKS:
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
-        assert all(f"isac over {other}" in row for other in LEARNERS if other != "isac")
+        assert all(f"ISAC over {other}" in row for other in LEARNERS if other != "ISAC")
     assert not any(" over " in row for row in page._apart(page.found_in(alike(rows))).splitlines())
 
 
 def test_the_page_shows_the_trainings_that_all_learners_have():
     curves, rows = invented()
     assert page.complete(curves, rows) == (curves, rows)
-    lacking = [row for row in curves if (row["task"], row["learner"], row["training"]) != ("hard_water", "ppo", "3")]
+    lacking = [
+        row for row in curves if (row["task"], row["learner"], row["training"]) != ("hard_water", "SB3-PPO", "3")
+    ]
     shown = page.complete(lacking, rows)
     assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
     assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
@@ -164,29 +166,29 @@ def test_what_the_page_finds_is_in_the_shipped_rows():
     laws = {name: float(page._values(found, name, task.policies[0])[0, 0]) for name, task in TASKS.items()}
     means = {who: dict(zip(TASKS, own.mean(axis=0), strict=True)) for who, own in every.items()}
     for task in ("random_field", "hard_water", "silent_targets"):
-        assert max(means, key=lambda who: means[who][task]) == "mappo"
+        assert max(means, key=lambda who: means[who][task]) == "MAPPO"
     for who in LEARNERS:
-        assert (abs(means[who]["hard_water"] - laws["hard_water"]) < 0.03) == (who in ("mappo", "ppo"))
+        assert (abs(means[who]["hard_water"] - laws["hard_water"]) < 0.03) == (who in ("MAPPO", "SB3-PPO"))
         for k, task in enumerate(TASKS):
             assert task == "hard_water" or every[who][:, k].max() < laws[task]
         assert means[who]["few_informed"] < 0.05
     for task in ("random_field", "hard_water"):
-        assert means["mappo_gru"][task] < means["mappo"][task] - 0.03
+        assert means["MAPPO-GRU"][task] < means["MAPPO"][task] - 0.03
     apart = {who: np.ptp(own[:, list(TASKS).index("hard_water")]) for who, own in every.items()}
-    assert max(apart, key=lambda who: apart[who]) == "mappo_gru"
+    assert max(apart, key=lambda who: apart[who]) == "MAPPO-GRU"
 
     def early(who):
         own = [row for row in curves if (row["task"], row["learner"]) == ("hard_water", who)]
         return np.mean([float(row["share"]) for row in own if 0.8e6 < float(row["agent_steps"]) < 1.2e6])
 
-    assert all(early("isac") > early(who) + 0.1 for who in LEARNERS if who != "isac")
+    assert all(early("ISAC") > early(who) + 0.1 for who in LEARNERS if who != "ISAC")
 
     def at_sea(task, who):
         return float(page._values(found, task, who, each=f"{task}-sea").mean())
 
     assert all(at_sea(task, TASKS[task].policies[0]) < 0.1 for task in ("hard_water", "two_swarms", "silent_targets"))
     for task in ("hard_water", "silent_targets"):
-        assert all(at_sea(task, who) > 0.9 * means[who][task] - 0.01 for who in LEARNERS if who != "isac")
+        assert all(at_sea(task, who) > 0.9 * means[who][task] - 0.01 for who in LEARNERS if who != "ISAC")
     for task in ("random_field", "few_informed"):
         assert all(at_sea(task, TASKS[task].policies[0]) > at_sea(task, who) for who in LEARNERS)
 
@@ -209,11 +211,26 @@ def test_the_layout_is_that_of_marl_eval():
         for runs in task.values():
             assert list(runs) == ["seed_0", "seed_1", "seed_2", "seed_3"]
             for run in runs.values():
-                assert list(run) == ["step_0", "step_1", "absolute_metrics"]
-                assert {"step_count", "elapsed_time"} < set(run["step_0"])
-                metrics = {*run["step_0"]} - {"step_count", "elapsed_time"}
-                assert {*run["absolute_metrics"]} == metrics
+                assert list(run) == [*(f"step_{k}" for k in range(protocol.MEASURES)), "absolute_metrics"]
+                assert {*run["absolute_metrics"]} == {*run["step_0"]} - {"step_count"}  # else marl-eval refuses it
                 assert all(isinstance(values, list) for values in run["absolute_metrics"].values())
+
+
+def test_all_learners_have_one_axis():
+    """Marl-eval draws steps over one interval, the mean of all differences of step counts, the first from 0."""
+    told = json.loads((FOLDER / "docs" / "learners_marl_eval.json").read_text())["uuv_marl"]
+    every = [run for task in told.values() for runs in task.values() for run in runs.values()]
+    counts = {tuple(step["step_count"] for key, step in run.items() if key.startswith("step_")) for run in every}
+    assert len(counts) == 1
+    assert {int(gap) for gap in np.diff([0, *counts.pop()])} == {protocol.AGENT_STEPS // protocol.MEASURES}
+
+
+def test_a_step_is_the_nearest_measure_and_after_its_end_a_training_stays_at_its_last():
+    place = {"task": "hard_water", "learner": next(iter(LEARNERS)), "training": "0", "whole": "0", "contacts": "0"}
+    ends = {400_000: "0.1", 700_000: "0.2", 1_600_000: "0.3"}
+    curve = [{**place, "agent_steps": str(k), "minutes": "1", "share": share} for k, share in ends.items()]
+    run = marl_eval(curve, [])["uuv_marl"]["hard_water"][place["learner"]]["seed_0"]
+    assert [step["share"] for step in run.values()] == [[0.1], [0.2], *[[0.3]] * (protocol.MEASURES - 2)]
 
 
 def test_every_set_of_the_protocol_can_be_run_by_its_learners():

@@ -77,6 +77,8 @@ class Policy:
     the link's fields lie where ``at`` says, and ``percept["link_velocity"]`` is not there."""
     yaw_damping_nms: ClassVar[float] = 0.0
     """Inner loop that the policy was designed with [N m s], on a vehicle of ``full_torque_nm``: ``inner_loop_nms``."""
+    identity: ClassVar[bool | str] = False
+    """Whether it acts by a vehicle's index, which no vehicle perceives; or the parameter that makes it do so."""
     decides_every_s: ClassVar[float | None] = None
     """Period between decisions that the policy needs [s]; None if it is made for any."""
     full_torque_nm: ClassVar[float] = 3000.0

@@ -146,6 +146,16 @@ def is_trained(name: str) -> bool:
     return isinstance(POLICIES[plain], Trained) if plain in POLICIES else not re.fullmatch(r"[\w.]+:\w+", plain)
 
 
+def uses_identity(name: str) -> bool:
+    """Whether the policy of that name acts by a vehicle's index, which no vehicle perceives."""
+    kind, written = parse_policy(name)
+    if isinstance(kind, Trained):
+        law = kind.checkpoint.card.around
+        return bool(law) and uses_identity(law)
+    by = kind.identity
+    return bool(_value(written.get(by, "false"))) if isinstance(by, str) else by
+
+
 def granted(name: str, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels, the inner loop (``inner_loop_nms``) and the clock that a policy declares.
 

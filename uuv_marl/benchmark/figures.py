@@ -9,16 +9,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from uuv_marl.benchmark.results import Results
 from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, PINK, draw_course, house_style, legend, panels, save
+from uuv_marl.extras import pictures
 from uuv_marl.scenario import Scenario, conditions, disturbances
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.groups import groups_of
 from uuv_marl.types import Float32, Float64
+
+with pictures():
+    from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
 
 Trace = dict[str, Float32]
 _TEAMS = (BLUE, GREEN, PINK, BLACK)

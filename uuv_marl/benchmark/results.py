@@ -24,7 +24,7 @@ from uuv_marl.atomic import replacing, write_text, writing
 from uuv_marl.baselines.grants import Declared
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.registry import policy_class
+from uuv_marl.baselines.registry import policy_class, uses_identity
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
@@ -58,6 +58,8 @@ class Knowledge(TypedDict):
     channels: list[str]
     yaw_damping_nms: float
     """The policy's inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
+    identity: NotRequired[Literal[True]]
+    """Where it acts by a vehicle's index."""
     decides_every_s: NotRequired[float]
     """Period between decisions, where it needs one."""
     source: str | None
@@ -265,6 +267,8 @@ def knowledge(policy: str) -> Knowledge:
         source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
     damping = made.yaw_damping_nms * (Policy.full_torque_nm / made.full_torque_nm)
     known = Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
+    if uses_identity(policy):
+        known["identity"] = True
     if made.decides_every_s:
         known["decides_every_s"] = made.decides_every_s
     if isinstance(made, Trained):

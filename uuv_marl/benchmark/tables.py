@@ -229,7 +229,7 @@ def _knows(scenario: Scenario, policy: str, known: Knowledge) -> str:
     """What a policy has beyond the percept on a scenario, and beyond what all others have there."""
     told = [known["policy_class"]] if "policy_class" in known else []
     has = granted_to(policy, declared(known), scenario)
-    told += has.sonar.channels
+    told += [*has.sonar.channels, *(["identity"] if "identity" in known else [])]
     if has.timing.decision_period_s != scenario.timing.decision_period_s:
         told.append(f"a decision every {has.timing.decision_period_s:g} s")
     damping = has.actuators.yaw_damping_nms

@@ -9,7 +9,10 @@ from uuv_marl.cli.console import explained, extra, path_argument, say
 
 
 def export(
-    policy: Annotated[str, typer.Argument(help="Checkpoint of a training without filter and law, file or folder.")],
+    policy: Annotated[
+        str,
+        typer.Argument(help="Name of a network, or checkpoint of a training without filter and law, file or folder."),
+    ],
     output: Annotated[Path, path_argument("ONNX file.")],
     scenario: Annotated[
         str | None, typer.Option(help="Name or TOML file of a scenario with its observation. Default: the training's.")
@@ -26,11 +29,13 @@ def export(
         with extra("onnx", "export to ONNX"):
             from uuv_marl.baselines.learned.export import write_onnx
 
-        from uuv_marl.baselines.learned.checkpoint import load_checkpoint
+        from uuv_marl.baselines.learned.trained import Trained
+        from uuv_marl.baselines.registry import policy_class
         from uuv_marl.scenario import load_scenario
         from uuv_marl.train.training import overrides_for
 
-        told = load_checkpoint(policy).card.training
+        kind = policy_class(policy)
+        told = kind.checkpoint.card.training if isinstance(kind, Trained) else {}
         name, own = scenario or told.get("scenario", "starter"), told.get("overrides", {}) if scenario is None else {}
         write_onnx(policy, load_scenario(name, overrides=overrides_for(name, own)), output)
         say(f"Model: {output}")

@@ -81,12 +81,14 @@ def _vehicles() -> Table:
 
 def _policies() -> Table:
     from uuv_marl.baselines import POLICIES
+    from uuv_marl.baselines.registry import uses_identity
 
-    table = Table("name", "channels", "yaw damping [N m s]", "decides every [s]", "what")
+    table = Table("name", "beyond sonar", "yaw damping [N m s]", "decides every [s]", "what")
     for name, made in POLICIES.items():
         every = f"{made.decides_every_s:g}" if made.decides_every_s else "-"
         what = (made.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
-        table.add_row(name, ", ".join(made.channels) or "-", f"{made.yaw_damping_nms:g}", every, what)
+        beyond = [*made.channels, *(["identity"] if uses_identity(name) else [])]
+        table.add_row(name, ", ".join(beyond) or "-", f"{made.yaw_damping_nms:g}", every, what)
     return table
 
 

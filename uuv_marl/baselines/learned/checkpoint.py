@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ Row = tuple[str, int, str, float]
 
 WEIGHTS_FILE = "policy.safetensors"
 """The checkpoint within a folder."""
+_SHIPPED = Path(__file__).parents[1] / "weights"
 _CARD = "uuv_marl"
 _MOST_WEIGHT = 1e6
 """Larger weights are no result of training, and overflow in single precision."""
@@ -149,15 +151,20 @@ def save_checkpoint(path: UserPath, card: Card, tensors: Mapping[str, NDArray[An
 
 
 def load_checkpoint(path: UserPath) -> Checkpoint:
-    """A checkpoint from its file, or from the folder that holds it. Raises PolicyError naming what is wrong."""
-    path = user_path(path)
+    """A checkpoint from its file, from the folder that holds it, or by the name of a network that ships.
+
+    Raises:
+        PolicyError: there is none, or it can't be used; the message names what is wrong.
+    """
+    shipped = _SHIPPED / f"{path}.safetensors"
+    path = shipped if isinstance(path, str) and path.isidentifier() and shipped.is_file() else user_path(path)
     file = path / WEIGHTS_FILE if path.is_dir() else path
     try:
         data = file.read_bytes()
     except OSError as error:
         raise PolicyError(
             f"policy {str(path)!r} can't be read ({error.strerror}: {file}); give a checkpoint, such as the folder "
-            "best of a training"
+            "best of a training, or the name of a network that ships"
         ) from None
     try:
         tensors: dict[str, NDArray[Any]] = safetensors.numpy.load(data)

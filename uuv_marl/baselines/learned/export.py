@@ -36,7 +36,7 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
     (vehicle, unit), zeros at first, and gives the next one.
 
     Args:
-        policy: path of a checkpoint.
+        policy: name of a network, or path of a checkpoint.
         scenario: gives the observation's layout.
         path: the file.
 

@@ -1,7 +1,6 @@
 """Learned policies from their checkpoints."""
 
 import functools
-from pathlib import Path
 
 from uuv_marl.baselines.learned.actor import Actor, Recurrent
 from uuv_marl.baselines.learned.checkpoint import Checkpoint, load_checkpoint
@@ -14,7 +13,7 @@ class Trained:
 
     Args:
         name: of the policy in messages.
-        path: of the checkpoint, a file or the folder that holds it; read on first use.
+        path: of the checkpoint, as ``load_checkpoint`` takes it; read on first use.
         doc: the policy's docstring.
     """
 
@@ -54,4 +53,4 @@ class Trained:
 
 def shipped(name: str, doc: str) -> Trained:
     """The policy of a checkpoint in ``uuv_marl/baselines/weights``."""
-    return Trained(name, Path(__file__).parents[1] / "weights" / f"{name}.safetensors", doc)
+    return Trained(name, name, doc)

@@ -81,6 +81,7 @@ class Sdc(Policy):
     wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = SdcMemory
     channels: ClassVar[tuple[str, ...]] = ("compass", "link")
+    identity: ClassVar[bool | str] = True
     yaw_damping_nms: ClassVar[float] = 600.0
     """Without it, in the settings tried by hand, the informed vehicle left the others behind and none arrived."""
     tuned_as: ClassVar[str] = "sdc"

@@ -82,6 +82,7 @@ class NearestTarget(Filtered):
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
+    identity: ClassVar[bool | str] = "lanes"
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,

@@ -6,12 +6,14 @@
 import itertools
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from uuv_marl.benchmark.robustness.axes import AXES, CALM, Axis
 from uuv_marl.benchmark.robustness.scores import ENOUGH, scored
 from uuv_marl.benchmark.style import BLACK, COLOURS, legend, panels
+from uuv_marl.extras import pictures
+
+with pictures():
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _AGAIN = ((".", "-"), ("x", "--"), ("^", ":"))
 """Marker and line of the policies that come first, and of those for which no new colour is left."""

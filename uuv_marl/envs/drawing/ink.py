@@ -3,11 +3,12 @@
 import functools
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 
-from uuv_marl.extras import extra
+from uuv_marl.extras import extra, pictures
 
+with pictures():
+    import matplotlib as mpl
 with extra("render", "rendering"):
     import pygame
 
