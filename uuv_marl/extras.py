@@ -1,7 +1,6 @@
 """Optional libraries: where one is missing, the message names the extra that brings it; and how they are made quiet."""
 
 import logging
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -29,18 +28,6 @@ def extra(name: str, what: str | None = None) -> Iterator[None]:
             f"{what or 'this'} needs {library}, which comes with the extra {name!r}: pip install 'uuv_marl[{name}]'",
             name=library,
         ) from None
-
-
-@contextmanager
-def environment(**variables: str) -> Iterator[None]:
-    """Set what a library reads from the environment for the block alone; what is set already stays as it is."""
-    added = variables.keys() - os.environ.keys()
-    os.environ.update({name: variables[name] for name in added})
-    try:
-        yield
-    finally:
-        for name in added:
-            os.environ.pop(name, None)
 
 
 @contextmanager
