@@ -20,8 +20,8 @@ from uuv_marl.baselines.learned.around import Around
 from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained, shipped
 from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
-from uuv_marl.baselines.paper.sdc import Sdc, SdcInformed
-from uuv_marl.baselines.paper.sff import Sff, SffInformed
+from uuv_marl.baselines.paper.sdc import Sdc
+from uuv_marl.baselines.paper.sff import Sff
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.random_idle import Idle, Random
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
@@ -48,8 +48,6 @@ POLICIES: dict[str, Kind] = {
     "nearest_target": NearestTarget,
     "sff": Sff,
     "sdc": Sdc,
-    "sff_informed": SffInformed,
-    "sdc_informed": SdcInformed,
     "apf": Apf,
     "olfati_saber": OlfatiSaber,
     "olfati_saber_informed": OlfatiSaberInformed,
