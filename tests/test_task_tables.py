@@ -28,7 +28,7 @@ def test_reported_episodes_count_from_zero_and_every_set_is_what_its_name_says()
     for study in STUDIES.values():
         assert study.own
         for name, each in study.sets.items():
-            case = each.cases(None)[0]
+            case = next(iter(each.cases(None).values()))
             scenario = case.load()
             kind, n = getattr(scenario.task_numbers, "kinds", [""])[0], scenario.swarm.num_vehicles
             usual, informed = load_scenario(scenario.name), case.overrides.get("task.informed", 0)

@@ -51,11 +51,12 @@ def copied(folder, name, wanted, **changes):
     ("name", "wanted"),
     [
         ("heldout.csv.gz", N10),
+        ("heldout.csv.gz", N10 | {"policy": "mappo_2"}),
         ("robustness.csv.gz", {"axis": "A1", "level": "3", "policy": "mappo", "seed": "3"}),
         ("sea-trials.csv.gz", {"scenario": "sea_trial", "vehicle": "lauv", "policy": "mappo", "seed": "4"}),
         ("paper.csv.gz", {"policy": "sdc", "seed": "4"}),
     ],
-    ids=["heldout", "robustness", "sea-trials", "paper"],
+    ids=["heldout", "second training", "robustness", "sea-trials", "paper"],
 )
 def test_shipped_rows_come_out_again(tmp_path, name, wanted):
     path, _ = copied(tmp_path, name, wanted)

@@ -7,6 +7,7 @@ import numpy as np
 
 from research.data import read_text
 from research.episodes import Row, measured, short
+from research.second import runnable
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.registry import is_trained, policy_class
 from uuv_marl.benchmark.tables import markdown_table
@@ -123,7 +124,7 @@ def _final(found: Found, study: Study) -> str:
 
 def _named(policy: str) -> str:
     """A policy with what it gets beyond sonar."""
-    channels = policy_class(policy).channels
+    channels = policy_class(runnable(policy)).channels
     return f"{policy} with {', '.join(channels)}" if channels else policy
 
 
