@@ -2,7 +2,6 @@
 
 import logging
 import runpy
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +20,6 @@ OURS: dict[str, Any] = {
     "gamma": GAMMA, "gae_lambda": GAE_LAMBDA, "horizon": DECISIONS, "clip": CLIP, "kl_stop": 1e9,
     "learning_rate": (LEARNING_RATE, LEARNING_RATE),
 }  # fmt: skip
-END = ExitStack()
-"""What is to be done when all is measured."""
 
 
 def scenario(agents: int) -> Scenario:
@@ -74,10 +71,8 @@ def supersuit(agents: int, worlds: int) -> Case:
 
 def rllib(agents: int, worlds: int) -> Case:
     """PPO as ``examples/training/rllib.py`` has it, sampling and learning in this process."""
-    from uuv_marl.benchmark.distributed import connected
-
-    END.enter_context(connected(None))
     example = runpy.run_path(str(Path(__file__).resolve().parent.parent / "examples" / "training" / "rllib.py"))
+    example["start_ray"](0)
     config = example["ppo_config"](SCENARIO, agents, 0, SEED)
     config.environment(env_config={"scenario": SCENARIO, "num_vehicles": agents, "overrides": OVERRIDES})
     config.env_runners(num_envs_per_env_runner=worlds)
@@ -96,5 +91,4 @@ CASES: dict[str, Maker] = {case.__name__: case for case in (mappo, plain, supers
 
 if __name__ == "__main__":
     torch.set_num_threads(1)  # Numba, OpenMP and BLAS are told by the environment's variables
-    with END:
-        serve(CASES)
+    serve(CASES)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from research.episodes import Row, cells
+from research.second import runnable
 from uuv_marl.atomic import locked
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.suite import NOTHING, Case, Report, Suite
@@ -24,12 +25,12 @@ class EpisodeSet(NamedTuple):
     """By policy."""
     overrides: Mapping[str, object] = NOTHING
 
-    def cases(self, most: int | None) -> list[Case]:
-        """All that is run, at most so many seeds of each policy."""
-        return [
-            Case(self.name, self.scenario, policy, self.overrides, shared=True, seeds=seeds[:most])
+    def cases(self, most: int | None) -> dict[str, Case]:
+        """All that is run, at most so many seeds of each policy, by its name in tables."""
+        return {
+            policy: Case(self.name, self.scenario, runnable(policy), self.overrides, shared=True, seeds=seeds[:most])
             for policy, seeds in self.seeds.items()
-        ]
+        }
 
 
 def run(
@@ -53,18 +54,19 @@ def run(
     for name in only:
         if name not in known:
             raise ResultsError(f"there is no set {name!r}; there are {', '.join(known)}")
-    planned = [case for each in sets if not only or each.name in only for case in each.cases(seeds)]
-    for policy in {case.policy for case in planned}:
+    planned = [pair for each in sets if not only or each.name in only for pair in each.cases(seeds).items()]
+    cases = [case for _, case in planned]
+    for policy in {case.policy for case in cases}:
         policy_class(policy)  # refused now, not after hours of others' runs
     suite = Suite(output, traces=False)
     with ExitStack() as locks:
-        for folder in dict.fromkeys(output / case.folder for case in planned):
+        for folder in dict.fromkeys(output / case.folder for case in cases):
             locks.enter_context(locked(folder))
-        suite.run(planned, report)
-    return [row for case in planned for row in _rows(suite, case, metrics)]
+        suite.run(cases, report)
+    return [row for policy, case in planned for row in _rows(suite, policy, case, metrics)]
 
 
-def _rows(suite: Suite, case: Case, metrics: Sequence[str]) -> Iterator[Row]:
+def _rows(suite: Suite, policy: str, case: Case, metrics: Sequence[str]) -> Iterator[Row]:
     for run in suite.results(case).select(case.load().name, case.policy, suite.seeds_of(case)):
-        place = {"set": case.name, "policy": case.policy, "seed": str(run.seed)}
+        place = {"set": case.name, "policy": policy, "seed": str(run.seed)}
         yield place | cells(run.metrics, metrics, DIGITS)

@@ -35,8 +35,8 @@ REWARD = "sparse"
 
 LAWS = {name: name for name in (
     "bio_inspired", "bio_inspired,obstacle_term=per_obstacle", "bio_inspired_plus", "scout", "sff", "sdc",
-    "sff_informed", "sdc_informed", "apf", "olfati_saber", "olfati_saber_informed", "orca_informed", "pull", "random",
-    "idle", "guarded:bio_inspired", "guarded:random",
+    "apf", "olfati_saber", "olfati_saber_informed", "orca_informed", "pull", "random", "idle", "guarded:bio_inspired",
+    "guarded:random",
 )} | {f"scout_{preset}": f"scout,preset={preset}" for preset in ("plus", "lead", "wary")}  # fmt: skip
 """Hand-made policies: as a key names them, and the name that makes them today."""
 NETWORKS = {name: name for name in ("mappo", "ppo", "guarded:mappo")}

@@ -95,7 +95,6 @@ def test_a_missing_library_names_its_extra():
         ("envs.torchrl", "torchrl", "torchrl"),
         ("envs.benchmarl", "benchmarl", "benchmarl"),
         ("envs.rllib", "ray", "distributed"),
-        ("benchmark.distributed", "ray", "distributed"),
     ],
 )
 def test_modules_of_optional_libraries_name_their_extra(module, library, name):

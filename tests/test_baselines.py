@@ -1,17 +1,18 @@
 """Laws of the policies, and what they demand."""
 
-import csv
 import dataclasses
 import json
 import math
 import pickle
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE, saved
 from uuv_marl import load_scenario, parallel_env, scenario_names
@@ -161,12 +162,13 @@ def test_slots_are_a_lattice_around_zero(n):
 
 
 FOLDER = resources.files("uuv_marl.baselines") / "tuned"
+TRIED = Path(__file__).resolve().parent.parent / "research" / "tuned"
 
 
 @pytest.mark.parametrize("file", SPACES)
 def test_tuned_gains_come_from_shipped_trials(file):
     data = json.loads((FOLDER / f"{file}.json").read_text())
-    trials = list(csv.DictReader((FOLDER / f"{file}.csv").read_text().splitlines()))
+    trials = read_rows(TRIED / f"{file}.csv.gz")
     name, _, what = file.partition(".")
     assert len(trials) == TRIALS
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])

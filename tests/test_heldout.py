@@ -7,6 +7,7 @@ import pytest
 from research.episodes import read_rows, succeeded, write_rows
 from research.heldout import page
 from research.heldout.sets import FIRST, GROUPS, SETS
+from research.second import SECOND
 from uuv_marl.baselines import POLICIES
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -20,13 +21,13 @@ def episode(policy="mappo", seed=5000, **changes):
 def test_seeds_are_held_out_and_sets_are_told_apart():
     assert len({held.name for held in SETS}) == len(SETS)
     for held in SETS:
-        cases = held.cases(None)
+        cases = held.cases(None).values()
         assert {case.load().name for case in cases} == {held.scenario}
         most = max(map(len, held.seeds.values()))
         assert {seed for case in cases for seed in case.seeds} == set(range(5000, 5000 + most))
-        assert max(len(case.seeds) for case in held.cases(30)) <= 30
+        assert max(len(case.seeds) for case in held.cases(30).values()) <= 30
     named = {name.removeprefix("guarded:").partition(",")[0] for group in GROUPS.values() for name in group}
-    assert named <= {*POLICIES}
+    assert named <= {*POLICIES, *SECOND}
 
 
 @pytest.mark.parametrize("name", ["rows.csv", "rows.csv.gz"])

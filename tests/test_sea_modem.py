@@ -81,9 +81,7 @@ def test_compasses_turn_what_is_said_and_what_is_read():
     assert turns > 100
 
 
-@pytest.mark.parametrize(
-    "policy", ["sff", "sff_informed", "sdc", "sdc_informed", "olfati_saber_informed", "orca_informed"]
-)
+@pytest.mark.parametrize("policy", ["sff", "sdc", "olfati_saber_informed", "orca_informed"])
 def test_comparators_run_on_messages_as_on_the_link(policy):
     """The same law: where messages are as fresh as the link, it does the same."""
     base = {"modem.period_s": 0.1, "obstacles": []}

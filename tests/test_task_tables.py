@@ -28,7 +28,7 @@ def test_reported_episodes_count_from_zero_and_every_set_is_what_its_name_says()
     for study in STUDIES.values():
         assert study.own
         for name, each in study.sets.items():
-            case = each.cases(None)[0]
+            case = next(iter(each.cases(None).values()))
             scenario = case.load()
             kind, n = getattr(scenario.task_numbers, "kinds", [""])[0], scenario.swarm.num_vehicles
             usual, informed = load_scenario(scenario.name), case.overrides.get("task.informed", 0)
@@ -39,7 +39,7 @@ def test_reported_episodes_count_from_zero_and_every_set_is_what_its_name_says()
 
 
 def test_the_page_by_hand():
-    done = [*rows("scout", 0.5), *rows("apf", 0.25), *rows("oracle", 1.0), *rows("sff_informed", 0.9)]
+    done = [*rows("scout", 0.5), *rows("apf", 0.25), *rows("oracle", 1.0), *rows("olfati_saber_informed", 0.9)]
     done += [*rows("sdc", 0.3), *rows("mappo", 0.75), *rows("research.blind:Blind,inner=mappo", 0.25)]
     text = report("hard_water", done)
     assert "| scout | .50 [.50, .50], .00 | .50 [.50, .50], .00 | .50 [.50, .50], .00 |" in text

@@ -51,10 +51,11 @@ def copied(folder, name, wanted, **changes):
     ("name", "wanted"),
     [
         ("heldout.csv.gz", N10),
+        ("heldout.csv.gz", N10 | {"policy": "mappo_2"}),
         ("robustness.csv.gz", {"axis": "A1", "level": "3", "policy": "mappo", "seed": "3"}),
         ("paper.csv.gz", {"policy": "sdc", "seed": "4"}),
     ],
-    ids=["heldout", "robustness", "paper"],
+    ids=["heldout", "second training", "robustness", "paper"],
 )
 def test_shipped_rows_come_out_again(tmp_path, name, wanted):
     path, _ = copied(tmp_path, name, wanted)

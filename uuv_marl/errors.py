@@ -21,10 +21,6 @@ class ReplayError(ValueError):
     """An episode that can't be shown; the message names the remedy."""
 
 
-class ClusterError(RuntimeError):
-    """A cluster that can't do the work; the message says what to do."""
-
-
 class TrainingError(ValueError):
     """A training that can't be run; the message says which field, what it is and what to do."""
 
@@ -42,7 +38,7 @@ class MissingExtraError(ModuleNotFoundError):
 
 
 MENDABLE = (
-    ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, ClusterError, TrainingError,
-    RewardError, PictureError, MissingExtraError,
+    ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, TrainingError, RewardError, PictureError,
+    MissingExtraError,
 )  # fmt: skip
 """All of them."""

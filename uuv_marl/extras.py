@@ -46,18 +46,6 @@ def pictures() -> Iterator[None]:
 
 
 @contextmanager
-def environment(**variables: str) -> Iterator[None]:
-    """Set what a library reads from the environment for the block alone; what is set already stays as it is."""
-    added = variables.keys() - os.environ.keys()
-    os.environ.update({name: variables[name] for name in added})
-    try:
-        yield
-    finally:
-        for name in added:
-            os.environ.pop(name, None)
-
-
-@contextmanager
 def silenced(logger: str, level: int) -> Iterator[None]:
     """Let a library's logger tell nothing below this level for the block alone. To be entered once it is imported."""
     log = logging.getLogger(logger)

@@ -1,22 +1,33 @@
-"""Train one policy for all vehicles with RLlib's PPO, on this machine or on a Ray cluster.
+"""Train one policy for all vehicles with RLlib's PPO, on this machine.
 
 python examples/training/rllib.py --scenario starter --steps 1000000 --output runs/rllib
 """
 
 import argparse
+import os
 from pathlib import Path
 from typing import Any
 
+# Read at Ray's import: it then listens on 127.0.0.1 alone and reports no usage. A process has one core.
+os.environ.update(
+    {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_USAGE_STATS_ENABLED": "0", "NUMBA_NUM_THREADS": "1"} | os.environ
+)
+
+import ray  # pyright: ignore[reportMissingImports]
 from ray.rllib.algorithms.ppo import PPOConfig  # pyright: ignore[reportMissingImports]
 from ray.rllib.core.rl_module.default_model_config import (  # pyright: ignore[reportMissingImports]
     DefaultModelConfig,
 )
 
-from uuv_marl.benchmark.distributed import connected
 from uuv_marl.envs.rllib import SwarmMultiAgentEnv
 from uuv_marl.paths import user_path
 
 TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
+
+
+def start_ray(runners: int) -> None:
+    """Start Ray on this machine, with a core for each runner."""
+    ray.init("local", num_cpus=max(1, runners), include_dashboard=False, log_to_driver=False, logging_level="error")
 
 
 def ppo_config(scenario: str, vehicles: int | None, runners: int, seed: int) -> PPOConfig:
@@ -74,17 +85,17 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=1_000_000, help="decisions times vehicles")
     parser.add_argument("--runners", type=int, default=2, help="processes that sample, a core each")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--ray", help="address of a Ray cluster (auto: the local one); this machine unless given")
     parser.add_argument("--output", type=user_path, default=Path("runs/rllib"), help="folder of the checkpoint")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint")
     given = parser.parse_args()
-    with connected(given.ray, max(1, given.runners)):
-        config = ppo_config(given.scenario, given.vehicles, given.runners, TRAINING_SEEDS + given.seed)
-        algorithm = config.build_algo()
-        if given.resume:
-            algorithm.restore_from_path(str(given.output.resolve()))
-        train(algorithm, given.steps, given.output)
-        algorithm.stop()
+    start_ray(given.runners)
+    config = ppo_config(given.scenario, given.vehicles, given.runners, TRAINING_SEEDS + given.seed)
+    algorithm = config.build_algo()
+    if given.resume:
+        algorithm.restore_from_path(str(given.output.resolve()))
+    train(algorithm, given.steps, given.output)
+    algorithm.stop()
+    ray.shutdown()
     print(f"The checkpoint is in {given.output}.")
 
 

@@ -19,9 +19,7 @@ ZETA_SMALL = _gains("zeta_o-small", zeta_o=0.8)
 ZETA_LARGE = _gains("zeta_o-large", zeta_o=40.0)
 DELTA_SMALL = _gains("delta_o-small", delta_o=40.0)
 DELTA_LARGE = _gains("delta_o-large", delta_o=160.0)
-COMPARATORS = tuple(
-    Case(policy, "single_obstacle", policy) for policy in ("sff", "sdc", "sff_informed", "sdc_informed")
-)
+COMPARATORS = tuple(Case(policy, "single_obstacle", policy) for policy in ("sff", "sdc"))
 ALL = (*SCENARIOS, ZETA_SMALL, ZETA_LARGE, DELTA_SMALL, DELTA_LARGE, *COMPARATORS)
 """What the paper's figures and the ledger are made of."""
 BY_NAME = {case.name: case for case in ALL}

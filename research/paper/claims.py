@@ -64,4 +64,4 @@ class Claim(NamedTuple):
 
 
 CLAIMS = tuple(Claim(**table) for table in stated("claim"))
-"""The claims in the paper's order; the last for both forms of the comparators."""
+"""The claims in the paper's order."""

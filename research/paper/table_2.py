@@ -18,7 +18,7 @@ _HEADS = {"task_time_s": "task time [s]", "min_obstacle_distance_m": "smallest d
 
 
 def table_2(suite: Suite, _report: Share) -> Tables:
-    """All seeds, in both forms of the comparators."""
+    """All seeds."""
     rows = [
         {
             "policy": case.policy,

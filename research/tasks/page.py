@@ -7,6 +7,7 @@ import numpy as np
 
 from research.data import read_text
 from research.episodes import Row, measured, short
+from research.second import runnable
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.registry import is_trained, policy_class, uses_identity
 from uuv_marl.benchmark.tables import markdown_table
@@ -123,7 +124,7 @@ def _final(found: Found, study: Study) -> str:
 
 def named(policy: str) -> str:
     """A policy with what it gets beyond sonar."""
-    beyond = [*policy_class(policy).channels, *(["identity"] if uses_identity(policy) else [])]
+    beyond = [*policy_class(runnable(policy)).channels, *(["identity"] if uses_identity(runnable(policy)) else [])]
     return f"{policy} with {', '.join(beyond)}" if beyond else policy
 
 

@@ -15,6 +15,7 @@ from research.heldout import sets as heldout
 from research.learners import cells as learners
 from research.learners.protocol import LEARNERS, TASKS
 from research.paper import report as paper
+from research.second import runnable
 from research.sets import DIGITS
 from research.tasks import studies
 from uuv_marl.benchmark.metrics import Metrics
@@ -129,7 +130,7 @@ def _set(cells: Cells) -> Source:
     found = next((each for each in (*heldout.SETS, *studies.SETS) if each.name == cells["set"]), None)
     if found is None:
         raise ResultsError(f"there is no set {cells['set']!r} in this version")
-    return _of(Case(found.name, found.scenario, cells["policy"], found.overrides))
+    return _of(Case(found.name, found.scenario, runnable(cells["policy"]), found.overrides))
 
 
 def _learned(cells: Cells) -> Source:

@@ -1,37 +1,29 @@
-"""RLlib: the same environment bit for bit, its example, and the benchmark's seeds on a cluster."""
+"""RLlib: the same environment bit for bit, and its example."""
 
 import importlib.util
-import json
 import os
 import subprocess
 import sys
-import time
 import warnings
 from pathlib import Path
 
-# Both before Ray is imported: it stays on 127.0.0.1, and reports nothing to anybody.
+# Before imports, as in the example: Ray stays on 127.0.0.1 and reports nothing to anybody; a process has one core.
+os.environ["NUMBA_NUM_THREADS"] = "1"
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
     ray = pytest.importorskip("ray")
-    from ray.cluster_utils import Cluster
     from ray.rllib.env.multi_agent_episode import MultiAgentEpisode
     from ray.rllib.utils.pre_checks.env import check_multiagent_environments
 
 import uuv_marl
 from tests import contract
-from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.distributed import connected, evaluate_on_cluster
-from uuv_marl.benchmark.results import Results, origin
-from uuv_marl.cli import app
 from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
-from uuv_marl.errors import ClusterError
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
@@ -42,7 +34,6 @@ assert spec
 assert spec.loader
 example = importlib.util.module_from_spec(spec)  # not in sys.modules, so that Ray takes its functions along
 spec.loader.exec_module(example)
-FEW = ["--set=swarm.num_vehicles=5", "--set=time_limit.factor=0.02", "--set=time_limit.extra_s=2"]
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning:ray"),
@@ -52,18 +43,10 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def address():
-    """A cluster of two nodes, a core each."""
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
-    cluster.add_node(num_cpus=1)
-    yield cluster.address
-    cluster.shutdown()
-
-
-@pytest.fixture
-def joined(address):
-    with connected(address):
-        yield
+def started():
+    example.start_ray(2)
+    yield
+    ray.shutdown()
 
 
 class Flagged:
@@ -169,8 +152,7 @@ def same(one, other):
 
 
 @pytest.mark.parametrize("at_sea", [False, True])
-def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(joined, at_sea):
-    """By class the second time: Ray keeps names under the first job of a process."""
+def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(started, at_sea):
     how = {"num_vehicles": 5, "overrides": contract.MEDIUM if at_sea else {}}
     env = SwarmMultiAgentEnv if at_sea else register()
     chosen = config("tracking").environment(env, env_config=how)
@@ -191,7 +173,8 @@ def test_ppo_trains_by_the_registered_name_and_by_class_on_remote_runners(joined
         algorithm.stop()
 
 
-def test_every_runner_starts_from_its_own_world(joined):
+def test_every_runner_starts_from_its_own_world(started):
+    assert ray.nodes()[0]["NodeManagerAddress"] == "127.0.0.1"
     algorithm = config("training_field", 123_000).build_algo()
     try:
         algorithm.train()
@@ -208,16 +191,6 @@ def test_every_runner_starts_from_its_own_world(joined):
     assert sorted(field.tobytes() for field in fields) == sorted(field.tobytes() for field in expected)
 
 
-@pytest.mark.parametrize("nowhere", ["127.0.0.1:9", "nonsense", "127.0.0.1:nine"])
-def test_an_address_where_nobody_is_fails_soon(tmp_path, nowhere, monkeypatch):
-    monkeypatch.delenv("RAY_ADDRESS", raising=False)
-    start = time.perf_counter()
-    done = CliRunner().invoke(app, ["benchmark", f"--ray={nowhere}", f"--output={tmp_path / 'out'}"])
-    assert done.exit_code == 2
-    assert "no Ray cluster can be joined" in " ".join(done.output.split())
-    assert time.perf_counter() - start < 10
-
-
 def test_the_example_trains_and_goes_on(tmp_path):
     command = [sys.executable, EXAMPLE, "--scenario=starter", "--steps=100", "--runners=1", f"--output={tmp_path}"]
     for more in ([], ["--resume"]):
@@ -226,98 +199,6 @@ def test_the_example_trains_and_goes_on(tmp_path):
         assert done.returncode == 0, done.stderr
         assert "agent-steps, return of all vehicles" in done.stdout
         assert f"The checkpoint is in {tmp_path}." in done.stdout
-
-
-def benchmark(folder, policies, *more):
-    names = [f"--policy={name}" for name in policies]
-    done = CliRunner().invoke(app, ["benchmark", *names, "--seeds=3", f"--output={folder}", *FEW, *more])
-    assert done.exit_code == 0, done.output
-    return json.loads((folder / "results.json").read_text())
-
-
-def test_the_benchmark_on_a_cluster_is_that_of_one_machine(tmp_path, address):
-    policies = ["bio_inspired", "sdc"]
-    here = benchmark(tmp_path / "here", policies)
-    there = benchmark(tmp_path / "there", policies, f"--ray={address}")
-
-    def key(run):
-        return run["policy"], run["seed"]
-
-    assert len(here["runs"]) == 6
-    assert sorted(there["runs"], key=key) == sorted(here["runs"], key=key)
-    for path in (tmp_path / "here" / "traces").iterdir():
-        with np.load(path) as mine, np.load(tmp_path / "there" / "traces" / path.name) as theirs:
-            assert mine.files == theirs.files
-            assert all(mine[name].tobytes() == theirs[name].tobytes() for name in mine.files), path.name
-
-
-OWN = """
-import os
-
-import numba
-from uuv_marl.baselines.random_idle import Idle
-from beside import NAME
-
-assert NAME == "found"
-assert os.getpid() == {driver} or numba.config.NUMBA_NUM_THREADS == 1
-assert os.getpid() == {driver} or "runtime_resources" in __file__  # a copy, as on another machine
-
-
-class Own(Idle):
-    pass
-"""
-
-
-def test_your_own_policy_reaches_the_nodes(tmp_path, address, monkeypatch):
-    (tmp_path / "my_cluster_policy.py").write_text(OWN.format(driver=os.getpid()))
-    (tmp_path / "beside.py").write_text("NAME = 'found'\n")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    runs = benchmark(tmp_path / "out", ["my_cluster_policy:Own", "idle"], f"--ray={address}")["runs"]
-    own = {run["seed"]: run["metrics"] for run in runs if run["policy"] != "idle"}
-    assert own == {run["seed"]: run["metrics"] for run in runs if run["policy"] == "idle"}
-    assert len(own) == 3
-
-
-def test_a_stopped_benchmark_keeps_its_seeds_and_goes_on(tmp_path, joined):
-    scenario = uuv_marl.load_scenario("tracking", num_vehicles=5, overrides=SHORT)
-    results = Results(tmp_path, [scenario])
-    seeds = list(range(12))
-
-    def stop(_, __, share):
-        if share > 0:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        runner.run_missing(results, [scenario], ["idle"], seeds, stop, evaluate_on_cluster)
-    again = Results(tmp_path, [scenario])
-    assert len(again.rows) == 1
-    shares = []
-    runner.run_missing(again, [scenario], ["idle"], seeds, lambda *event: shares.append(event[-1]), evaluate_on_cluster)
-    assert [row.seed for row in again.select("tracking", "idle", seeds)] == seeds
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
-
-
-def test_other_code_on_a_node_is_refused(joined, monkeypatch):
-    scenario = uuv_marl.load_scenario("tracking", num_vehicles=5, overrides=SHORT)
-    for what in ("code of uuv_marl", "numpy", "mappo"):
-        other = {**origin("mappo"), what: "another"}
-        monkeypatch.setattr("uuv_marl.benchmark.distributed.origin", lambda _, other=other: other)
-        with pytest.raises(ClusterError, match=rf"has other {what} \(.*\) than this machine \(another\); install"):
-            list(evaluate_on_cluster(scenario, "mappo", [0]))
-
-
-def test_ray_on_one_machine_is_closed_to_others():
-    code = (
-        "from uuv_marl.benchmark.distributed import connected, ray\n"
-        "with connected(None): print(ray.nodes()[0]['NodeManagerAddress'], int(ray.cluster_resources()['CPU']))\n"
-        "print(ray.is_initialized())"
-    )
-    clean = {name: value for name, value in os.environ.items() if name != "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"}
-    done = subprocess.run([sys.executable, "-c", code], env=clean, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["127.0.0.1", "1", "False"]
-    assert done.stderr == ""
 
 
 def test_the_example_of_the_page_runs(tmp_path):

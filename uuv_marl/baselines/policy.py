@@ -293,7 +293,7 @@ def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
 
 
 def tuned(name: str, what: str = "") -> Mapping[str, float]:
-    """The best parameters that tuning found for a policy; all trials are in the CSV file beside them.
+    """The best parameters that tuning found for a policy.
 
     Args:
         name: the policy's name.

@@ -20,8 +20,8 @@ from uuv_marl.baselines.learned.around import Around
 from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained, shipped
 from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
-from uuv_marl.baselines.paper.sdc import Sdc, SdcInformed
-from uuv_marl.baselines.paper.sff import Sff, SffInformed
+from uuv_marl.baselines.paper.sdc import Sdc
+from uuv_marl.baselines.paper.sff import Sff
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.random_idle import Idle, Random
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
@@ -47,8 +47,6 @@ POLICIES: dict[str, Kind] = {
     "nearest_target": NearestTarget,
     "sff": Sff,
     "sdc": Sdc,
-    "sff_informed": SffInformed,
-    "sdc_informed": SdcInformed,
     "apf": Apf,
     "olfati_saber": OlfatiSaber,
     "olfati_saber_informed": OlfatiSaberInformed,
@@ -58,15 +56,10 @@ POLICIES: dict[str, Kind] = {
     "oracle": Oracle,
     "tangent_bug": TangentBug,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field, end to end."),
-    "mappo_2": shipped("mappo_2", "A second training of mappo, with another seed."),
     "mappo_hard_water": shipped("mappo_hard_water", "Trained by MAPPO on hard_water and its hard tier, end to end."),
-    "mappo_hard_water_2": shipped("mappo_hard_water_2", "A second training of mappo_hard_water, with another seed."),
     "mappo_two_swarms": shipped("mappo_two_swarms", "Trained by MAPPO on two_swarms, end to end."),
-    "mappo_two_swarms_2": shipped("mappo_two_swarms_2", "A second training of mappo_two_swarms, with another seed."),
     "mappo_few_informed": shipped("mappo_few_informed", "Taught by leader_follower, then MAPPO on few_informed."),
-    "mappo_few_informed_2": shipped("mappo_few_informed_2", "A second training of mappo_few_informed."),
     "mappo_silent_targets": shipped("mappo_silent_targets", "Trained by MAPPO on silent_targets, end to end."),
-    "mappo_silent_targets_2": shipped("mappo_silent_targets_2", "A second training of mappo_silent_targets."),
     "mappo_all": shipped("mappo_all", "One network, trained by MAPPO on random_field, hard_water and two_swarms."),
     "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on short random fields, end to end."),
     "random": Random,

@@ -282,11 +282,6 @@ def declared(known: Knowledge) -> Declared:
     return Declared(known["channels"], known["yaw_damping_nms"], Policy.full_torque_nm, every)
 
 
-def origin(policy: str) -> dict[str, str | None]:
-    """All that a policy's numbers come from, by name: code, libraries, and its file if it has one."""
-    return {"code of uuv_marl": source_fingerprint(), policy: knowledge(policy)["source"], **_versions()}
-
-
 def source_fingerprint() -> str:
     """Hash of all that a run's numbers come from: code of the layers up to the benchmark's, and tuned gains."""
     code = sorted({path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)})

@@ -1,7 +1,7 @@
 """The benchmark as a job: it finds the missing runs, runs them, and writes table and pictures."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,9 +42,6 @@ def default_policies(scenarios: Sequence[Scenario]) -> list[str]:
 Report = Callable[[str, str, float], None]
 """Called with scenario, policy and the share of that pair's work that is done."""
 
-Evaluate = Callable[[Scenario, str, Sequence[int]], Iterator[Run | Progress]]
-"""Runs a policy on a scenario over seeds: here as ``evaluate``, or elsewhere with the same runs."""
-
 
 def run_missing(
     results: Results,
@@ -52,7 +49,7 @@ def run_missing(
     policies: Sequence[str],
     seeds: Sequence[int],
     report: Report,
-    evaluator: Evaluate = evaluate,
+    **parameters: object,
 ) -> None:
     """Run what ``results`` lacks; every finished seed is kept at once.
 
@@ -62,7 +59,7 @@ def run_missing(
         policies: their names.
         seeds: of the runs on each scenario with each policy.
         report: called with scenario, policy and the share of their work that is done.
-        evaluator: runs a policy on a scenario over seeds.
+        parameters: of the policies.
     """
     for scenario in scenarios:
         for policy in policies:
@@ -71,7 +68,7 @@ def run_missing(
             done, fresh, share = len(seeds) - len(missing), 0, 0.0
             report(scenario.name, policy, done / len(seeds))
             with blaming(policy):
-                for event in evaluator(granted(policy, scenario), policy, missing):
+                for event in evaluate(granted(policy, scenario), policy, missing, **parameters):
                     if isinstance(event, Run):
                         results.add(scenario.name, policy, event)
                         fresh += 1

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -10,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.results import Results
-from uuv_marl.benchmark.runner import Evaluate, run_missing
+from uuv_marl.benchmark.runner import run_missing
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.types import Float32
 
@@ -68,8 +66,8 @@ class Suite:
         self.seeds = range(seeds)
         self._open: dict[str, Results] = {}
 
-    def run(self, cases: Sequence[Case], report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> None:
-        """Run what is missing of these cases, here or where the evaluator does.
+    def run(self, cases: Sequence[Case], report: Report, *, anew: bool = False) -> None:
+        """Run what is missing of these cases.
 
         ``report`` is called as it goes on; ``anew`` drops runs of policies whose file has changed since.
 
@@ -84,8 +82,8 @@ class Suite:
 
             if anew:
                 self.results(case).forget_changed(case.policy)
-            how = partial(evaluator, **case.parameters)
-            run_missing(self.results(case), [case.load()], [case.policy], self.seeds_of(case), note, how)
+            seeds = self.seeds_of(case)
+            run_missing(self.results(case), [case.load()], [case.policy], seeds, note, **case.parameters)
 
     def seeds_of(self, case: Case) -> Sequence[int]:
         """The seeds of a case."""

@@ -59,8 +59,6 @@ def _ranges() -> dict[str, dict[str, Range]]:
 
 
 _RANGES = _ranges()
-_SFF = _RANGES["sff"] | _RANGES["obstacle"]
-_SDC = _RANGES["sdc"] | _RANGES["obstacle"] | _RANGES["informed"]
 
 
 class Space(NamedTuple):
@@ -89,10 +87,8 @@ SPACES: dict[str, Space] = {
     "bio_inspired_plus": Space(
         _RANGES["bio_inspired"], partial(bio_inspired.BioInspiredGains, feed_forward=bio_inspired.FEED_FORWARD)
     ),
-    "sff": Space(_SFF | _RANGES["uninformed"], sff.SffGains),
-    "sff_informed": Space(_SFF | _RANGES["informed"], sff.SffGains),
-    "sdc": Space(_SDC, sdc.SdcGains),
-    "sdc_informed": Space(_SDC, sdc.SdcGains),
+    "sff": Space(_RANGES["sff"] | _RANGES["obstacle"] | _RANGES["sff_drag"], sff.SffGains),
+    "sdc": Space(_RANGES["sdc"] | _RANGES["obstacle"] | _RANGES["sdc_reference"], sdc.SdcGains),
     "apf": Space(_RANGES["apf"], apf.ApfGains),
     "olfati_saber": Space(_RANGES["olfati_saber"], olfati_saber.OlfatiSaberGains),
     "olfati_saber_informed": Space(_RANGES["olfati_saber"] | _RANGES["alignment"], olfati_saber.OlfatiSaberGains),

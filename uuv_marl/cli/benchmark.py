@@ -2,16 +2,13 @@
 
 import functools
 import itertools
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from uuv_marl.cli.console import (
     Anew,
-    Ray,
     changes_of,
     console,
     explained,
@@ -22,9 +19,6 @@ from uuv_marl.cli.console import (
     say,
     working,
 )
-
-if TYPE_CHECKING:
-    from uuv_marl.benchmark.runner import Evaluate
 
 _WORST = "The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
 _NEXT = (
@@ -56,7 +50,6 @@ def benchmark(
     ] = None,
     output: Annotated[Path, path_option("Folder of results, table and pictures.")] = Path("results/benchmark"),
     anew: Anew = False,
-    ray: Ray = None,
 ) -> None:
     """Compare policies on scenarios over seeds.
 
@@ -82,7 +75,6 @@ def benchmark(
         policies = list(dict.fromkeys(policy or runner.default_policies(scenarios)))
         for name, loaded in itertools.product(policies, scenarios):
             make(name, granted(name, loaded))  # refused now, not after hours of others' runs
-        evaluator, cluster = evaluator_at(ray, policies)
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
@@ -91,8 +83,7 @@ def benchmark(
 
             for name in policies if anew else ():
                 results.forget_changed(name)
-            with cluster:
-                runner.run_missing(results, scenarios, policies, wanted, report, evaluator)
+            runner.run_missing(results, scenarios, policies, wanted, report)
             tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
             console.print(runner.terminal_table(table, console.width))
@@ -106,20 +97,6 @@ def benchmark(
         say(_NEXT.format(output=output))
         if set(policies) <= {*POLICIES} and names == ["starter"] and not overrides:
             say(_TRAIN.format(scenario=files[0]))
-
-
-def evaluator_at(ray: str | None, policies: Sequence[str]) -> "tuple[Evaluate, AbstractContextManager[None]]":
-    """What runs the seeds, and the connection that it needs: this machine, or the Ray cluster at an address."""
-    from uuv_marl.benchmark.evaluate import evaluate
-
-    if ray is None:
-        return evaluate, nullcontext()
-    with extra("distributed", "--ray"):
-        from uuv_marl.benchmark.distributed import connected, evaluate_on_cluster
-    from uuv_marl.baselines import POLICIES
-
-    own = any(name not in POLICIES for name in policies)
-    return evaluate_on_cluster, connected(ray, working_dir=Path.cwd() if own else None)
 
 
 def tune_command(

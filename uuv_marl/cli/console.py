@@ -34,13 +34,6 @@ errors = Console(stderr=True)
 Anew = Annotated[
     bool, typer.Option("--anew", help="Drop the runs of policies whose file has changed since, and run these again.")
 ]
-Ray = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help='Distribute the seeds over this Ray cluster (auto: the local one). Needs the extra "distributed".',
-    ),
-]
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.benchmark import evaluator_at
-from uuv_marl.cli.console import Anew, Ray, explained, find_modules, path_option, say, working
+from uuv_marl.cli.console import Anew, explained, find_modules, path_option, say, working
 
 
 def robustness(
@@ -31,7 +30,6 @@ def robustness(
         list[str] | None, typer.Option(help="Name or TOML file. Repeat it for several. Default: random_field.")
     ] = None,
     seeds: Annotated[int | None, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1. Default: 20.")] = None,
-    ray: Ray = None,
     anew: Anew = False,
     output: Annotated[Path, path_option("Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:
@@ -59,14 +57,13 @@ def robustness(
             seeds=seeds or plan.seeds,
         )
         find_modules([*plan.policies, *plan.scenarios])
-        evaluator, cluster = evaluator_at(ray, plan.policies)
-        with working(f"The finished episodes are in {output}", alone=output) as bar, cluster:
+        with working(f"The finished episodes are in {output}", alone=output) as bar:
             task = bar.add_task("robustness", total=1.0)
 
             def report(what: str, share: float) -> None:
                 bar.update(task, completed=share, description=what[-60:])
 
-            episodes = job.run(output, plan, report, evaluator, anew=anew)
+            episodes = job.run(output, plan, report, anew=anew)
             written = [*page.write_robustness_report(output), episodes]
             report("robustness", 1.0)
         for path in written:

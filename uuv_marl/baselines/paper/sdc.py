@@ -41,7 +41,7 @@ class SdcGains(NamedTuple):
     kappa: float
     """How fast it shrinks [1/s]."""
     reference: float
-    """Weight of l(t) in an informed vehicle's error, all predecessors together weighing 1 [1]."""
+    """Weight of l(t) in the informed vehicle's error, all predecessors together weighing 1 [1]."""
     velocity: float
     """Velocity coordination [N s/m]."""
     short: float
@@ -59,7 +59,7 @@ class SdcGains(NamedTuple):
     drag: float
     """Share of the vehicle's own drag that it makes up for [1]."""
     reference_velocity: float
-    """Damping of informed vehicles towards the reference's velocity [N s/m]."""
+    """Damping of the informed vehicle towards the reference's velocity [N s/m]."""
 
 
 @described
@@ -84,12 +84,10 @@ class Sdc(Policy):
     identity: ClassVar[bool | str] = True
     yaw_damping_nms: ClassVar[float] = 600.0
     """Without it, in the settings tried by hand, the informed vehicle left the others behind and none arrived."""
-    tuned_as: ClassVar[str] = "sdc"
-    all_informed: ClassVar[bool] = False
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SdcGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or SdcGains(**tuned(self.tuned_as))
+        self.gains = gains or SdcGains(**tuned("sdc"))
         n = scenario.swarm.num_vehicles
         if n > _MOST_VEHICLES:
             raise PolicyError(
@@ -112,10 +110,7 @@ class Sdc(Policy):
         rho = (g.rho_0 - g.rho_inf) * np.exp(
             -g.kappa * self.scenario.timing.decision_period_s * (memory.decisions - 1)
         ) + g.rho_inf
-        _act(
-            flat, self.at, g, self.limits, memory.slots, memory.depth, self.all_informed, rho,
-            action, self.clamps,
-        )  # fmt: skip
+        _act(flat, self.at, g, self.limits, memory.slots, memory.depth, rho, action, self.clamps)
         return action
 
     def _assign(self, w: int, percept: Percept) -> None:
@@ -134,13 +129,6 @@ class Sdc(Policy):
         self.memory.depth[w] = np.round(np.hypot(*(slots - root).T), 6)
 
 
-class SdcInformed(Sdc):
-    """``Sdc`` in which every vehicle reads the reference."""
-
-    tuned_as: ClassVar[str] = "sdc_informed"
-    all_informed: ClassVar[bool] = True
-
-
 def hexagonal_slots(n: int) -> Float64:
     """The n points of a hexagonal lattice nearest to its centre, their mean at zero [m], shape (vehicle, 2)."""
     reach = math.ceil(math.sqrt(n)) + 2
@@ -154,20 +142,19 @@ def hexagonal_slots(n: int) -> Float64:
 
 @compiled
 def _act(
-    flat: Float32, at: Starts, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, all_informed: bool,
-    rho: Float64, action: Float32, clamps: Int64,
+    flat: Float32, at: Starts, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, rho: Float64,
+    action: Float32, clamps: Int64,
 ) -> None:  # fmt: skip
     """The law for every vehicle.
 
     ``slots``: place of every vehicle in the formation, north and east [m], shape (world, vehicle, 2); ``depth``:
-    distance of its place from the informed vehicle's [m], shape (world, vehicle). With ``all_informed`` every vehicle
-    uses the reference, else the informed one alone. ``rho``: half width of the funnel [m], shape (world,).
+    distance of its place from the informed vehicle's [m], shape (world, vehicle). ``rho``: half width of the funnel
+    [m], shape (world,).
     """
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            informed = all_informed or depth[w, i] == 0.0
-            f_x, f_y, clamped = _force(w, i, see, g, limits, slots[w], depth[w], informed, rho[w])
+            f_x, f_y, clamped = _force(w, i, see, g, limits, slots[w], depth[w], rho[w])
             clamps[w] += clamped
             write_action(f_x, f_y, limits, action[w, i])
 
@@ -180,14 +167,14 @@ def _index(identity: float, num: int) -> int:
 
 @compiled
 def _force(
-    w: int, i: int, see: Fields, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, informed: bool,
-    rho: float,
-) -> tuple[float, float, int]:  # fmt: skip
+    w: int, i: int, see: Fields, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, rho: float
+) -> tuple[float, float, int]:
     """Body-frame force on one vehicle [N], forward and to starboard, and 1 where the funnel's bound binds.
 
-    ``slots`` and ``depth`` are those of the world, ``rho`` the half width of the funnel [m]. An ``informed`` vehicle
-    uses the reference.
+    ``slots`` and ``depth`` are those of the world, ``rho`` the half width of the funnel [m]. The vehicle at depth 0 is
+    informed and uses the reference.
     """
+    informed = depth[i] == 0.0
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])
     # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.

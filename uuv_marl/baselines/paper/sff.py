@@ -53,8 +53,6 @@ class SffGains(NamedTuple):
     """Distance to the surface at which the sideways push ends [m]."""
     drag: float
     """Share of the vehicle's own drag that it makes up for [1]."""
-    reference_velocity: float = 0.0
-    """Damping towards the reference's velocity [N s/m]; 0 where it is not used."""
 
 
 @described
@@ -75,11 +73,10 @@ class Sff(Policy):
     wishes_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = SffMemory
     channels: ClassVar[tuple[str, ...]] = ("link",)
-    tuned_as: ClassVar[str] = "sff"
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SffGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or SffGains(**tuned(self.tuned_as))
+        self.gains = gains or SffGains(**tuned("sff"))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Compare what is heard with what was heard."""
@@ -92,13 +89,6 @@ class Sff(Policy):
         action = np.empty((*flat.shape[:2], 2), np.float32)
         _decide(flat, self.at, self.gains, self.limits, self.memory, action)
         return action
-
-
-class SffInformed(Sff):
-    """``Sff`` in which every vehicle uses the reference's velocity, with yaw damping."""
-
-    yaw_damping_nms: ClassVar[float] = 600.0
-    tuned_as: ClassVar[str] = "sff_informed"
 
 
 @compiled
@@ -198,7 +188,5 @@ def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: Sff
         share = g.blend if echoes and change >= 0.0 else 0.0
         f_x += g.velocity * ((1.0 - share) * mean_x / num + share * leader_x - u)
         f_y += g.velocity * ((1.0 - share) * mean_y / num + share * leader_y - v)
-    f_x += g.reference_velocity * (see.reference_velocity[w, i, 0] - u)
-    f_y += g.reference_velocity * (see.reference_velocity[w, i, 1] - v)
     o_x, o_y = pass_obstacle(w, i, see, g.repulsion, g.repulsion_range, g.tangential, g.tangential_range)
     return f_x + o_x, f_y + o_y

@@ -6,10 +6,8 @@ from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing
 from uuv_marl.baselines import granted, make
-from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.benchmark.frame import need_pandas
 from uuv_marl.benchmark.robustness.axes import AXES, CALM, overrides
-from uuv_marl.benchmark.runner import Evaluate
 from uuv_marl.benchmark.suite import Case, Report, Suite
 from uuv_marl.scenario import ScenarioError, load_scenario
 from uuv_marl.tasks import Follow
@@ -78,7 +76,7 @@ def _places(plan: Plan) -> Iterator[tuple[str, int]]:
         yield from ((axis, level) for level in plan.levels if level in AXES[axis].levels)
 
 
-def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate, *, anew: bool = False) -> Path:
+def run(folder: Path, plan: Plan, report: Report, *, anew: bool = False) -> Path:
     """Run what is missing of a plan, and write all its episodes to ``EPISODES``, a row each; the file.
 
     The folder holds a benchmark's results of each scenario, axis and level, in ``cells``. The rest is as for
@@ -107,7 +105,7 @@ def run(folder: Path, plan: Plan, report: Report, evaluator: Evaluate = evaluate
     for cell in planned:
         make(cell.case.policy, granted(cell.case.policy, cell.case.load()))  # refused now, not after hours
     suite = Suite(folder / "cells", traces=False)
-    suite.run([cell.case for cell in planned], report, evaluator, anew=anew)
+    suite.run([cell.case for cell in planned], report, anew=anew)
     path = folder / EPISODES
     write_episodes(path, (row for cell in planned for row in _rows(suite, cell)))
     return path
