@@ -196,10 +196,10 @@ def earlier(path: Path, only: list[str]) -> dict[str, Any]:
     """What the file holds where only a part is measured anew, or an empty record of this machine."""
     if not only or not path.exists():
         return {"machine": machine(), "libraries": {}, "cases": []}
-    found = json.loads(path.read_text(encoding="utf-8"))
-    if found["machine"] != machine():
-        raise SystemExit(f"{path} was measured on another machine ({found['machine']}); name another --output")
-    return found
+    results = json.loads(path.read_text(encoding="utf-8"))
+    if results["machine"] != machine():
+        raise SystemExit(f"{path} was measured on another machine ({results['machine']}); name another --output")
+    return results
 
 
 def table_rows(records: Sequence[Record]) -> Iterator[tuple[object, ...]]:
@@ -228,14 +228,14 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5, help="repeats of each case (default 5)")
     parser.add_argument("--seconds", type=float, default=0.3, help="length of a repeat [s] (default 0.3)")
     parser.add_argument("--output", type=Path, help="results file (default perf/results.json or perf/training.json)")
-    given = parser.parse_args()
-    output = given.output or (TRAININGS if given.training else RESULTS)
-    results = earlier(output, given.only)
-    results |= {"rounds": given.rounds, "seconds": given.seconds, "load": round(os.getloadavg()[0], 2)}
+    arguments = parser.parse_args()
+    output = arguments.output or (TRAININGS if arguments.training else RESULTS)
+    results = earlier(output, arguments.only)
+    results |= {"rounds": arguments.rounds, "seconds": arguments.seconds, "load": round(os.getloadavg()[0], 2)}
     print("| kind | case | agents | worlds | rate [1/s] | ratio to the first case |\n|" + " --- |" * 6)
-    for cell in plan(given.training):
-        asked = {n: at for n, at in cell.cases.items() if not given.only or {n, at[0], cell.kind} & {*given.only}}
-        records, about = measure(cell._replace(cases=asked), given.rounds, given.seconds)
+    for cell in plan(arguments.training):
+        asked = {n: at for n, at in cell.cases.items() if not arguments.only or {n, at[0], cell.kind} & {*arguments.only}}
+        records, about = measure(cell._replace(cases=asked), arguments.rounds, arguments.seconds)
         new = {key(record) for record in records}
         results["cases"] = [old for old in results["cases"] if key(old) not in new] + records
         results["libraries"] |= about

@@ -47,8 +47,8 @@ def hard_vector_env(agents: int, worlds: int) -> Case:
     envs, actions = uuv_marl.vector_env(worlds, num_vehicles=agents, **PILES), random_actions(agents, worlds)
     envs.reset(seed=0)
     swarm, ages = envs.swarm, np.random.default_rng(0).uniform(size=worlds)
-    swarm.state.tick[:] = ages * swarm.time_limit_s / swarm.scenario.timing.control_hold_s
-    discs = float(swarm.course.num_obstacles.mean())
+    swarm.state.tick[:] = ages * swarm.time_limit_s / swarm.scenario.timing.control_step_s
+    discs = float(swarm.world_map.num_obstacles.mean())
     return repeated(lambda k: envs.step(actions[k % SETS]), agents * worlds, entries=swarm.layout.size, discs=discs)
 
 

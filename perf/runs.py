@@ -17,7 +17,7 @@ import numpy as np
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, granted, make
+from uuv_marl.baselines import POLICIES, with_policy_requirements, make
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.folder import Record
@@ -63,7 +63,7 @@ def digest(*values: Any) -> str:
 
 def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEPS) -> str:
     """Two episodes stepped together: a hash of each over states, facts, percepts and actions."""
-    scenario = granted(policy, scenario)
+    scenario = with_policy_requirements(policy, scenario)
     swarm, actor = Swarm(scenario, 2), make(policy, scenario, 2)
     percept, active, hashed = swarm.reset(first), np.ones(2, np.bool_), [hashlib.sha256(), hashlib.sha256()]
     actor.reset(first)
@@ -72,7 +72,7 @@ def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEP
         percept = swarm.step(action, active)
         arrays = [getattr(swarm.state, name) for name in STATE] + [getattr(swarm.facts, name) for name in FACTS]
         for w in np.flatnonzero(active):
-            for array in (*arrays, swarm.heard, percept.flat, action, actor.clamps):
+            for array in (*arrays, swarm.detected_index, percept.flat, action, actor.clamps):
                 hashed[w].update(array[w].tobytes())
         active &= ~(swarm.arrived | (swarm.facts.time_s >= swarm.time_limit_s - 1e-9) | ~swarm.state.alive.any(axis=1))
         actor.active[:] = active
@@ -83,12 +83,12 @@ def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEP
 
 def parallel(scenario: str, policy: str, reward: Any) -> str:
     """An episode, or its first thousand steps, through ``parallel_env``."""
-    env = uuv_marl.parallel_env(granted(policy, load_scenario(scenario)), reward=reward)
+    env = uuv_marl.parallel_env(with_policy_requirements(policy, load_scenario(scenario)), reward=reward)
     actor, hashed = make(policy, env), list[str]()
     (observations, _), _ = env.reset(SEED), actor.reset(SEED)
     while env.agents and len(hashed) < 1000:
-        observations, *told, _ = env.step(actor(observations))
-        hashed.append(digest(*observations.values(), *told, env.state()))
+        observations, *outcome, _ = env.step(actor(observations))
+        hashed.append(digest(*observations.values(), *outcome, env.state()))
     return digest(hashed)
 
 
@@ -97,14 +97,14 @@ def vector(scenario: str) -> str:
     envs, rng = uuv_marl.vector_env(4, scenario, max_cycles=40, reward=REWARD), np.random.default_rng(SEED)
     hashed = [digest(envs.reset(seed=SEED)[0])]
     for _ in range(100):
-        *told, infos = envs.step(rng.uniform(-1.0, 1.0, envs.action_space.shape or ()).astype(np.float32))
-        hashed.append(digest(*told, infos["agent_reward"]))
+        *outcome, infos = envs.step(rng.uniform(-1.0, 1.0, envs.action_space.shape or ()).astype(np.float32))
+        hashed.append(digest(*outcome, infos["agent_reward"]))
     return digest(hashed)
 
 
 def reported(policy: str) -> str:
     """What the benchmark reports of two short episodes: metrics, series, routes."""
-    scenario = granted(policy, load_scenario("single_obstacle", num_vehicles=10))
+    scenario = with_policy_requirements(policy, load_scenario("single_obstacle", num_vehicles=10))
     runs = [run for run in evaluate(scenario, policy, [SEED, SEED + 1]) if isinstance(run, Run)]
     metrics = [{key: value for key, value in run.metrics.items() if key in METRICS} for run in runs]
     return digest(metrics, *(a for run in runs for a in (*run.series.values(), *run.routes)))
@@ -113,16 +113,16 @@ def reported(policy: str) -> str:
 def trained() -> str:
     """Weights and progress of five updates on small swarms."""
     training = Trainer(Training(sizes=[(5, 4), (10, 2)], ppo={"horizon": 16}, steps=3200, seed=3))
-    told = [Record()]
+    records = [Record()]
     for _ in range(5):
-        told.append(training.iterate(told[-1]))
-    return digest(*training.learner.weights.values(), [[record.reward, record.kl] for record in told])
+        records.append(training.iterate(records[-1]))
+    return digest(*training.learner.weights.values(), [[record.reward, record.kl] for record in records])
 
 
 def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any, ...]]]:
     """Kind, name, maker and its arguments of every hash."""
     for (kind, (base, changes)), policy in itertools.product(SETS.items(), POLICIES):
-        if changes in PERIODS.values() and getattr(POLICIES[policy], "decides_every_s", None):
+        if changes in PERIODS.values() and getattr(POLICIES[policy], "decision_period_s", None):
             continue  # it has its own
         name = f"{kind} {policy}"
         scenario = load_scenario(base, overrides=changes)
@@ -144,10 +144,10 @@ def main(other: Path, only: list[str]) -> None:
     for kind, name, make_hash, arguments in cases(other):
         if not only or kind in only:
             try:
-                found = make_hash(*arguments)
+                hashed = make_hash(*arguments)
             except Exception as error:  # a version that can't is a result
-                found = f"failed: {type(error).__name__}: {error}"
-            print(json.dumps([kind, name, found]), flush=True)
+                hashed = f"failed: {type(error).__name__}: {error}"
+            print(json.dumps([kind, name, hashed]), flush=True)
 
 
 if __name__ == "__main__":

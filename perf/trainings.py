@@ -33,9 +33,9 @@ def mappo(agents: int, worlds: int) -> Case:
     from uuv_marl.train.training import Training
 
     rows = agents * worlds
-    by = {**OURS, "minibatches": max(1, round(rows * DECISIONS / MINIBATCH)), "epochs": EPOCHS}
-    told = {"sizes": [(agents, worlds)], "ppo": by, "network": {"hidden": HIDDEN}, "seed": SEED, "steps": 10**9}
-    training = Trainer(Training(scenario=SCENARIO, **told))
+    config = {**OURS, "minibatches": max(1, round(rows * DECISIONS / MINIBATCH)), "epochs": EPOCHS}
+    fields = {"sizes": [(agents, worlds)], "ppo": config, "network": {"hidden": HIDDEN}, "seed": SEED, "steps": 10**9}
+    training = Trainer(Training(scenario=SCENARIO, **fields))
     return repeated(lambda _: training.iterate(Record()), rows * DECISIONS)
 
 

@@ -47,11 +47,11 @@ def printed(variables: dict[str, str], *arguments: str) -> str:
 def same_runs(other: Path, only: list[str]) -> bool:
     """Print which hashes of the other version differ here; whether none does. What is new here doesn't count."""
     texts = (printed(variables(path), str(HERE / "runs.py"), str(other), *only) for path in (other, ROOT))
-    before, now = ({(kind, name): found for kind, name, found in map(json.loads, text.splitlines())} for text in texts)
-    bad = [key for key, found in before.items() if now.get(key) != found or "failed" in found]
+    before, now = ({(kind, name): digest for kind, name, digest in map(json.loads, text.splitlines())} for text in texts)
+    bad = [key for key, digest in before.items() if now.get(key) != digest or "failed" in digest]
     print("| runs | hashes | that differ |\n| --- | --- | --- |")
     for kind in dict.fromkeys(kind for kind, _ in before):
-        count = sum(len(found.split()) for key, found in before.items() if key[0] == kind)
+        count = sum(len(digest.split()) for key, digest in before.items() if key[0] == kind)
         print(f"| {kind} | {count} | {', '.join(name for k, name in bad if k == kind) or 'none'} |")
     for key in bad:
         print(f"{' '.join(key)}: {before[key]} before, {now.get(key)} now", file=sys.stderr)
@@ -73,8 +73,8 @@ def same_speed(other: Path, rounds: int) -> bool:
             process.stop()
         ratios, (before, now) = [new / old for old, new in rates], map(median, zip(*rates, strict=True))
         good = good and median(ratios) >= LEAST_RATIO
-        told = f"{before:,.0f} | {now:,.0f} | {median(ratios):.3f} | {min(ratios):.3f}, {max(ratios):.3f}"
-        print(f"| {case} x {worlds} | {told} |")
+        row = f"{before:,.0f} | {now:,.0f} | {median(ratios):.3f} | {min(ratios):.3f}, {max(ratios):.3f}"
+        print(f"| {case} x {worlds} | {row} |")
     return good
 
 
@@ -94,12 +94,12 @@ def main() -> None:
     parser.add_argument("--speed", action="store_true", help="compare speed")
     parser.add_argument("--rounds", type=int, default=15, help="alternating rounds of the speed (default 15)")
     parser.add_argument("--only", nargs="*", default=[], help="kinds of runs, such as episodes or checkpoints")
-    given = parser.parse_args()
-    other, both, good = given.other.resolve(), given.bits == given.speed, True
-    if given.bits or both:
-        good = same_runs(other, given.only)
-    if given.speed or both:
-        good = same_speed(other, given.rounds) and good
+    arguments = parser.parse_args()
+    other, both, good = arguments.other.resolve(), arguments.bits == arguments.speed, True
+    if arguments.bits or both:
+        good = same_runs(other, arguments.only)
+    if arguments.speed or both:
+        good = same_speed(other, arguments.rounds) and good
         tell_cold_start(other)
     sys.exit(not good)
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 BUILD_S = 20.0
 MEMORY_SHARE = 0.7
 """Of the machine's memory; with more, a case fails."""
-TOLD = (
+REPORTED = (
     "uuv_marl", "numpy", "numba", "gymnasium", "pettingzoo", "stable_baselines3", "torch", "mpe2", "vmas", "jaxmarl",
     "jax", "jaxlib", "camar", "supersuit", "ray",
 )  # fmt: skip
@@ -91,7 +91,7 @@ def serve(makers: Mapping[str, Maker], warm: bool = False) -> None:
         case.run(1)
     build_s, first_s = time.perf_counter() - start, seconds_of(case, 1)
     units = units_within(case, seconds) if first_s < limit / 50 and seconds else 1
-    versions = {library: version(library) for library in TOLD if library in sys.modules}
+    versions = {library: version(library) for library in REPORTED if library in sys.modules}
     about = {"python": platform.python_version(), "versions": versions}
     say(about=about, build_s=build_s, first_s=first_s, first_rate=case.amount / first_s, facts=dict(case.facts))
     for _ in sys.stdin:

@@ -24,14 +24,14 @@ class Blind(Policy):
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
-    decides_every_s: ClassVar[float | None] = 0.5
-    wishes_force: ClassVar[bool] = True
+    decision_period_s: ClassVar[float | None] = 0.5
+    outputs_force: ClassVar[bool] = True
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: str) -> None:
         super().__init__(scenario, num_worlds)
         self._inner = make(inner, scenario, num_worlds)
-        told = [np.full(field.size, not field.name.startswith("echo")) for field in self.layout.table]
-        self._told = np.concatenate(told).astype(np.float32)
+        masks = [np.full(field.size, not field.name.startswith("echo")) for field in self.layout.table]
+        self._mask = np.concatenate(masks).astype(np.float32)
 
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Reset the policy inside, too."""
@@ -40,7 +40,7 @@ class Blind(Policy):
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        unheard = dataclasses.replace(percept, flat=percept.flat * self._told)
+        unheard = dataclasses.replace(percept, flat=percept.flat * self._mask)
         self._inner.active = self.active
-        self._inner.hear(unheard)
+        self._inner.update_memory(unheard)
         return self._inner.decide(unheard)

@@ -17,8 +17,8 @@ _DIGITS = 6
 
 def columns(rows: Iterable[Mapping[str, Any]]) -> Columns:
     """A table from its rows, of which there is at least one."""
-    kept = list(rows)
-    return {name: np.array([row[name] for row in kept]) for name in kept[0]}
+    table = list(rows)
+    return {name: np.array([row[name] for row in table]) for name in table[0]}
 
 
 def where(table: Columns, **values: object) -> Columns:
@@ -29,8 +29,8 @@ def where(table: Columns, **values: object) -> Columns:
 
 def groups(table: Columns, *names: str) -> dict[tuple[Any, ...], Columns]:
     """The rows grouped by their values in these columns, in the order of first appearance."""
-    found = dict.fromkeys(zip(*(table[name].tolist() for name in names), strict=True))
-    return {values: where(table, **dict(zip(names, values, strict=True))) for values in found}
+    combinations = dict.fromkeys(zip(*(table[name].tolist() for name in names), strict=True))
+    return {values: where(table, **dict(zip(names, values, strict=True))) for values in combinations}
 
 
 def write_columns(path: Path, table: Columns) -> None:

@@ -16,17 +16,17 @@ Row = Mapping[str, str]
 
 def cells(metrics: Metrics, names: Sequence[str], digits: str) -> dict[str, str]:
     """What was measured, the task's own too, as it stands in a file, such as ``.6g``: six significant digits."""
-    found: dict[str, Any] = {**metrics, **metrics.get("task", {})}
-    values = {name: found[name] for name in names}
+    metric_values: dict[str, Any] = {**metrics, **metrics.get("task", {})}
+    values = {name: metric_values[name] for name in names}
     return {k: "" if v is None else f"{v:{digits}}" if isinstance(v, float) else str(v) for k, v in values.items()}
 
 
 def write_rows(path: Path, rows: Iterable[Row]) -> None:
     """Write rows, of which there is at least one, whole or not at all; the same rows give the same bytes."""
-    kept, text = list(rows), io.StringIO(newline="")
-    table = csv.DictWriter(text, kept[0], lineterminator="\n")
+    columns, text = list(rows), io.StringIO(newline="")
+    table = csv.DictWriter(text, columns[0], lineterminator="\n")
     table.writeheader()
-    table.writerows(kept)
+    table.writerows(columns)
     path.parent.mkdir(parents=True, exist_ok=True)
     data = text.getvalue().encode()
     with replacing(path) as partial:

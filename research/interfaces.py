@@ -68,19 +68,19 @@ def printed(learner: Learner, training: int) -> str:
     return block
 
 
-def acting(learner: Learner, made: dict[str, Any]) -> Act:
+def acting(learner: Learner, namespace: dict[str, Any]) -> Act:
     """The mean actions of what the block has made."""
     if learner in (Learner.PPO, Learner.RECURRENT):
-        return _remembering(made["model"])
+        return _remembering(namespace["model"])
     if learner is Learner.RLLIB:
-        return _of_rllib(made["network"])
-    return _of_torchrl(made["policy"] if learner is Learner.TORCHRL else made["experiment"].policy)
+        return _of_rllib(namespace["network"])
+    return _of_torchrl(namespace["policy"] if learner is Learner.TORCHRL else namespace["experiment"].policy)
 
 
 def _of_rllib(network: Any) -> Act:
     def act(seen: Float32, _: Bool) -> Float32:
-        found = network.forward_inference({"obs": torch.from_numpy(seen)})["action_dist_inputs"]
-        return np.clip(found[:, :2].numpy(), -1.0, 1.0)
+        outputs = network.forward_inference({"obs": torch.from_numpy(seen)})["action_dist_inputs"]
+        return np.clip(outputs[:, :2].numpy(), -1.0, 1.0)
 
     return act
 
@@ -90,9 +90,9 @@ def _of_torchrl(policy: Any) -> Act:
     from torchrl.envs.utils import ExplorationType, set_exploration_type  # noqa: PLC0415 - likewise
 
     def act(seen: Float32, _: Bool) -> Float32:
-        told = {"uuv": {"observation": torch.from_numpy(seen).reshape(EPISODES, -1, seen.shape[1])}}
+        tensordict = {"uuv": {"observation": torch.from_numpy(seen).reshape(EPISODES, -1, seen.shape[1])}}
         with set_exploration_type(ExplorationType.DETERMINISTIC), torch.no_grad():
-            return policy(TensorDict(told, [EPISODES]))["uuv", "action"].reshape(-1, 2).numpy()
+            return policy(TensorDict(tensordict, [EPISODES]))["uuv", "action"].reshape(-1, 2).numpy()
 
     return act
 
@@ -118,7 +118,7 @@ def whole(act: Act) -> int:
         action = act(rows, np.full(len(rows), begins))
         seen, _, terminated, truncated, _ = envs.step(action.reshape(EPISODES, n, 2))
         now, begins = (terminated | truncated) & ~ended, False
-        good += int((now & terminated & ~envs.swarm.state.touched.any(axis=1)).sum())
+        good += int((now & terminated & ~envs.swarm.state.collided.any(axis=1)).sum())
         ended |= now
     return good
 
@@ -137,9 +137,9 @@ def main(
         with tempfile.TemporaryDirectory() as folder:
             block = Path(folder, "block.py")
             block.write_text(printed(learner, training), encoding="utf-8")
-            made = runpy.run_path(str(block), run_name="page")
+            namespace = runpy.run_path(str(block), run_name="page")
         took, used = time.perf_counter() - began, time.process_time() - used
-        good = whole(acting(learner, made))
+        good = whole(acting(learner, namespace))
         print(
             f"{learner}, training {training}: {good} of {EPISODES} whole; {took:.0f} s, {used:.0f} s of processors here"
         )

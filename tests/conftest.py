@@ -84,7 +84,7 @@ def place():
         swarm.state.before[0] = eta[:, :2]
         swarm.state.nu[0] = 0.0 if nu is None else nu
         if len(obstacles):
-            swarm.course.obstacles[0] = swarm.state.obstacles_before[0] = obstacles
+            swarm.world_map.obstacles[0] = swarm.state.obstacles_before[0] = obstacles
         swarm.observe()
         return swarm
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
@@ -33,7 +33,7 @@ WORLDS = 3
 REWARD = "sparse"
 """The name of the reward of commit 3eb4921."""
 
-LAWS = {name: name for name in (
+CONTROLLERS = {name: name for name in (
     "bio_inspired", "bio_inspired,obstacle_term=per_obstacle", "bio_inspired_plus", "scout", "sff", "sdc",
     "apf", "olfati_saber", "olfati_saber_informed", "orca_informed", "pull", "random", "idle", "guarded:bio_inspired",
     "guarded:random",
@@ -81,7 +81,7 @@ class Setting(NamedTuple):
     shown: int = 60
     """The same of what ``NETWORKS`` see."""
     overrides: Mapping[str, object] = {}
-    laws: tuple[str, ...] = tuple(LAWS)
+    controllers: tuple[str, ...] = tuple(CONTROLLERS)
     networks: tuple[str, ...] = tuple(NETWORKS)
 
 
@@ -116,18 +116,18 @@ def runs(name: str) -> Iterator[tuple[str, Any]]:
     """Keys and values of a setting's runs."""
     setting = SETTINGS[name]
     scenario = load_scenario(setting.scenario, overrides=setting.overrides)
-    for law in setting.laws:
-        decisions = WHOLE if law == DRIVER else setting.decisions
-        parts = (*RUN, "reward") if law in REWARDED else RUN
-        for what, value in hashes(scenario, LAWS.get(law, law), decisions, parts).items():
-            yield f"{name} {law} {what}", value
+    for controller in setting.controllers:
+        decisions = WHOLE if controller == DRIVER else setting.decisions
+        parts = (*RUN, "reward") if controller in REWARDED else RUN
+        for what, value in hashes(scenario, CONTROLLERS.get(controller, controller), decisions, parts).items():
+            yield f"{name} {controller} {what}", value
     for network in setting.networks:
         yield f"{name} {network} sample", sample(scenario, NETWORKS[network], setting.shown)
 
 
 def hashes(scenario: Scenario, policy: str, decisions: int, parts: tuple[str, ...]) -> dict[str, str]:
     """Of the parts of a run, a hash for each of its seeds."""
-    scenario = granted(policy, scenario)
+    scenario = with_policy_requirements(policy, scenario)
     env, actor = BatchedEnv(scenario, WORLDS, REWARD), make(policy, scenario, WORLDS)
     hashed = {what: [hashlib.sha256() for _ in range(WORLDS)] for what in parts}
     running = np.ones(WORLDS, np.bool_)
@@ -157,8 +157,8 @@ def hashes(scenario: Scenario, policy: str, decisions: int, parts: tuple[str, ..
 
 def sample(scenario: Scenario, policy: str, decisions: int) -> list[float]:
     """Actions of a policy that sees what ``DRIVER`` sees: of two vehicles of each world, at five times."""
-    own = granted(policy, scenario)
-    damping = granted(DRIVER, scenario).actuators.yaw_damping_nms
+    own = with_policy_requirements(policy, scenario)
+    damping = with_policy_requirements(DRIVER, scenario).actuators.yaw_damping_nms
     driven = load_scenario(own, overrides={"actuators.yaw_damping_nms": damping})
     swarm, driver, actor = Swarm(driven, WORLDS), make(DRIVER, driven, WORLDS), make(policy, own, WORLDS)
     swarm.reset(0)

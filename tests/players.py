@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import BaseParallelWrapper
 
 import uuv_marl
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.scenario import load_scenario
 
@@ -18,7 +18,7 @@ WORLDS, CYCLES = 2, 9
 
 
 def suited(name, scenario, **overrides):
-    return granted(name, load_scenario(scenario, overrides=overrides))
+    return with_policy_requirements(name, load_scenario(scenario, overrides=overrides))
 
 
 def reference(name, scenario, seed, decisions):

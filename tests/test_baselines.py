@@ -16,7 +16,7 @@ from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE, saved
 from uuv_marl import load_scenario, parallel_env, scenario_names
-from uuv_marl.baselines import POLICIES, Policy, PolicyError, granted, make
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, with_policy_requirements, make
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.registry import uses_identity
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
@@ -49,7 +49,7 @@ def test_clamps_bind_only_where_equation_20_overflows_and_are_counted():
 def written_as_in_the_paper(percept, gains, limits):
     """Eq. 18-22 with NumPy, for one vehicle."""
     force = gains.zeta_l * percept["reference"].astype(float)
-    for heard, p in zip(percept["heard"], percept["neighbour"].astype(float), strict=True):
+    for heard, p in zip(percept["detected"], percept["neighbour"].astype(float), strict=True):
         if heard:
             d = np.hypot(*p)
             force += gains.zeta_n * -p * (np.exp(gains.delta_n / d) - np.e)
@@ -79,7 +79,7 @@ def test_the_controller_is_equations_18_to_22(seed):
 @pytest.mark.parametrize("name", [*(name for name in ANYWHERE if name != "random"), "guarded:mappo"])
 def test_forces_turn_with_the_world(name):
     """Body-frame actions don't change, up to float32, when the world is rotated and moved."""
-    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=20))
+    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
     turn, (x, y) = 0.7, (50.0, -80.0)
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     actions = []
@@ -90,8 +90,8 @@ def test_forces_turn_with_the_world(name):
         if moved:
             swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
             swarm.state.eta[0, :, 2] += turn
-            swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (x, y)
-            swarm.course.waypoints[0, 0] = swarm.course.waypoints[0, 0] @ rotation.T + (x, y)
+            swarm.world_map.obstacles[0, :, :2] = swarm.world_map.obstacles[0, :, :2] @ rotation.T + (x, y)
+            swarm.world_map.waypoints[0, 0] = swarm.world_map.waypoints[0, 0] @ rotation.T + (x, y)
         percept = swarm.observe()
         if name.startswith("sdc"):  # its lattice lies north-east, so only the move is a symmetry
             policy.act(percept)
@@ -105,7 +105,7 @@ def test_forces_turn_with_the_world(name):
 @pytest.mark.parametrize("name", [name for name in ANYWHERE if name != "random"])
 def test_who_a_vehicle_is_does_not_matter(name):
     """Vehicles that swap their places swap their actions."""
-    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=20))
+    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
     order, actions = np.random.default_rng(0).permutation(20), []
     for places in (np.arange(20), order):
         swarm, policy = Swarm(scenario), make(name, scenario)
@@ -127,7 +127,7 @@ def test_clustering_repels_within_its_distance_and_attracts_beyond(distance, wid
 def test_sff_predicts_where_a_neighbour_will_be():
     """A neighbour that closes in is pushed away earlier than one that stands, in whatever frame the vehicle turns."""
     gains = sff.SffGains(0.001, 60, 600.0, 18.0, 12.0, 40.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0)
-    scenario = granted("sff", load_scenario("tracking", num_vehicles=2))
+    scenario = with_policy_requirements("sff", load_scenario("tracking", num_vehicles=2))
     layout = PerceptLayout.of(scenario)
 
     def second_action(before, now, yaw_rate=0.0):
@@ -135,7 +135,7 @@ def test_sff_predicts_where_a_neighbour_will_be():
         for place in (before, now):
             flat = np.zeros((1, 2, layout.size), np.float32)
             percept = Percept(flat, layout)
-            percept["heard"][0, 0, 3] = 1
+            percept["detected"][0, 0, 3] = 1
             percept["neighbour"][0, 0, 3] = place
             percept["link_identity"][0, 0, 3] = 2
             percept["yaw_rate"][0, 0] = yaw_rate
@@ -177,13 +177,13 @@ def test_tuned_gains_come_from_shipped_trials(file):
     chosen = {"scout": "scout,preset=closed", "nearest_target.lanes": "nearest_target,lanes=true"}
     policy = chosen.get(file, f"{name},tuned_for={what}" if what else name)
     flown_in = "silent_targets" if name == "nearest_target" else "tracking"
-    made = make(policy, granted(policy, load_scenario(flown_in)))
+    made = make(policy, with_policy_requirements(policy, load_scenario(flown_in)))
     numbers = vars(made) | made.gains._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 
 
 def flown(name, scenario, decisions=6, worlds=2):
-    scenario = granted(name, load_scenario(scenario))
+    scenario = with_policy_requirements(name, load_scenario(scenario))
     swarm, policy = Swarm(scenario, worlds), make(name, scenario, worlds)
     percept = swarm.reset(0)
     policy.reset(0)
@@ -244,11 +244,11 @@ def test_gains_and_parameters_can_be_written_behind_a_name():
     assert make("bio_inspired", scenario, zeta_n=0.5).gains == policy.gains
     percept = Swarm(scenario).reset(0)
     assert not np.array_equal(policy.act(percept), make("bio_inspired", scenario).act(percept))
-    assert granted("sff,cluster=3", scenario).sonar.channels == ("link",)
+    assert with_policy_requirements("sff,cluster=3", scenario).sonar.channels == ("link",)
 
 
 def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
-    scenario = granted("scout", load_scenario(STARTER))
+    scenario = with_policy_requirements("scout", load_scenario(STARTER))
     assert make("scout", scenario).gains == make(f"scout,preset={DEFAULT_PRESET}", scenario).gains
     for name, preset in PRESETS.items():
         policy = make(f"guarded:scout,preset={name},push=3.5", scenario).inner
@@ -284,7 +284,7 @@ def test_a_name_that_means_nothing_is_explained(name, message):
 
 
 def test_what_a_policy_cannot_be_made_for_is_explained():
-    damped = granted("bio_inspired_plus", load_scenario("tracking"))
+    damped = with_policy_requirements("bio_inspired_plus", load_scenario("tracking"))
     for arguments, message in (((damped,), "yaw damping of 0"), (("tracking",), "made for a Scenario"),
                                ((load_scenario("tracking"), 0), "num_worlds must be at least 1")):  # fmt: skip
         with pytest.raises(PolicyError, match=message):
@@ -302,7 +302,7 @@ def test_what_a_policy_cannot_be_made_for_is_explained():
 )
 @pytest.mark.parametrize("name", ["scout", "mappo"])
 def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, damping):
-    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=3, overrides=change))
+    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=3, overrides=change))
     assert scenario.actuators.yaw_damping_nms == pytest.approx(damping, rel=1e-12)
     any_vehicle = {"any_vehicle": True} if name == "mappo" else {}
     percept = Swarm(scenario).reset(0)
@@ -315,7 +315,7 @@ def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
     plain = name.partition(",")[0].removeprefix("mappo_").removesuffix("_2")
     homes = {"nearest_target": "silent_targets", "oracle": "hard_water", "carrot_informed": "hard_water"}
     home = homes.get(plain, plain if plain in scenario_names() else "starter")
-    scenario = granted(name, load_scenario(home, num_vehicles=4))
+    scenario = with_policy_requirements(name, load_scenario(home, num_vehicles=4))
     policy, alike, swarm = make(name, scenario), make(name, scenario), Swarm(scenario)
     percept, acted_alike = swarm.reset(3), True
     for _ in range(12):

@@ -9,7 +9,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -26,7 +26,7 @@ def quick(name="single_obstacle"):
 
 
 def runs_of(scenario, policy, seeds):
-    return {run.seed: run for run in evaluate(granted(policy, scenario), policy, seeds) if isinstance(run, Run)}
+    return {run.seed: run for run in evaluate(with_policy_requirements(policy, scenario), policy, seeds) if isinstance(run, Run)}
 
 
 def test_metrics_are_those_of_the_series(monkeypatch):
@@ -86,7 +86,7 @@ def test_results_go_on_where_they_stopped(tmp_path):
     ran = []
     runner.run_missing(again, [scenario], ["idle", "bio_inspired"], [0, 1], lambda *a: ran.append(a))
     assert len(again.rows) == 4
-    whole = Results(tmp_path / "whole", [scenario])
+    whole = Results(tmp_path / "swarm_success", [scenario])
     runner.run_missing(whole, [scenario], ["idle", "bio_inspired"], [0, 1], lambda *a: None)
     assert sorted(map(str, whole.rows)) == sorted(map(str, again.rows))
     assert set(data) == {"schema", "fingerprint", "versions", "machine", "scenarios", "policies", "runs"}
@@ -144,7 +144,7 @@ def test_your_own_policy_stands_in_the_table(tmp_path, monkeypatch):
 
 def test_the_command_line_from_end_to_end(tmp_path):
     arguments = ["benchmark", "--scenario=lossy", "--scenario=tracking", "--policy=bio_inspired", "--policy=random"]
-    arguments += ["--seeds=3", f"--output={tmp_path}", *SETS, "--set=disturbance.loss_times_s=[1.0, 2.0]"]
+    arguments += ["--seeds=3", f"--output={tmp_path}", *SETS, "--set=losses.times_s=[1.0, 2.0]"]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
     assert "bio_inspired" in done.output
@@ -212,13 +212,13 @@ def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
     monkeypatch.setattr("uuv_marl.scenario.load_scenario", lambda *a, **k: quick())
     optuna = pytest.importorskip("optuna")
     before = optuna.logging.get_verbosity()
-    for folder, stops in (("whole", [5]), ("parts", [2, 5])):
+    for folder, stops in (("swarm_success", [5]), ("parts", [2, 5])):
         for trials in stops:
             tuning.tune("bio_inspired_plus", tmp_path / folder, trials, lambda *a: None)
     assert optuna.logging.get_verbosity() == before
     for name in ("bio_inspired_plus.json", "bio_inspired_plus.csv"):
-        assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
-    assert len((tmp_path / "whole" / "bio_inspired_plus.csv").read_text().splitlines()) == 6
+        assert (tmp_path / "swarm_success" / name).read_bytes() == (tmp_path / "parts" / name).read_bytes()
+    assert len((tmp_path / "swarm_success" / "bio_inspired_plus.csv").read_text().splitlines()) == 6
 
 
 @pytest.mark.parametrize("width", [80, 88, 100, 130])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.baselines.comparators import apf, olfati_saber, orca
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -21,7 +21,7 @@ METRES = st.floats(-60.0, 60.0)
 
 def seen(name, n=1, **overrides):
     """A scenario that grants what a policy needs, and a percept in which nothing is perceived yet."""
-    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=n, overrides=overrides))
+    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=n, overrides=overrides))
     layout = PerceptLayout.of(scenario)
     return scenario, Percept(np.zeros((1, n, layout.size), np.float32), layout)
 
@@ -111,7 +111,7 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
     gains = FLOCK._replace(
         spacing=spacing, reach=1.3, attraction=100.0, repulsion=500.0, pull=5.0, reference_velocity=300.0
     )
-    scenario = granted("olfati_saber", load_scenario("tracking", num_vehicles=7))
+    scenario = with_policy_requirements("olfati_saber", load_scenario("tracking", num_vehicles=7))
     swarm, policy = Swarm(scenario), make("olfati_saber", scenario, gains=gains)
     swarm.reset(10_000)
     angle = np.arange(6) * math.pi / 3
@@ -157,7 +157,7 @@ def test_the_change_grazes_the_disc_and_is_the_smallest(p_x, p_y, v_x, v_y, radi
 
 def test_the_field_is_bounded_and_what_was_cut_is_counted():
     scenario, percept = seen("apf", 2)
-    percept["heard"][0, 0, 3] = 1.0  # a neighbour at the very same place
+    percept["detected"][0, 0, 3] = 1.0  # a neighbour at the very same place
     percept["echo"][0, 1, 3] = 1.0  # an obstacle's surface
     policy = make("apf", scenario, gains=APF)
     assert np.isfinite(policy.act(percept)).all()

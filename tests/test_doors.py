@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import uuv_marl
 from tests.nets import ANYWHERE
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines import POLICIES, PolicyError, with_policy_requirements, make
 from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoint
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, load_trace
@@ -37,7 +37,7 @@ from uuv_marl.sim.vehicle import plant
 
 
 def made_for(name, n=5, worlds=2):
-    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=n))
+    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=n))
     swarm = Swarm(scenario, worlds)
     policy = make(name, scenario, worlds)
     policy.reset(0)
@@ -76,7 +76,7 @@ def test_no_number_of_an_observation_is_an_index(name):
     _, policy, percept = made_for(name)
     policy.act(percept)
     identity = percept["link_identity"]
-    percept["heard"][...] = 1.0
+    percept["detected"][...] = 1.0
     for ghost in (0.0, -3.0, 6.0, 16384.0, 1e30, np.inf, np.nan):
         identity[...] = ghost
         assert np.isfinite(policy.act(percept)).all(), ghost
@@ -84,7 +84,7 @@ def test_no_number_of_an_observation_is_an_index(name):
 
 def test_a_swarm_too_large_to_assign_slots_is_refused_at_once():
     with pytest.raises(PolicyError, match="at most 2000 vehicles"):
-        make("sdc", granted("sdc", load_scenario("tracking", num_vehicles=2001)))
+        make("sdc", with_policy_requirements("sdc", load_scenario("tracking", num_vehicles=2001)))
 
 
 @pytest.mark.parametrize("active", [[True], np.ones(8), np.ones((8, 1), bool), np.ones(9, bool)])
@@ -104,13 +104,13 @@ def test_a_mask_of_other_worlds_is_refused(active):
         ("num_obstacles", 1000),
         ("losses", 1 << 40),
         ("losses", -1),
-        ("heard", 6),
+        ("detected", 6),
         ("diverged", 77),
         ("times", np.nan),
     ],
 )
 def test_a_snapshot_holds_no_index_out_of_range(name, value):
-    scenario = load_scenario("lossy", num_vehicles=6, overrides={"disturbance.loss_times_s": [1.0]})
+    scenario = load_scenario("lossy", num_vehicles=6, overrides={"losses.times_s": [1.0]})
     swarm = Swarm(scenario, 2)
     swarm.reset(0)
     before, snapshot = swarm.snapshot(), swarm.snapshot()
@@ -139,7 +139,7 @@ def test_a_snapshot_of_another_swarm_is_refused(name, change):
 def test_state_changed_by_hand_is_checked():
     swarm = Swarm(load_scenario("single_obstacle", num_vehicles=2))
     swarm.reset(0)
-    swarm.course.num_obstacles[0] = 50
+    swarm.world_map.num_obstacles[0] = 50
     with pytest.raises(ValueError, match="num_obstacles"):
         swarm.observe()
 
@@ -252,7 +252,7 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     (home / "best").mkdir()
     save_checkpoint("~/best/policy.safetensors", trained.checkpoint.card, trained.checkpoint.tensors)
     for name in ("~/best", "guarded:~/best", "~/best/policy.safetensors"):
-        assert make(name, granted(name, load_scenario("starter")))
+        assert make(name, with_policy_requirements(name, load_scenario("starter")))
     assert load_checkpoint("~/best").card == trained.checkpoint.card
 
 
@@ -272,10 +272,10 @@ def test_results_and_replays_go_to_the_home_folder(home):
 @pytest.mark.needs("torch")
 def test_trainings_and_recipes_in_the_home_folder(home):
     from uuv_marl.train.run import train
-    from uuv_marl.train.training import Training, told_by
+    from uuv_marl.train.training import Training, recipe_fields
 
     (home / "r.toml").write_text('scenario = "starter"\ntitle = "mine"', encoding="utf-8")
-    assert told_by("~/r.toml") == {"scenario": "starter", "title": "mine"}
+    assert recipe_fields("~/r.toml") == {"scenario": "starter", "title": "mine"}
     few = {"validations": 1, "validation_episodes": 1, "overrides": {"time_limit.factor": 0.02}, "ppo": {"horizon": 2}}
     list(train("~/runs", Training(scenario="starter", steps=1, sizes=((2, 2),), **few)))
     assert (home / "runs" / "best").is_dir()

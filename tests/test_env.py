@@ -8,7 +8,7 @@ import pytest
 
 import uuv_marl
 from uuv_marl import load_scenario, uuv_swarm_v1
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
 
@@ -24,7 +24,7 @@ def test_parallel_api(scenario_name):
 
 
 def test_parallel_api_to_the_end_with_losses():
-    overrides = {"disturbance.loss_times_s": [1.0, 2.0], "time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
+    overrides = {"losses.times_s": [1.0, 2.0], "time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
     parallel_api_test(uuv_marl.parallel_env("lossy", num_vehicles=8, overrides=overrides), num_cycles=100)
 
 
@@ -55,8 +55,8 @@ SHORT = {"time_limit.factor": 0.05, "time_limit.extra_s": 20.0}
 @pytest.mark.parametrize("scenario", ["lossy", "random_field"])
 def test_a_policy_drives_the_environment_as_it_drives_the_swarm(name, scenario):
     """From observations alone, a whole episode, bit for bit the batched run."""
-    losses = {"disturbance.loss_times_s": [2.0, 4.0, 9.0]} if scenario == "lossy" else {}
-    granting = granted(name, load_scenario(scenario, overrides={**SHORT, **losses}))
+    losses = {"losses.times_s": [2.0, 4.0, 9.0]} if scenario == "lossy" else {}
+    granting = with_policy_requirements(name, load_scenario(scenario, overrides={**SHORT, **losses}))
     env = uuv_marl.parallel_env(granting)
     through_env = make(name, env)
     seeds = [11, 12]
@@ -206,8 +206,8 @@ def test_np_random_is_seeded_and_touches_nothing():
 
 
 WIDE = {
-    "disturbance.loss_times_s": [1.0, 2.0],
-    "contact.hull_radius_m": 22.0,
+    "losses.times_s": [1.0, 2.0],
+    "collision.hull_radius_m": 22.0,
     "start.spacing_m": 45.0,
     "start.gap_m": 45.0,
 }
@@ -218,10 +218,10 @@ ENDINGS = {
         "arrival.radius_m": 5e3,
         "arrival.spread_m": 2e4,
         "arrival.dwell_s": 0.2,
-        "disturbance.loss_times_s": [1.0],
+        "losses.times_s": [1.0],
     },
     "time_limit": {**WIDE, "time_limit.factor": 0.05, "time_limit.extra_s": 30.0},
-    "lost": {**WIDE, "contact.ends_vehicle": True},
+    "lost": {**WIDE, "collision.ends_vehicle": True},
 }
 
 

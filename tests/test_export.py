@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, PolicyError, granted, make
+from uuv_marl.baselines import POLICIES, PolicyError, with_policy_requirements, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.baselines.learned.trained import Trained
@@ -26,7 +26,7 @@ RING = {
 def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_path):
     scenario = load_scenario("starter", overrides={"sonar.arrays": arrays} if arrays else {})
     best = saved(tmp_path, scenario, kind=kind, memory=memory)
-    scenario = granted(best, scenario)
+    scenario = with_policy_requirements(best, scenario)
     write_onnx(best, scenario, tmp_path / "policy.onnx")
     onnx.checker.check_model(onnx.load(tmp_path / "policy.onnx"), full_check=True)
     model, policy = ReferenceEvaluator(str(tmp_path / "policy.onnx")), make(best, scenario)

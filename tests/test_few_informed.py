@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.state import global_state, state_layout
@@ -23,25 +23,25 @@ def water(worlds=1, **changes):
 def test_so_many_are_informed_and_each_episode_draws_who(k):
     swarm = water(6, **{"task.informed": k})
     swarm.reset(0)
-    informed = swarm.course.informed.copy()
+    informed = swarm.world_map.informed.copy()
     assert (informed.sum(axis=1) == min(k, N)).all()
     np.testing.assert_array_equal(swarm.percept["informed"][..., 0], informed)
     np.testing.assert_array_equal(global_state(swarm, state_layout(swarm.scenario))[:, -N:], informed)
     assert k > N or len({row.tobytes() for row in informed}) == 6
     swarm.reset(0)
-    np.testing.assert_array_equal(swarm.course.informed, informed)
+    np.testing.assert_array_equal(swarm.world_map.informed, informed)
 
 
 @pytest.mark.parametrize("sea", [{}, {"navigation.drift_share": 0.1, "navigation.compass_bias_deg": 5.0}])
 def test_two_courses_with_equal_sonar_give_the_uninformed_equal_percepts(sea):
     swarm = water(1, **sea)
     swarm.reset(1)
-    swarm.course.num_obstacles[0] = 0
-    informed, (c, s) = swarm.course.informed[0], (np.cos(2.0), np.sin(2.0))
+    swarm.world_map.num_obstacles[0] = 0
+    informed, (c, s) = swarm.world_map.informed[0], (np.cos(2.0), np.sin(2.0))
     snapshot, seen = swarm.snapshot(), []
     for turn in (np.eye(2), np.array([[c, s], [-s, c]])):
         swarm.restore(snapshot)
-        swarm.course.waypoints[0, 0] = swarm.course.waypoints[0, 0] @ turn
+        swarm.world_map.waypoints[0, 0] = swarm.world_map.waypoints[0, 0] @ turn
         rows = [swarm.observe().flat[0].copy()]
         rows += [swarm.step(np.full((1, N, 2), 0.3)).flat[0].copy() for _ in range(5)]
         seen.append(np.array(rows))
@@ -55,7 +55,7 @@ def test_two_courses_with_equal_sonar_give_the_uninformed_equal_percepts(sea):
 def test_the_start_is_turned_at_random_against_the_first_leg_and_clear_of_obstacles(name):
     swarm = Swarm(load_scenario(name), 64)
     swarm.reset(10_000)
-    first, second = swarm.course.waypoints[:, 0, 0], swarm.course.waypoints[:, 0, 1]
+    first, second = swarm.world_map.waypoints[:, 0, 0], swarm.world_map.waypoints[:, 0, 1]
     behind, leg = first - swarm.state.eta[:, :, :2].mean(axis=1), second - first
     angle = np.arctan2(leg[:, 0] * behind[:, 1] - leg[:, 1] * behind[:, 0], (leg * behind).sum(axis=1))
     share = (np.sort(angle) + np.pi) / (2.0 * np.pi)
@@ -74,7 +74,7 @@ def test_who_does_not_perceive_the_reference_reckons_where_it_is():
     moved = np.zeros(N)
     for _ in range(120):
         eta, percept = swarm.state.eta[0].copy(), swarm.percept
-        policy.hear(percept)
+        policy.update_memory(percept)
         pose = policy.memory.pose[0]
         heading = np.arctan2(pose[:, 3], pose[:, 2])
         turn = eta[:, 2] - heading if turn is None else turn
@@ -85,7 +85,7 @@ def test_who_does_not_perceive_the_reference_reckons_where_it_is():
         moved = np.maximum(moved, np.hypot(*(eta[:, :2] - began).T))
         swarm.step(policy.drive(percept, rng.uniform(-1.0, 1.0, (1, N, 2)).astype(np.float32)))
     off = np.abs((heading + turn - eta[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
-    informed = swarm.course.informed[0]
+    informed = swarm.world_map.informed[0]
     assert moved.min() > 5.0
     assert error[informed].max() < 0.01
     assert error[~informed].max() < 0.5
@@ -95,10 +95,10 @@ def test_who_does_not_perceive_the_reference_reckons_where_it_is():
 def test_newcomers_begin_at_the_references_velocity_for_the_informed_alone():
     swarm = water()
     policy = make("leader_follower", swarm.scenario)
-    policy.hear(swarm.reset(10_002))
+    policy.update_memory(swarm.reset(10_002))
     known = policy.memory.known[0] > 0.0
     speed = np.hypot(*np.moveaxis(policy.memory.velocity[0], -1, 0))
-    informed = swarm.course.informed[0]
+    informed = swarm.world_map.informed[0]
     assert known.any(axis=1).all()
     assert (speed[~informed] == 0.0).all()
     np.testing.assert_allclose(speed[informed][known[informed]], swarm.scenario.trajectory.speed_mps, rtol=1e-6)
@@ -108,26 +108,26 @@ def test_there_is_at_the_end_once_the_reference_rests_and_who_touched_something_
     batch = BatchedEnv(load_scenario("few_informed", overrides=KNOWN | {"time_limit.factor": 1.0}))
     batch.reset(0)
     swarm, task = batch.swarm, batch.task
-    informed = np.flatnonzero(swarm.course.informed[0])
-    uninformed = np.flatnonzero(~swarm.course.informed[0])
+    informed = np.flatnonzero(swarm.world_map.informed[0])
+    uninformed = np.flatnonzero(~swarm.world_map.informed[0])
 
     def gather_at(place):
         swarm.state.eta[0, :, :2] = place + 7.0 * np.stack([np.arange(N) % 5, np.arange(N) // 5], axis=1)
         swarm.state.nu[0] = 0.0
         swarm.observe()
 
-    gather_at(swarm.course.waypoints[0, 0, 0])
+    gather_at(swarm.world_map.waypoints[0, 0, 0])
     assert (swarm.facts.away < 80.0).all()
-    assert not task.there().any()  # near l(t), which has not come to its end
-    swarm.course.times[0] *= 1e-3
+    assert not task.at_goal().any()  # near l(t), which has not come to its end
+    swarm.world_map.times[0] *= 1e-3
     swarm.duration_s[0] *= 1e-3
-    gather_at(swarm.course.waypoints[0, 0, -1])
-    swarm.state.touched[0, [informed[0], uninformed[0], uninformed[1]]] = True
+    gather_at(swarm.world_map.waypoints[0, 0, -1])
+    swarm.state.collided[0, [informed[0], uninformed[0], uninformed[1]]] = True
     swarm.state.eta[0, uninformed[2], :2] += 200.0
     result = batch.step(np.zeros((1, N, 2)))
     assert result.terms["arrival"][0].tolist() == [20.0 * (k != uninformed[2]) for k in range(N)]
     assert not result.over.any()
-    expected = {"untouched_share": 1 - 4 / N, "whole": 0.0, "uninformed_share": 1 - 3 / (N - K)}
+    expected = {"untouched_share": 1 - 4 / N, "swarm_success": 0.0, "uninformed_share": 1 - 3 / (N - K)}
     assert batch.task.metrics(0) == pytest.approx(expected)
     while not batch.over.all():
         result = batch.step(np.zeros((1, N, 2)))
@@ -144,7 +144,7 @@ def test_followers_come_along_only_with_the_law_that_is_made_for_it():
     """On tuning seeds of the easy tier: ``scout`` brings the informed alone, the law nearly all."""
     share = {}
     for name in ("leader_follower", "scout"):
-        scenario = granted(name, load_scenario("few_informed_easy"))
+        scenario = with_policy_requirements(name, load_scenario("few_informed_easy"))
         runs = [run for run in evaluate(scenario, name, range(10_000, 10_004)) if isinstance(run, Run)]
         share[name] = np.mean([run.metrics["task"]["uninformed_share"] for run in runs])
     assert share["leader_follower"] > 0.7
@@ -161,17 +161,17 @@ def test_a_swarm_that_amplifies_what_it_hears_goes_at_the_cruise_of_its_follower
         policy.reset(10_000)
         for _ in range(100):
             percept = swarm.step(policy.act(percept))
-        speed = np.hypot(swarm.state.nu[..., 0], swarm.state.nu[..., 1])[~swarm.course.informed]
+        speed = np.hypot(swarm.state.nu[..., 0], swarm.state.nu[..., 1])[~swarm.world_map.informed]
         assert speed.max() < cruise + 0.4
         speeds.append(np.median(speed) / cruise)
     assert min(speeds) > 0.8
 
 
 def test_who_leads_is_paid_for_who_follows():
-    usual, led = (BatchedEnv(load_scenario("few_informed_easy"), 2, reward) for reward in ("dense", "led"))
+    usual, led = (BatchedEnv(load_scenario("few_informed_easy"), 2, reward) for reward in ("dense", "leader"))
     for batch in (usual, led):
         batch.reset(7)
-    informed, rng = usual.swarm.course.informed, np.random.default_rng(0)
+    informed, rng = usual.swarm.world_map.informed, np.random.default_rng(0)
     for _ in range(20):
         action = rng.uniform(-1.0, 1.0, (2, 20, 2))
         own, paid = usual.step(action).reward, led.step(action).reward
@@ -184,7 +184,7 @@ def test_who_has_no_gamma_agent_keeps_its_velocity():
     swarm = Swarm(load_scenario("few_informed", num_vehicles=2, overrides={"task.informed": 1}))
     policy = make("olfati_saber", swarm.scenario)
     swarm.reset(0)
-    alone = int(np.flatnonzero(~swarm.course.informed[0])[0])
+    alone = int(np.flatnonzero(~swarm.world_map.informed[0])[0])
     swarm.state.eta[0, alone, :2] += 5000.0
     swarm.state.nu[0, alone] = (1.5, 0.0, 0.0)
     percept = swarm.observe()

@@ -60,7 +60,7 @@ def test_groups_that_swap_sides_have_colours_of_their_own_and_so_have_their_goal
     for own in (0, 1):
         at = camera.pixels(swap.position[team == own])
         assert np.mean([near(picture, place, ink.TEAMS[own]) for place in at]) > 0.9
-        goals = camera.pixels(np.array([way[-1] for number, way in swap.groups.ways.values() if number == own]))
+        goals = camera.pixels(np.array([way[-1] for number, way in swap.groups.paths.values() if number == own]))
         assert len(goals) == 20
         assert np.mean([near(picture, place, ink.TEAMS[own], 1) for place in goals]) > 0.9
     assert words(swap)[:3] == ["group 1", "group 2", "goal of a vehicle"]
@@ -74,8 +74,8 @@ def test_a_goal_at_rest_is_a_goal_in_the_legend_and_nothing_to_follow():
 def test_each_group_has_its_trajectory_and_its_leading_point():
     scene, *_ = played("multi_obstacle", "idle", 30.0, num_vehicles=8, overrides=TWO)
     picture, camera = painted(scene)
-    assert [number for number, *_ in scene.leads] == [0, 1]
-    for number, way, at in scene.leads:
+    assert [number for number, *_ in scene.followed_paths] == [0, 1]
+    for number, way, at in scene.followed_paths:
         assert near(picture, camera.pixels(0.6 * way[1] + 0.4 * way[2]), ink.TEAMS[number])
         assert near(picture, camera.pixels(at) + np.array([12.0, 0.0]), ink.TEAMS[number])
         assert near(picture, camera.pixels(way[-1]), ink.TEAMS[number])
@@ -99,9 +99,9 @@ def test_the_uninformed_are_hollow_and_the_legend_says_so(few):
 def test_one_group_of_informed_vehicles_is_drawn_as_ever(few):
     scene, *_ = played("single_obstacle", seconds=10.0)
     assert words(scene)[:2] == ["vehicle", "l(t), to follow"]
-    assert len(scene.groups.ways) == 1
+    assert len(scene.groups.paths) == 1
     assert scene.groups.informed.all()
-    np.testing.assert_array_equal(scene.leads[0][1], scene.waypoints)
+    np.testing.assert_array_equal(scene.followed_paths[0][1], scene.waypoints)
     known = few._replace(groups=few.groups._replace(informed=np.ones(20, np.bool_)))
     frames = [pixels(Frame((800, 800)).draw([Panel("few", one)], "map")) for one in (few, known)]
     assert not np.array_equal(*frames)
@@ -125,9 +125,9 @@ def test_recordings_traces_and_pages_know_the_groups(name, tmp_path):
         for got, wanted in zip(one.groups[:2], groups_of(swarm)[:2], strict=True):
             np.testing.assert_array_equal(got, wanted)
         wanted = [0] * 20 + [1] * 20 if name == "two_swarms" else [None]
-        assert [number for number, _ in one.groups.ways.values()] == wanted
+        assert [number for number, _ in one.groups.paths.values()] == wanted
     episode = json.loads(json.dumps(payload([whole])))["episodes"][0]
-    assert len(episode["ways"]) * 2 == episode["arrays"]["reference"]["shape"][1]
+    assert len(episode["paths"]) * 2 == episode["arrays"]["reference"]["shape"][1]
     assert episode["team"] == whole.groups.team.tolist()
     assert len(episode["uninformed"]) == (16 if name == "few_informed_easy" else 0)
 

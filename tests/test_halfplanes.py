@@ -21,9 +21,9 @@ def planes_of(most):
     return st.lists(plane, min_size=0, max_size=most)
 
 
-def solved(wish, planes, firm=0, limit=LIMIT):
+def solved(desired, planes, firm=0, limit=LIMIT):
     rows = np.array(planes, float).reshape(-1, 3)
-    v_x, v_y, violation = nearest_velocity(*wish, rows, len(rows), firm, limit)
+    v_x, v_y, violation = nearest_velocity(*desired, rows, len(rows), firm, limit)
     return np.array([v_x, v_y]), violation
 
 
@@ -60,24 +60,24 @@ def least_violation(planes, limit=LIMIT):
     return excess(np.array(near), planes).min()
 
 
-def nearest_by_force(wish, planes, limit=LIMIT):
+def nearest_by_force(desired, planes, limit=LIMIT):
     """The nearest of all points at which the answer can lie, for planes that can be kept; None where they can't."""
-    wish, rows = np.array(wish), [np.array(plane) for plane in planes]
-    points = [wish, wish * min(1.0, limit / max(np.hypot(*wish), 1e-9))]
+    desired, rows = np.array(desired), [np.array(plane) for plane in planes]
+    points = [desired, desired * min(1.0, limit / max(np.hypot(*desired), 1e-9))]
     for row in rows:
-        points += [wish - (wish @ row[:2] - row[2]) * row[:2], *on_circle(row[:2], row[2], limit)]
+        points += [desired - (desired @ row[:2] - row[2]) * row[:2], *on_circle(row[:2], row[2], limit)]
     points += [point for a, b in itertools.combinations(rows, 2) for point in crossing(a, b)]
     near = np.array([point for point in points if np.hypot(*point) <= limit * (1 + 1e-9)])
     near = near[excess(near, planes) <= 1e-7]
-    return near[np.argmin(np.hypot(*(near - wish).T))] if len(near) else None
+    return near[np.argmin(np.hypot(*(near - desired).T))] if len(near) else None
 
 
 @given(WISHES, planes_of(6))
 @example((0.0, 0.0), [(1.0, 0.0, -1.0), (1.0, 0.0, -1.0)])
 @example((0.0, 0.0), [(1.0, 0.0, -1.0), (-1.0, 0.0, 1.0)])
-def test_the_answer_is_the_nearest_velocity_that_keeps_all(wish, planes):
-    velocity, violation = solved(wish, planes)
-    expected = nearest_by_force(wish, planes)
+def test_the_answer_is_the_nearest_velocity_that_keeps_all(desired, planes):
+    velocity, violation = solved(desired, planes)
+    expected = nearest_by_force(desired, planes)
     assert np.hypot(*velocity) <= LIMIT * (1 + 1e-9)
     if expected is None:
         assert violation > 0.0
@@ -91,8 +91,8 @@ def test_the_answer_is_the_nearest_velocity_that_keeps_all(wish, planes):
 @given(WISHES, planes_of(5))
 @example((1.0, 2.0), [(1.0, 0.0, -1.0), (-1.0, 0.0, -1.0)])
 @example((1.0, 2.0), [(1.0, 0.0, -5.0)])
-def test_what_cannot_be_kept_is_violated_least_and_next_to_the_wish(wish, planes):
-    velocity, violation = solved(wish, planes)
+def test_what_cannot_be_kept_is_violated_least_and_next_to_the_wish(desired, planes):
+    velocity, violation = solved(desired, planes)
     if not planes:
         return
     least = max(least_violation(planes), 0.0)
@@ -100,14 +100,14 @@ def test_what_cannot_be_kept_is_violated_least_and_next_to_the_wish(wish, planes
     assert excess(velocity[None], planes) <= violation + 1e-8
     if violation > 1e-6:
         relaxed = [(n_x, n_y, b + violation + 1e-6) for n_x, n_y, b in planes]
-        found = nearest_by_force(wish, relaxed)
-        assert np.hypot(*(velocity - wish)) <= np.hypot(*(found - wish)) + 1e-2
+        found = nearest_by_force(desired, relaxed)
+        assert np.hypot(*(velocity - desired)) <= np.hypot(*(found - desired)) + 1e-2
 
 
 @given(WISHES, planes_of(4), planes_of(4))
-def test_firm_planes_are_kept_where_they_can_be(wish, firm, loose):
-    velocity, violation = solved(wish, firm + loose, len(firm))
-    if firm and nearest_by_force(wish, [(x, y, b - 1e-6) for x, y, b in firm]) is not None:
+def test_firm_planes_are_kept_where_they_can_be(desired, firm, loose):
+    velocity, violation = solved(desired, firm + loose, len(firm))
+    if firm and nearest_by_force(desired, [(x, y, b - 1e-6) for x, y, b in firm]) is not None:
         assert excess(velocity[None], firm) <= 1e-8
     if violation == 0.0:
-        np.testing.assert_array_equal(velocity, solved(wish, firm + loose)[0])
+        np.testing.assert_array_equal(velocity, solved(desired, firm + loose)[0])

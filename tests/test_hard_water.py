@@ -8,7 +8,7 @@ from uuv_marl import load_scenario
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps import KINDS
-from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
+from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
 
 SEEDS = range(8)
 
@@ -27,7 +27,7 @@ def test_every_map_can_be_passed_from_each_start_with_its_clearance(kind):
         grid.x + CELL_M * np.arange(grid.rows)[:, None, None], grid.y + CELL_M * np.arange(grid.columns)[None, :, None]
     )  # fmt: skip
     for seed in SEEDS:
-        made = task.draw_map(np.random.default_rng(seed))
+        made = task.sample_map(np.random.default_rng(seed))
         away = np.hypot(x - made.discs[:, 0], y - made.discs[:, 1]) - made.discs[:, 2]
         free = away.min(axis=2) >= numbers.clearance_m
         parts, _ = label(free)
@@ -40,9 +40,9 @@ def test_every_map_can_be_passed_from_each_start_with_its_clearance(kind):
         assert kind == made.kind
         assert (starts > 0).all()
         assert swarm.facts.clearance.min() >= numbers.start_clear_m
-        assert len(made.discs) < swarm.course.obstacles.shape[1]
-        assert (task.ways() >= swarm.facts.away).all()
-        assert (task.ways() < 3.0 * swarm.facts.away).all()
+        assert len(made.discs) < swarm.world_map.obstacles.shape[1]
+        assert (task.path_lengths() >= swarm.facts.away).all()
+        assert (task.path_lengths() < 3.0 * swarm.facts.away).all()
 
 
 def test_a_map_depends_on_its_seed_alone():
@@ -63,7 +63,7 @@ def test_a_map_depends_on_its_seed_alone():
 
 
 def test_free_cells_and_ways_are_those_of_brute_force():
-    grid, rng = WayGrid(-20.0, -15.0, 30, 25), np.random.default_rng(0)
+    grid, rng = MapGrid(-20.0, -15.0, 30, 25), np.random.default_rng(0)
     discs = np.concatenate([rng.uniform(-20, 50, (6, 2)), rng.uniform(2, 6, (6, 1))], axis=1)
     x, y = grid.x + CELL_M * np.arange(30)[:, None, None], grid.y + CELL_M * np.arange(25)[None, :, None]
     expected = ((x - discs[:, 0]) ** 2 + (y - discs[:, 1]) ** 2 >= (discs[:, 2] + 1.5) ** 2).all(axis=2)
@@ -87,7 +87,7 @@ def test_percepts_turn_with_a_map():
     before = swarm.observe().flat.copy()
     angle, shift = 0.7, np.array([40.0, -25.0])
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    for places in (swarm.state.eta[0, :, :2], swarm.course.obstacles[0, :, :2], swarm.course.waypoints[0, 0]):
+    for places in (swarm.state.eta[0, :, :2], swarm.world_map.obstacles[0, :, :2], swarm.world_map.waypoints[0, 0]):
         places[...] = places @ turn + shift
     swarm.state.eta[0, :, 2] += angle
     np.testing.assert_allclose(swarm.observe().flat, before, atol=2e-4)
@@ -97,12 +97,12 @@ def test_there_is_along_the_free_way():
     """Behind a wall a vehicle may be near the goal, and is not there."""
     swarm = water("gate", **{"task.near_m": 60.0})
     swarm.reset(0)
-    task, goal = swarm.task, swarm.course.waypoints[0, 0, 1]
+    task, goal = swarm.task, swarm.world_map.waypoints[0, 0, 1]
     swarm.state.eta[0, :, :2] = goal + 4.0 * np.arange(10)[:, None]
     swarm.observe()
-    assert task.there().all()
-    task.memory.way[0] += 100.0  # as if all ways were longer
-    assert not task.there().any()
+    assert task.at_goal().all()
+    task.memory.path_length[0] += 100.0  # as if all ways were longer
+    assert not task.at_goal().any()
 
 
 @pytest.mark.parametrize(("changes", "message"), [

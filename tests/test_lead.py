@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.test_memory import room
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.baselines.memory.actuators import answer, identify, lead
 from uuv_marl.sim.swarm import Swarm
 
@@ -70,7 +70,7 @@ def test_with_a_lead_what_is_wanted_acts_after_one_period(lag_s, share, wanted, 
 )
 def test_with_a_lead_vehicles_do_not_swing(overrides, least):
     """The mean yaw rate on a leg is a fraction of that without; margins of two and more over what six seeds showed."""
-    scenario = granted("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
+    scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
     rates = []
     for share in (0.0, 1.0):
         swarm, policy, rate = Swarm(scenario), make("scout,preset=plus", scenario, lead=share), []

@@ -9,12 +9,12 @@ import safetensors.numpy
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines import PolicyError, with_policy_requirements, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint, vehicle_of
 from uuv_marl.baselines.learned.layers import ENCODED, Architecture, Network, NumpyOps, columns, shapes
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.evaluate import Run, evaluate
-from uuv_marl.benchmark.results import knowledge
+from uuv_marl.benchmark.results import policy_info
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
 
@@ -71,7 +71,7 @@ def test_an_encoder_reads_sub_sectors_in_any_order_with_their_places():
             t[name] = rng.standard_normal(shape).astype(np.float32)
         x, order = rng.standard_normal((4, 8 + 3 * num)).astype(np.float32), rng.permutation(num)
         turned = x.copy()
-        turned[:, sectors["heard"].ravel()] = x[:, sectors["heard"][order].ravel()]
+        turned[:, sectors["detected"].ravel()] = x[:, sectors["detected"][order].ravel()]
         seen = Network(made, sizes, t, NumpyOps).features(x)
         again = Network(made, sizes, {**t, "heard.place": t["heard.place"][order]}, NumpyOps).features(turned)
         np.testing.assert_allclose(seen, again, atol=1e-6)
@@ -127,7 +127,7 @@ def test_torch_and_numpy_give_the_same(kind, memory):
 @pytest.mark.parametrize(("kind", "memory"), KINDS)
 def test_a_run_depends_on_its_seed_alone(kind, memory, n, tmp_path):
     best = saved(tmp_path, water(), kind=kind, memory=memory)
-    scenario = granted(best, load_scenario("tracking", num_vehicles=n, overrides=SHORT))
+    scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=n, overrides=SHORT))
     together = {e.seed: e for e in evaluate(scenario, best, [4, 5, 6]) if isinstance(e, Run)}
     (alone,) = (e for e in evaluate(scenario, best, [5]) if isinstance(e, Run))
     assert together[5].metrics == alone.metrics
@@ -136,7 +136,7 @@ def test_a_run_depends_on_its_seed_alone(kind, memory, n, tmp_path):
 
 def test_a_memory_can_be_kept_and_is_forgotten_at_a_reset(tmp_path):
     best = saved(tmp_path, water(), memory=True)
-    scenario = granted(best, load_scenario("tracking", num_vehicles=4))
+    scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=4))
     swarm, policy = Swarm(scenario, 2), make(best, scenario, 2)
     percept = swarm.reset([1, 2])
     first = policy.act(percept).copy()
@@ -172,12 +172,12 @@ def test_what_decides_beside_a_network_is_told_and_acts(beside, told, tmp_path):
 def test_it_works_for_any_size_and_declares_what_it_needs(best):
     digest = load_checkpoint(learned_file(best)).digest
     known = {
-        "channels": [], "yaw_damping_nms": 600.0, "decides_every_s": 0.1, "source": digest,
+        "channels": [], "yaw_damping_nms": 600.0, "decision_period_s": 0.1, "source": digest,
         "policy_class": "end to end",
     }  # fmt: skip
-    assert knowledge(best) == known
+    assert policy_info(best) == known
     for n in (1, 200):
-        scenario = granted(best, load_scenario("tracking", num_vehicles=n))
+        scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=n))
         assert make(best, scenario).act(Swarm(scenario).reset(0)).shape == (1, n, 2)
     with pytest.raises(PolicyError, match="yaw damping of 600.*granted"):
         make(best, load_scenario("tracking"))
@@ -185,16 +185,16 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
 
 def test_another_percept_or_period_is_refused_with_the_remedy(best):
     """A clock that the scenario does not fix is the policy's own."""
-    other = granted(best, water(**{"sonar.arrays.bow.sub_sectors": 5}))
+    other = with_policy_requirements(best, water(**{"sonar.arrays.bow.sub_sectors": 5}))
     message = r"another percept.*was .'closeness', 21, '1', 1.0. in .* is .'closeness', 19, '1', 1.0. here; use"
     with pytest.raises(PolicyError, match=message):
         make(best, other)
     slow = water(**{"timing.decision_period_s": 0.5})
-    assert granted(best, slow).timing.decision_period_s == 0.1
-    fixed = granted(best, water(**{"timing.decision_period_s": 0.5, "timing.fixed": True}))
-    odd = {"timing.control_hold_s": 0.2, "timing.integration_step_s": 0.2, "timing.decision_period_s": 0.2}
+    assert with_policy_requirements(best, slow).timing.decision_period_s == 0.1
+    fixed = with_policy_requirements(best, water(**{"timing.decision_period_s": 0.5, "timing.fixed": True}))
+    odd = {"timing.control_step_s": 0.2, "timing.integration_step_s": 0.2, "timing.decision_period_s": 0.2}
     with pytest.raises(ScenarioError, match="can't run on scenario 'tracking' with what it declares: .*multiple"):
-        granted(best, water(**odd))
+        with_policy_requirements(best, water(**odd))
     for other in (slow, fixed):
         with pytest.raises(PolicyError, match=r"needs a decision every 0.1 s .timing.decision_period_s."):
             make(best, other)
@@ -223,7 +223,7 @@ def test_a_rewritten_checkpoint_is_loaded_anew(best):
 @pytest.mark.parametrize("name", ["mappo", "best"])
 def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     name = best if name == "best" else name
-    other = granted(name, load_scenario("tracking", num_vehicles=2, overrides={field: value}))
+    other = with_policy_requirements(name, load_scenario("tracking", num_vehicles=2, overrides={field: value}))
     was = {**vehicle_of(load_scenario("tracking"))}[field]
     told = f"{field} was {was} in the training and is {value} here"
     message = f"another vehicle than scenario 'tracking' has: {told}.*any_vehicle=True"
@@ -235,9 +235,9 @@ def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
 def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
     heavy = water(**{"vehicle.m_kg": 600.0})
     saved(Path(best), heavy)
-    make(best, granted(best, heavy))
+    make(best, with_policy_requirements(best, heavy))
     with pytest.raises(PolicyError, match=r"vehicle.m_kg was 600.0 in the training and is 185.0"):
-        make(best, granted(best, load_scenario("tracking")))
+        make(best, with_policy_requirements(best, load_scenario("tracking")))
 
 
 def changed(name, value=None, at=None, **more):
@@ -276,7 +276,7 @@ def test_weights_that_cannot_run_are_refused(made, message, tmp_path):
     [
         ("network", {"hidden": []}),
         ("network", {"hidden": [0, 4]}),
-        ("decides_every_s", 0.0),
+        ("decision_period_s", 0.0),
         ("yaw_damping_nms", float("nan")),
         ("percept", "none"),
         ("format", 2),

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.doubt import doubt
+from uuv_marl.baselines.memory.uncertainty import uncertainty
 from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
 from uuv_marl.baselines.scout.gains import ScoutGains
-from uuv_marl.baselines.scout.law import wary
+from uuv_marl.baselines.scout.controller import wary
 from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
@@ -42,7 +42,7 @@ def run(overrides, seconds=140.0, policy="scout", seed=10_500):
     centres and surfaces within 40 m [m] and of the velocities of neighbours heard within 30 m [m/s]; the share of the
     confirmed discs that are no obstacle, and of the obstacles within 20 m that are not remembered.
     """
-    scenario = granted(policy, load_scenario("single_obstacle", overrides=COURSE | overrides))
+    scenario = with_policy_requirements(policy, load_scenario("single_obstacle", overrides=COURSE | overrides))
     swarm, acts = Swarm(scenario), make(policy, scenario)
     percept, period = swarm.reset(seed), scenario.timing.decision_period_s
     errors = {name: [] for name in ("place", "turn", "centre", "surface", "velocity")}
@@ -56,7 +56,7 @@ def run(overrides, seconds=140.0, policy="scout", seed=10_500):
             errors["place"].append(np.linalg.norm(origin + rotated(m.pose[0, :, :2], turn) - eta[:, :2], axis=1))
             heading = np.arctan2(m.pose[0, :, 3], m.pose[0, :, 2]) + turn - eta[:, 2]
             errors["turn"].append(np.abs((heading + np.pi) % (2 * np.pi) - np.pi))
-            there = swarm.course.obstacles[0, : swarm.course.num_obstacles[0]]
+            there = swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0]]
             for i, pose in enumerate(m.pose[0]):
                 now = eta[i, 2] - np.arctan2(pose[3], pose[2])  # what counts is where things are from here
 
@@ -122,7 +122,7 @@ def test_what_remains_is_found_from_any_actions(a, share, drift, seed):
 
 def room():
     """What one vehicle remembers of nothing."""
-    scenario = granted("scout", load_scenario("tracking", num_vehicles=1))
+    scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=1))
     return make("scout", scenario).memory
 
 
@@ -162,12 +162,12 @@ def test_obstacles_are_known_in_a_disturbed_sea(disturbance, median, worst, phan
 
 
 def test_an_obstacle_that_is_gone_is_forgotten():
-    scenario = granted("scout", load_scenario("single_obstacle", num_vehicles=1))
+    scenario = with_policy_requirements("scout", load_scenario("single_obstacle", num_vehicles=1))
     swarm, policy = Swarm(scenario), make("scout", scenario)
     percept = swarm.reset(0)
     while not (policy.memory.score[0, 0] >= 20.0).any():
         percept = swarm.step(policy.act(percept))
-    swarm.course.num_obstacles[0] = 0
+    swarm.world_map.num_obstacles[0] = 0
     percept = swarm.observe()
     for _ in range(35):
         percept = swarm.step(policy.act(percept))
@@ -180,7 +180,7 @@ def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
     angles = np.radians(np.arange(100) * 0.5)
     points = np.cumsum(np.column_stack([np.cos(angles), np.sin(angles)]) * (0.02 if speed < 1.0 else 2.0), axis=0)
     overrides = {"trajectory.waypoints_m": points.tolist(), "trajectory.speed_mps": speed, "obstacles": []}
-    scenario = granted("guarded:pull", load_scenario("tracking", num_vehicles=1, overrides=overrides))
+    scenario = with_policy_requirements("guarded:pull", load_scenario("tracking", num_vehicles=1, overrides=overrides))
     swarm, policy = Swarm(scenario), make("guarded:pull", scenario)
     percept = swarm.reset(1)
     for k in range(400):
@@ -194,7 +194,7 @@ def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
 
 
 def test_a_fix_that_is_cut_is_none():
-    scenario = granted("guarded:pull", load_scenario("tracking", num_vehicles=1))
+    scenario = with_policy_requirements("guarded:pull", load_scenario("tracking", num_vehicles=1))
     swarm, policy = Swarm(scenario), make("guarded:pull", scenario)
     swarm.reset(0)
     swarm.state.eta[0, 0, :2] = (-9000.0, 5000.0)
@@ -208,11 +208,11 @@ def test_a_fix_that_is_cut_is_none():
     assert np.hypot(*(policy.memory.pose[0, 0, :2] - before)) == pytest.approx(went, rel=1e-3)
 
 
-@pytest.mark.parametrize("kept_s", [1.0, 2.0, 3.0])
-def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(kept_s):
+@pytest.mark.parametrize("memory_s", [1.0, 2.0, 3.0])
+def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(memory_s):
     """Two vehicles at rest, beside each other; then one is gone."""
-    scenario = granted("scout", load_scenario("tracking", num_vehicles=2))
-    swarm, policy = Swarm(scenario), make("scout", scenario, kept_s=kept_s)
+    scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=2))
+    swarm, policy = Swarm(scenario), make("scout", scenario, memory_s=memory_s)
     swarm.reset(0)
     swarm.state.eta[0, 1, :2] = swarm.state.eta[0, 0, :2] + 20.0
     policy.act(swarm.observe())
@@ -222,7 +222,7 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(kept_
     while policy.memory.known[0, 0].any() and silent_s < 10.0:
         policy.act(swarm.step(np.zeros((1, 2, 2), np.float32)))
         silent_s += scenario.timing.decision_period_s
-    assert kept_s < silent_s < kept_s + 0.15
+    assert memory_s < silent_s < memory_s + 0.15
     assert age_of(0, 0, policy.memory) == 0.0, "and says nothing of the sonar by then"
 
 
@@ -237,17 +237,17 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(kept_
     ids=["calm", "lag", "noise", "slow"],
 )
 def test_vehicles_doubt_where_something_is_not_as_expected(overrides, least, most):
-    scenario = granted("scout", load_scenario("random_field", num_vehicles=20, overrides=overrides))
+    scenario = with_policy_requirements("scout", load_scenario("random_field", num_vehicles=20, overrides=overrides))
     swarm, policy, doubts = Swarm(scenario), make("scout", scenario), []
     percept, decisions = swarm.reset(10_007), round(40.0 / scenario.timing.decision_period_s)
     for k in range(decisions):
         percept = swarm.step(policy.act(percept))
         if k > decisions / 4:
-            doubts.append([doubt(0, i, policy.memory) for i in range(20)])
+            doubts.append([uncertainty(0, i, policy.memory) for i in range(20)])
     assert least <= np.mean(doubts) <= most
 
 
 def test_who_does_not_doubt_has_the_gains_of_the_law():
-    law = ScoutGains(pull_in_doubt=-0.3, push_in_doubt=0.7)
+    law = ScoutGains(pull_if_uncertain=-0.3, push_if_uncertain=0.7)
     assert wary(law, 0.0) == law
     assert wary(law, 1.0) == law._replace(pull=law.pull * math.exp(-0.3), push=law.push * math.exp(0.7))

@@ -20,18 +20,18 @@ def among_piles(period_s, seed, **changes):
     changes |= {"timing.decision_period_s": period_s}
     swarm = Swarm(load_scenario("hard_water", num_vehicles=30, overrides=PILES | changes), 1)
     swarm.reset(10_000 + seed)
-    rng, num = np.random.default_rng(seed), swarm.course.num_obstacles[0]
+    rng, num = np.random.default_rng(seed), swarm.world_map.num_obstacles[0]
     assert num > 200
-    first = swarm.course.obstacles[0, rng.integers(num, size=30)]
+    first = swarm.world_map.obstacles[0, rng.integers(num, size=30)]
     swarm.state.eta[0, :, :2] = first[:, :2] + rng.normal(scale=2.0, size=(30, 2)) * first[:, 2:]
     swarm.state.nu[0, :, 0] = rng.choice([0.0, 3.0, 15.0, 40.0], 30)
-    swarm.course.obstacle_velocity[0, :num:3] = rng.uniform(-0.3, 0.3, swarm.course.obstacle_velocity[0, :num:3].shape)
+    swarm.world_map.obstacle_velocity[0, :num:3] = rng.uniform(-0.3, 0.3, swarm.world_map.obstacle_velocity[0, :num:3].shape)
     swarm.observe()
     return swarm
 
 
 def check_echoes(swarm):
-    percept, discs = swarm.percept, swarm.course.obstacles[0, : swarm.course.num_obstacles[0]]
+    percept, discs = swarm.percept, swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0]]
     for i in range(swarm.num_vehicles):
         found = sonar.echoes(swarm.state.eta[0, i, :2], swarm.heading[0, i], discs, swarm.scenario.sonar)
         for name, part in zip(("echo", "echo_range", "echo_position"), found, strict=True):
@@ -43,7 +43,7 @@ def check_echoes(swarm):
 @pytest.mark.parametrize("stops", [True, False])
 def test_facts_are_those_of_all_pairs(seed, stops):
     """Each control hold beside the oracle, and decisions of twenty holds beside what was so in these holds."""
-    calm = {"contact.stops": stops, "actuators.yaw_damping_nms": 0.0}
+    calm = {"collision.stops": stops, "actuators.yaw_damping_nms": 0.0}
     by_hold, by_many = (among_piles(period_s, seed, **calm) for period_s in (0.1, 2.0))
     alive, ahead = np.ones(30, bool), np.zeros((1, 30, 2), np.float32)
     ahead[..., 0] = not stops  # straight on, so that a force that is held stays ahead
@@ -61,15 +61,15 @@ def test_facts_are_those_of_all_pairs(seed, stops):
             facts = by_hold.facts
             np.testing.assert_array_equal(facts.clearance[0], nearest)
             np.testing.assert_array_equal(facts.obstacle_clearance[0, :num], nearest_vehicle)
-            assert (facts.contacts[0] >= met).all()
+            assert (facts.vehicle_collisions[0] >= met).all()
             clearance, reached = np.minimum(clearance, nearest), np.minimum(reached, nearest_vehicle)
-            contacts += facts.contacts[0]
+            contacts += facts.vehicle_collisions[0]
         by_many.step(ahead)
         np.testing.assert_array_equal(by_many.state.eta, by_hold.state.eta)
         np.testing.assert_array_equal(by_many.facts.clearance[0], clearance)
         np.testing.assert_array_equal(by_many.facts.obstacle_clearance[0, :num], reached)
-        np.testing.assert_array_equal(by_many.facts.contacts[0], contacts)
-    assert by_many.state.touched.any()
+        np.testing.assert_array_equal(by_many.facts.vehicle_collisions[0], contacts)
+    assert by_many.state.collided.any()
 
 
 @pytest.mark.parametrize("arrays", [None, AROUND, BEHIND], ids=["bow", "around", "behind"])

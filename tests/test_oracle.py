@@ -97,7 +97,7 @@ def fleet(clock):
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, 1e-6]), st.booleans())
 def test_vehicles_move_as_the_paper_says_from_any_state(clock, seed, size, astern):
     rng, swarm = np.random.default_rng(seed), fleet(clock)
-    n, state, sea = swarm.num_vehicles, swarm.state, swarm._sea
+    n, state, sea = swarm.num_vehicles, swarm.state, swarm._disturbances
     state.eta[0, :, :2], state.eta[0, :, 2] = rng.uniform(-1000, 1000, (n, 2)), rng.uniform(-math.pi, math.pi, n)
     if astern:  # where the heading wraps
         state.eta[0, :, 2] = math.pi * (1.0 - 10.0 ** rng.uniform(-16, -1, n)) * rng.choice([-1, 1], n)
@@ -290,7 +290,7 @@ def world(suite, n):
     discs = [{"centre_m": [5000.0 + 200.0 * k, 9000.0], "radius_m": disc[2]} for k, disc in enumerate(DISCS)]
     swarm = Swarm(load_scenario(BASE, num_vehicles=n, overrides={**changes, "obstacles": discs}))
     swarm.reset(0)
-    swarm.course.obstacles[0] = DISCS
+    swarm.world_map.obstacles[0] = DISCS
     return swarm
 
 
@@ -303,23 +303,23 @@ def fill(swarm, layout, seed):
     if layout is all_lost_but_one:
         state.alive[0, rng.integers(n)] = True
     if layout is far_away:
-        swarm.course.obstacles[0, :, :2] = np.array(DISCS)[:, :2] + [1e7, -3e7]
+        swarm.world_map.obstacles[0, :, :2] = np.array(DISCS)[:, :2] + [1e7, -3e7]
     else:
-        swarm.course.obstacles[0] = DISCS
-    state.obstacles_before[0] = swarm.course.obstacles[0]
+        swarm.world_map.obstacles[0] = DISCS
+    state.obstacles_before[0] = swarm.world_map.obstacles[0]
     swarm.observe()
 
 
 def check(swarm):
     """Distances, contacts and whom each vehicle hears, as the oracle has them."""
-    facts, alive, hull = swarm.facts, swarm.state.alive[0], swarm.scenario.contact.hull_radius_m
+    facts, alive, hull = swarm.facts, swarm.state.alive[0], swarm.scenario.collision.hull_radius_m
     eta, now, before = swarm.state.eta[0], swarm.state.eta[0, :, :2], swarm.state.before[0]
-    discs, heading = swarm.course.obstacles[0, : swarm.course.num_obstacles[0]], swarm.heading[0]
+    discs, heading = swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0]], swarm.heading[0]
     np.testing.assert_allclose(heading, np.stack([np.cos(eta[:, 2]), np.sin(eta[:, 2])], 1), rtol=0, atol=1e-15)
 
     hiding = discs if swarm.scenario.sonar.obstacles_hide_vehicles else ()
     heard = sonar.heard(now, heading, alive, swarm.scenario.sonar.arrays, hiding)
-    np.testing.assert_array_equal(swarm.heard[0], heard)
+    np.testing.assert_array_equal(swarm.detected_index[0], heard)
     there = sonar.to_body(now[heard] - now[:, None], heading[:, None]).astype(np.float32)
     np.testing.assert_array_equal(swarm.percept["neighbour"][0], np.where(heard[:, :, None] >= 0, there, 0))
 
@@ -329,7 +329,7 @@ def check(swarm):
     assert (facts.min_spacing[0], facts.max_spacing[0]) == (min(spacing), largest)
     np.testing.assert_array_equal(facts.clearance[0], clearance)
     np.testing.assert_array_equal(facts.obstacle_clearance[0, : len(discs)], reached)
-    np.testing.assert_array_equal(facts.contacts[0], met + touched)
+    np.testing.assert_array_equal(facts.vehicle_collisions[0], met + touched)
     assert facts.collisions[0] == sum(met) // 2 + sum(touched)
 
 
@@ -411,7 +411,7 @@ def test_one_lost_vehicle_more_calls_for_a_grid_and_changes_nothing(layout):
     np.testing.assert_array_equal(more.heard[0, :-1], few.heard[0])
     np.testing.assert_array_equal(more.percept.flat[0, :-1], few.percept.flat[0])
     np.testing.assert_array_equal(more.facts.spacing[0, :-1], few.facts.spacing[0])
-    np.testing.assert_array_equal(more.facts.contacts[0, :-1], few.facts.contacts[0])
+    np.testing.assert_array_equal(more.facts.vehicle_collisions[0, :-1], few.facts.vehicle_collisions[0])
     assert more.facts.max_spacing[0] == few.facts.max_spacing[0]
 
 
@@ -463,14 +463,14 @@ EPISODES = {
     "link alone": ("multi_obstacle", {"num_vehicles": 9, "overrides": {"sonar.channels": ["link"]}}),
     "obstacles hide": ("multi_obstacle", {"num_vehicles": 12, "overrides": {"sonar.obstacles_hide_vehicles": True}}),
     "overlapping arrays": ("single_obstacle", {"num_vehicles": 7, "overrides": {"sonar.arrays": OVERLAPPING}}),
-    "losses": ("random_field", {"num_vehicles": 6, "overrides": {"disturbance.loss_times_s": [0.3, 1.25, 1.25]}}),
+    "losses": ("random_field", {"num_vehicles": 6, "overrides": {"losses.times_s": [0.3, 1.25, 1.25]}}),
 }  # fmt: skip
 
 
 def crowd(swarm, rng):
     """Vehicles about to touch an obstacle or each other, on one spot, inside an obstacle; headings beyond pi."""
     state, n = swarm.state, swarm.num_vehicles
-    x, y, radius = swarm.course.obstacles[0, 0] if swarm.course.num_obstacles[0] else (50.0, 20.0, 10.0)
+    x, y, radius = swarm.world_map.obstacles[0, 0] if swarm.world_map.num_obstacles[0] else (50.0, 20.0, 10.0)
     angle = rng.uniform(-math.pi, math.pi, n)
     away = radius + rng.uniform(1.05, 1.6, n)
     state.eta[0] = np.stack([x + away * np.cos(angle), y + away * np.sin(angle), angle + math.pi], 1)
@@ -484,12 +484,12 @@ def crowd(swarm, rng):
 def check_percept(swarm):
     """Every field of the percepts, as the oracle has it; zero for the lost."""
     percept, heading, nu = swarm.percept, swarm.heading[0], swarm.state.nu[0]
-    now, alive, discs = swarm.state.eta[0, :, :2], swarm.state.alive[0], swarm.course.obstacles[0]
-    discs, l_t = discs[: swarm.course.num_obstacles[0]], swarm.facts.reference[0, 0]
+    now, alive, discs = swarm.state.eta[0, :, :2], swarm.state.alive[0], swarm.world_map.obstacles[0]
+    discs, l_t = discs[: swarm.world_map.num_obstacles[0]], swarm.facts.reference[0, 0]
     over_ground = np.stack([motion.rotation(psi) @ v[:2] for psi, v in zip(swarm.state.eta[0, :, 2], nu, strict=True)])
-    j = swarm.heard[0]
+    j = swarm.detected_index[0]
     seen = {
-        "velocity": nu[:, :2], "yaw_rate": nu[:, 2:], "compass": heading, "heard": j >= 0, "link_identity": j + 1,
+        "velocity": nu[:, :2], "yaw_rate": nu[:, 2:], "compass": heading, "detected": j >= 0, "link_identity": j + 1,
         "reference": sonar.to_body(l_t[:2] - now, heading), "reference_velocity": sonar.to_body(l_t[2:], heading),
         "link_velocity": np.where(j[:, :, None] >= 0, sonar.to_body(over_ground[j], heading[:, None]), 0.0),
         **dict(zip(
@@ -520,6 +520,6 @@ def test_an_episode_s_facts_and_percepts_are_those_of_the_oracle(name):
         swarm.step(actor.act(swarm.percept) if k % 10 < 5 else wild)
         check(swarm)
         check_percept(swarm)
-        happened |= {name for name in ("heard", "echo") if swarm.percept[name].any()}
+        happened |= {name for name in ("detected", "echo") if swarm.percept[name].any()}
         happened |= {name for name in ("contacts", "lost") if getattr(swarm.facts, name).any()}
-    assert happened == {"heard", "echo", "contacts", *(["lost"] if name == "losses" else [])}
+    assert happened == {"detected", "echo", "contacts", *(["lost"] if name == "losses" else [])}

@@ -8,7 +8,7 @@ import pytest
 
 import uuv_marl
 from tests.golden import STARTER
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim
@@ -23,7 +23,7 @@ SIZE = (600, 500)
 
 def played(scenario=STARTER, policy="bio_inspired", seconds=10.0, sonar_of=None, seed=0, **changes):
     """The scene of an episode after some seconds, its worlds and its memory."""
-    batch = make_batched_env(granted(policy, uuv_marl.load_scenario(scenario, **changes)))
+    batch = make_batched_env(with_policy_requirements(policy, uuv_marl.load_scenario(scenario, **changes)))
     actor = make(policy, batch.swarm.scenario)
     batch.reset(seed)
     actor.reset(seed)
@@ -146,7 +146,7 @@ def test_the_numbers_are_those_of_the_swarm():
 
 def test_the_sonar_shown_is_what_the_vehicle_hears():
     scene, batch, memory = played("single_obstacle", seconds=70.0, sonar_of=10)
-    heard = batch.swarm.heard[0, 10]
+    heard = batch.swarm.detected_index[0, 10]
     eta = batch.swarm.state.eta[0]
     c, s = np.cos(eta[10, 2]), np.sin(eta[10, 2])
     places = eta[10, :2] + scene.sonar.neighbour @ np.array([[c, s], [-s, c]])

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import uuv_marl.replay.encode
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results
@@ -29,7 +29,7 @@ from uuv_marl.sim.swarm import Swarm
 QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
 SETS = [f"--set={field}={value}" for field, value in QUICK.items()]
 ROUGH = {
-    "start.spacing_m": 3.0, "start.length_m": 9.0, "start.width_m": 9.0, "contact.hull_radius_m": 1.4,
+    "start.spacing_m": 3.0, "start.length_m": 9.0, "start.width_m": 9.0, "collision.hull_radius_m": 1.4,
     "start.gap_m": 3.0,
     "obstacles": [{"centre_m": [157.0, 157.0], "radius_m": 3.0}], "time_limit.extra_s": 20.0,
 }  # fmt: skip
@@ -46,7 +46,7 @@ def rough(**changes):
 
 
 def run_of(scenario, policy, seed, watch=None):
-    events = evaluate(granted(policy, scenario), policy, [seed], watch)
+    events = evaluate(with_policy_requirements(policy, scenario), policy, [seed], watch)
     return next(event for event in events if isinstance(event, Run))
 
 
@@ -80,7 +80,7 @@ def test_watching_changes_nothing():
 
 
 def test_inspected_vehicles_show_what_the_engine_recorded():
-    scenario = granted("bio_inspired", quick())
+    scenario = with_policy_requirements("bio_inspired", quick())
     recording = record(scenario, "bio_inspired", 5, inspect=[6, 2, 6])
     assert list(recording.inspections) == [6, 2]
     swarm, policy = Swarm(scenario), make("bio_inspired", scenario)
@@ -89,8 +89,8 @@ def test_inspected_vehicles_show_what_the_engine_recorded():
     for t in range(30):
         action = policy.act(percept)
         for i, sonar in recording.inspections.items():
-            heard, echo = swarm.heard[0, i], percept["echo"][0, i] > 0
-            np.testing.assert_array_equal(sonar.heard[t], heard)
+            heard, echo = swarm.detected_index[0, i], percept["echo"][0, i] > 0
+            np.testing.assert_array_equal(sonar.detected_index[t], heard)
             np.testing.assert_array_equal(sonar.neighbour[t][heard >= 0], percept["neighbour"][0, i][heard >= 0])
             np.testing.assert_array_equal(sonar.echo_range[t][echo], percept["echo_range"][0, i][echo])
             np.testing.assert_array_equal(sonar.echo_position[t][echo], percept["echo_position"][0, i][echo])
@@ -101,7 +101,7 @@ def test_inspected_vehicles_show_what_the_engine_recorded():
     assert np.isnan(recording.inspections[6].action[-1]).all()
 
 
-@pytest.mark.parametrize("changes", [{}, {"contact.ends_vehicle": True}, {"timing.decision_period_s": 0.5}])
+@pytest.mark.parametrize("changes", [{}, {"collision.ends_vehicle": True}, {"timing.decision_period_s": 0.5}])
 def test_every_contact_is_an_event(changes):
     seen = set()
     for seed in range(4):
@@ -166,8 +166,8 @@ def assert_coded(name, got, values):
 
 
 EPISODES = {
-    "lost": (rough(**{"contact.ends_vehicle": True}), "random", 1, [0, 3]),
-    "scheduled": (quick("lossy", **{"disturbance.loss_times_s": [1.0, 2.0, 3.0]}), "bio_inspired", 0, [1]),
+    "lost": (rough(**{"collision.ends_vehicle": True}), "random", 1, [0, 3]),
+    "scheduled": (quick("lossy", **{"losses.times_s": [1.0, 2.0, 3.0]}), "bio_inspired", 0, [1]),
     "alone": (quick("tracking", **{"swarm.num_vehicles": 1}), "bio_inspired", 0, [0]),
     "short": (quick(**{"time_limit.factor": 0.001, "time_limit.extra_s": 0.3}), "idle", 0, []),
     "moving": (quick("random_field", **{"traffic.speed_mps": 2.0}), "idle", 0, []),
@@ -194,14 +194,14 @@ def test_a_browser_reads_the_recording(tmp_path):
         assert_coded("heading", arrays["heading"][:, others], heading[:, others])
         assert_coded("inspected_heading", arrays["heading"][:, inspected], heading[:, inspected])
         for k, sonar in enumerate(recording.inspections.values()):
-            np.testing.assert_array_equal(arrays["heard"][:, k], sonar.heard)
+            np.testing.assert_array_equal(arrays["detected"][:, k], sonar.detected_index)
             for name in ("neighbour", "echo_range", "echo_position", "action"):
                 assert_coded(name, arrays[name][:, k], getattr(sonar, name))
-        assert ("heard" in arrays) == bool(inspected)
+        assert ("detected" in arrays) == bool(inspected)
 
 
 def saved(folder, policies=("idle", "random"), scenario=None):
-    scenario = scenario or quick("lossy", **{"disturbance.loss_times_s": [2.0]})
+    scenario = scenario or quick("lossy", **{"losses.times_s": [2.0]})
     results = Results(folder, [scenario])
     runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
     return results

@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.cli import app
 from uuv_marl.replay import demo
@@ -68,7 +68,7 @@ def read(page):
 @pytest.fixture(scope="module")
 def runs():
     """The benchmark's runs of the same episodes: what results.json holds."""
-    scenarios = {policy: granted(policy, load_scenario("lossy")) for policy in POLICIES}
+    scenarios = {policy: with_policy_requirements(policy, load_scenario("lossy")) for policy in POLICIES}
     return [next(r for r in evaluate(scenarios[p], p, [SEED]) if isinstance(r, Run)) for p in POLICIES]
 
 
@@ -109,7 +109,7 @@ def test_the_page_hears_what_the_engine_recorded(read, recordings):
         for time, number in zip(TIMES, numbers, strict=True):
             at = int(np.searchsorted(recording.time_s, time + 1e-3)) - 1
             for sonar, hearing in zip(recording.inspections.values(), number["hearing"], strict=True):
-                assert [sector["heard"] for sector in hearing] == sonar.heard[at].tolist()
+                assert [sector["detected"] for sector in hearing] == sonar.detected_index[at].tolist()
                 echoes = np.array([sector["echo"] or 0.0 for sector in hearing if sector["echoAt"]])
                 assert echoes == pytest.approx(
                     np.nan_to_num(sonar.echo_range[at]), abs=CODINGS["echo_range"].resolution
@@ -122,7 +122,7 @@ def test_the_page_knows_each_groups_goal_and_the_circles_of_a_task(tmp_path):
     recording = record(load_scenario("two_swarms", overrides=short), "idle", 0)
     write_page([recording], tmp_path / "replay.html")
     shown = json.loads(node(HERE / "page_numbers.mjs", tmp_path / "replay.html", 2.0))["numbers"][0][0]
-    goals = np.array([way[-1] for _, way in recording.groups.ways.values()])
+    goals = np.array([way[-1] for _, way in recording.groups.paths.values()])
     np.testing.assert_allclose(shown["references"], goals, atol=0.02)
     np.testing.assert_array_equal(np.array(shown["marks"]).reshape(-1, 3), recording.marks[4])
 

@@ -11,7 +11,7 @@ from research.episodes import read_rows
 from research.paper import cases
 from research.paper import reproduce as job
 from research.paper.assumptions import ASSUMPTIONS, READINGS
-from research.paper.ledger import difference, given_entries, ledger, verdict
+from research.paper.ledger import difference, stated_entries, ledger, verdict
 from research.paper.report import page
 from uuv_marl.benchmark.suite import Suite
 
@@ -49,7 +49,7 @@ def test_scenario_files_differ_in_what_the_papers_text_says_and_nothing_else():
 
 
 def test_the_papers_inputs_are_the_scenarios():
-    assert {entry.verdict for entry in given_entries()} == {"as given"}
+    assert {entry.verdict for entry in stated_entries()} == {"as given"}
 
 
 def test_a_ledger_of_nothing_claims_nothing():

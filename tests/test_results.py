@@ -17,7 +17,7 @@ from uuv_marl.atomic import locked
 from uuv_marl.benchmark import load, load_trace, runner
 from uuv_marl.benchmark.evaluate import Routes, Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics, Sample
-from uuv_marl.benchmark.results import Content, Knowledge, ResultRow, Results, trace_path
+from uuv_marl.benchmark.results import Content, PolicyInfo, ResultRow, Results, trace_path
 from uuv_marl.benchmark.tables import markdown_table, task_rows
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
@@ -230,9 +230,9 @@ def test_a_full_disk_loses_nothing(tmp_path, monkeypatch, writes):
     assert not list(tmp_path.rglob("*.partial*"))
     done, text = command("--policy=idle", "--seeds=2", output=tmp_path)
     assert done.exit_code == 0, text
-    made(tmp_path / "whole")
+    made(tmp_path / "swarm_success")
     whole, here = (
-        json.loads((folder / "results.json").read_text())["runs"] for folder in (tmp_path / "whole", tmp_path)
+        json.loads((folder / "results.json").read_text())["runs"] for folder in (tmp_path / "swarm_success", tmp_path)
     )
     assert here == whole
 
@@ -282,7 +282,7 @@ def keys(title):
 def test_the_page_of_the_format_has_every_key_and_array(tmp_path):
     results = made(tmp_path)
     assert keys("`results.json`") == set(Content.__annotations__) - {"__pydantic_config__"}
-    assert keys("A policy") == set(Knowledge.__annotations__)
+    assert keys("A policy") == set(PolicyInfo.__annotations__)
     assert keys("A run") == set(ResultRow._fields)
     assert keys("Metrics") == set(Metrics.__annotations__) == {*results.rows[0].metrics, "task"}  # follow has none
     assert set(Shares.__annotations__) == set(results.rows[0].metrics["constraint_share"])

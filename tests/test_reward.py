@@ -29,7 +29,7 @@ GUIDED = [
     ("follow", "single_obstacle", 54, "dense", 2), ("reach", "starter", 5, "dense", 100),
     ("reach", "single_obstacle", 54, "dense", 2), ("hard_water", "hard_water", 10, "dense", 100),
     ("hard_water", "hard_water", 10, "geodesic", 100), ("two_swarms", "two_swarms_easy", 10, "dense", 100),
-    ("few_informed", "few_informed_easy", 10, "dense", 100), ("few_informed", "few_informed_easy", 10, "led", 30),
+    ("few_informed", "few_informed_easy", 10, "dense", 100), ("few_informed", "few_informed_easy", 10, "leader", 30),
     ("few_informed", "few_informed", 20, "dense", 8), ("two_swarms", "two_swarms", 40, "dense", 4),
     ("silent_targets", "silent_targets_easy", 8, "dense", 100),
 ]  # fmt: skip
@@ -52,11 +52,11 @@ def mean_return(name, scenario, reward, worlds):
 
 @pytest.mark.parametrize(("task", "scenario", "vehicles", "reward", "seeds"), GUIDED)
 def test_the_guide_of_a_task_beats_the_floors(task, scenario, vehicles, reward, seeds):
-    loaded, guide = (
+    loaded, reference_policy = (
         load_scenario(scenario, num_vehicles=vehicles, overrides={"task.name": task}),
-        task_class(task).guide,
+        task_class(task).reference_policy,
     )
-    best = mean_return(guide, loaded, reward, seeds)
+    best = mean_return(reference_policy, loaded, reward, seeds)
     for floor in ("random", "idle"):
         assert best > mean_return(floor, loaded, reward, seeds), floor
 
@@ -68,9 +68,9 @@ class Puppets:
         scenario, own = PLACES[task]
         batch = BatchedEnv(load_scenario(scenario, num_vehicles=n, overrides={**own, **overrides}), reward=reward)
         batch.reset(0)
-        self.batch, self.n, self.swarm, course = batch, n, batch.swarm, batch.swarm.course
-        group = course.group[0]
-        self.end = course.waypoints[0, group, course.last[0, group]]
+        self.batch, self.n, self.swarm, world_map = batch, n, batch.swarm, batch.swarm.world_map
+        group = world_map.group[0]
+        self.end = world_map.waypoints[0, group, world_map.last[0, group]]
         rank = np.array([(group[:i] == group[i]).sum() for i in range(n)])
         apart = (6.0 if group.any() else 10.0) * (rank - (np.bincount(group)[group] - 1) / 2)
         self.block = np.stack([apart, np.zeros(n)], axis=1)
@@ -109,13 +109,13 @@ def test_who_moves_and_comes_back_gains_nothing(task, way):
 
 def left(batch):
     """What progress counts [m]."""
-    away = batch.task.left()[0] if hasattr(batch.task, "left") else batch.swarm.facts.away
+    away = batch.task.remaining_m()[0] if hasattr(batch.task, "left") else batch.swarm.facts.away
     return np.minimum(away, batch.swarm.scenario.reward.progress_far_m)
 
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(100_000, 200_000))
-@pytest.mark.parametrize(("task", "reward"), [pair for pair in PAID if pair[1] not in ("sparse", "led")])
+@pytest.mark.parametrize(("task", "reward"), [pair for pair in PAID if pair[1] not in ("sparse", "leader")])
 def test_progress_sums_to_what_the_way_has_shortened_by_and_but_for_being_there_all_else_costs(task, reward, seed):
     scenario, own = PLACES[task]
     batch = BatchedEnv(load_scenario(scenario, num_vehicles=6, overrides=own), reward=reward)
@@ -155,13 +155,13 @@ def test_an_earlier_arrival_of_the_same_way_never_lowers_the_return(task, reward
 @pytest.mark.parametrize(("task", "reward"), PAID)
 def test_a_contact_lowers_the_return_of_both(task, reward):
     whole, bumped = arrival(40, task, reward), arrival(40, task, reward, bump_at=20)
-    share = 0.25 if reward == "led" else 1.0  # of the informed; the others pay it whole, too
+    share = 0.25 if reward == "leader" else 1.0  # of the informed; the others pay it whole, too
     assert (bumped[:2] <= whole[:2] - 9.0 * share).all()
     assert bumped.mean() < whole.mean() - 1.0
 
 
 @pytest.mark.parametrize("task", [*PUPPETS, "few_informed"])
-@pytest.mark.parametrize("reward", ["dense", "sparse", "team", "led"])
+@pytest.mark.parametrize("reward", ["dense", "sparse", "team", "leader"])
 def test_dying_never_pays_the_one_who_dies(reward, task):
     """Idle vehicles are left behind for minutes: dying at once must cost more than that."""
     if reward not in (*task_class(task).rewards, "team"):
@@ -171,9 +171,9 @@ def test_dying_never_pays_the_one_who_dies(reward, task):
     base = load_scenario(scenario, num_vehicles=6, overrides=changes)
     totals, lost = [], []
     for losses in ([], [1.0]):
-        batch = BatchedEnv(load_scenario(base, overrides={"disturbance.loss_times_s": losses}), reward=reward)
+        batch = BatchedEnv(load_scenario(base, overrides={"losses.times_s": losses}), reward=reward)
         batch.reset(3)
-        lost += batch.swarm.course.losses[0].tolist()
+        lost += batch.swarm.world_map.losses[0].tolist()
         total = np.zeros(6)
         while not batch.over[0]:
             total += batch.step(np.zeros((1, 6, 2), np.float32)).reward[0]
@@ -194,7 +194,7 @@ def test_the_mean_does_not_depend_on_the_number_of_vehicles(task):
         swarm.paid[:] = 0.0
         swarm.swarm.state.eta[0, :, :2] = swarm.end + np.array([200.0, 0.0])
         swarm.swarm.state.before[0] = swarm.swarm.state.eta[0, :, :2]
-        swarm.swarm.facts.was_away[0] = swarm.swarm.facts.away[0] = 300.0
+        swarm.swarm.facts.away_before[0] = swarm.swarm.facts.away[0] = 300.0
         swarm.step()
         means.append(swarm.paid.mean())
     assert means[0] == pytest.approx(means[1], rel=1e-6)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, granted, make
-from uuv_marl.baselines.grants import inner_loop_nms
+from uuv_marl.baselines import PolicyError, with_policy_requirements, make
+from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
@@ -22,7 +22,7 @@ def with_vehicle(vehicle, num_vehicles=1, speed=1.5):
     return load_scenario(
         "single_obstacle", num_vehicles=num_vehicles, overrides={
             "vehicle": vehicle, "trajectory.speed_mps": speed, "start.speed_max_mps": speed,
-            "timing.integration_step_s": 0.025, "arrival.by": "passage",
+            "timing.integration_step_s": 0.025, "arrival.criterion": "passage",
         },
     )  # fmt: skip
 
@@ -81,7 +81,7 @@ def test_to_a_wished_velocity_a_rudder_turns_by_the_angle_whatever_the_hull_slip
 
 @pytest.mark.parametrize("name", ["lauv", "remus100"])
 def test_torpedoes_pass_an_obstacle_without_a_collision(name):
-    scenario = granted("scout", with_vehicle(name, num_vehicles=12))
+    scenario = with_policy_requirements("scout", with_vehicle(name, num_vehicles=12))
     swarm, actor = Swarm(scenario), make("scout", scenario)
     percept, collisions = swarm.reset(10_000), 0
     actor.reset(10_000)
@@ -104,7 +104,7 @@ def test_bad_combinations_are_refused_with_the_remedy():
     with pytest.raises(PolicyError, match=r"'Acts' must define decide\(percept\), and leave act, .* alone"):
         make("tests.test_rudder:Acts", LAUV)
     with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
-        make("mappo", granted("mappo", LAUV))
+        make("mappo", with_policy_requirements("mappo", LAUV))
     rov = with_vehicle("bluerov2_heavy", speed=0.5)
     needed = re.escape(f"a yaw damping of {inner_loop_nms(600.0, 3000.0, rov):g} N m s")
     with pytest.raises(PolicyError, match=f"Scout needs {needed}"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, PolicyError, granted, make
+from uuv_marl.baselines import Policy, PolicyError, with_policy_requirements, make
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -30,7 +30,7 @@ COURSE = {"trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
 def placed(overrides, poses, name, **parameters):
     """A swarm with its vehicles at (x, y, heading), and a policy for it."""
     scenario = load_scenario("single_obstacle", num_vehicles=len(poses), overrides=COURSE | overrides)
-    scenario = granted(name, scenario)
+    scenario = with_policy_requirements(name, scenario)
     swarm, policy = Swarm(scenario), make(name, scenario, **parameters)
     swarm.reset(0)
     swarm.state.eta[0], swarm.state.nu[0] = np.array(poses), 0.0
@@ -117,7 +117,7 @@ def test_policies_that_collide_alone_do_not_inside_the_filter(name):
     """On a crowded field of the tuning seeds; more are in docs/policies.md."""
     collisions = {}
     for policy in (name, f"guarded:{name}"):
-        scenario = granted(policy, load_scenario("random_field"))
+        scenario = with_policy_requirements(policy, load_scenario("random_field"))
         runs = [run for run in evaluate(scenario, policy, [10_007]) if isinstance(run, Run)]
         collisions[policy] = sum(run.metrics["collisions"] for run in runs)
     assert collisions[name] > 0
@@ -125,7 +125,7 @@ def test_policies_that_collide_alone_do_not_inside_the_filter(name):
 
 
 def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
-    scenario = granted("guarded:bio_inspired", load_scenario("starter"))
+    scenario = with_policy_requirements("guarded:bio_inspired", load_scenario("starter"))
     policy = make("guarded:bio_inspired,zeta_n=0.5", scenario, barrier=Barrier(obstacle_m=9.0))
     assert policy.name == "guarded:bio_inspired,zeta_n=0.5"
     assert policy.inner.gains.zeta_n == 0.5
@@ -134,14 +134,14 @@ def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
         make("guarded:bio_inspired,barrier=5", scenario)
     with pytest.raises(PolicyError, match="has a prefix too many"):
         make("guarded:guarded:bio_inspired", scenario)
-    guarded = make("guarded:sff", granted("guarded:sff", scenario))
+    guarded = make("guarded:sff", with_policy_requirements("guarded:sff", scenario))
     with pytest.raises(PolicyError, match=r"the snapshot's identity must be"):
         guarded.restore(guarded.snapshot() | {"inner.identity": np.zeros(3)})
 
 
 @pytest.mark.parametrize("echoes", ["centre", "surface"])
 def test_scout_arrives_and_touches_nothing(echoes):
-    scenario = granted("scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes}))
+    scenario = with_policy_requirements("scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes}))
     runs = [run for run in evaluate(scenario, "scout", [10_007, 10_008]) if isinstance(run, Run)]
     assert all(run.metrics["collisions"] == 0 for run in runs)
     assert all(run.metrics["task_time_s"] is not None for run in runs)

@@ -17,7 +17,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines import PolicyError, with_policy_requirements, make
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.train import run
 from uuv_marl.train.sb3 import save_sb3
@@ -157,10 +157,10 @@ def test_a_checkpoint_acts_as_the_model_does(tmp_path):
     save_sb3(model, tmp_path / "policy.safetensors")
     policy, observation = make(str(tmp_path), env.scenario, 2), env.reset()
     for _ in range(20):
-        wish = model.predict(observation, deterministic=True)[0]
-        within = wish / np.maximum(1.0, np.linalg.norm(wish, axis=1, keepdims=True))
+        output = model.predict(observation, deterministic=True)[0]
+        within = output / np.maximum(1.0, np.linalg.norm(output, axis=1, keepdims=True))
         np.testing.assert_allclose(policy.act(env.swarm.percept).reshape(-1, 2), within, atol=1e-5)
-        observation, *_ = env.step(wish)
+        observation, *_ = env.step(output)
 
 
 class Doubled(FlattenExtractor):
@@ -193,7 +193,7 @@ def test_the_example_trains_a_policy(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
     assert f"--scenario starter --policy {tmp_path}" in done.stdout
     assert PPO.load(tmp_path / "model").num_timesteps > 100
-    scenario = granted(str(tmp_path), load_scenario("starter"))
+    scenario = with_policy_requirements(str(tmp_path), load_scenario("starter"))
     assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0
 
 

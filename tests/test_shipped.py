@@ -6,12 +6,12 @@ import pytest
 
 from research.second import SECOND, runnable
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, granted, make
+from uuv_marl.baselines import POLICIES, with_policy_requirements, make
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.observation import observation_layout
-from uuv_marl.train.training import Training, told_by
+from uuv_marl.train.training import Training, recipe_fields
 
 RECIPES = Path(__file__).parents[1] / "examples" / "training"
 NETWORKS = [*(name for name, kind in POLICIES.items() if isinstance(kind, Trained)), *SECOND]
@@ -24,7 +24,7 @@ def test_it_is_end_to_end_and_runs_where_its_task_is(name):
     rows = observation_layout(load_scenario(card.training.get("scenario", "training_field")), "closeness").table
     for scenario in map(load_scenario, scenario_names()):
         if observation_layout(scenario, "closeness").table == rows:
-            make(runnable(name), granted(runnable(name), scenario))
+            make(runnable(name), with_policy_requirements(runnable(name), scenario))
 
 
 @pytest.mark.parametrize("name", [name for name in NETWORKS if name.startswith("mappo")])
@@ -32,7 +32,7 @@ def test_it_is_what_its_recipe_makes(name):
     """But for the seed, which a second training of the same recipe has of its own."""
     first = name.removesuffix("_2")
     card = policy_class(runnable(name)).checkpoint.card
-    made = Training(**told_by(str(RECIPES / f"{first}.toml")), seed=int(name != first))
+    made = Training(**recipe_fields(str(RECIPES / f"{first}.toml")), seed=int(name != first))
     told = made.model_dump(mode="json")
     later = {name: told.pop(name) for name in told.keys() - card.training.keys()}  # fields that came after it
     assert all(Training.model_fields[name].default == value for name, value in later.items())

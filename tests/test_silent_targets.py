@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, ScenarioError
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -58,11 +58,11 @@ def test_targets_stay_in_the_box_keep_their_speed_and_turn_smoothly(tier):
     assert ((memory.speed >= low * full) & (memory.speed <= high * full)).all()
     turned, before = [], None
     for _ in range(300):
-        at = swarm.course.obstacles[:, :, :2].copy()
+        at = swarm.world_map.obstacles[:, :, :2].copy()
         drift(swarm)
-        moved = swarm.course.obstacles[:, :, :2] - at
+        moved = swarm.world_map.obstacles[:, :, :2] - at
         np.testing.assert_allclose(np.hypot(*np.moveaxis(moved, -1, 0)), memory.speed * period, rtol=1e-9)
-        assert np.abs(swarm.course.obstacles[:, :, :2]).max() <= 0.5 * numbers.side_m + 1e-9
+        assert np.abs(swarm.world_map.obstacles[:, :, :2]).max() <= 0.5 * numbers.side_m + 1e-9
         way = np.arctan2(moved[..., 1], moved[..., 0])
         if before is not None:
             turned.append(np.abs((way - before + np.pi) % (2.0 * np.pi) - np.pi))
@@ -75,21 +75,21 @@ def test_targets_stay_in_the_box_keep_their_speed_and_turn_smoothly(tier):
 def test_nothing_but_the_bow_hears_a_target():
     swarm = water(**{"task.targets": 1})
     swarm.reset(TUNING)
-    swarm.course.obstacles[0, 0, :2] = 0.0
+    swarm.world_map.obstacles[0, 0, :2] = 0.0
     for bearing, away, heard in ((0, 99, 1), (59, 60, 1), (-59, 60, 1), (75, 60, 0), (180, 20, 0), (0, 102, 0)):
         alone(swarm)
         angle = np.radians(bearing)
         swarm.state.eta[0, 0, :2] = -away * np.cos(angle), -away * np.sin(angle)
         percept = swarm.observe()
         assert percept["echo"][0, 0].any() == heard, bearing
-        assert (percept["heard"][0, 0] == water_without(swarm)["heard"][0, 0]).all()
+        assert (percept["detected"][0, 0] == water_without(swarm)["detected"][0, 0]).all()
         assert not percept["echo"][0, 1:].any()
 
 
 def water_without(swarm):
     """What is perceived where the targets are far away."""
     before = swarm.snapshot()
-    swarm.course.obstacles[:, :, :2] = 1e5
+    swarm.world_map.obstacles[:, :, :2] = 1e5
     seen = swarm.observe().flat.copy()
     swarm.restore(before)
     return dataclasses.replace(swarm.percept, flat=seen)
@@ -102,7 +102,7 @@ def test_a_vehicle_knows_where_it_is_in_the_box():
     x, y = np.moveaxis(percept["reference"].astype(float), -1, 0)
     place = -np.stack([c * x - s * y, s * x + c * y], axis=-1)
     np.testing.assert_allclose(place, swarm.state.eta[:, :, :2], atol=1e-3)
-    assert np.hypot(*np.moveaxis(swarm.course.obstacles[:, :, :2], -1, 0)).min() > swarm.task.numbers.clear_m
+    assert np.hypot(*np.moveaxis(swarm.world_map.obstacles[:, :, :2], -1, 0)).min() > swarm.task.numbers.clear_m
 
 
 def test_the_heading_in_the_box_is_by_compass():
@@ -122,26 +122,26 @@ def test_the_held_share_is_that_of_the_last_half():
         time_s = swarm.facts.time_s[0]
         alone(swarm)
         holds = {0: True, 1: time_s > 0.75 * limit - 0.6, 2: time_s < 0.5 * limit - 0.6, 3: False}
-        swarm.course.obstacles[0, :4, :2] = 150.0 * np.arange(4)[:, None] - 250.0
+        swarm.world_map.obstacles[0, :4, :2] = 150.0 * np.arange(4)[:, None] - 250.0
         for k, held in holds.items():
             if held:
-                swarm.state.eta[0, k, :2] = swarm.course.obstacles[0, k, :2] + (0.0, 20.0)
+                swarm.state.eta[0, k, :2] = swarm.world_map.obstacles[0, k, :2] + (0.0, 20.0)
         result = batch.step(np.zeros((1, 8, 2)))
         np.testing.assert_allclose(result.terms["held"][0, :4], 20.0 * 0.5 / limit * np.array([*holds.values()]))
         assert not result.terms["held"][0, 4:].any()
     measured = task.metrics(0)
     assert measured["held_share"] == pytest.approx((1.0 + 0.5) / 4.0, abs=0.01)
-    assert (measured["found_share"], measured["whole"]) == (0.75, 0.0)
+    assert (measured["found_share"], measured["swarm_success"]) == (0.75, 0.0)
     assert measured["found_s"] == pytest.approx((0.5 + 0.75 * limit + 0.5 + limit) / 4.0, abs=1.0)
     assert not task.success(0)
-    assert task.success(0, 5) != bool(swarm.state.touched[0, 5])
+    assert task.success(0, 5) != bool(swarm.state.collided[0, 5])
 
 
 def test_progress_and_pay_count_targets_that_no_nearer_vehicle_holds():
     swarm = water(**{"task.targets": 2})
     swarm.reset(TUNING)
     alone(swarm)
-    swarm.course.obstacles[0, :2, :2] = (0.0, 0.0), (200.0, 0.0)
+    swarm.world_map.obstacles[0, :2, :2] = (0.0, 0.0), (200.0, 0.0)
     swarm.state.eta[0, 0, :2], swarm.state.eta[0, 1, :2] = (0.0, 10.0), (0.0, 50.0)
     swarm.observe()
     left = swarm.task._left()[0]
@@ -171,7 +171,7 @@ def test_a_run_goes_on_alike_from_a_snapshot():
 
 
 def shares(name, tier, worlds=4):
-    scenario = granted(name, load_scenario(tier))
+    scenario = with_policy_requirements(name, load_scenario(tier))
     batch, policy = BatchedEnv(scenario, worlds), make(name, scenario, worlds)
     batch.reset(TUNING)
     policy.reset(TUNING)
@@ -187,9 +187,9 @@ def shares(name, tier, worlds=4):
 def test_the_oracle_holds_all_and_the_guide_beats_the_floors():
     held, _ = shares("oracle", "silent_targets_easy")
     assert held >= 0.95
-    found = {name: shares(name, "silent_targets_easy") for name in (SilentTargets.guide, "idle", "random")}
-    assert found[SilentTargets.guide][0] > 0.3
-    assert found[SilentTargets.guide][1] > max(found["idle"][1], found["random"][1])
+    found = {name: shares(name, "silent_targets_easy") for name in (SilentTargets.reference_policy, "idle", "random")}
+    assert found[SilentTargets.reference_policy][0] > 0.3
+    assert found[SilentTargets.reference_policy][1] > max(found["idle"][1], found["random"][1])
 
 
 def way_of(policy, decisions=300):
@@ -209,7 +209,7 @@ def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
 
 def test_the_search_refuses_what_has_no_box():
     with pytest.raises(PolicyError, match="searches a box, of which task 'follow' tells nothing; run it on silent"):
-        make("nearest_target", granted("nearest_target", load_scenario("starter")))
+        make("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
 
 
 @pytest.mark.parametrize(("changes", "message"), [

@@ -65,8 +65,8 @@ def test_percepts_do_not_change_when_the_world_is_rotated_and_moved(seed, turn, 
     rotation = np.array([[c, -s], [s, c]])
     swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
     swarm.state.eta[0, :, 2] += turn
-    swarm.course.obstacles[0, :, :2] = swarm.course.obstacles[0, :, :2] @ rotation.T + (x, y)
-    swarm.course.waypoints[0, 0] = swarm.course.waypoints[0, 0] @ rotation.T + (x, y)
+    swarm.world_map.obstacles[0, :, :2] = swarm.world_map.obstacles[0, :, :2] @ rotation.T + (x, y)
+    swarm.world_map.waypoints[0, 0] = swarm.world_map.waypoints[0, 0] @ rotation.T + (x, y)
     np.testing.assert_allclose(swarm.observe().flat, before, rtol=1e-4, atol=1e-3)
 
 
@@ -75,13 +75,13 @@ def test_percepts_do_not_change_when_the_world_is_rotated_and_moved(seed, turn, 
 def test_permuting_vehicles_permutes_the_percepts(seed):
     swarm = Swarm(load_scenario("single_obstacle", num_vehicles=15))
     swarm.reset(seed % 1000)
-    before, heard = swarm.observe().flat[0].copy(), swarm.heard[0].copy()
+    before, heard = swarm.observe().flat[0].copy(), swarm.detected_index[0].copy()
     order = np.random.default_rng(seed).permutation(15)
     swarm.state.eta[0] = swarm.state.eta[0, order]
     swarm.state.nu[0] = swarm.state.nu[0, order]
     np.testing.assert_array_equal(swarm.observe().flat[0], before[order])
     rank = np.append(np.argsort(order), -1)
-    np.testing.assert_array_equal(swarm.heard[0], rank[heard[order]])
+    np.testing.assert_array_equal(swarm.detected_index[0], rank[heard[order]])
 
 
 def test_the_reference_saturates_with_its_direction_kept(place):

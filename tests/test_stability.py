@@ -19,8 +19,8 @@ def seven():
     return formation.formations(formation.straight_leg(7), GAINS, [0])[0]
 
 
-def timed(scenario, hold_s, steps=1):
-    overrides = {"control_hold_s": hold_s, "integration_step_s": hold_s / steps, "decision_period_s": hold_s}
+def timed(scenario, control_step_s, steps=1):
+    overrides = {"control_step_s": control_step_s, "integration_step_s": control_step_s / steps, "decision_period_s": control_step_s}
     return load_scenario(scenario, overrides={f"timing.{clock}": value for clock, value in overrides.items()})
 
 
@@ -65,39 +65,39 @@ def test_the_real_swarm_stays_in_a_settled_formation(seven):
 
 
 @pytest.mark.parametrize(("hold_s", "damping"), [(0.1, 0.0), (0.05, 60.0)])
-def test_the_loop_is_the_slope_of_one_step_of_the_real_swarm(seven, hold_s, damping):
-    scenario = timed(formation.straight_leg(7, damping), hold_s, steps=5)
+def test_the_loop_is_the_slope_of_one_step_of_the_real_swarm(seven, control_step_s, damping):
+    scenario = timed(formation.straight_leg(7, damping), control_step_s, steps=5)
     steps = np.diag(np.tile([2e-2, 2e-2, 1e-3, 1e-3, 1e-3, 1e-3], 7))
     shifts = np.concatenate([steps, -steps])
     swarm, policy = placed(scenario, seven, len(shifts))
     swarm.state.eta[:] += shifts.reshape(-1, 7, 6)[..., :3]
     swarm.state.nu[:] += shifts.reshape(-1, 7, 6)[..., 3:]
     percept = swarm.observe()
-    assert (swarm.heard == seven.heard).all()
+    assert (swarm.detected_index == seven.heard).all()
     swarm.step(policy.act(percept))
     after = relative(swarm)
     slope = (after[:42] - after[42:]).T / (2.0 * steps.sum(axis=0))
     rigid = formation.stiffness(seven.places, seven.heard, GAINS)
-    np.testing.assert_allclose(slope, stability.loop(scenario, rigid, hold_s), atol=5e-3)
+    np.testing.assert_allclose(slope, stability.loop(scenario, rigid, control_step_s), atol=5e-3)
 
 
 @pytest.mark.parametrize("hold_s", [0.02, 0.06])
-def test_a_lone_vehicle_weaves_as_predicted(hold_s):
+def test_a_lone_vehicle_weaves_as_predicted(control_step_s):
     """Below the critical hold it straightens, above it swings up, at the rate that the eigenvalues say."""
     lone = stability.lone_stiffness(GAINS)
-    scenario = timed(formation.straight_leg(1), hold_s)
-    critical = stability.critical_hold_s(scenario, lone)
+    scenario = timed(formation.straight_leg(1), control_step_s)
+    critical = stability.critical_control_step_s(scenario, lone)
     assert 0.02 < critical < 2.0 * 50.0 / 1880.0  # the sway takes its part of the yaw damping
-    rate = stability.rates(stability.eigenvalues(scenario, lone, hold_s)).weaving
-    assert (rate > 0.0) == (hold_s > critical)
+    rate = stability.rates(stability.eigenvalues(scenario, lone, control_step_s)).weaving
+    assert (rate > 0.0) == (control_step_s > critical)
     found = formation.formations(scenario, GAINS, [0], rounds=200)[0]
     swarm, policy = placed(scenario, found)
     swarm.state.nu[0, 0, 2] = 2e-3
     percept, yaw = swarm.observe(), []
-    for _ in range(round(24.0 / hold_s)):
+    for _ in range(round(24.0 / control_step_s)):
         percept = swarm.step(policy.act(percept))
         yaw.append(abs(swarm.state.nu[0, 0, 2]))
-    early, late = (max(yaw[round(t / hold_s) : round((t + 3.0) / hold_s)]) for t in (6.0, 20.0))
+    early, late = (max(yaw[round(t / control_step_s) : round((t + 3.0) / control_step_s)]) for t in (6.0, 20.0))
     assert math.log(late / early) / 14.0 == pytest.approx(rate, abs=0.02)
 
 

@@ -9,7 +9,7 @@ from uuv_marl import load_scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import Plant
 
-STOPS = {"contact.stops": True, "obstacles": [{"centre_m": [0.0, 0.0], "radius_m": 20.0}]}
+STOPS = {"collision.stops": True, "obstacles": [{"centre_m": [0.0, 0.0], "radius_m": 20.0}]}
 STOPS |= {"trajectory.waypoints_m": [[200.0, 0.0], [400.0, 0.0]]}
 NOTHING = np.zeros((1, 2, 2))
 
@@ -36,10 +36,10 @@ def test_a_hull_that_pushes_on_stands_at_the_wall_and_touches_it_once():
     contacts = 0
     for _ in range(100):
         swarm.step(np.array([[[1.0, 0.0], [0.0, 0.0]]]))
-        contacts += int(swarm.facts.contacts[0, 0])
+        contacts += int(swarm.facts.vehicle_collisions[0, 0])
         assert swarm.facts.clearance[0, 0] >= 0.998
     assert contacts == 1
-    assert swarm.state.touched[0].tolist() == [True, False]
+    assert swarm.state.collided[0].tolist() == [True, False]
     assert abs(swarm.state.nu[0, 0, 0]) < 1e-9
     for _ in range(50):  # and it leaves by its own thrust
         swarm.step(np.array([[[-1.0, 0.0], [0.0, 0.0]]]))
@@ -49,11 +49,11 @@ def test_a_hull_that_pushes_on_stands_at_the_wall_and_touches_it_once():
 def test_along_a_wall_a_hull_glides():
     """The impulse has no component along the surface: that velocity stays, but for drag."""
     swarm = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    free = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)), **{"contact.stops": False})
+    free = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)), **{"collision.stops": False})
     for _ in range(6):
         swarm.step(NOTHING)
         free.step(NOTHING)
-    assert swarm.state.touched[0, 0]
+    assert swarm.state.collided[0, 0]
     assert swarm.state.nu[0, 0, 0] > 0.7 * free.state.nu[0, 0, 0]
 
 
@@ -75,7 +75,7 @@ def test_energy_never_rises_and_two_hulls_keep_their_momentum(pose, first, secon
     """Beside the same hulls that pass through each other: what differs after a hold is the impulse alone."""
     start = (300.0 + pose[0], pose[1], pose[2]), (300.0, 0.0, 0.0)
     on, off = (
-        two(*start, nu=(first, second), **{"vehicle.x_G_m": x_g, "contact.stops": stops}) for stops in (True, False)
+        two(*start, nu=(first, second), **{"vehicle.x_G_m": x_g, "collision.stops": stops}) for stops in (True, False)
     )
     for swarm in (on, off):
         swarm.step(NOTHING)
@@ -89,13 +89,13 @@ def test_hulls_of_other_masses_than_the_nominal_one_keep_their_momentum_too():
     """Masses are drawn (mismatch); beside the same hulls that pass through each other, as above."""
     start, nu = ((300.0, 0.0, 0.0), (302.02, 0.0, 0.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     drawn = {"mismatch.mass": 0.8, "mismatch.added_mass": 0.8, "timing.integration_step_s": 0.00625}
-    on, off = (two(*start, nu=nu, **drawn, **{"contact.stops": stops}) for stops in (True, False))
-    mass = 1.0 / on._sea.hull.plants[0, :, Plant._fields.index("inverse_11")]
+    on, off = (two(*start, nu=nu, **drawn, **{"collision.stops": stops}) for stops in (True, False))
+    mass = 1.0 / on._disturbances.hull.plants[0, :, Plant._fields.index("inverse_11")]
     assert mass.max() > 1.2 * mass.min()
     for swarm in (on, off):
         swarm.step(NOTHING)
     u_on, u_off = on.state.nu[0, :, 0], off.state.nu[0, :, 0]
-    assert on.facts.contacts[0].all()
+    assert on.facts.vehicle_collisions[0].all()
     assert mass @ u_on == pytest.approx(mass @ u_off, abs=1e-9)
     assert mass @ u_on**2 < mass @ u_off**2
 
@@ -107,25 +107,25 @@ def test_two_hulls_head_on_share_their_momentum():
     other = swarm.state.nu[0, 1, 0] * np.cos(swarm.state.eta[0, 1, 2])
     assert ahead == pytest.approx(other, abs=1e-9)
     assert 0.7 < ahead < 1.0  # half of 3 - 1, less the drag of 0.1 s
-    assert swarm.facts.contacts[0].tolist() == [1, 1]
+    assert swarm.facts.vehicle_collisions[0].tolist() == [1, 1]
 
 
 def test_a_disc_that_drifts_carries_a_hull_along():
     swarm = two((22.0, 0.0, 0.0), (300.0, 0.0, 0.0))
-    swarm.course.obstacle_velocity[0, 0] = (2.0, 0.0)
+    swarm.world_map.obstacle_velocity[0, 0] = (2.0, 0.0)
     for _ in range(50):
         swarm.step(NOTHING)
-        swarm.course.obstacle_velocity[0, 0] = (2.0, 0.0)
+        swarm.world_map.obstacle_velocity[0, 0] = (2.0, 0.0)
     assert swarm.state.nu[0, 0, 0] == pytest.approx(2.0, abs=0.05)
     assert swarm.facts.clearance[0, 0] >= 0.99
 
 
 def test_off_is_as_before():
-    on, off = (two((-30.0, 1.0, 0.0), (300.0, 0.0, 0.0), **{"contact.stops": stops}) for stops in (True, False))
+    on, off = (two((-30.0, 1.0, 0.0), (300.0, 0.0, 0.0), **{"collision.stops": stops}) for stops in (True, False))
     for k in range(100):
         for swarm in (on, off):
             swarm.step(np.array([[[0.7, 0.0], [0.3, 0.1]]]))
-        if off.facts.contacts[0].any():
+        if off.facts.vehicle_collisions[0].any():
             assert k > 5
             break
         np.testing.assert_array_equal(on.state.eta, off.state.eta)

@@ -5,7 +5,7 @@ import pytest
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
 from uuv_marl.envs.core import BatchedEnv
@@ -31,9 +31,9 @@ class Story:
         state.tick[0] = round(facts.time_s[0] * 10)
         facts.reference[0, 0, :2] = 600.0
         state.eta[0, :, :2] = 600.0 + np.asarray(offsets)
-        facts.contacts[0], facts.lost[0] = 0, False
-        state.touched[0, list(touching)] = True
-        facts.contacts[0, list(touching)], facts.lost[0, list(lost)] = 1, True
+        facts.vehicle_collisions[0], facts.lost[0] = 0, False
+        state.collided[0, list(touching)] = True
+        facts.vehicle_collisions[0, list(touching)], facts.lost[0, list(lost)] = 1, True
         state.alive[0, list(lost)] = False
         self.recorder.update(WORLD)
         return self
@@ -105,7 +105,7 @@ def test_nothing_is_judged_before_its_time():
 def test_faulty_vehicles_count_in_nobodys_done_but_in_what_others_touch():
     broken = {"kind": "yaw", "share": 0.3, "onset_s": 5.0}
     story = Story(10, faults=[broken])
-    faulty = np.flatnonzero(story.swarm._sea.hull.broken[0, :, 0, 0] == 50)
+    faulty = np.flatnonzero(story.swarm._disturbances.hull.broken[0, :, 0, 0] == 50)
     assert len(faulty) == 3
     offsets = ring(10)
     offsets[faulty] = 5000.0
@@ -148,7 +148,7 @@ def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
     short, long = (
         next(
             event
-            for event in evaluate(granted("bio_inspired_plus", scenario), "bio_inspired_plus", [3])
+            for event in evaluate(with_policy_requirements("bio_inspired_plus", scenario), "bio_inspired_plus", [3])
             if isinstance(event, Run)
         )
         for scenario in (load_scenario("starter"), load_scenario("starter", overrides=LONG))

@@ -14,16 +14,16 @@ from hypothesis import strategies as st
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.sim import engine as engine_module
-from uuv_marl.sim.field import draw_field
+from uuv_marl.sim.field import sample_field
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.threads import on_threads
 
 
 def play(scenario, seeds, steps, policy="bio_inspired"):
     """Final states and percepts, world by world, of a few steps in one batch."""
-    scenario = granted(policy, scenario)
+    scenario = with_policy_requirements(policy, scenario)
     swarm, actor = Swarm(scenario, len(seeds)), make(policy, scenario, len(seeds))
     percept = swarm.reset(list(seeds))
     actor.reset(list(seeds))
@@ -35,7 +35,7 @@ def play(scenario, seeds, steps, policy="bio_inspired"):
 @pytest.mark.parametrize("policy", ["bio_inspired", "sff", "sdc", "random"])
 @pytest.mark.parametrize("name", ["lossy", "random_field"])
 def test_a_world_is_the_same_alone_and_in_a_batch(name, policy):
-    scenario = load_scenario(name, overrides={"disturbance.loss_times_s": [5.0, 9.0]})
+    scenario = load_scenario(name, overrides={"losses.times_s": [5.0, 9.0]})
     batch = play(scenario, (3, 1, 7, 5, 2), 150, policy)
     for w, seed in enumerate((3, 1, 7, 5, 2)):
         alone = play(scenario, (seed,), 150, policy)
@@ -191,7 +191,7 @@ def test_arrival_needs_rest_nearness_spread_and_dwell(place):
 
 
 def passing(**changes):
-    base = {"arrival.by": "passage", "trajectory.waypoints_m": [[0.0, 0.0], [100.0, 0.0], [100.0, 60.0]]}
+    base = {"arrival.criterion": "passage", "trajectory.waypoints_m": [[0.0, 0.0], [100.0, 0.0], [100.0, 60.0]]}
     return load_scenario("tracking", num_vehicles=4, overrides={**base, "arrival.spread_m": 10.0, **changes})
 
 
@@ -221,7 +221,7 @@ def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together
 
 
 def test_lost_vehicles_fall_silent_and_leave_the_centre():
-    scenario = load_scenario("lossy", overrides={"disturbance.loss_times_s": [0.0, 0.25, 1.0]})
+    scenario = load_scenario("lossy", overrides={"losses.times_s": [0.0, 0.25, 1.0]})
     swarm = Swarm(scenario)
     swarm.reset(5)
     action = np.zeros((1, 54, 2), np.float32)
@@ -231,9 +231,9 @@ def test_lost_vehicles_fall_silent_and_leave_the_centre():
         for i in np.flatnonzero(swarm.facts.lost[0]):
             lost_at[int(i)] = step
     assert sorted(lost_at.values()) == [1, 3, 10]
-    assert list(lost_at) == swarm.course.losses[0].tolist()
+    assert list(lost_at) == swarm.world_map.losses[0].tolist()
     gone = list(lost_at)
-    assert not np.isin(swarm.heard[0], gone).any()
+    assert not np.isin(swarm.detected_index[0], gone).any()
     assert not percept.flat[0, gone].any()
     living = swarm.state.alive[0]
     np.testing.assert_allclose(swarm.facts.centre[0], swarm.state.eta[0, living, :2].mean(axis=0))
@@ -248,8 +248,8 @@ def test_lost_vehicles_fall_silent_and_leave_the_centre():
 def test_random_fields_are_feasible(seed, n):
     """Independent of the construction: on a grid, water with s_o + s_u to spare joins the start with the end."""
     scenario = load_scenario("random_field", num_vehicles=n)
-    waypoints, obstacles = draw_field(scenario, np.random.default_rng(seed))
-    again = draw_field(scenario, np.random.default_rng(seed))
+    waypoints, obstacles = sample_field(scenario, np.random.default_rng(seed))
+    again = sample_field(scenario, np.random.default_rng(seed))
     np.testing.assert_array_equal(waypoints, again.waypoints)
     np.testing.assert_array_equal(obstacles, again.obstacles)
     assert len(obstacles) <= scenario.random_field.obstacles[1]
@@ -278,15 +278,15 @@ def test_an_obstacle_that_moves_onto_a_vehicle_is_a_contact():
     swarm.state.nu[...] = 0.0
     counted = []
     for north in (30.0, 25.5, 25.0, 500.0, 25.5):  # from the vehicle to the centre of a disc of 25 m [m]
-        swarm.course.obstacles[0, 0, :2] = swarm.state.eta[0, 0, :2] + (north, 0.0)
+        swarm.world_map.obstacles[0, 0, :2] = swarm.state.eta[0, 0, :2] + (north, 0.0)
         swarm.step(still)
-        counted.append(swarm.facts.contacts[0].tolist())
+        counted.append(swarm.facts.vehicle_collisions[0].tolist())
     assert [one for one, _ in counted] == [0, 1, 0, 0, 1]
-    swarm.course.num_obstacles[0] = 0
+    swarm.world_map.num_obstacles[0] = 0
     swarm.step(still)
-    swarm.course.num_obstacles[0] = 1
+    swarm.world_map.num_obstacles[0] = 1
     assert swarm.step(still) is not None
-    assert swarm.facts.contacts[0, 0] == 1, "an obstacle that appears on a vehicle"
+    assert swarm.facts.vehicle_collisions[0, 0] == 1, "an obstacle that appears on a vehicle"
 
 
 def test_a_swarm_that_has_run_can_be_pickled_and_goes_on_alike():

@@ -10,10 +10,10 @@ from typing_extensions import TypeAliasType
 from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.sim import entry_points
-from uuv_marl.sim.arrays import Course, Facts, Senses, State
+from uuv_marl.sim.arrays import WorldMap, Facts, Senses, State
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
-from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, scratch, workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, workspace_buffers, workspace
 from uuv_marl.types import Float32
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
@@ -25,7 +25,7 @@ LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5, "obstacle": 4, "nearby": 7 * M
 
 @pytest.fixture
 def desks():
-    room = scratch(threads=2, num_vehicles=7, num_sectors=21, num_cells=4, num_obstacles=3)
+    room = workspace_buffers(threads=2, num_vehicles=7, num_sectors=21, num_cells=4, num_obstacles=3)
     own = [workspace.py_func(room, t) for t in range(2)]
     return room, [(*desk[:-1], named.py_func(desk.obstacles)) for desk in own]
 
@@ -62,7 +62,7 @@ def test_a_table_tells_shapes_types_and_meaning():
     state = allocate(State, SIZES)
     assert (state.eta.shape, state.eta.dtype, state.alive.dtype) == ((2, 5, 3), np.float64, np.bool_)
     assert "eta: Pose: north [m], east [m], heading [rad]. Shape (world, vehicle, 3), float64." in State.__doc__
-    for table in (State, Course, Senses, Facts):
+    for table in (State, WorldMap, Senses, Facts):
         assert all(f"\n        {name}: " in table.__doc__ for name in table._fields)
 
 
@@ -70,16 +70,16 @@ def test_a_table_tells_shapes_types_and_meaning():
     ("low", "axis", "beyond", "wrong"), [(0, "vehicle", 0, 5), (-1, "vehicle", 0, -2), (1, "point", 1, 4)]
 )
 def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyond, wrong, monkeypatch):
-    arrays = allocate(Course, SIZES)._asdict()
+    arrays = allocate(WorldMap, SIZES)._asdict()
     arrays["last"][:] = 1
-    check(Course, arrays, SIZES)
+    check(WorldMap, arrays, SIZES)
     monkeypatch.setattr(
         "uuv_marl.sim.tables.array_specs",
         lambda table: {"last": array_specs(table)["last"]._replace(bounds=Bounds(low, axis, beyond))},
     )
     arrays["last"][1] = wrong
     with pytest.raises(ValueError, match="last must lie within"):
-        check(Course, arrays, SIZES)
+        check(WorldMap, arrays, SIZES)
 
 
 def test_the_compiled_types_are_the_same_for_all_scenarios():
@@ -90,7 +90,7 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
         ("single_obstacle", {"overrides": {"sonar.arrays.bow.sub_sectors": 3, "sonar.echo_reports": "surface"}}),
         ("multi_obstacle", {"num_vehicles": 300}),
         ("lossy", {"overrides": {"sonar.channels": ["compass", "link"]}}),
-        ("random_field", {"overrides": {"vehicle.m_kg": 250.0, "contact.ends_vehicle": True}}),
+        ("random_field", {"overrides": {"vehicle.m_kg": 250.0, "collision.ends_vehicle": True}}),
         (STARTER, {"overrides": RUDDER}),
         (STARTER, {"overrides": {**RUDDER, "actuators.yaw_lag_s": 0.2}}),
         (STARTER, {"overrides": {"current.eddies": 8, "current.eddy_speed_mps": 0.5}}),

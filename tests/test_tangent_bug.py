@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import SAME_M
 from uuv_marl.sim.swarm import Swarm
@@ -20,7 +20,7 @@ def water(walls, surface=False, side=1.0):
         "task": {"name": "reach", "near_m": 10.0},
         "obstacles": [{"centre_m": [x, side * y], "radius_m": 7.0} for x, y in walls],
         "trajectory.waypoints_m": [[0.0, 0.0], [GOAL_M, 0.0]],
-        "contact.stops": True,
+        "collision.stops": True,
         "sonar.echo_reports": "surface" if surface else "centre",
     }
     return load_scenario("starter", num_vehicles=1, overrides=changes)
@@ -28,7 +28,7 @@ def water(walls, surface=False, side=1.0):
 
 def fly(name, scenario, side=1.0, steps=300, **parameters):
     """The swarm, the policy, and places [m], shape (decision, 2), until the vehicle is there."""
-    scenario = granted(name, scenario)
+    scenario = with_policy_requirements(name, scenario)
     swarm, policy = Swarm(scenario), make(name, scenario, **parameters)
     swarm.reset(10_000)
     swarm.state.eta[0, 0], swarm.state.nu[0, 0] = (5.0, 4.0 * side, 0.0), 0.0
@@ -47,7 +47,7 @@ def fly(name, scenario, side=1.0, steps=300, **parameters):
 def test_it_comes_round_a_wall_that_stops_a_pull(walls, surface):
     swarm, _, places = fly("tangent_bug", water(walls, surface))
     assert np.hypot(GOAL_M - places[-1, 0], places[-1, 1]) <= 10.0
-    assert not swarm.state.touched.any()
+    assert not swarm.state.collided.any()
     _, _, pulled = fly("guarded:pull", water(walls, surface))
     assert pulled[-1, 0] < 110.0
 
@@ -64,7 +64,7 @@ def test_dead_reckoning_remembers_walls_where_they_are(surface):
     """After a way round them; the map's origin is the goal, and its first axis the bow at the start."""
     swarm, policy, places = fly("tangent_bug", water(POCKET, surface), gains=BugGains(), barrier=BUG_BARRIER)
     walls = policy.memory.echoes[0, 0, : int(policy.memory.num[0, 0])] + (GOAL_M, 0.0, 0.0)
-    away = np.hypot(*(walls[:, None, :2] - swarm.course.obstacles[0, None, :, :2]).transpose(2, 0, 1))
+    away = np.hypot(*(walls[:, None, :2] - swarm.world_map.obstacles[0, None, :, :2]).transpose(2, 0, 1))
     if surface:
         assert np.abs(away - 7.0).min(axis=1).max() < 1.0
         assert not walls[:, 2].any()

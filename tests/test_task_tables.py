@@ -10,7 +10,7 @@ from research.episodes import read_rows
 from research.tasks.page import report
 from research.tasks.studies import STUDIES, set_name
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps import KINDS
@@ -20,7 +20,7 @@ STUDY = STUDIES["hard_water"]
 
 
 def rows(policy, share):
-    told = dict.fromkeys(STUDY.metrics, "1.000") | {"untouched_share": f"{share:.3f}", "whole": "0.000"}
+    told = dict.fromkeys(STUDY.metrics, "1.000") | {"untouched_share": f"{share:.3f}", "swarm_success": "0.000"}
     return [{"set": name, "policy": policy, "seed": str(seed), **told} for name in STUDY.sets for seed in range(3)]
 
 
@@ -51,7 +51,7 @@ def test_the_page_by_hand():
 
 
 def test_a_blind_policy_hears_no_echo_and_all_else():
-    scenario = granted("mappo", load_scenario("hard_water", num_vehicles=4))
+    scenario = with_policy_requirements("mappo", load_scenario("hard_water", num_vehicles=4))
     swarm, blind, sighted = Swarm(scenario, 2), Blind(scenario, 2, inner="mappo"), make("mappo", scenario, 2)
     percept = swarm.reset(10_100)
     for policy in (blind, sighted):

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.figures import _outcome
 from uuv_marl.benchmark.frame import load
@@ -21,7 +21,7 @@ from uuv_marl.cli import app
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.percept import FLAG, PerceptField
-from uuv_marl.sim.draw import usual_draw
+from uuv_marl.sim.episode_setup import default_setup
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import Task
 from uuv_marl.tasks.measures import MEASURED
@@ -53,7 +53,7 @@ def test_draws_do_not_depend_on_the_processor_s_own_instructions():
 
 
 def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
-    sea = load_scenario("single_obstacle", num_vehicles=3, overrides={"arrival.by": "passage", "task": "reach"})
+    sea = load_scenario("single_obstacle", num_vehicles=3, overrides={"arrival.criterion": "passage", "task": "reach"})
     batch = BatchedEnv(sea)
     assert np.isfinite(batch.reset(0)).all()
     assert np.isfinite(batch.step(np.ones((1, 3, 2))).reward).all()
@@ -75,7 +75,7 @@ class TwoWays(Survive):
         return {"group": 2}
 
     def draw(self, world, rng):
-        drawn = usual_draw(self.swarm.scenario, rng)
+        drawn = default_setup(self.swarm.scenario, rng)
         n = len(drawn.eta)
         return drawn._replace(
             waypoints=(drawn.waypoints[0], drawn.waypoints[0] * [1.0, -1.0]),
@@ -85,14 +85,14 @@ class TwoWays(Survive):
         )
 
     def move(self, running):
-        self.swarm.course.obstacle_velocity[running, 0] = (0.0, 2.0)
+        self.swarm.world_map.obstacle_velocity[running, 0] = (0.0, 2.0)
 
 
 class Endless(Survive):
     """Draws a longer way than it says."""
 
     def draw(self, world, rng):
-        return usual_draw(self.swarm.scenario, rng)._replace(duration_s=1e4)
+        return default_setup(self.swarm.scenario, rng)._replace(duration_s=1e4)
 
 
 class Broken(Survive):
@@ -127,7 +127,7 @@ def test_each_vehicle_perceives_its_own_groups_reference_or_nothing(sea):
 def test_an_obstacle_that_drifts_is_where_it_should_be_and_hits_who_lies_in_its_way():
     swarm = Swarm(load_scenario("single_obstacle", num_vehicles=4, overrides=TWO))
     swarm.reset(0)
-    before = swarm.course.obstacles.copy()
+    before = swarm.world_map.obstacles.copy()
     radius = before[0, 0, 2]
     swarm.state.eta[0, 0, :2] = before[0, 0, :2] + (0.0, radius + 3.0)  # 2 m from contact, in its way
     swarm.state.nu[0, 0] = 0.0
@@ -135,10 +135,10 @@ def test_an_obstacle_that_drifts_is_where_it_should_be_and_hits_who_lies_in_its_
     contacts = []
     for _ in range(20):
         swarm.step(np.zeros((1, 4, 2)))
-        contacts.append(int(swarm.facts.contacts[0, 0]))
-    np.testing.assert_allclose(swarm.course.obstacles[0, 0, :2], before[0, 0, :2] + (0.0, 4.0), atol=1e-9)
+        contacts.append(int(swarm.facts.vehicle_collisions[0, 0]))
+    np.testing.assert_allclose(swarm.world_map.obstacles[0, 0, :2], before[0, 0, :2] + (0.0, 4.0), atol=1e-9)
     assert sum(contacts) == 1
-    assert swarm.state.touched[0].tolist() == [True, False, False, False]
+    assert swarm.state.collided[0].tolist() == [True, False, False, False]
     assert contacts.index(1) in (9, 10)  # after about 1 s
 
 
@@ -146,11 +146,11 @@ def test_an_arrival_of_groups_is_that_of_all():
     changes = TWO | {"arrival.radius_m": 1e5, "arrival.spread_m": 1e5, "arrival.dwell_s": 0.1}
     swarm = Swarm(load_scenario("single_obstacle", num_vehicles=4, overrides=changes))
     swarm.reset(0)
-    swarm.course.times[0, 1] *= 0.001
+    swarm.world_map.times[0, 1] *= 0.001
     swarm.step(np.zeros((1, 4, 2)))
     swarm.step(np.zeros((1, 4, 2)))
     assert not swarm.arrived[0]  # one group's l(t) still moves
-    swarm.course.times[0, 0] *= 0.001
+    swarm.world_map.times[0, 0] *= 0.001
     swarm.step(np.zeros((1, 4, 2)))
     swarm.step(np.zeros((1, 4, 2)))
     assert swarm.arrived[0]
@@ -171,16 +171,16 @@ def test_a_snapshot_of_groups_goes_on_bit_for_bit_and_refuses_a_group_that_is_no
 def test_at_a_goal_at_rest_who_touched_something_has_failed():
     batch = BatchedEnv(load_scenario("starter", overrides={"task": {"name": "reach", "near_m": 30.0}}))
     batch.reset(0)
-    swarm, goal = batch.swarm, batch.swarm.course.waypoints[0, 0, -1]
+    swarm, goal = batch.swarm, batch.swarm.world_map.waypoints[0, 0, -1]
     assert (swarm.facts.reference[0, 0] == [*goal, 0.0, 0.0]).all()
     swarm.state.eta[0, :, :2] = goal + 7.0 * np.stack([np.arange(5), np.zeros(5)], axis=1)
     swarm.state.nu[0] = 0.0
     swarm.observe()
-    swarm.state.touched[0, 2] = True
+    swarm.state.collided[0, 2] = True
     result = batch.step(np.zeros((1, 5, 2)))
     assert result.world_terminated[0]
     assert result.terms["arrival"][0].tolist() == 5 * [20.0]
-    assert batch.task.metrics(0) == {"untouched_share": 0.8, "whole": 0.0}
+    assert batch.task.metrics(0) == {"untouched_share": 0.8, "swarm_success": 0.0}
 
 
 def test_a_task_that_is_named_takes_fields_too():
@@ -209,7 +209,7 @@ NEAR = PerceptField("near", (1,), FLAG, "1 within 10 m")
     (Task, {}, "must define there(), the vehicles that are where they should be"),
     (Survive, {"columns": {"collisions": "", "mine_m": ""}}, "can't have collisions in columns: the name is taken"),
     (Survive, {"columns": {"constraint_share_all": ""}}, "can't have constraint_share_all in columns"),
-    (Survive, {"observed": (NEAR._replace(name="heard"),)}, "can't have heard in observed or channels"),
+    (Survive, {"observed": (NEAR._replace(name="detected"),)}, "can't have heard in observed or channels"),
     (Survive, {"observed": (NEAR,), "channels": {"sight": (NEAR,)}}, "can't have near in observed or channels"),
     (Survive, {"channels": {"compass": (NEAR,)}}, "can't have compass in channels"),
     (Survive, {"rewards": ("dense", "team")}, "can't have team in rewards"),
@@ -227,9 +227,9 @@ def test_a_task_may_say_who_succeeds_without_saying_where(monkeypatch):
 
 
 @pytest.mark.parametrize(("own", "more", "message"), [
-    ({"min_spacing_m": 1.0, "untouched_share": 1.0, "whole": 1.0}, {}, "can't give min_spacing_m in metrics: the name"),
+    ({"min_spacing_m": 1.0, "untouched_share": 1.0, "swarm_success": 1.0}, {}, "can't give min_spacing_m in metrics: the name"),
     ({"mine_m": 1.0}, {}, "must give untouched_share, whole in metrics; add to super"),
-    ({"untouched_share": 1.0, "whole": 1.0}, {"headline": "mine_share"}, "must give mine_share in metrics"),
+    ({"untouched_share": 1.0, "swarm_success": 1.0}, {"headline": "mine_share"}, "must give mine_share in metrics"),
 ])  # fmt: skip
 def test_metrics_that_would_be_hidden_or_missed_are_refused_at_the_first_episodes_end(monkeypatch, own, more, message):
     wrong = type("Wrong", (Survive,), {"metrics": lambda task, world: own, **more})
@@ -262,9 +262,9 @@ def test_a_task_may_draw_no_longer_way_than_it_says():
 def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
     scenario = load_scenario("starter")
     for name in ("bio_inspired", "bio_inspired_plus", "scout", "idle", "mappo"):
-        mine = granted(name, scenario)
+        mine = with_policy_requirements(name, scenario)
         assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
-    own = granted("own_clock:bio_inspired", scenario)
+    own = with_policy_requirements("own_clock:bio_inspired", scenario)
     assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
     (run,) = [event for event in evaluate(own, "own_clock:bio_inspired", [0]) if isinstance(event, Run)]
     assert run.metrics["task_time_s"] is not None
@@ -283,13 +283,13 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     done = CliRunner().invoke(app, ["benchmark", *how, "--seeds", "2", "--output", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     runs = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]
-    assert all(set(run["metrics"]["task"]) == {"untouched_share", "whole", "spread_m"} for run in runs)
+    assert all(set(run["metrics"]["task"]) == {"untouched_share", "swarm_success", "spread_m"} for run in runs)
     text = (tmp_path / "out" / "table.md").read_text()
     assert "| spread_m |" in text
     assert "spread_m: mean distance from the centre at the end [m]." in text
     frame = load(tmp_path / "out")
     np.testing.assert_array_equal(frame["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs])
-    assert {*frame.columns} <= {"spread_m", "untouched_share", "whole", *MEASURED}
+    assert {*frame.columns} <= {"spread_m", "untouched_share", "swarm_success", *MEASURED}
     assert _outcome(runs[0]["metrics"]).startswith("0% untouched and there, ")
     done = CliRunner().invoke(app, ["replay", *how, "--output", str(tmp_path / "replay.html")])
     assert done.exit_code == 0, done.output
@@ -347,6 +347,6 @@ def test_a_users_task_is_trained_and_the_policy_runs(tmp_path):
     assert len(rewards) == 13
     assert np.isfinite(rewards).all()
     policy = str(tmp_path / "a" / "best")
-    scenario = granted(policy, load_scenario("starter", overrides={"task": EXAMPLE}))
+    scenario = with_policy_requirements(policy, load_scenario("starter", overrides={"task": EXAMPLE}))
     (run,) = [event for event in evaluate(scenario, policy, [0]) if isinstance(event, Run)]
     assert run.metrics["task"]["spread_m"] > 0.0

@@ -24,7 +24,7 @@ FINE = {"timing.decision_period_s": HOLD_S, "swarm.num_vehicles": N}
 
 
 def scenario(name="starter", speed_mps=2.0, way_m=8.0, share=1.0, **changes):
-    traffic = {"traffic.speed_mps": speed_mps, "traffic.way_m": way_m, "traffic.share": share}
+    traffic = {"traffic.speed_mps": speed_mps, "traffic.amplitude_m": way_m, "traffic.share": share}
     return load_scenario(name, overrides={**FINE, **traffic, **changes})
 
 
@@ -71,7 +71,7 @@ def test_an_obstacle_goes_to_and_fro_at_its_speed_and_never_farther_than_its_way
 def test_so_slow_an_obstacle_never_turns():
     made = swarm(speed_mps=1e-300)
     go(made, 3)
-    assert made.course.swing_holds[0, 0] > 10**6
+    assert made.course.swing_control_steps[0, 0] > 10**6
 
 
 def test_the_share_moves_rounded_up_and_a_larger_one_the_same_and_more():
@@ -90,7 +90,7 @@ def test_which_move_and_where_to_is_the_seed_s():
     pairs = [swarm("multi_obstacle", share=0.5, seed=seed).course.swing[0, :, 2:] for seed in (0, 0, 1)]
     np.testing.assert_array_equal(pairs[0], pairs[1])
     assert (pairs[0] != pairs[2]).any()
-    movers = {tuple(swarm("multi_obstacle", share=0.5, seed=seed).course.swing_holds[0] > 0) for seed in range(8)}
+    movers = {tuple(swarm("multi_obstacle", share=0.5, seed=seed).course.swing_control_steps[0] > 0) for seed in range(8)}
     assert len(movers) > 2
 
 
@@ -153,7 +153,7 @@ def drift(made, steps):
     contacts, clearance = 0, math.inf
     for _ in range(steps):
         made.step(np.zeros((1, N, 2)))
-        contacts += int(made.facts.contacts[0, 0])
+        contacts += int(made.facts.vehicle_collisions[0, 0])
         clearance = min(clearance, float(made.facts.clearance[0, 0]))
     return contacts, clearance
 
@@ -162,13 +162,13 @@ def test_a_vehicle_that_lies_still_is_hit_once():
     made = ahead(3.0)
     assert drift(made, 10) == (0, pytest.approx(2.0))
     assert drift(made, 30) == (1, pytest.approx(-4.0))  # 8 m on its way, of which 4 m led to the vehicle's middle
-    assert made.state.touched[0].tolist() == [True, False, False]
+    assert made.state.collided[0].tolist() == [True, False, False]
     assert drift(made, 70) == (0, pytest.approx(-3.8))  # on its way back from there
     assert drift(made, 80)[0] == 1, "the disc comes back"
 
 
 def test_a_hull_that_is_pushed_keeps_at_the_surface_and_is_left_behind():
-    made = ahead(3.0, **{"contact.stops": True})
+    made = ahead(3.0, **{"collision.stops": True})
     contacts, clearance = drift(made, 40)
     assert contacts == 1
     assert clearance == pytest.approx(1.0 - SINK_M, abs=1e-9)
@@ -181,7 +181,7 @@ def test_a_hull_that_is_pushed_keeps_at_the_surface_and_is_left_behind():
 
 
 def test_a_batch_and_a_snapshot_give_the_same_run():
-    changes = {"contact.stops": True, "traffic.share": 0.5}
+    changes = {"collision.stops": True, "traffic.share": 0.5}
     many = swarm("random_field", worlds=8, seed=5, **changes)
     one = swarm("random_field", seed=8, **changes)
     for made in (many, one):
@@ -190,7 +190,7 @@ def test_a_batch_and_a_snapshot_give_the_same_run():
     other.restore(one.snapshot())
     for made in (many, one, other):
         go(made, 90)
-    assert one.course.swing_holds[0].any()
+    assert one.course.swing_control_steps[0].any()
     for made, w in ((many, 3), (other, 0)):
         np.testing.assert_array_equal(made.state.eta[w], one.state.eta[0])
         np.testing.assert_array_equal(discs(made, w), discs(one))
@@ -207,8 +207,8 @@ def test_interfaces_agree_and_the_global_state_tells_the_velocity():
         both, *_ = vector.step(np.full((2, N, 2), [0.3, 0.0], np.float32).reshape(vector.action_space.shape))
     np.testing.assert_array_equal(np.stack(list(seen.values())), np.reshape(both, (2, N, -1))[1])
     velocity = parallel.state()[-8:].reshape(4, 2)
-    course = parallel.swarm.course
-    np.testing.assert_array_equal(velocity, (course.obstacle_velocity[0] / 4.0).astype(np.float32))
+    world_map = parallel.swarm.world_map
+    np.testing.assert_array_equal(velocity, (world_map.obstacle_velocity[0] / 4.0).astype(np.float32))
     assert len(parallel.state()) == 8 + len(uuv_marl.parallel_env(scenario("multi_obstacle", 0.0)).state_space.low)
 
 
@@ -224,8 +224,8 @@ def test_interfaces_agree_and_the_global_state_tells_the_velocity():
             {"swarm.num_vehicles": 10},
             "traffic.speed_mps must be 0 for task 'two_swarms', .* got 2; leave",
         ),
-        ("starter", {"way_m": 0.1}, "traffic.way_m must be at least 0.2, .* got 0.1; raise it or lower the speed"),
-        ("random_field", {"way_m": 55.1}, r"traffic.way_m must be at most .* = 55, so .*, got 55.1; lower it"),
+        ("starter", {"way_m": 0.1}, "traffic.amplitude_m must be at least 0.2, .* got 0.1; raise it or lower the speed"),
+        ("random_field", {"way_m": 55.1}, r"traffic.amplitude_m must be at most .* = 55, so .*, got 55.1; lower it"),
         ("starter", {"way_m": 90.0}, "lies on the trajectory's end; keep 95 m"),
         ("starter", {"share": 1.5}, "traffic.share must lie within 0 to 1, got 1.5"),
     ],

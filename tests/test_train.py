@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 
 from tests.nets import card_for, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -38,10 +38,10 @@ from uuv_marl.train.objective import objective
 from uuv_marl.train.ppo import Learner, annealed, gae
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows, Transition
 from uuv_marl.train.run import Trainer, resume, train
-from uuv_marl.train.training import Ppo, Training, told_by
-from uuv_marl.train.validation import VALIDATION_SEEDS, Judged, Worst, replay_command
+from uuv_marl.train.training import Ppo, Training, recipe_fields
+from uuv_marl.train.validation import VALIDATION_SEEDS, Validation, Worst, replay_command
 
-GOOD = Judged(1.0, 1.0, 0.0, 30.0, Worst("starter", 3, 900_000))
+GOOD = Validation(1.0, 1.0, 0.0, 30.0, Worst("starter", 3, 900_000))
 TINY = Ppo(horizon=8, minibatches=2)
 
 
@@ -77,7 +77,7 @@ class Toy:
     def _draw(self):
         self.observation = self._rng.uniform(-1, 1, (self.rows, self.size)).astype(np.float32)
 
-    def taught(self, action):
+    def query_expert(self, action):
         """The teacher does (x2, -x1), and lets the network act."""
         return self.observation[:, 1::-1] * np.array([1.0, -1.0], np.float32), action
 
@@ -145,7 +145,7 @@ def test_a_one_step_task_is_solved():
 def test_a_lesson_is_learned_whatever_pays():
     toy = Toy(lambda observation, action: 10.0 * observation[:, 0] * action[:, 0])
     learner = learner_for(toy, Ppo(horizon=8))
-    learner.teach(lesson=True)
+    learner.set_imitation(imitating=True)
     batch, _ = learner.sample(toy, 1e-3)
     assert (batch.action - batch.mean).abs().max() < 0.01  # the network acts
     for _ in range(120):
@@ -160,7 +160,7 @@ def test_a_pull_holds_at_the_teacher_against_what_pays(pull, near):
     """Half of what is seen pays, and the teacher swaps it."""
     toy = Toy(lambda observation, action: -np.square(action - observation[:, :2] * (0.5, -0.5)).sum(axis=1))
     learner = learner_for(toy, Ppo(horizon=8))
-    learner.teach(lesson=False, pull=pull)
+    learner.set_imitation(imitating=False, pull=pull)
     for _ in range(150):
         learner.update(learner.sample(toy, 0.2)[0], 0.2, 3e-3)
     x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)
@@ -206,10 +206,10 @@ def test_a_memory_is_trained_from_where_it_was():
     learner = learner_for(problem, Ppo(horizon=8), Architecture(memory=True, hidden=(8,)))
     for _ in range(2):
         batch, _ = learner.sample(problem, 0.3)
-        mean, states = learner.actor.through(batch.observation[:, :, :2], batch.state, batch.goes_on)
+        mean, states = learner.actor.through(batch.observation[:, :, :2], batch.state, batch.continues)
         np.testing.assert_allclose(mean.detach().reshape(8, 64, 2), batch.mean, atol=1e-6)
     np.testing.assert_allclose(states[-64:].detach(), learner.state, atol=1e-6)
-    assert not batch.goes_on.bool().all()
+    assert not batch.continues.bool().all()
 
 
 class Mixed(Toy):
@@ -284,12 +284,12 @@ def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
     """Nothing else is charged, and each contact that begins by as much."""
     crowd = Training(scenario="starter", sizes=[(12, 4)], ppo=TINY)
     plain, charged, found = rows_for(crowd), rows_for(crowd), 0
-    charged.charge(7.0)
+    charged.set_collision_cost(7.0)
     rng = np.random.default_rng(0)
     for _ in range(60):
         action = rng.uniform(-1.0, 1.0, (48, 2)).astype(np.float32)
         less = plain.step(action).reward - charged.step(action).reward
-        contacts = charged.groups[0].env.swarm.facts.contacts.ravel()
+        contacts = charged.groups[0].env.swarm.facts.vehicle_collisions.ravel()
         np.testing.assert_allclose(less, 7.0 * contacts, atol=1e-4)
         found += contacts.sum()
     assert found > 0
@@ -331,26 +331,26 @@ NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
     ("told", "cost"),
     [
         ({}, (1.0, 300.0)),
-        ({"scenario": "few_informed", "reward": "led"}, (1.0, 300.0)),
+        ({"scenario": "few_informed", "reward": "leader"}, (1.0, 300.0)),
         ({"reward": "own_task:mine"}, (0.0, 0.0)),
         ({"overrides": {"task": "own_task:Mine"}}, (0.0, 0.0)),
         ({"overrides": {"task": "own_task:Mine"}, "also": ["starter"]}, (0.0, 0.0)),
         ({"overrides": {"task": NEARER}}, (0.0, 0.0)),
-        ({"overrides": {"task": NEARER}, "ppo": {"contact_cost": (2.0, 5.0)}}, (2.0, 5.0)),
-        ({"ppo": {"contact_cost": (0.0, 0.0)}}, (0.0, 0.0)),
+        ({"overrides": {"task": NEARER}, "ppo": {"collision_cost": (2.0, 5.0)}}, (2.0, 5.0)),
+        ({"ppo": {"collision_cost": (0.0, 0.0)}}, (0.0, 0.0)),
     ],
 )
 def test_contacts_cost_nothing_beyond_a_reward_of_ones_own(told, cost, own_task):
     training = Training(**told)
-    assert training.ppo.contact_cost == cost
+    assert training.ppo.collision_cost == cost
     assert Training(**json.loads(training.model_dump_json())) == training
     assert ("contact that begins costs" in objective(training)) == (cost[1] > 0.0)
 
 
 def test_a_training_begins_with_its_whole_objective(tmp_path, own_task, no_validation):
     said = []
-    list(train(tmp_path / "a", small(steps=1, teacher="scout", lesson=0.3, pull=2.0), say=said.append))
-    assert said[1] == objective(small(teacher="scout", lesson=0.3, pull=2.0))
+    list(train(tmp_path / "a", small(steps=1, expert="scout", lesson=0.3, pull=2.0), say=said.append))
+    assert said[1] == objective(small(expert="scout", lesson=0.3, pull=2.0))
     for part in (
         "Reward dense of task follow on starter\n  tracking: -0.1 · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's",
         "\n  arrival: +20 for every vehicle",
@@ -428,7 +428,7 @@ def test_rows_act_as_the_policy_will(beside, tmp_path):
 def test_a_teacher_is_told_what_was_done_and_acts_as_it_would_alone(beside):
     """It says what it would do; where it teaches, that is done; its memory is that of one who did what was done."""
     brief = {"time_limit.factor": 0.001, "time_limit.extra_s": 3.0}
-    told = {"scenario": "starter", **beside, "teacher": "scout"}
+    told = {"scenario": "starter", **beside, "expert": "scout"}
     training = Training(sizes=[(4, 2)], ppo=TINY, **{**told, "overrides": told.get("overrides", {}) | brief})
     seeds, taken = itertools.count(100_000), []
     env = Rows(training, lambda num: [next(seeds) for _ in range(num)])
@@ -439,7 +439,7 @@ def test_a_teacher_is_told_what_was_done_and_acts_as_it_would_alone(beside):
     for _ in range(16):
         group._teaches[:] = True, False
         expected = alone.act(group.env.swarm.percept).copy()
-        said, done = env.taught(np.full((env.rows, 2), 0.3, np.float32))
+        said, done = env.query_expert(np.full((env.rows, 2), 0.3, np.float32))
         np.testing.assert_array_equal(said, expected.reshape(-1, 2))
         np.testing.assert_array_equal(done, [*said[:4], *np.full((4, 2), np.float32(0.3))])
         env.step(done)
@@ -450,24 +450,24 @@ def test_a_teacher_is_told_what_was_done_and_acts_as_it_would_alone(beside):
 
 
 def test_a_teacher_that_lacks_what_it_needs_is_named(tmp_path):
-    for teacher, scenario, why in [
+    for expert, scenario, why in [
         ("scoot", "starter", "unknown; did you mean 'scout'"),
         ("orca_informed", "starter", "link"),
     ]:
-        with pytest.raises(TrainingError, match=f"teacher = '{teacher}' can't teach on {scenario}: .*{why}"):
-            list(train(tmp_path / "a", Training(scenario=scenario, teacher=teacher, steps=100)))
+        with pytest.raises(TrainingError, match=f"teacher = '{expert}' can't teach on {scenario}: .*{why}"):
+            list(train(tmp_path / "a", Training(scenario=scenario, expert=expert, steps=100)))
         assert not (tmp_path / "a" / "config.json").exists()
 
 
 def test_fewer_and_fewer_worlds_are_the_teachers():
-    training = Training(scenario="starter", sizes=[(1, 400)], teacher="random", overrides={"time_limit.factor": 0.001})
+    training = Training(scenario="starter", sizes=[(1, 400)], expert="random", overrides={"time_limit.factor": 0.001})
     drawn = np.random.default_rng(0)
     env = Rows(training, lambda num: drawn.integers(*TRAINING_SEEDS, num))
     for share in (1.0, 0.6, 0.0, -0.3):
-        env.teach(share)
+        env.set_imitation(share)
         ended = np.zeros(env.rows, np.bool_)
         while not ended.all():
-            env.taught(np.zeros((env.rows, 2), np.float32))
+            env.query_expert(np.zeros((env.rows, 2), np.float32))
             came = env.step(np.zeros((env.rows, 2), np.float32))
             ended |= came.terminated | came.truncated
         assert abs(env.groups[0]._teaches.mean() - max(share, 0.0)) < 0.1
@@ -475,7 +475,7 @@ def test_fewer_and_fewer_worlds_are_the_teachers():
 
 def test_rewards_count_after_the_lesson(tmp_path, no_validation):
     """In a lesson of nine tenths the network is far from who acts, the teacher; then PPO is near itself."""
-    fields = {"scenario": "starter", "sizes": [(4, 2)], "steps": 20 * 64, "lesson": 0.9, "teacher": "scout"}
+    fields = {"scenario": "starter", "sizes": [(4, 2)], "steps": 20 * 64, "lesson": 0.9, "expert": "scout"}
     records = list(train(tmp_path, Training(ppo=TINY, **fields)))
     assert len(records) == 20
     after = [record.kl for record in records[18:]]
@@ -484,8 +484,8 @@ def test_rewards_count_after_the_lesson(tmp_path, no_validation):
 
 def test_after_the_lesson_the_network_acts_and_is_told_what_the_teacher_would_do():
     """In worlds that began while the teacher acted, too."""
-    trainer = Trainer(Training(scenario="starter", sizes=[(4, 2)], ppo=TINY, teacher="scout", lesson=0.0, pull=2.0))
-    trainer.learner.teach(lesson=False, pull=2.0)
+    trainer = Trainer(Training(scenario="starter", sizes=[(4, 2)], ppo=TINY, expert="scout", lesson=0.0, pull=2.0))
+    trainer.learner.set_imitation(imitating=False, pull=2.0)
     batch, _ = trainer.learner.sample(trainer.rows, 1e-3)
     assert (batch.action - batch.mean).abs().max() < 0.01
     assert (batch.action - batch.told).abs().mean() > 0.1
@@ -561,37 +561,37 @@ def rows(folder):
         {"filter": True},
         {"around": "random"},
         {"around": "scout"},
-        {"teacher": "scout", "lesson": 0.3},
-        {"teacher": "scout", "lesson": 0.3, "pull": 2.0},
+        {"expert": "scout", "lesson": 0.3},
+        {"expert": "scout", "lesson": 0.3, "pull": 2.0},
     ],
     ids=["gru", "sectors", "filter", "random", "scout", "lesson", "pull"],
 )
 def test_a_resumed_training_equals_an_uninterrupted_one(kind, tmp_path, no_validation):
     """Bit for bit: weights, optimiser, memories, worlds and random numbers; stopped after a checkpoint, and between."""
     kind = {"validations": 1, **kind}
-    records = list(train(tmp_path / "whole", small(**kind)))
+    records = list(train(tmp_path / "swarm_success", small(**kind)))
     assert [record.iteration for record in records] == [1, 2, 3, 4, 5]
     for stop in (2, 3):
         begun(tmp_path / f"{stop}", stop, **kind)
         rest = list(resume(tmp_path / f"{stop}"))
         assert [record.iteration for record in rest] == [3, 4, 5]
         assert [record.reward for record in rest] == [record.reward for record in records[2:]]
-        assert files(tmp_path / f"{stop}") == files(tmp_path / "whole")
+        assert files(tmp_path / f"{stop}") == files(tmp_path / "swarm_success")
     assert [row["iteration"] for row in rows(tmp_path / "3")] == ["1", "2", "3", "4", "5"]
     assert (tmp_path / "3" / "curve.png").is_file()
-    assert list(resume(tmp_path / "whole")) == []
+    assert list(resume(tmp_path / "swarm_success")) == []
 
 
 def test_a_finished_training_goes_on_to_more_steps_as_it_ended(tmp_path, no_validation):
     """Noise and rates stay what they were at its end; stopped and resumed it is the same bit for bit."""
     assert annealed((0.4, 0.1), 1.5) == annealed((0.4, 0.1), 1.0)
-    assert len(list(train(tmp_path / "whole", small(steps=2 * 168)))) == 2
-    rest = list(resume(tmp_path / "whole", 5 * 168))
+    assert len(list(train(tmp_path / "swarm_success", small(steps=2 * 168)))) == 2
+    rest = list(resume(tmp_path / "swarm_success", 5 * 168))
     assert [record.iteration for record in rest] == [3, 4, 5]
     list(train(tmp_path / "parts", small(steps=2 * 168)))
     for steps in (4, 5):
         list(resume(tmp_path / "parts", steps * 168))
-    assert files(tmp_path / "parts") == files(tmp_path / "whole")
+    assert files(tmp_path / "parts") == files(tmp_path / "swarm_success")
     assert json.loads((tmp_path / "parts" / "config.json").read_text())["training"]["steps"] == 2 * 168
     assert TrainingFolder(tmp_path / "parts", None).until == 5 * 168
     for until in (0.0, math.nan, math.inf):
@@ -632,7 +632,7 @@ def test_the_starter_scenario_is_learned_in_seconds(tmp_path):
     """From nothing to arrival: after 328,000 agent-steps 15 of 16 swarms were seen to arrive without a contact."""
     list(train(tmp_path / "a", Training(scenario="starter", steps=400_000, validations=1, validation_episodes=1)))
     policy = str(tmp_path / "a" / "best")
-    runs = evaluate(granted(policy, load_scenario("starter")), policy, range(10))
+    runs = evaluate(with_policy_requirements(policy, load_scenario("starter")), policy, range(10))
     assert sum(run.metrics["task_time_s"] is not None for run in runs if isinstance(run, Run)) >= 7
 
 
@@ -721,7 +721,7 @@ def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
     weights = {name: 0.1 * array for name, array in tensors(card).items()}
     save_checkpoint(expert / WEIGHTS_FILE, card, weights)
     for k, name in enumerate((f"{expert}", f"guarded:{expert}")):
-        begun(tmp_path / f"{k}", 3, teacher=name)
+        begun(tmp_path / f"{k}", 3, expert=name)
     shutil.copytree(tmp_path / "0", tmp_path / "same")
     assert list(resume(tmp_path / "same"))
     save_checkpoint(expert / WEIGHTS_FILE, card, {name: 2.0 * array for name, array in weights.items()})
@@ -744,14 +744,14 @@ def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
 def test_a_training_that_is_told_to_stop_ends_with_a_checkpoint(tmp_path, no_validation):
     """After the iteration under way, and a resume goes on exactly, though no checkpoint was due."""
     stop = 3
-    list(train(tmp_path / "whole", small()))
+    list(train(tmp_path / "swarm_success", small()))
     asked, said = iter(range(1, 9)), []
     first = list(train(tmp_path / "a", small(), stop=lambda: next(asked) == stop))
     assert [record.iteration for record in first] == list(range(1, stop + 1))
     rest = list(resume(tmp_path / "a", say=said.append))
     assert [record.iteration for record in rest] == list(range(stop + 1, 6))
     assert said[0] == f"going on from iteration {stop}, {168 * stop:,} agent-steps"
-    assert files(tmp_path / "a") == files(tmp_path / "whole")
+    assert files(tmp_path / "a") == files(tmp_path / "swarm_success")
 
 
 def test_a_first_start_that_was_cut_off_can_be_started_again(tmp_path, no_validation):
@@ -802,7 +802,7 @@ def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
 
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
 def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_path, no_validation, monkeypatch):
-    list(train(tmp_path / "whole", small(validations=1)))
+    list(train(tmp_path / "swarm_success", small(validations=1)))
     first = train(tmp_path / "a", small(validations=1))
     for _ in range(3):
         next(first)
@@ -813,7 +813,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_pa
             next(first)
     assert sorted(path.name for path in (tmp_path / "a" / "checkpoints").iterdir()) == ["000002", "000004.partial"]
     assert [record.iteration for record in resume(tmp_path / "a")] == [3, 4, 5]
-    assert files(tmp_path / "a") == files(tmp_path / "whole")
+    assert files(tmp_path / "a") == files(tmp_path / "swarm_success")
 
 
 @pytest.fixture(scope="module")
@@ -885,10 +885,10 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
     assert Training(scenario="starter", around="scout,preset=wary").loaded.actuators.yaw_damping_nms == 600.0
     (tmp_path / "mine.toml").write_text('extends = "random_field"\n[swarm]\nnum_vehicles = 20\n')
     (tmp_path / "recipe.toml").write_text('scenario = "hard_water"\n[ppo]\ngamma = 0.98\n')
-    mine = Training(**told_by(str(tmp_path / "mine.toml")))
+    mine = Training(**recipe_fields(str(tmp_path / "mine.toml")))
     assert [(part.vehicles, part.worlds) for part in mine.parts] == [(20, 32)]
-    assert Training(**told_by(str(tmp_path / "recipe.toml"))).ppo.gamma == 0.98
-    assert told_by("starter") == {"scenario": "starter"}
+    assert Training(**recipe_fields(str(tmp_path / "recipe.toml"))).ppo.gamma == 0.98
+    assert recipe_fields("starter") == {"scenario": "starter"}
 
 
 @pytest.mark.parametrize(
@@ -901,7 +901,7 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
         ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         (
-            {"around": "scout", "teacher": "scout"},
+            {"around": "scout", "expert": "scout"},
             "teacher 'scout' and around 'scout' are both given; leave one out",
         ),
         (
@@ -931,9 +931,9 @@ def test_what_is_written_is_what_was_told():
 def test_a_file_that_is_no_recipe_is_named(tmp_path):
     (tmp_path / "bad.toml").write_text("steps = \n", encoding="utf-8")
     with pytest.raises(TrainingError, match=r"bad.toml is no TOML"):
-        told_by(str(tmp_path / "bad.toml"))
+        recipe_fields(str(tmp_path / "bad.toml"))
     with pytest.raises(TrainingError, match=r"gone.toml can't be read \(No such file or directory\); give"):
-        told_by(str(tmp_path / "gone.toml"))
+        recipe_fields(str(tmp_path / "gone.toml"))
 
 
 # --- The command ---
@@ -1064,7 +1064,7 @@ SETTINGS = {
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Files of a training that nothing outside has changed."""
-    folder = tmp_path_factory.mktemp("whole") / "a"
+    folder = tmp_path_factory.mktemp("swarm_success") / "a"
     with pytest.MonkeyPatch.context() as patch, trainings.fixed_torch():
         patch.setattr(trainings, "validate", lambda *_: GOOD)
         list(train(folder, small()))
@@ -1093,7 +1093,7 @@ def test_what_others_set_in_the_middle_of_a_training_changes_nothing(whole, tmp_
     assert files(tmp_path / "a") == whole
 
 
-@pytest.mark.parametrize("end", ["whole", "closed", "error"])
+@pytest.mark.parametrize("end", ["swarm_success", "closed", "error"])
 def test_a_training_gives_global_state_back(end, tmp_path, no_validation):
     torch.set_num_threads(2)
     before = global_state()
@@ -1104,7 +1104,7 @@ def test_a_training_gives_global_state_back(end, tmp_path, no_validation):
         return False
 
     records = train(tmp_path, small(), stop=stop)
-    if end == "whole":
+    if end == "swarm_success":
         assert list(records)
     elif end == "closed":
         next(records)

@@ -5,11 +5,11 @@ import pytest
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.maps.ways import WayGrid, free_cells
+from uuv_marl.tasks.maps.grid_paths import MapGrid, free_cells
 
 TIERS = ("two_swarms_easy", "two_swarms", "two_swarms_hard")
 TUNING = 10_000
@@ -25,8 +25,8 @@ def framed(swarm, w):
     turn = np.array([[c, -s], [s, c]])
     return (
         swarm.state.eta[w, :, :2] @ turn,
-        swarm.course.waypoints[w, :, 1] @ turn,
-        swarm.course.obstacles[w, : swarm.course.num_obstacles[w], :2] @ turn,
+        swarm.world_map.waypoints[w, :, 1] @ turn,
+        swarm.world_map.obstacles[w, : swarm.world_map.num_obstacles[w], :2] @ turn,
     )
 
 
@@ -52,10 +52,10 @@ def test_the_gap_is_the_only_way_and_as_wide_as_its_numbers(tier):
     """By SciPy's labels: the two sides meet through the gap, and no more once the gap is shut."""
     swarm = waters(6, tier)
     swarm.reset(TUNING)
-    grid, hull = WayGrid(-260.0, -160.0, 208, 128), swarm.scenario.contact.hull_radius_m
+    grid, hull = MapGrid(-260.0, -160.0, 208, 128), swarm.scenario.collision.hull_radius_m
     for w in range(6):
         place, goal, middles = framed(swarm, w)
-        radius = swarm.course.obstacles[w, : len(middles), 2]
+        radius = swarm.world_map.obstacles[w, : len(middles), 2]
         discs, at = np.column_stack([middles, radius]), swarm.task.memory.gap[w]
         wall = discs[(np.abs(middles[:, 0]) < 1e-6) & (radius == swarm.task.numbers.radius_m)]
         below, above = wall[wall[:, 1] < at], wall[wall[:, 1] > at]
@@ -88,13 +88,13 @@ def test_a_map_depends_on_its_seed_alone():
 
 def test_percepts_turn_with_a_map():
     """What is told of the way, too."""
-    swarm = waters(**{"sonar.channels": ["way"]})
+    swarm = waters(**{"sonar.channels": ["path"]})
     swarm.reset(TUNING)
     rng = np.random.default_rng(0)
     swarm.state.eta[0, :, :2] *= rng.uniform(0.3, 1.0, (40, 1))
     before, angle = swarm.observe().flat.copy(), 0.7
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    places = (swarm.state.eta[0, :, :2], swarm.course.obstacles[0, :, :2], swarm.course.waypoints[0])
+    places = (swarm.state.eta[0, :, :2], swarm.world_map.obstacles[0, :, :2], swarm.world_map.waypoints[0])
     for each in places:
         each[...] = each @ turn
     swarm.state.eta[0, :, 2] += angle
@@ -105,7 +105,7 @@ def test_percepts_turn_with_a_map():
 def test_each_vehicles_reference_is_its_own_goal():
     swarm = waters(2)
     percept = swarm.reset(TUNING)
-    goals = swarm.course.waypoints[:, :, 1]
+    goals = swarm.world_map.waypoints[:, :, 1]
     np.testing.assert_array_equal(swarm.own_reference[:, :, :2], goals)
     np.testing.assert_allclose(
         np.hypot(*np.moveaxis(percept["reference"], -1, 0)),
@@ -115,27 +115,27 @@ def test_each_vehicles_reference_is_its_own_goal():
     swarm.state.eta[0, 3, :2] = goals[0, 3]
     swarm.state.eta[0, 4, :2] = goals[0, 5]  # another's
     swarm.observe()
-    assert np.flatnonzero(swarm.task.there()[0]).tolist() == [3]
+    assert np.flatnonzero(swarm.task.at_goal()[0]).tolist() == [3]
 
 
 def test_success_is_untouched_and_there_and_the_episode_ends_when_all_are_there():
     batch = BatchedEnv(load_scenario("two_swarms_easy"))
     batch.reset(TUNING)
     swarm, task = batch.swarm, batch.task
-    swarm.state.eta[0, :, :2] = swarm.course.waypoints[0, :, 1]
+    swarm.state.eta[0, :, :2] = swarm.world_map.waypoints[0, :, 1]
     swarm.state.eta[0, 0, :2] += (task.numbers.near_m + 1.0) * np.array([1.0, 0.0])
     swarm.state.nu[0] = 0.0
     swarm.observe()
-    swarm.state.touched[0, 2] = True
+    swarm.state.collided[0, 2] = True
     result = batch.step(np.zeros((1, 20, 2)))
     assert not result.world_terminated[0]
     assert task.metrics(0)["untouched_share"] == 18 / 20
     assert task.metrics(0)["whole_ratio"] is None
-    swarm.state.eta[0, 0, :2] = swarm.course.waypoints[0, 0, 1]
+    swarm.state.eta[0, 0, :2] = swarm.world_map.waypoints[0, 0, 1]
     result = batch.step(np.zeros((1, 20, 2)))
     assert result.world_terminated[0]
     measured = task.metrics(0)
-    assert (measured["untouched_share"], measured["whole"]) == (19 / 20, 0.0)
+    assert (measured["untouched_share"], measured["swarm_success"]) == (19 / 20, 0.0)
     assert measured["whole_ratio"] == pytest.approx(1.0 / task.memory.best_s[0].max())  # two decisions of 0.5 s
 
 
@@ -151,22 +151,22 @@ def test_the_straight_way_is_that_through_the_gaps_middle():
 
 
 def test_one_group_has_its_turn_once_the_other_is_through():
-    swarm = waters(**{"sonar.channels": ["way"]})
+    swarm = waters(**{"sonar.channels": ["path"]})
     percept = swarm.reset(TUNING)
     first = swarm.task.memory.side[0] > 0.0
-    assert (percept["way_turn"][0, :, 0] == first).all()
-    swarm.state.eta[0, first, :2] = swarm.course.waypoints[0, first, 1]
+    assert (percept["right_of_way"][0, :, 0] == first).all()
+    swarm.state.eta[0, first, :2] = swarm.world_map.waypoints[0, first, 1]
     last = int(np.flatnonzero(first)[0])
     swarm.state.eta[0, last, :2] = 0.0
-    assert (swarm.observe()["way_turn"][0, :, 0] == first).all()
-    swarm.state.touched[0, last] = True  # it has failed: nobody waits for it
+    assert (swarm.observe()["right_of_way"][0, :, 0] == first).all()
+    swarm.state.collided[0, last] = True  # it has failed: nobody waits for it
     swarm._tell(np.ones(1, np.bool_))
-    assert (percept["way_turn"] == 1.0).all()
+    assert (percept["right_of_way"] == 1.0).all()
 
 
 @pytest.mark.parametrize("tier", TIERS)
 def test_the_oracle_passes(tier):
-    scenario = granted("oracle", load_scenario(tier))
+    scenario = with_policy_requirements("oracle", load_scenario(tier))
     batch, policy = BatchedEnv(scenario, 4), make("oracle", scenario, 4)
     batch.reset(TUNING)
     while not batch.over.all():
@@ -184,7 +184,7 @@ def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
     for k in range(11):
         swarm.state.nu[:] = 0.0
         there = slice(0, 1) if k < 10 else slice(None)
-        swarm.state.eta[0, there, :2] = swarm.course.waypoints[0, there, 1]
+        swarm.state.eta[0, there, :2] = swarm.world_map.waypoints[0, there, 1]
         result = batch.step(np.zeros((1, 20, 2)))
         paid += result.terms["stay"][0]
     assert result.world_terminated[0]
@@ -196,7 +196,7 @@ def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
     ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
      "task.half_width_m = 120, got 128"),
     ({"task.gap_m": [20.0, 10.0]}, r"task.gap_m must be \[low, high\] with low <= high"),
-    ({"task.gap_m": [1.0, 2.0]}, r"task.gap_m must be above 2, two times contact.hull_radius_m, got \[1.0, 2.0\]"),
+    ({"task.gap_m": [1.0, 2.0]}, r"task.gap_m must be above 2, two times collision.hull_radius_m, got \[1.0, 2.0\]"),
     ({"task.apart_m": 30.0}, "task.apart_m must be at least .*, so that groups .* m long start before the wall"),
     ({"start.width_m": 210.0}, "the groups must start in the water of task 'two_swarms'"),
 ])  # fmt: skip
@@ -209,13 +209,13 @@ def test_a_carrot_is_ahead_at_its_speed_and_to_starboard_and_ends_at_the_goal():
     scenario = load_scenario("two_swarms")
     swarm, policy = Swarm(scenario), make("carrot,right_m=7,ahead_m=6,speed=3", scenario)
     swarm.reset(TUNING)
-    swarm.state.eta[0, 0, :2] = swarm.course.waypoints[0, 0, 1] + (3.0, 0.0)
+    swarm.state.eta[0, 0, :2] = swarm.world_map.waypoints[0, 0, 1] + (3.0, 0.0)
     percept = swarm.observe()
-    led, goal = policy.led(percept), percept["reference"].astype(float)
-    np.testing.assert_array_equal(led["reference"][0, 0], percept["reference"][0, 0])
-    assert (led["reference_velocity"][0, 0] == 0.0).all()
+    with_carrot, goal = policy.with_carrot(percept), percept["reference"].astype(float)
+    np.testing.assert_array_equal(with_carrot["reference"][0, 0], percept["reference"][0, 0])
+    assert (with_carrot["reference_velocity"][0, 0] == 0.0).all()
     for i in range(1, 40):
-        at, moves, to = led["reference"][0, i], led["reference_velocity"][0, i], goal[0, i]
+        at, moves, to = with_carrot["reference"][0, i], with_carrot["reference_velocity"][0, i], goal[0, i]
         np.testing.assert_allclose([np.hypot(*at), np.hypot(*moves)], [6.0, 3.0], rtol=1e-5)
         aside = (to[0] * at[1] - to[1] * at[0]) / np.hypot(*to) / 6.0  # sine of the angle to starboard
         np.testing.assert_allclose(aside, 7.0 / np.hypot(7.0, np.hypot(*to)), rtol=1e-4)

@@ -212,10 +212,10 @@ def test_solo_passes_gymnasiums_check(scenario_name):
 @pytest.mark.parametrize("others", ["bio_inspired", "sdc", "random"])
 def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
     """The learner's action and the policy's for all others give the run of ``parallel_env``, bit for bit."""
-    losses = {"disturbance.loss_times_s": [2.0, 3.0]} if scenario_name == "lossy" else {}
+    losses = {"losses.times_s": [2.0, 3.0]} if scenario_name == "lossy" else {}
     scenario = uuv_marl.load_scenario(scenario_name, num_vehicles=6, overrides={**SHORT, **losses})
     env = solo(others, scenario=scenario, num_vehicles=None, info_terms=True)
-    whole = uuv_marl.parallel_env(baselines.granted(others, scenario), info_terms=True)
+    whole = uuv_marl.parallel_env(baselines.with_policy_requirements(others, scenario), info_terms=True)
     policy = baselines.make(others, whole)
     rng = np.random.default_rng(0)
     observation, _ = env.reset(seed=8)

@@ -9,7 +9,7 @@ from uuv_marl import load_scenario
 from uuv_marl.benchmark.style import BLUE, ORANGE, house_style, panels, save
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps import KINDS
-from uuv_marl.tasks.maps.ways import CELL_M, distances, free_cells
+from uuv_marl.tasks.maps.grid_paths import CELL_M, distances, free_cells
 
 ROOT = Path(__file__).resolve().parent.parent
 SEED = 10_000
@@ -45,11 +45,11 @@ def main() -> None:
         figure, axes = panels(len(KINDS) + 1, 4, (2.6, 1.6), sharex=True, sharey=True)
         for kind, ax in zip(KINDS, axes, strict=False):
             swarm = Swarm(load_scenario("hard_water", overrides={"task.kinds": [kind]}))
-            made = swarm.task.draw_map(np.random.default_rng(SEED))
-            for x, y, radius in made.discs:
+            sampled = swarm.task.sample_map(np.random.default_rng(SEED))
+            for x, y, radius in sampled.discs:
                 ax.add_patch(Circle((x, y), radius, color="0.55"))
-            ax.plot(*way(made.discs, made.length, swarm.task).T, color=BLUE)
-            ax.plot([0.0, made.length], [0.0, 0.0], "o", color=ORANGE)
+            ax.plot(*way(sampled.discs, sampled.length, swarm.task).T, color=BLUE)
+            ax.plot([0.0, sampled.length], [0.0, 0.0], "o", color=ORANGE)
             ax.set(title=kind, xlim=(-100.0, 490.0), ylim=(-130.0, 130.0), aspect="equal")
         for ax in axes[len(KINDS) :]:
             ax.set_axis_off()

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "gallery"
 SIZE, LASTS_S, COLUMNS = (440, 520), 5.0, 3
 """Of a film [px], how long it runs [s], and how many stand side by side."""
-_TOLD = tomllib.loads(Path(__file__).with_name("gallery.toml").read_text(encoding="utf-8"))
+_DATA = tomllib.loads(Path(__file__).with_name("gallery.toml").read_text(encoding="utf-8"))
 
 
 class Film(NamedTuple):
@@ -38,7 +38,7 @@ class Film(NamedTuple):
         return "-".join(filter(None, (self.scenario, self.kind)))
 
 
-FILMS = [Film(**told) for told in _TOLD["film"]]
+FILMS = [Film(**table) for table in _DATA["film"]]
 
 
 def page() -> str:
@@ -49,7 +49,7 @@ def page() -> str:
     ]
     rows = [" | ".join(cells[k : k + COLUMNS]) for k in range(0, len(cells), COLUMNS)]
     head = f"| {' | '.join([' '] * COLUMNS)} |\n|{' --- |' * COLUMNS}\n"
-    return f"# Gallery\n{_TOLD['text']}\n\n{head}" + "".join(f"| {row} |\n" for row in rows)
+    return f"# Gallery\n{_DATA['text']}\n\n{head}" + "".join(f"| {row} |\n" for row in rows)
 
 
 def main() -> None:

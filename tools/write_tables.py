@@ -71,7 +71,7 @@ def benchmark() -> str:
                 f"{Decimal(obstacle):.1f} m, {Decimal(spacing):.1f} m"  # what ends in 5 was rounded before: to even
             )
             lines.append((name, f"{time.split()[0]} s", closest, collisions, *shares(policy)))
-    lines += [(told, "–", "–", "–", *shares(policy)) for policy, told in IN_TASKS.items()]
+    lines += [(requirements, "–", "–", "–", *shares(policy)) for policy, requirements in IN_TASKS.items()]
     heads = ("one obstacle: time", "to the obstacle, to a vehicle", "collisions", "hard water", "two swarms")
     return table(("policy, and what it gets beyond sonar", *heads), lines)
 
@@ -99,9 +99,9 @@ def scenarios() -> str:
 def tasks() -> list[tuple[str, ...]]:
     """Every task that ships: its name, what it is, its numbers with their values."""
     return [
-        (f"`{name}`", (made.__doc__ or "").splitlines()[0],
-         ", ".join(f"`{field}`" for field in made.Numbers.model_fields) or "none")
-        for name, made in ((name, task_class(name)) for name in TASKS)
+        (f"`{name}`", (task.__doc__ or "").splitlines()[0],
+         ", ".join(f"`{field}`" for field in task.Numbers.model_fields) or "none")
+        for name, task in ((name, task_class(name)) for name in TASKS)
     ]  # fmt: skip
 
 
@@ -125,7 +125,7 @@ def filled() -> dict[str, str]:
         "env": env, "scenario": scenario, "agents": agents, "last": agents[-1],
         "action": env.action_space(agents[0]), "observation": env.observation_space(agents[0]),
         "render_modes": ", ".join(f"`{mode}`" for mode in env.metadata["render_modes"]),
-        "terms": table(("term", "value", "weight w"), terms), "hulls": 2 * scenario.contact.hull_radius_m,
+        "terms": table(("term", "value", "weight w"), terms), "hulls": 2 * scenario.collision.hull_radius_m,
     }  # fmt: skip
     return dict(MARKED.findall(text.format(**values)))
 
@@ -151,8 +151,8 @@ TABLES = filled() | {
 
 def written(page: Path) -> str:
     """A page with every marked table written anew."""
-    anew = lambda found: f"<!-- {found[1]} -->\n{TABLES[found[1]]}\n<!-- /{found[1]} -->"  # noqa: E731
-    return MARKED.sub(anew, page.read_text(encoding="utf-8"))
+    filled_table = lambda found: f"<!-- {found[1]} -->\n{TABLES[found[1]]}\n<!-- /{found[1]} -->"  # noqa: E731
+    return MARKED.sub(filled_table, page.read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -68,15 +68,15 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
     Raises:
         ResultsError: another block has the folder, in this process or another, or it can't be written.
     """
-    lock, owner, made = FileLock(folder / _LOCK), folder / _OWNER, not folder.exists()
+    lock, owner, is_new = FileLock(folder / _LOCK), folder / _OWNER, not folder.exists()
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         try:
             lock.acquire(timeout=wait_s)
         except Timeout:
-            by = owner.read_text(encoding="utf-8") if owner.exists() else "another command"
+            opener = owner.read_text(encoding="utf-8") if owner.exists() else "another command"
             raise ResultsError(
-                f"{folder} is in use by {by}; wait until it has ended, or give another --output"
+                f"{folder} is in use by {opener}; wait until it has ended, or give another --output"
             ) from None
     try:
         since = time.strftime("%Y-%m-%d %H:%M:%S")
@@ -85,6 +85,6 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
     finally:
         owner.unlink(missing_ok=True)
         lock.release()
-        if made and {path.name for path in folder.iterdir()} <= {_LOCK}:  # the block failed before it wrote anything
+        if is_new and {path.name for path in folder.iterdir()} <= {_LOCK}:  # the block failed before it wrote anything
             (folder / _LOCK).unlink(missing_ok=True)
             folder.rmdir()

@@ -62,7 +62,7 @@ def _sonar(sectors: int, active: int) -> Table:
         PerceptField("yaw_rate", (1,), YAW_RATE, "own yaw rate"),
         PerceptField("reference", (2,), POSITION, "vector to the reference point l(t); a longer one is cut to 4096 m"),
         PerceptField("reference_velocity", (2,), SPEED, "velocity of the reference point"),
-        PerceptField("heard", (sectors,), FLAG, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
+        PerceptField("detected", (sectors,), FLAG, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
         PerceptField("neighbour", (sectors, 2), POSITION, "per sub-sector: that vehicle's position, else 0"),
         PerceptField("echo", (active,), FLAG, "per active sub-sector: 1 if an obstacle returns an echo, else 0"),
         PerceptField(
@@ -122,15 +122,15 @@ CHANNELS = {
 @functools.cache
 def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = tuple(CHANNELS)) -> Table:
     """The fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
-    granted = (rows(num_sectors, num_active) for name, rows in CHANNELS.items() if name in channels)
-    return sum(granted, _sonar(num_sectors, num_active))
+    with_policy_requirements = (rows(num_sectors, num_active) for name, rows in CHANNELS.items() if name in channels)
+    return sum(with_policy_requirements, _sonar(num_sectors, num_active))
 
 
-def told_rows(scenario: Scenario) -> Table:
+def task_fields(scenario: Scenario) -> Table:
     """Rows that a scenario's task tells: those it always does, and those of its own channels that are granted."""
-    kind, granted = scenario.task_class, scenario.sonar.channels
+    kind, with_policy_requirements = scenario.task_class, scenario.sonar.channels
     rows: Table = kind.observed
-    return sum((own for name, own in kind.channels.items() if name in granted), rows)
+    return sum((own for name, own in kind.channels.items() if name in with_policy_requirements), rows)
 
 
 class Starts(NamedTuple):
@@ -140,7 +140,7 @@ class Starts(NamedTuple):
     yaw_rate: int
     reference: int
     reference_velocity: int
-    heard: int
+    detected: int
     neighbour: int
     echo: int
     echo_range: int
@@ -168,7 +168,7 @@ class PerceptLayout:
         """The layout that a scenario's sonar suite, channels and task make."""
         sonar = scenario.sonar
         own = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
-        return PerceptLayout(own + told_rows(scenario))
+        return PerceptLayout(own + task_fields(scenario))
 
     @functools.cached_property
     def size(self) -> int:

@@ -16,7 +16,7 @@
 import uuv_marl
 from uuv_marl import baselines
 
-scenario = baselines.granted("bio_inspired_plus", uuv_marl.load_scenario("starter"))
+scenario = baselines.with_policy_requirements("bio_inspired_plus", uuv_marl.load_scenario("starter"))
 print(scenario.title)
 print("yaw damping:", scenario.actuators.yaw_damping_nms, "N m s")
 
@@ -61,9 +61,9 @@ pd.DataFrame(rows, index=list(percept.names), columns=["first entry", "entries",
 # %%
 import numpy as np
 
-heard = percept["heard"] == 1.0
-ahead, starboard = percept["neighbour"][heard].T.astype(float)
-neighbours = pd.DataFrame({"ahead [m]": ahead, "to starboard [m]": starboard}, index=np.flatnonzero(heard))
+detected = percept["detected"] == 1.0
+ahead, starboard = percept["neighbour"][detected].T.astype(float)
+neighbours = pd.DataFrame({"ahead [m]": ahead, "to starboard [m]": starboard}, index=np.flatnonzero(detected))
 neighbours["distance [m]"] = np.hypot(ahead, starboard)
 neighbours.round(1)
 
@@ -144,8 +144,8 @@ except ScenarioError as error:
 
 # %% tags=["check"]
 assert len(observations["uuv_0"]) == 98
-assert len(heard) == 21
-assert 1 <= heard.sum() <= 4
+assert len(detected) == 21
+assert 1 <= detected.sum() <= 4
 assert infos["uuv_0"]["ending"] == "arrival"
 assert infos["uuv_0"]["collisions"] == 0
 assert 32.0 <= infos["uuv_0"]["time_s"] < 40.0

@@ -28,12 +28,12 @@ class Careful(baselines.Policy):
     yaw_damping_nms = 600.0  # an inner loop that brakes turns
 
     def decide(self, percept):
-        heard = np.concatenate([percept["heard"], percept["echo"]], axis=-1)[..., None]
+        detected = np.concatenate([percept["detected"], percept["echo"]], axis=-1)[..., None]
         position = np.concatenate([percept["neighbour"], percept["echo_position"]], axis=-2)
         squared = np.maximum((position**2).sum(axis=-1, keepdims=True), 1.0)
-        away = -(heard * position / squared).sum(axis=-2)
-        wish = percept["reference_velocity"] + 0.2 * percept["reference"] + 40.0 * away
-        ahead, starboard = wish[..., 0], wish[..., 1]
+        away = -(detected * position / squared).sum(axis=-2)
+        desired = percept["reference_velocity"] + 0.2 * percept["reference"] + 40.0 * away
+        ahead, starboard = desired[..., 0], desired[..., 1]
         thrust, turn = np.clip(0.12 * ahead, 0.0, 1.0), 0.3 * np.arctan2(starboard, ahead)
         return np.stack([thrust, turn], axis=-1).astype(np.float32)
 

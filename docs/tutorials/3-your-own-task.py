@@ -37,14 +37,14 @@ class Rendezvous(Task):
         offset = self.swarm.state.eta[:, :, :2] - self.swarm.facts.centre[:, None]
         return np.linalg.norm(offset, axis=-1)
 
-    def there(self):  # which vehicles are where they should be, shape (world, vehicle)
+    def at_goal(self):  # which vehicles are where they should be, shape (world, vehicle)
         return self.away() <= self.numbers.near_m
 
     def done(self):  # in which worlds the episode ends, shape (world,)
-        return np.all(self.there(), axis=1)
+        return np.all(self.at_goal(), axis=1)
 
     def reward(self, running):  # the terms of the reward, shape (world, vehicle)
-        return {"away": -0.01 * self.away(), "collision": -10.0 * self.swarm.facts.contacts}
+        return {"away": -0.01 * self.away(), "collision": -10.0 * self.swarm.facts.vehicle_collisions}
 
     def marks(self, world):  # circles that a film shows: north, east and radius
         return np.array([[*self.swarm.facts.centre[world], self.numbers.near_m]])
@@ -54,11 +54,11 @@ class Join(baselines.Policy):
     """Goes slowly to the vehicles that it hears, and away from those that are near."""
 
     def decide(self, percept):
-        heard, position = percept["heard"][..., None], percept["neighbour"]
+        detected, position = percept["detected"][..., None], percept["neighbour"]
         squared = np.maximum((position**2).sum(axis=-1, keepdims=True), 1.0)
-        wish = (heard * position * (1.0 - 50.0 / squared)).sum(axis=-2)
-        turn = 0.3 * np.arctan2(wish[..., 1], wish[..., 0]) - 0.3 * percept["yaw_rate"][..., 0]
-        thrust = np.clip(0.005 * wish[..., 0], 0.0, 0.1)
+        desired = (detected * position * (1.0 - 50.0 / squared)).sum(axis=-2)
+        turn = 0.3 * np.arctan2(desired[..., 1], desired[..., 0]) - 0.3 * percept["yaw_rate"][..., 0]
+        thrust = np.clip(0.005 * desired[..., 0], 0.0, 0.1)
         return np.stack([thrust, turn], axis=-1).astype(np.float32)
 
 
@@ -79,10 +79,10 @@ import uuv_marl
 env = uuv_marl.parallel_env("starter", task="meet:Rendezvous")
 policy = Join(env.scenario)
 percept = env.swarm.reset(seed=1)
-print("there at the start:", env.swarm.task.there().sum(), "of", env.scenario.swarm.num_vehicles)
+print("there at the start:", env.swarm.task.at_goal().sum(), "of", env.scenario.swarm.num_vehicles)
 while not env.swarm.task.done()[0]:
     percept = env.swarm.step(policy.act(percept))
-print("there after", env.swarm.facts.time_s[0], "s:", env.swarm.task.there().sum())
+print("there after", env.swarm.facts.time_s[0], "s:", env.swarm.task.at_goal().sum())
 
 # %% [markdown]
 # ## In a table
@@ -122,8 +122,8 @@ Image("meet.gif", width=400)
 import uuv_marl.benchmark
 
 runs = uuv_marl.benchmark.load("results/meet").set_index("policy")
-whole = runs["whole"]
+whole = runs["swarm_success"]
 assert 6 <= whole["meet:Join"].sum() < 10
 assert runs.loc["meet:Join", "collisions"].sum() > 0
 assert whole["idle"].sum() == 0
-assert env.swarm.task.there().sum() == 5
+assert env.swarm.task.at_goal().sum() == 5

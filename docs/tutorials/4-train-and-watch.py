@@ -72,7 +72,7 @@ import uuv_marl.benchmark
 
 progress = pd.read_csv("runs/starter/progress.csv")
 assert progress["reward"][:3].mean() < progress["reward"].iloc[-5:].mean()
-assert progress["whole"].dropna().max() >= 0.8
+assert progress["swarm_success"].dropna().max() >= 0.8
 runs = uuv_marl.benchmark.load("results/trained").set_index("policy")
 assert runs.loc["runs/starter/best", "task_time_s"].notna().sum() >= 8
 assert runs.loc["runs/starter/best", "task_time_s"].median() < 50.0

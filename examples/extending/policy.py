@@ -15,7 +15,7 @@ Float32 = NDArray[np.float32]
 class Memory(NamedTuple):
     """What each vehicle keeps from decision to decision."""
 
-    wish: Annotated[Float32, "world vehicle 2", "Smoothed direction to the reference point, in the body frame [1]."]
+    desired: Annotated[Float32, "world vehicle 2", "Smoothed direction to the reference point, in the body frame [1]."]
 
 
 class Smooth(baselines.Policy):
@@ -27,15 +27,15 @@ class Smooth(baselines.Policy):
         """Take the new direction into the mean, in the worlds that have gone on."""
         to_reference = percept["reference"]
         length = np.maximum(np.linalg.norm(to_reference, axis=-1, keepdims=True), 1e-3)
-        self.memory.wish[worlds] += 0.2 * ((to_reference / length) - self.memory.wish)[worlds]
+        self.memory.desired[worlds] += 0.2 * ((to_reference / length) - self.memory.desired)[worlds]
 
     def decide(self, percept: Percept) -> Float32:
         """Shares of full force and torque, shape (world, vehicle, 2)."""
-        neighbour, heard = percept["neighbour"], percept["heard"][..., None]
+        neighbour, detected = percept["neighbour"], percept["detected"][..., None]
         squared = np.maximum((neighbour**2).sum(axis=-1, keepdims=True), 1.0)
-        away = -(heard * neighbour / squared).sum(axis=-2)
-        wish = self.memory.wish + 30.0 * away
-        turn = 0.3 * np.arctan2(wish[..., 1], wish[..., 0]) - 0.3 * percept["yaw_rate"][..., 0]
+        away = -(detected * neighbour / squared).sum(axis=-2)
+        desired = self.memory.desired + 30.0 * away
+        turn = 0.3 * np.arctan2(desired[..., 1], desired[..., 0]) - 0.3 * percept["yaw_rate"][..., 0]
         return np.stack([np.full_like(turn, 0.5), turn], axis=-1).astype(np.float32)
 
 

@@ -16,12 +16,12 @@ def close_and_careful(swarm: Swarm) -> NDArray[np.float64]:
     offset = swarm.state.eta[:, :, :2] - swarm.facts.reference[:, :1, :2]
     distance = np.linalg.norm(offset, axis=-1)
     near = np.minimum(swarm.facts.clearance, swarm.facts.spacing)
-    reward = -0.01 * distance - np.clip(1.0 - near / 5.0, 0.0, 1.0) - 10.0 * swarm.facts.contacts
+    reward = -0.01 * distance - np.clip(1.0 - near / 5.0, 0.0, 1.0) - 10.0 * swarm.facts.vehicle_collisions
     return np.where(swarm.state.alive, reward, 0.0)
 
 
 if __name__ == "__main__":
-    scenario = baselines.granted("bio_inspired_plus", uuv_marl.load_scenario("starter"))
+    scenario = baselines.with_policy_requirements("bio_inspired_plus", uuv_marl.load_scenario("starter"))
     env = uuv_marl.parallel_env(scenario, reward=close_and_careful)
     policy = baselines.make("bio_inspired_plus", env)
     observations, _ = env.reset(seed=0)

@@ -42,7 +42,7 @@ class Askew(BioInspiredPlus):
 
 
 if __name__ == "__main__":
-    scenario = baselines.granted("bio_inspired_plus", load_scenario("starter"))
+    scenario = baselines.with_policy_requirements("bio_inspired_plus", load_scenario("starter"))
     for degrees in (0.0, 20.0, 60.0):
         (run,) = [e for e in evaluate(scenario, "sensor:Askew", [0], degrees=degrees) if isinstance(e, Run)]
         time_s, away = run.metrics["task_time_s"] or float("nan"), run.metrics["min_obstacle_distance_m"]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import uuv_marl
 from uuv_marl.percept import FLAG, PerceptField
 from uuv_marl.scenario.fields import Positive, Section
-from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.tasks import Task
 
 Floats, Bool = NDArray[np.floating[Any]], NDArray[np.bool_]
@@ -25,24 +25,24 @@ class Rendezvous(Task):
     terms: ClassVar[Mapping[str, str]] = {"away": "-0.01/m for each decision", "collision": "-10 for each"}
     columns: ClassVar[Mapping[str, str]] = {"spread_m": "mean distance from the centre at the end [m]"}
 
-    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
         drawn = super().draw(world, rng)
         return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)))
 
     def _away(self) -> Floats:
         return np.hypot(*np.moveaxis(self.swarm.state.eta[:, :, :2] - self.swarm.facts.centre[:, None], -1, 0))
 
-    def there(self) -> Bool:
+    def at_goal(self) -> Bool:
         return self._away() <= self.numbers.near_m
 
     def done(self) -> Bool:
-        return np.all(self.there() | ~self.swarm.state.alive, axis=1)
+        return np.all(self.at_goal() | ~self.swarm.state.alive, axis=1)
 
     def observe(self, running: Bool) -> Mapping[str, Floats]:
-        return {"near": self.there()[:, :, None].astype(np.float64)}
+        return {"near": self.at_goal()[:, :, None].astype(np.float64)}
 
     def reward(self, running: Bool) -> Mapping[str, Floats]:
-        return {"away": -0.01 * self._away(), "collision": -10.0 * self.swarm.facts.contacts}
+        return {"away": -0.01 * self._away(), "collision": -10.0 * self.swarm.facts.vehicle_collisions}
 
     def metrics(self, world: int) -> dict[str, float | None]:
         return {**super().metrics(world), "spread_m": float(self._away()[world].mean())}

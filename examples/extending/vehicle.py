@@ -39,7 +39,7 @@ if __name__ == "__main__":
         path.write_text(SLOW)
         for vehicle in ("literature_185", str(path)):
             changed = load_scenario("starter", overrides={"vehicle": vehicle, "trajectory.speed_mps": 2.0})
-            scenario = baselines.granted("bio_inspired", changed)
+            scenario = baselines.with_policy_requirements("bio_inspired", changed)
             (run,) = [event for event in evaluate(scenario, "bio_inspired", [0]) if isinstance(event, Run)]
             time_s, collisions = run.metrics["task_time_s"] or float("nan"), run.metrics["collisions"]
             print(f"{scenario.vehicle.name}: arrived after {time_s:.1f} s, {collisions} collisions")

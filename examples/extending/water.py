@@ -29,9 +29,9 @@ class Tide(BaseParallelWrapper[str, Any, Any]):
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Start an episode, at high water."""
-        found = super().reset(seed, options)
+        result = super().reset(seed, options)
         self._high = self._water.mean.copy()
-        return found
+        return result
 
     def step(self, actions: dict[str, Any]) -> Any:
         """One decision, at whose end the tide has come on."""
@@ -42,7 +42,7 @@ class Tide(BaseParallelWrapper[str, Any, Any]):
 
 if __name__ == "__main__":
     changed = uuv_marl.load_scenario("starter", overrides={"current.speed_mps": 0.8, "current.direction_deg": 90.0})
-    env = uuv_marl.parallel_env(baselines.granted("bio_inspired_plus", changed))
+    env = uuv_marl.parallel_env(baselines.with_policy_requirements("bio_inspired_plus", changed))
     tidal, policy, eastward = Tide(env), baselines.make("bio_inspired_plus", env), list[float]()
     observations, infos = tidal.reset(seed=0)
     while tidal.agents:

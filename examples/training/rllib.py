@@ -87,16 +87,16 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=user_path, default=Path("runs/rllib"), help="folder of the checkpoint")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint")
-    given = parser.parse_args()
-    start_ray(given.runners)
-    config = ppo_config(given.scenario, given.vehicles, given.runners, TRAINING_SEEDS + given.seed)
+    arguments = parser.parse_args()
+    start_ray(arguments.runners)
+    config = ppo_config(arguments.scenario, arguments.vehicles, arguments.runners, TRAINING_SEEDS + arguments.seed)
     algorithm = config.build_algo()
-    if given.resume:
-        algorithm.restore_from_path(str(given.output.resolve()))
-    train(algorithm, given.steps, given.output)
+    if arguments.resume:
+        algorithm.restore_from_path(str(arguments.output.resolve()))
+    train(algorithm, arguments.steps, arguments.output)
     algorithm.stop()
     ray.shutdown()
-    print(f"The checkpoint is in {given.output}.")
+    print(f"The checkpoint is in {arguments.output}.")
 
 
 if __name__ == "__main__":

@@ -48,12 +48,12 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=32)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=user_path, default=Path("runs/sb3"))
-    given = parser.parse_args()
-    model = train(given.scenario, given.steps, given.worlds, given.seed)
-    given.output.mkdir(parents=True, exist_ok=True)
-    model.save(given.output / "model")  # for PPO.load, to train on
-    save_sb3(model, given.output / "policy.safetensors")
-    print(f"The policy is in {given.output}: uuv-marl benchmark --scenario {given.scenario} --policy {given.output}")
+    arguments = parser.parse_args()
+    model = train(arguments.scenario, arguments.steps, arguments.worlds, arguments.seed)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    model.save(arguments.output / "model")  # for PPO.load, to train on
+    save_sb3(model, arguments.output / "policy.safetensors")
+    print(f"The policy is in {arguments.output}: uuv-marl benchmark --scenario {arguments.scenario} --policy {arguments.output}")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ class Formation(NamedTuple):
 
     places: Float64
     """Places relative to l(t) [m], shape (vehicle, 2)."""
-    heard: Int32
+    neighbour_indices: Int32
     """Index of the vehicle heard, -1 for none, shape (vehicle, sector)."""
     residual_n: float
     """Root mean square over vehicles of the force that is missing for balance [N]; 0 where settled."""
@@ -36,7 +36,7 @@ class Formation(NamedTuple):
 
 
 def straight_leg(
-    num_vehicles: int = 54, yaw_damping_nms: float = 0.0, hold_s: float = 0.1, leg_m: float = 4000.0
+    num_vehicles: int = 54, yaw_damping_nms: float = 0.0, control_step_s: float = 0.1, leg_m: float = 4000.0
 ) -> Scenario:
     """Open water and one leg to the north that starts at the origin; all clocks tick with the control hold.
 
@@ -46,8 +46,8 @@ def straight_leg(
         hold_s: control hold, integration step and decision period [s].
         leg_m: length of the leg [m].
     """
-    clocks = ("control_hold_s", "integration_step_s", "decision_period_s")
-    overrides = {f"timing.{clock}": hold_s for clock in clocks} | {
+    clocks = ("control_step_s", "integration_step_s", "decision_period_s")
+    overrides = {f"timing.{clock}": control_step_s for clock in clocks} | {
         "trajectory.waypoints_m": [[0.0, 0.0], [leg_m, 0.0]],
         "actuators.yaw_damping_nms": yaw_damping_nms,
     }
@@ -60,33 +60,33 @@ def drag_n(scenario: Scenario) -> float:
     return (scenario.vehicle.X_u + scenario.vehicle.X_uu * speed) * speed
 
 
-def links(places: Float64, heard: Int32, gains: BioInspiredGains) -> tuple[Float64, Float64, Float64]:
+def links(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains) -> tuple[Float64, Float64, Float64]:
     """Of every link: where the neighbour is [m], shape (..., vehicle, sector, 2), and its weight and slope.
 
     The force from a neighbour at p is weight p, and changes with p by weight I + slope p p^T. Both [N/m, N/m3] are 0
     where nobody is heard. Eq. 20.
     """
-    at = np.take_along_axis(places[..., None, :, :], np.maximum(heard, 0)[..., None], axis=-2)
+    at = np.take_along_axis(places[..., None, :, :], np.maximum(neighbour_indices, 0)[..., None], axis=-2)
     p = at - places[..., :, None, :]
     distance = np.maximum(np.hypot(p[..., 0], p[..., 1]), MIN_DISTANCE_M)
     value = np.exp(np.minimum(gains.delta_n / distance, MAX_EXPONENT))
-    zeta_n = gains.zeta_n * (heard >= 0)
+    zeta_n = gains.zeta_n * (neighbour_indices >= 0)
     return p, -zeta_n * (value - np.e), zeta_n * value * gains.delta_n / distance**3
 
 
-def forces(places: Float64, heard: Int32, gains: BioInspiredGains) -> Float64:
+def forces(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains) -> Float64:
     """Force of the law on every vehicle [N], in the leg's frame, shape (..., vehicle, 2). Eq. 18-20."""
-    p, weight, _ = links(places, heard, gains)
+    p, weight, _ = links(places, neighbour_indices, gains)
     return -gains.zeta_l * places + (weight[..., None] * p).sum(axis=-2)
 
 
-def stiffness(places: Float64, heard: Int32, gains: BioInspiredGains) -> Float64:
+def stiffness(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains) -> Float64:
     """How forces change with places [N/m], shape (2 vehicle, 2 vehicle): one world, frozen sets."""
-    n, each = len(heard), np.arange(len(heard))
-    p, weight, slope = links(places, heard, gains)
+    n, each = len(neighbour_indices), np.arange(len(neighbour_indices))
+    p, weight, slope = links(places, neighbour_indices, gains)
     block = weight[..., None, None] * np.eye(2) + slope[..., None, None] * p[..., :, None] * p[..., None, :]
     total = np.zeros((n, n, 2, 2))
-    np.add.at(total, (np.repeat(each, heard.shape[1]), np.maximum(heard, 0).ravel()), block.reshape(-1, 2, 2))
+    np.add.at(total, (np.repeat(each, neighbour_indices.shape[1]), np.maximum(neighbour_indices, 0).ravel()), block.reshape(-1, 2, 2))
     total[each, each] -= block.sum(axis=1) + gains.zeta_l * np.eye(2)
     return total.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
 
@@ -111,8 +111,8 @@ def formations(
     places -= places.mean(axis=1, keepdims=True) + push / gains.zeta_l
     best, least = places.copy(), np.full(len(seeds), np.inf)
     for k in range(rounds):
-        heard = _hear(swarm, places)
-        p, weight, slope = links(places, heard, gains)
+        neighbour_indices = _detected_indices(swarm, places)
+        p, weight, slope = links(places, neighbour_indices, gains)
         missing = -gains.zeta_l * places + (weight[..., None] * p).sum(axis=-2) - push
         residual = _rms(missing)
         better = (residual < least) & (k >= rounds // 2)
@@ -120,9 +120,9 @@ def formations(
         # Each vehicle moves by its own stiffness, so that no gain makes the iteration overshoot.
         stiff = np.abs(weight + slope * (p**2).sum(axis=-1)) + np.abs(weight)
         places = places + 0.5 * missing / (gains.zeta_l + 2.0 * stiff.sum(axis=-1))[..., None]
-    sets = _hear(swarm, best)
+    sets = _detected_indices(swarm, best)
     solved = np.array([_solve(best[w], sets[w], push, gains) for w in range(len(seeds))])
-    same = (_hear(swarm, solved) == sets).all(axis=(1, 2))
+    same = (_detected_indices(swarm, solved) == sets).all(axis=(1, 2))
     return [
         Formation(solved[w], sets[w], 0.0, True)
         if same[w] and _rms(forces(solved[w], sets[w], gains) - push) < _SETTLED_N
@@ -131,11 +131,11 @@ def formations(
     ]
 
 
-def _hear(swarm: Swarm, places: Float64) -> Int32:
+def _detected_indices(swarm: Swarm, places: Float64) -> Int32:
     """Whom vehicles at these places hear, bows to the north, shape (world, vehicle, sector)."""
     swarm.state.eta[:, :, :2], swarm.state.eta[:, :, 2] = places, 0.0
     swarm.observe()
-    return swarm.heard.copy()
+    return swarm.detected_index.copy()
 
 
 def _rms(force: Float64) -> Float64:
@@ -143,7 +143,7 @@ def _rms(force: Float64) -> Float64:
     return np.sqrt((force**2).sum(axis=-1).mean(axis=-1))
 
 
-def _solve(places: Float64, heard: Int32, push: Float64, gains: BioInspiredGains) -> Float64:
+def _solve(places: Float64, neighbour_indices: Int32, push: Float64, gains: BioInspiredGains) -> Float64:
     """Places of balance with these sets by Newton's method; where it leaves for elsewhere, the last within reach.
 
     Args:
@@ -154,9 +154,9 @@ def _solve(places: Float64, heard: Int32, push: Float64, gains: BioInspiredGains
     """
     now = places
     for _ in range(_NEWTON_ROUNDS):
-        missing = forces(now, heard, gains) - push
+        missing = forces(now, neighbour_indices, gains) - push
         # The smallest move that solves it: turning the whole formation about its centre costs nothing.
-        move = np.linalg.lstsq(stiffness(now, heard, gains), -missing.ravel(), rcond=1e-9)[0].reshape(-1, 2)
+        move = np.linalg.lstsq(stiffness(now, neighbour_indices, gains), -missing.ravel(), rcond=1e-9)[0].reshape(-1, 2)
         after = now + move * min(1.0, 1.0 / max(float(np.abs(move).max()), 1e-12))
         if np.abs(after - places).max() > _WITHIN_M:
             break

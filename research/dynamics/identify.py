@@ -118,9 +118,9 @@ def tables(suite: Suite, _report: Share) -> Tables:
     return {"identification-trials": trials(), "identification": columns(rows)}
 
 
-def draw(made: Tables) -> Figure:
+def draw(computed: Tables) -> Figure:
     """The paper's numbers under every trial that arrives without a collision, beside the paper's own."""
-    table = made["identification-trials"]
+    table = computed["identification-trials"]
     members, chosen = pareto(table)
     safe = table["failed"] == 0
     spacing, obstacle = PAPER["tracking", "bio_inspired"], PAPER["single_obstacle", "bio_inspired"]
@@ -159,12 +159,12 @@ def _draw(trial: Any, name: str) -> Value:
     return float(f"{trial.suggest_float(name, unknown.low, unknown.high, log=unknown.log):.4g}")
 
 
-def _table(found: Sequence[dict[str, Any]]) -> Columns:
+def _table(trial_rows: Sequence[dict[str, Any]]) -> Columns:
     """The table of each trial's values and numbers."""
-    numbers = [Numbers(*(np.nan if number is None else number for number in one["numbers"])) for one in found]
+    numbers = [Numbers(*(np.nan if number is None else number for number in one["numbers"])) for one in trial_rows]
     return columns(
         {"trial": k, **one["values"], **each._asdict(), **dict(zip(OBJECTIVES, unknowns.errors(each), strict=True))}
-        for k, (one, each) in enumerate(zip(found, numbers, strict=True))
+        for k, (one, each) in enumerate(zip(trial_rows, numbers, strict=True))
     )
 
 

@@ -75,30 +75,30 @@ INSIDE = READINGS["O_j, and what Eq. 21 sums over", "centre, once per obstacle (
 
 def tables(suite: Suite, _report: Share) -> Tables:
     """Spacing with both sectors ahead, distance with one term per obstacle's centre, error of Eq. 24."""
-    made: dict[str, Columns] = {"literal-eq-24": convergence()}
+    results: dict[str, Columns] = {"literal-eq-24": convergence()}
     for name, series, pair in (
         ("literal-forward-only", "min_spacing_m", (TRACKING, AHEAD)),
         ("literal-centre-once", "obstacle_distance_m", (SINGLE, INSIDE)),
     ):
         ours, printed = (suite.trace(case, 0) for case in pair)
         pick = slice(0, min(len(ours["time_s"]), len(printed["time_s"])), 5)
-        made[name] = {"time_s": ours["time_s"][pick]} | {
+        results[name] = {"time_s": ours["time_s"][pick]} | {
             key: trace[series].reshape(len(trace["time_s"]), -1)[pick].min(axis=1)
             for key, trace in (("as_taken_m", ours), ("as_printed_m", printed))
         }
-    return made
+    return results
 
 
-def draw(made: Tables) -> Figure:
+def draw(computed: Tables) -> Figure:
     """One panel for each reading."""
     figure, axes = panels(3, size=(4.6, 4.4))
-    hull_m = load_scenario("tracking").contact.hull_radius_m
+    hull_m = load_scenario("tracking").collision.hull_radius_m
     for ax, name, heading, what, contact_m in (
         (axes[0], "literal-forward-only", "(a) both sectors ahead: tracking", "smallest spacing [m]", 2 * hull_m),
         (axes[1], "literal-centre-once", "(b) centre, once per obstacle: single obstacle",
          "smallest distance to its surface [m]", hull_m),
     ):  # fmt: skip
-        table = made[name]
+        table = computed[name]
         ax.plot(table["time_s"], table["as_taken_m"], color=BLUE, label="as we take it")
         ax.plot(table["time_s"], table["as_printed_m"], "--", color=ORANGE, label="as printed")
         ax.axhline(contact_m, color=BLACK, linestyle=":", linewidth=1.0, label="collision")
@@ -106,7 +106,7 @@ def draw(made: Tables) -> Figure:
     axes[1].set_ylim(-15.0, 60.0)
     ax = axes[2]
     for name, colour, mark in (("as printed", ORANGE, "s--"), ("classical", BLUE, "o-")):
-        own = where(made["literal-eq-24"], reading=name)
+        own = where(computed["literal-eq-24"], reading=name)
         ax.loglog(own["step_s"], own["position_error_m"], mark, color=colour)
     ax.axvline(0.1, color=GREY, linestyle=":", label="t_r = 0.1 s")
     ax.set_xticks(STEPS_S, [f"{step:g}" for step in STEPS_S])

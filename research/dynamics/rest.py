@@ -50,7 +50,7 @@ class Variant:
     """One case of the table."""
 
     name: str
-    hold_s: float = 0.1
+    control_step_s: float = 0.1
     yaw_damping_nms: float = 0.0
     softening: Softening = PAPER
     gains: BioInspiredGains = TABLE_1
@@ -63,7 +63,7 @@ class Variant:
     def scenario(self) -> Scenario:
         """Open water; the reference point rests after a second, or never in the time measured."""
         leg_m = 4.0 * (self.settle_s + 2.5 * MEASURE_S) if self.tracking else 4.0
-        return straight_leg(self.num_vehicles, self.yaw_damping_nms, self.hold_s, leg_m)
+        return straight_leg(self.num_vehicles, self.yaw_damping_nms, self.control_step_s, leg_m)
 
     def policy(self, scenario: Scenario, num_worlds: int) -> Policy:
         """The law for this scenario: the paper's own code where nothing is softened."""
@@ -82,8 +82,8 @@ SMOOTH_DAMPED = SMOOTH._replace(surge_damping=SURGE_DAMPED.surge_damping)
 VARIANTS = (
     Variant("Table 1, while tracking", tracking=True),
     Variant("Table 1"),
-    Variant("Table 1", hold_s=0.05),
-    Variant("Table 1", hold_s=0.02),
+    Variant("Table 1", control_step_s=0.05),
+    Variant("Table 1", control_step_s=0.02),
     Variant("Table 1", yaw_damping_nms=60.0),
     Variant("Table 1", yaw_damping_nms=200.0),
     Variant("Table 1", yaw_damping_nms=600.0),
@@ -94,7 +94,7 @@ VARIANTS = (
     Variant("torque gate 300 N", softening=Softening(torque_gate_n=300.0)),
     Variant("dead zone 300 N", softening=Softening(dead_zone_n=300.0)),
     Variant("dead zone 600 N", softening=Softening(dead_zone_n=600.0)),
-    Variant("dead zone 600 N", hold_s=0.05, softening=Softening(dead_zone_n=600.0)),
+    Variant("dead zone 600 N", control_step_s=0.05, softening=Softening(dead_zone_n=600.0)),
     Variant("one vehicle", num_vehicles=1),
     Variant("one vehicle, zeta_l = 1000 N/m", num_vehicles=1, gains=BioInspiredGains(zeta_l=1000.0)),
     Variant(
@@ -135,7 +135,7 @@ class Pairs:
         scenario = variant.scenario()
         self._swarm = Swarm(scenario, 2 * len(seeds))
         self._policy = variant.policy(scenario, 2 * len(seeds))
-        self._rows, self._hold_s = len(seeds), variant.hold_s
+        self._rows, self._hold_s = len(seeds), variant.control_step_s
         self._percept = self._swarm.reset([*seeds, *seeds])
         self.restart()
 
@@ -202,7 +202,7 @@ def measure(variant: Variant, seeds: tuple[int, ...] = SEEDS) -> Columns:
     n, spacing = len(seeds), pairs.min_spacing_m
     return {
         "variant": np.full(n, variant.name),
-        "t_r_s": np.full(n, variant.hold_s),
+        "t_r_s": np.full(n, variant.control_step_s),
         "yaw_damping_nms": np.full(n, variant.yaw_damping_nms),
         "seed": np.array(seeds),
         "yaw_rate_rms_rad_per_s": pairs.yaw_rate_rms,
@@ -215,16 +215,16 @@ def measure(variant: Variant, seeds: tuple[int, ...] = SEEDS) -> Columns:
 
 def tables(_suite: Suite, report: Share) -> Tables:
     """``rest``: every variant and seed."""
-    made: list[Columns] = []
+    results: list[Columns] = []
     for k, variant in enumerate(VARIANTS):
-        made.append(measure(variant))
+        results.append(measure(variant))
         report((k + 1) / len(VARIANTS))
-    return {"rest": {name: np.concatenate([table[name] for table in made]) for name in made[0]}}
+    return {"rest": {name: np.concatenate([table[name] for table in results]) for name in results[0]}}
 
 
-def draw(made: Tables) -> Figure:
+def draw(computed: Tables) -> Figure:
     """Amplitudes and exponents by variant: all seeds as points, their mean as a bar; from the table alone."""
-    rows = groups(made["rest"], "variant", "t_r_s", "yaw_damping_nms")
+    rows = groups(computed["rest"], "variant", "t_r_s", "yaw_damping_nms")
     names = [f"{name}, $t_r$ = {hold:g} s" + (f", yaw damping {c:g} N m s" if c else "") for name, hold, c in rows]
     figure, axes = panels(3, size=(4.4, 0.36 * len(rows) + 1.6), sharey=True)
     for ax, column, shift, mark, colour, label in (

@@ -57,10 +57,10 @@ def _measured(suite: Suite, case: Case, number: Number) -> dict[str, object]:
     }
 
 
-def draw(made: Tables) -> Figure:
+def draw(computed: Tables) -> Figure:
     """A field for each alternative and number: the value, and by colour how far it moved."""
-    rows = groups(made["sensitivity"], "assumption", "alternative")
-    heads = list(groups(made["sensitivity"], "section", "quantity", "paper", "unit"))
+    rows = groups(computed["sensitivity"], "assumption", "alternative")
+    heads = list(groups(computed["sensitivity"], "section", "quantity", "paper", "unit"))
     figure, (ax,) = panels(1, size=(11.5, 0.27 * len(rows) + 2.4))
     change: Float64 = np.full((len(rows), len(heads)), np.nan)
     for i, own in enumerate(rows.values()):

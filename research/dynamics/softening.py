@@ -55,7 +55,7 @@ class Softened(BioInspired):
         """Actions of shape (world, vehicle, 2)."""
         g, soft, limits = self.gains, self.softening, self.limits
         neighbour, echo = percept["neighbour"].astype(np.float64), percept["echo_position"].astype(np.float64)
-        weight = -g.zeta_n * (_bounded_exp(g.delta_n, neighbour) - math.e) * (percept["heard"] > 0)
+        weight = -g.zeta_n * (_bounded_exp(g.delta_n, neighbour) - math.e) * (percept["detected"] > 0)
         weight *= fade(np.hypot(neighbour[..., 0], neighbour[..., 1]), soft.near_m, soft.far_m)
         force = g.zeta_l * percept["reference"].astype(np.float64) + (weight[..., None] * neighbour).sum(axis=-2)
         weight = -g.zeta_o * _bounded_exp(g.delta_o, echo) * (percept["echo"] > 0)

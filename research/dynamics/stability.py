@@ -32,11 +32,11 @@ Complex128 = NDArray[np.complex128]
 
 SEEDS = (0, 1, 2, 3)
 """Starts from which formations are sought."""
-HOLDS_S = (0.0, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.15, 0.2)
+CONTROL_STEPS_S = (0.0, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.15, 0.2)
 """Control holds t_r swept; 0 is feedback without delay."""
-SHOWN_HOLDS_S = (0.0, 0.02, 0.05, 0.1)
+SHOWN_CONTROL_STEPS_S = (0.0, 0.02, 0.05, 0.1)
 """Control holds whose eigenvalues are tabled."""
-SWEEP_HOLDS_S = (0.0, 0.1)
+SWEEP_CONTROL_STEPS_S = (0.0, 0.1)
 """Control holds at which the other parameters are swept."""
 SWEEPS: dict[str, tuple[float, ...]] = {
     "zeta_n": (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
@@ -47,7 +47,7 @@ SWEEPS: dict[str, tuple[float, ...]] = {
 """Other parameters swept, one at a time."""
 CRITICAL_DAMPING_NMS = (0.0, 60.0, 200.0)
 """Yaw dampings whose critical control hold is tabled."""
-_HOLD_COLOURS = {"continuous": BLUE, "t_r = 0.1 s": ORANGE, "control hold on the axis": BLACK}
+_CONTROL_STEP_COLOURS = {"continuous": BLUE, "t_r = 0.1 s": ORANGE, "control hold on the axis": BLACK}
 NEUTRAL_PER_S = 1e-6
 """Growth rates smaller than this are none: a formation in balance may be turned about its centre for nothing."""
 WEAVING_RAD_PER_S = 1.0
@@ -96,7 +96,7 @@ def feedback(scenario: Scenario, rigid: Float64) -> Float64:
     return gain.reshape(2 * n, 6 * n)
 
 
-def loop(scenario: Scenario, rigid: Float64, hold_s: float) -> Float64:
+def loop(scenario: Scenario, rigid: Float64, control_step_s: float) -> Float64:
     """The closed loop, shape (6 vehicle, 6 vehicle): the state's rate for a hold of 0, else its next sample.
 
     Body forces are held for ``hold_s`` exactly (zero-order hold); the simulation's Runge-Kutta step differs from that
@@ -104,16 +104,16 @@ def loop(scenario: Scenario, rigid: Float64, hold_s: float) -> Float64:
     """
     a, b = vehicle_jacobians(scenario)
     n = len(rigid) // 2
-    if hold_s > 0.0:
-        both = expm(np.block([[a, b], [np.zeros((2, 8))]]) * hold_s)
+    if control_step_s > 0.0:
+        both = expm(np.block([[a, b], [np.zeros((2, 8))]]) * control_step_s)
         a, b = both[:6, :6], both[:6, 6:]
     return np.kron(np.eye(n), a) + np.kron(np.eye(n), b) @ feedback(scenario, rigid)
 
 
-def eigenvalues(scenario: Scenario, rigid: Float64, hold_s: float) -> Complex128:
+def eigenvalues(scenario: Scenario, rigid: Float64, control_step_s: float) -> Complex128:
     """Eigenvalues as rates [1/s]; those of a sampled loop as log(eigenvalue) / hold."""
-    values = np.linalg.eigvals(loop(scenario, rigid, hold_s)).astype(np.complex128)
-    return cast(Complex128, np.log(values)) / hold_s if hold_s > 0.0 else values
+    values = np.linalg.eigvals(loop(scenario, rigid, control_step_s)).astype(np.complex128)
+    return cast(Complex128, np.log(values)) / control_step_s if control_step_s > 0.0 else values
 
 
 def rates(values: Complex128) -> Rates:
@@ -133,15 +133,15 @@ def lone_stiffness(gains: BioInspiredGains) -> Float64:
     return -gains.zeta_l * np.eye(2)
 
 
-def critical_hold_s(scenario: Scenario, rigid: Float64) -> float:
+def critical_control_step_s(scenario: Scenario, rigid: Float64) -> float:
     """Control hold above which weaving grows [s]; 0 where it grows without any, infinite where none up to 0.5 s does.
 
     For a lone vehicle about 2 N_r / drag: the hold delays the yaw spring by half its length, which takes
     drag hold / 2 off the yaw damping.
     """
 
-    def growth(hold_s: float) -> float:
-        return rates(eigenvalues(scenario, rigid, hold_s)).weaving
+    def growth(control_step_s: float) -> float:
+        return rates(eigenvalues(scenario, rigid, control_step_s)).weaving
 
     if growth(0.0) > 0.0:
         return 0.0
@@ -160,19 +160,19 @@ def tables(_suite: Suite, report: Share) -> Tables:
         nominal = formations(straight_leg(), BioInspiredGains(), SEEDS)
         rigid = stiffness(nominal[0].places, nominal[0].heard, BioInspiredGains())
         spectrum = [
-            {"loop": loop_name(hold_s), "real_per_s": value.real, "imaginary_rad_per_s": value.imag}
-            for hold_s in SHOWN_HOLDS_S
-            for value in eigenvalues(straight_leg(), rigid, hold_s)
+            {"loop": loop_name(control_step_s), "real_per_s": value.real, "imaginary_rad_per_s": value.imag}
+            for control_step_s in SHOWN_CONTROL_STEPS_S
+            for value in eigenvalues(straight_leg(), rigid, control_step_s)
         ]
         rows: list[dict[str, Any]] = []
-        cases = [(parameter, value) for parameter, values in {"t_r": HOLDS_S, **SWEEPS}.items() for value in values]
+        cases = [(parameter, value) for parameter, values in {"t_r": CONTROL_STEPS_S, **SWEEPS}.items() for value in values]
         for k, (parameter, value) in enumerate(cases):
             rows += _margins(parameter, value, nominal)
             report((k + 1) / len(cases))
         critical = [
             {
                 "yaw_damping_nms": damping,
-                "lone_critical_hold_s": critical_hold_s(alone, lone_stiffness(BioInspiredGains())),
+                "lone_critical_hold_s": critical_control_step_s(alone, lone_stiffness(BioInspiredGains())),
             }
             for damping in CRITICAL_DAMPING_NMS
             for alone in [straight_leg(1, yaw_damping_nms=damping)]
@@ -180,28 +180,28 @@ def tables(_suite: Suite, report: Share) -> Tables:
         return {"eigenvalues": columns(spectrum), "margins": columns(rows), "critical": columns(critical)}
 
 
-def loop_name(hold_s: float) -> str:
+def loop_name(control_step_s: float) -> str:
     """Name of a loop in the table of eigenvalues."""
-    return f"t_r = {hold_s:g} s" if hold_s > 0.0 else "continuous"
+    return f"t_r = {control_step_s:g} s" if control_step_s > 0.0 else "continuous"
 
 
 def _margins(parameter: str, value: float, nominal: Sequence[Formation]) -> Iterator[dict[str, Any]]:
     """Rows of ``margins`` for one value of one parameter: per control hold and seed."""
-    gains, found = BioInspiredGains(), nominal
+    gains, equilibrium = BioInspiredGains(), nominal
     scenario = straight_leg(yaw_damping_nms=value if parameter == "yaw_damping_nms" else 0.0)
     if parameter == "num_vehicles":
         scenario = straight_leg(round(value))
     elif parameter in gains._fields:
         gains = gains._replace(**{parameter: value})
     if gains != BioInspiredGains() or scenario.swarm.num_vehicles != len(nominal[0].places):
-        found = formations(scenario, gains, SEEDS)
-    for hold_s in (value,) if parameter == "t_r" else SWEEP_HOLDS_S:
-        lone = rates(eigenvalues(scenario, lone_stiffness(gains), hold_s))
-        for seed, formation in zip(SEEDS, found, strict=True):
-            rigid = stiffness(formation.places, formation.heard, gains)
-            swarm = rates(eigenvalues(scenario, rigid, hold_s))
+        equilibrium = formations(scenario, gains, SEEDS)
+    for control_step_s in (value,) if parameter == "t_r" else SWEEP_CONTROL_STEPS_S:
+        lone = rates(eigenvalues(scenario, lone_stiffness(gains), control_step_s))
+        for seed, formation in zip(SEEDS, equilibrium, strict=True):
+            rigid = stiffness(formation.places, formation.neighbour_indices, gains)
+            swarm = rates(eigenvalues(scenario, rigid, control_step_s))
             yield {
-                "parameter": parameter, "value": value, "t_r_s": hold_s, "seed": seed,
+                "parameter": parameter, "value": value, "t_r_s": control_step_s, "seed": seed,
                 "growth_per_s": swarm.growth, "weaving_growth_per_s": swarm.weaving,
                 "unstable_modes": swarm.unstable, "neutral_modes": swarm.neutral,
                 "settled": int(formation.settled), "residual_n": formation.residual_n,
@@ -209,10 +209,10 @@ def _margins(parameter: str, value: float, nominal: Sequence[Formation]) -> Iter
             }  # fmt: skip
 
 
-def draw(made: Tables) -> Figure:
+def draw(computed: Tables) -> Figure:
     """Eigenvalues of the nominal swarm, and growth rates over each parameter; from the tables alone."""
     figure, axes = panels(6, 3, (4.3, 4.0))
-    for k, ((name,), own) in enumerate(groups(made["eigenvalues"], "loop").items()):
+    for k, ((name,), own) in enumerate(groups(computed["eigenvalues"], "loop").items()):
         axes[0].plot(own["real_per_s"], own["imaginary_rad_per_s"], ".", color=COLOURS[k], label=name)
     axes[0].axvline(0.0, color=BLACK, linewidth=0.8)
     axes[0].set(xlim=(-2.0, 1.5), xlabel="growth rate [1/s]", ylabel="angular rate [rad/s]")
@@ -230,10 +230,10 @@ def draw(made: Tables) -> Figure:
         ),
         strict=True,
     ):
-        _draw_sweep(ax, made["margins"], parameter)
+        _draw_sweep(ax, computed["margins"], parameter)
         ax.set_xlabel(label)
     axes[5].set_xscale("log")
-    for which, colour in _HOLD_COLOURS.items():
+    for which, colour in _CONTROL_STEP_COLOURS.items():
         for whose, style in (("swarm", "-"), ("one vehicle", ":")):
             axes[1].plot([], [], style, color=colour, label=f"{whose}, {which}")
     for fill, words in (("full", "forces balance"), ("none", "no balance found")):
@@ -245,10 +245,10 @@ def draw(made: Tables) -> Figure:
 def _draw_sweep(ax: Axes, table: Columns, parameter: str) -> None:
     """Growth rates over one parameter, of the swarm and of a vehicle alone."""
     swept = where(table, parameter=parameter)
-    by_hold = {(None,): swept} if parameter == "t_r" else groups(swept, "t_r_s")
-    for (hold_s,), own in by_hold.items():
+    by_control_step = {(None,): swept} if parameter == "t_r" else groups(swept, "t_r_s")
+    for (control_step_s,), own in by_control_step.items():
         values, settled, growth = own["value"], own["settled"] > 0, own["growth_per_s"]
-        colour = BLACK if hold_s is None else _HOLD_COLOURS[loop_name(hold_s)]
+        colour = BLACK if control_step_s is None else _CONTROL_STEP_COLOURS[loop_name(control_step_s)]
         at = np.unique(values)
         for rate, style in ((growth, "-"), (own["lone_growth_per_s"], ":")):
             ax.plot(at, [rate[values == value].mean() for value in at], style, color=colour)

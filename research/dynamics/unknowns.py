@@ -106,8 +106,8 @@ def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Number
             break
 
     def mean(name: str, scenario: str) -> float:
-        found = [value for m in metrics.get(scenario, ()) if (value := dict[str, Any](m)[name]) is not None]
-        return sum(found) / len(found) if found else math.nan
+        values = [value for m in metrics.get(scenario, ()) if (value := dict[str, Any](m)[name]) is not None]
+        return sum(values) / len(values) if values else math.nan
 
     total, safe = len(SEARCHED) * len(seeds), sum(not _fails(m) for found in metrics.values() for m in found)
     return Numbers(*(mean(name, scenario) for name, scenario in _MEASURED_ON.items()), failed=(total - safe) / total)

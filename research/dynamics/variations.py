@@ -73,10 +73,10 @@ def variation(
         ]
         return {name: columns(rows)}
 
-    def draw(made: Tables) -> Figure:
+    def draw(computed: Tables) -> Figure:
         figure, axes = panels(len(quantities), size=(3.6, 3.1))
         for ax, quantity in zip(axes, quantities, strict=True):
-            _panel(ax, made[name], quantity, list(variants))
+            _panel(ax, computed[name], quantity, list(variants))
             ax.set_xlabel(axis)
         return legend(figure)
 
@@ -115,14 +115,14 @@ def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) 
 _CLOCKS = ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))
 CLOCKS: dict[str, dict[str, object]] = {
     f"{hold:g}\n{step:g}": {
-        "timing.control_hold_s": hold, "timing.decision_period_s": hold, "timing.integration_step_s": step
+        "timing.control_step_s": hold, "timing.decision_period_s": hold, "timing.integration_step_s": step
     }
     for hold, step in _CLOCKS
 }  # fmt: skip
 """A control hold and an integration step [s]; the policy decides at every hold."""
 SIZES = {f"{n}": {"swarm.num_vehicles": n} for n in (10, 20, 54, 100, 200)}
 LOST = {
-    f"{n}": {"disturbance.loss_times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, n)]}
+    f"{n}": {"losses.times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, n)]}
     for n in (0, 6, 12, 24, 36)
 }
 """So many vehicles lost one by one, between 30 and 105 s: before, at and after the obstacle."""

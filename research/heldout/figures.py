@@ -25,9 +25,9 @@ ENDS = {
 def draw_fields(rows: Sequence[Row], path: Path) -> Path:
     """Draw how many episodes of each policy on a set end in each of four ways, the best policy first."""
     by_policy = [select(rows, policy=policy) for policy in dict.fromkeys(row["policy"] for row in rows)]
-    found = sorted(by_policy, key=lambda mine: np.mean([*map(succeeded, mine)]), reverse=True)
-    figure, (ax,) = panels(1, 1, (8.0, 0.42 * len(found) + 1.5))
-    for k, mine in enumerate(found):
+    ranking = sorted(by_policy, key=lambda mine: np.mean([*map(succeeded, mine)]), reverse=True)
+    figure, (ax,) = panels(1, 1, (8.0, 0.42 * len(ranking) + 1.5))
+    for k, mine in enumerate(ranking):
         left = 0.0
         for label, (arrives, collides, colour, hatch) in ENDS.items():
             ends = [(bool(row["task_time_s"]), row["collisions"] != "0") for row in mine]
@@ -37,7 +37,7 @@ def draw_fields(rows: Sequence[Row], path: Path) -> Path:
         interval = binomtest(sum(map(succeeded, mine)), len(mine)).proportion_ci(method="wilson")
         words = "95 % interval of the first share"
         ax.errorbar([sum(interval) / 2], [k], xerr=np.ptp(interval) / 2, color=BLACK, capsize=3, label=words)
-    ax.set_yticks(range(len(found)), [f"{mine[0]['policy']} (n = {len(mine)})" for mine in found])
+    ax.set_yticks(range(len(ranking)), [f"{mine[0]['policy']} (n = {len(mine)})" for mine in ranking])
     ax.invert_yaxis()
     ax.set(xlim=(0.0, 1.0), xlabel="share of the episodes")
     ax.xaxis.set_major_formatter(PercentFormatter(1.0))

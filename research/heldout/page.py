@@ -33,11 +33,11 @@ def write_page(folder: Path, rows: Sequence[Row]) -> list[Path]:
 
 def tables(rows: Sequence[Row]) -> tuple[str, str]:
     """How many episodes arrive untouched in each set, and what the episodes on random fields are like."""
-    found: dict[tuple[str, str], list[Row]] = {}
+    rows_by_set: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        found.setdefault((row["policy"], row["set"]), []).append(row)
-    policies = [name for group in GROUPS.values() for name in group if any(name == policy for policy, _ in found)]
-    return _sets(found, policies), _fields(found, policies)
+        rows_by_set.setdefault((row["policy"], row["set"]), []).append(row)
+    policies = [name for group in GROUPS.values() for name in group if any(name == policy for policy, _ in rows_by_set)]
+    return _sets(rows_by_set, policies), _fields(rows_by_set, policies)
 
 
 def report(rows: Sequence[Row]) -> str:
@@ -48,10 +48,10 @@ def report(rows: Sequence[Row]) -> str:
     )
 
 
-def _sets(found: Found, policies: Sequence[str]) -> str:
+def _sets(rows_by_set: Found, policies: Sequence[str]) -> str:
     """How many episodes arrive untouched: a row for each policy, a column for each set."""
-    names = [held.name for held in SETS if any(held.name == name for _, name in found)]
-    rows = [(policy, *(_share(found.get((policy, name), ())) for name in names)) for policy in policies]
+    names = [held.name for held in SETS if any(held.name == name for _, name in rows_by_set)]
+    rows = [(policy, *(_share(rows_by_set.get((policy, name), ())) for name in names)) for policy in policies]
     return markdown_table(("policy", *(name.removeprefix("random_field_") for name in names)), rows)
 
 
@@ -59,9 +59,9 @@ def _share(mine: Sequence[Row]) -> str:
     return f"{sum(map(succeeded, mine))}/{len(mine)}" if mine else _NOTHING
 
 
-def _fields(found: Found, policies: Sequence[str]) -> str:
+def _fields(rows_by_set: Found, policies: Sequence[str]) -> str:
     """What the episodes on random fields are like: a row for each policy."""
-    rows = [(policy, *_cells(mine)) for policy in policies if (mine := found.get((policy, _MAIN), ()))]
+    rows = [(policy, *_cells(mine)) for policy in policies if (mine := rows_by_set.get((policy, _MAIN), ()))]
     head = ("policy", "arrived", "collided", "mean time [s]", "nearest obstacle [m]", "nearest vehicle [m]")
     return markdown_table(head, rows)
 

@@ -6,10 +6,10 @@ from research.data import read_toml
 from research.sets import EpisodeSet
 from uuv_marl.benchmark.suite import NOTHING
 
-_TOLD: dict[str, Any] = read_toml("heldout", "sets.toml")
-FIRST: int = _TOLD["first"]
+_DATA: dict[str, Any] = read_toml("heldout", "sets.toml")
+FIRST: int = _DATA["first"]
 """The first held-out seed. Benchmarks count from 0, and tuning and training use seeds from 10,000 on."""
-GROUPS: dict[str, list[str]] = _TOLD["groups"]
+GROUPS: dict[str, list[str]] = _DATA["groups"]
 """Policies by the name of their group."""
 METRICS = ("task_time_s", "collisions", "min_obstacle_distance_m", "min_spacing_m")
 """What is kept of an episode."""
@@ -22,5 +22,5 @@ def _set(table: dict[str, Any]) -> EpisodeSet:
     return EpisodeSet(table["name"], table["scenario"], seeds, table.get("overrides", NOTHING))
 
 
-SETS = tuple(map(_set, _TOLD["set"]))
+SETS = tuple(map(_set, _DATA["set"]))
 """Those of ``sets.toml``, in the order of the page."""

@@ -9,7 +9,7 @@ from filelock import FileLock, Timeout
 
 from research import FOLDER
 from research.episodes import Row
-from research.learners.cells import EPISODES, Cell, beside, cells, make, need_protocol, read
+from research.learners.cells import EPISODES, Cell, beside, cells, make, check_protocol, read
 from research.learners.page import write_page
 from research.learners.protocol import LEARNERS, TASKS, TRAININGS
 from research.learners.watch import Report
@@ -42,27 +42,27 @@ def main(
         for name, known, what in ((task, TASKS, "task"), (learner, LEARNERS, "learner")):
             if unknown := [each for each in name or [] if each not in known]:
                 raise ResultsError(f"{what} must be one of {', '.join(known)}, got {unknown[0]!r}")
-        need_protocol(output)
+        check_protocol(output)
         chosen = cells(task or [], learner or [], trainings)
         with working(f"Finished trainings are in {output}") as bar:
             for k, cell in enumerate(chosen):
-                told = progress_line(bar, f"{k + 1} of {len(chosen)}: {cell.learner.name} {cell.task.name} {cell.seed}")
-                _make(cell, cell.folder(output), told)
+                report = progress_line(bar, f"{k + 1} of {len(chosen)}: {cell.learner.name} {cell.task.name} {cell.seed}")
+                _make(cell, cell.folder(output), report)
             if task is None and learner is None:
                 _write(chosen, output, progress_line(bar, "laws"))
         console.print(f"  {output}", highlight=False)
 
 
-def _make(cell: Cell, folder: Path, told: Report) -> None:
+def _make(cell: Cell, folder: Path, report: Report) -> None:
     """Unless it is made, or another process makes it."""
     if (folder / EPISODES).exists():
         return
     folder.mkdir(parents=True, exist_ok=True)
     with suppress(Timeout), FileLock(folder.with_suffix(".lock"), timeout=0):
-        make(cell, folder, told)
+        make(cell, folder, report)
 
 
-def _write(chosen: list[Cell], output: Path, told: Report) -> None:
+def _write(chosen: list[Cell], output: Path, report: Report) -> None:
     """The page, if all trainings are there."""
     missing = [cell for cell in chosen if not (cell.folder(output) / EPISODES).exists()]
     if missing:
@@ -74,7 +74,7 @@ def _write(chosen: list[Cell], output: Path, told: Report) -> None:
         curve, final = read(cell, cell.folder(output))
         curves += curve
         rows += final
-    rows += beside(output, told)
+    rows += beside(output, report)
     with locked(output, wait_s=600.0):
         for path in write_page(output, curves, rows):
             console.print(f"  {path}", highlight=False)

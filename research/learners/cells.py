@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from research.data import read_text
 from research.episodes import Row, read_rows, write_rows
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, PROTOCOL, TASKS, Judged, Learner, Task
-from research.learners.watch import Asked, Report, Trainer
+from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, PROTOCOL, TASKS, EvaluationSet, Learner, Task
+from research.learners.watch import TrainingRequest, Report, Trainer
 from uuv_marl.atomic import write_text
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
@@ -24,7 +24,7 @@ CURVE, EPISODES, OTHERS = "curve.csv", "episodes.csv", "others"
 _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.isac"}
 _TRAINED = 0.8
 """Share of a cell's progress that the training is; assumed."""
-KEPT = Path(__file__).resolve().parent / "policies"
+WEIGHTS_FOLDER = Path(__file__).resolve().parent / "policies"
 """Weights that ship, so that their rows can be run again."""
 
 
@@ -42,21 +42,21 @@ class Cell(NamedTuple):
     def policy(self, path: Path) -> str:
         """The name of what it made, by the path of its weights."""
         path = path.resolve()
-        return f"research.learners.squashed:Squashed,path={path}" if self.learner.by == "benchmarl" else str(path)
+        return f"research.learners.squashed:Squashed,path={path}" if self.learner.trainer == "benchmarl" else str(path)
 
     @property
-    def kept(self) -> Path:
+    def shipped_weights(self) -> Path:
         """Where its weights ship, if they do."""
-        return KEPT / f"{self.task.name}-{self.learner.name}-{self.seed}.safetensors"
+        return WEIGHTS_FOLDER / f"{self.task.name}-{self.learner.name}-{self.seed}.safetensors"
 
 
-def need_protocol(output: Path) -> None:
+def check_protocol(output: Path) -> None:
     """Note in a new folder by which protocol it is made. Raises ResultsError where it was another."""
-    path, told = output / PROTOCOL, read_text("learners", PROTOCOL)
+    path, protocol = output / PROTOCOL, read_text("learners", PROTOCOL)
     if not path.exists():
         output.mkdir(parents=True, exist_ok=True)
-        write_text(path, told)
-    elif tomllib.loads(path.read_text(encoding="utf-8")) != tomllib.loads(told):
+        write_text(path, protocol)
+    elif tomllib.loads(path.read_text(encoding="utf-8")) != tomllib.loads(protocol):
         raise ResultsError(f"{output} was made by another protocol, see {path}; remove it, or give another --output")
 
 
@@ -68,8 +68,8 @@ def cells(tasks: list[str], learners: list[str], trainings: int) -> list[Cell]:
 
 def trainer_of(learner: Learner) -> Trainer:
     """Its trainer, whose library is imported now."""
-    made: Trainer = import_module(_TRAINERS[learner.by]).learn
-    return made
+    learn: Trainer = import_module(_TRAINERS[learner.trainer]).learn
+    return learn
 
 
 def emptied(folder: Path) -> None:
@@ -83,7 +83,7 @@ def make(cell: Cell, folder: Path, report: Report) -> None:
     if not (folder / CURVE).exists():
         emptied(folder)  # of a training that was cut off
         spent: Report = lambda share: report(_TRAINED * share)  # noqa: E731
-        asked = Asked(cell.task, cell.seed, folder, cell.learner.settings, AGENT_STEPS, MINUTES, spent)
+        asked = TrainingRequest(cell.task, cell.seed, folder, cell.learner.settings, AGENT_STEPS, MINUTES, spent)
         curve = trainer_of(cell.learner)(asked)
         write_rows(folder / CURVE, curve)
     if not (folder / EPISODES).exists():
@@ -99,9 +99,9 @@ def every(task: Task, policy: str, report: Report) -> Iterator[Row]:
         yield from episodes(policy, each, each.episodes)
 
 
-def episodes(policy: str, each: Judged, seeds: range) -> Iterator[Row]:
+def episodes(policy: str, each: EvaluationSet, seeds: range) -> Iterator[Row]:
     """What a policy does in a set's episodes, by seed."""
-    scenario = granted(policy, load_scenario(each.scenario, overrides=each.overrides))
+    scenario = with_policy_requirements(policy, load_scenario(each.scenario, overrides=each.overrides))
     rows = [
         {"set": each.name, "seed": str(run.seed), **measures(run.metrics, scenario)}
         for run in evaluate(scenario, policy, seeds)
@@ -110,7 +110,7 @@ def episodes(policy: str, each: Judged, seeds: range) -> Iterator[Row]:
     yield from sorted(rows, key=lambda row: int(row["seed"]))
 
 
-MEASURES = ("share", "whole", "contacts", "to_obstacles", "to_others", "time")
+MEASURES = ("share", "swarm_success", "collisions", "to_obstacles", "to_others", "time_ratio")
 
 
 def measures(metrics: Metrics, scenario: Scenario) -> dict[str, str]:
@@ -134,15 +134,15 @@ def read(cell: Cell, folder: Path) -> tuple[list[Row], list[Row]]:
 def beside(output: Path, report: Report) -> list[Row]:
     """Episodes of the policies that stand beside learners, and others' rows; what was run before is read."""
     todo = [(task, policy) for task in TASKS.values() for policy in task.policies]
-    found: list[Row] = []
+    rows: list[Row] = []
     for k, (task, policy) in enumerate(todo):
         report(k / len(todo))
         path = output / "policies" / f"{task.name}-{policy}.csv"
         if not path.exists():
             write_rows(path, every(task, policy, lambda _: None))
-        found += [{"task": task.name, "learner": policy, "training": "", **row} for row in read_rows(path)]
+        rows += [{"task": task.name, "learner": policy, "training": "", **row} for row in read_rows(path)]
     for path in sorted((output / OTHERS).glob("*/*.csv")):
         place = {"task": path.parent.name, "learner": f"{path.stem} (checked)", "training": ""}
-        found += [{**place, **row} for row in read_rows(path)]
+        rows += [{**place, **row} for row in read_rows(path)]
     report(1.0)
-    return found
+    return rows

@@ -31,8 +31,8 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
             share = np.array([[float(row["share"]) for row in run[:length]] for run in runs.values()])
             ax.plot(steps, share.mean(axis=0), color=f"C{k}", label=learner)
             ax.fill_between(steps, share.min(axis=0), share.max(axis=0), color=f"C{k}", alpha=0.15, linewidth=0)
-        law = [row for row in rows if (row["learner"], row["set"]) == (task.policies[0], task.tiers[0][0].name)]
-        ax.axhline(float(np.mean(measured(law, "share"))), color="0.4", linestyle="--", label="the best law")
+        controller = [row for row in rows if (row["learner"], row["set"]) == (task.policies[0], task.tiers[0][0].name)]
+        ax.axhline(float(np.mean(measured(controller, "share"))), color="0.4", linestyle="--", label="the best law")
         ax.set(title=name, xlabel="million agent-steps", ylabel="headline", ylim=(-0.02, 1.02))
     axes[0].legend()
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -21,7 +21,7 @@ with warnings.catch_warnings():
     from uuv_marl.envs.benchmarl import SwarmTask
 
 from research.episodes import Row
-from research.learners.watch import Asked, Watch
+from research.learners.watch import TrainingRequest, Watch
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.train.rows import TRAINING_SEEDS
 from uuv_marl.train.training import overrides_for
@@ -62,27 +62,27 @@ def tensors_of(actor: Any) -> dict[str, Any]:
     return {f"{k // 2}.{'bias' if k % 2 else 'weight'}": x.T.copy() for k, x in enumerate(layers)}
 
 
-def learn(asked: Asked) -> list[Row]:
+def learn(asked: TrainingRequest) -> list[Row]:
     """As ``watch.Trainer`` says."""
     torch.set_num_threads(1)
-    told, task, folder, watch = asked.settings, asked.task, asked.folder, Watch(asked)
+    settings, task, folder, watch = asked.settings, asked.task, asked.folder, Watch(asked)
     config = ExperimentConfig.get_from_yaml()
     config.save_folder, config.loggers, config.create_json, config.render = str(folder), [], False, False
     config.evaluation = False
-    config.lr, config.gamma, config.max_n_frames = told["lr"], told["gamma"], 10**9
+    config.lr, config.gamma, config.max_n_frames = settings["lr"], settings["gamma"], 10**9
 
     def frames(agent_steps: int) -> int:
         """Decisions of all vehicles at once."""
         return max(1, round(agent_steps / task.num_vehicles))
 
-    config.off_policy_n_envs_per_worker = frames(told["rows"])
-    config.off_policy_collected_frames_per_batch = frames(told["rows"]) * told["decisions"]
-    config.off_policy_n_optimizer_steps = told["optimizer_steps"]
-    config.off_policy_train_batch_size = frames(told["batch"])
+    config.off_policy_n_envs_per_worker = frames(settings["rows"])
+    config.off_policy_collected_frames_per_batch = frames(settings["rows"]) * settings["decisions"]
+    config.off_policy_n_optimizer_steps = settings["optimizer_steps"]
+    config.off_policy_train_batch_size = frames(settings["batch"])
     config.off_policy_memory_size = frames(REPLAYED)
-    config.off_policy_init_random_frames = frames(told["random_steps"])
+    config.off_policy_init_random_frames = frames(settings["random_steps"])
     algorithm = IsacConfig.get_from_yaml()
-    algorithm.alpha_init = told["alpha_init"]
+    algorithm.alpha_init = settings["alpha_init"]
     model = MlpConfig(num_cells=[64, 64], layer_class=torch.nn.Linear, activation_class=torch.nn.Tanh)
     options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": overrides_for(task.name, {})}
     with (folder / "benchmarl.log").open("w") as log, redirect_stderr(log), redirect_stdout(log), suppress(_SpentError):

@@ -7,7 +7,7 @@ from research.episodes import Row, measured
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MEASURES, TASKS
 
 ENVIRONMENT = "uuv_marl"
-_METRICS = ("share", "whole", "contacts")
+_METRICS = ("share", "swarm_success", "collisions")
 _STEPS = [AGENT_STEPS * (k + 1) // MEASURES for k in range(MEASURES)]
 
 
@@ -18,20 +18,20 @@ def marl_eval(curves: Sequence[Row], rows: Sequence[Row]) -> dict[str, Any]:
     are the tenths of the budget in agent-steps. Each has the measure nearest to it: a training that time ended sooner
     stays at its last one. The absolute metrics are those of the best policy in the final episodes.
     """
-    found: dict[str, dict[str, dict[str, Any]]] = {task: {name: {} for name in LEARNERS} for task in TASKS}
+    layout: dict[str, dict[str, dict[str, Any]]] = {task: {name: {} for name in LEARNERS} for task in TASKS}
     runs: dict[tuple[str, str, str], list[Row]] = {}
     for row in curves:
         runs.setdefault((row["task"], row["learner"], row["training"]), []).append(row)
     for (task, learner, training), run in runs.items():
-        found[task][learner][f"seed_{training}"] = {f"step_{k}": _at(step, run) for k, step in enumerate(_STEPS)}
+        layout[task][learner][f"seed_{training}"] = {f"step_{k}": _at(step, run) for k, step in enumerate(_STEPS)}
     first = {task: each.tiers[0][0].name for task, each in TASKS.items()}
     final: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
         if row["training"] and row["set"] == first[row["task"]]:
             final.setdefault((row["task"], row["learner"], row["training"]), []).append(row)
     for (task, learner, training), mine in final.items():
-        found[task][learner][f"seed_{training}"]["absolute_metrics"] = _means(mine)
-    return {ENVIRONMENT: found}
+        layout[task][learner][f"seed_{training}"]["absolute_metrics"] = _means(mine)
+    return {ENVIRONMENT: layout}
 
 
 def _at(step: int, run: Sequence[Row]) -> dict[str, Any]:

@@ -35,24 +35,24 @@ def main(
         if task not in TASKS:
             raise ResultsError(f"task must be one of {', '.join(TASKS)}, got {task!r}")
         with working("Nothing was kept") as bar:
-            told = progress_line(bar, rows.name)
+            report = progress_line(bar, rows.name)
             if not rows.exists():
-                write_rows(rows, every(TASKS[task], policy, told))
+                write_rows(rows, every(TASKS[task], policy, report))
                 console.print(f"  {rows}", highlight=False)
                 return
-            given = read_rows(rows)
-            need_whole(given, TASKS[task])
-            drawn = np.random.default_rng().choice(len(given), min(sample, len(given)), replace=False)
+            rows_given = read_rows(rows)
+            check_complete(rows_given, TASKS[task])
+            drawn = np.random.default_rng().choice(len(rows_given), min(sample, len(rows_given)), replace=False)
             for k, at in enumerate(map(int, drawn)):
-                told(k / len(drawn))
-                need_alike(given[at], policy, TASKS[task])
-            told(1.0)
+                report(k / len(drawn))
+                check_equal(rows_given[at], policy, TASKS[task])
+            report(1.0)
         path = output / OTHERS / task / f"{rows.name.removesuffix('.gz').removesuffix('.csv')}.csv"
-        write_rows(path, given)
-        console.print(f"  {len(drawn)} of {len(given)} rows came again alike: {path}", highlight=False)
+        write_rows(path, rows_given)
+        console.print(f"  {len(drawn)} of {len(rows_given)} rows came again alike: {path}", highlight=False)
 
 
-def need_whole(rows: list[Row], task: Task) -> None:
+def check_complete(rows: list[Row], task: Task) -> None:
     """Refuse rows that leave out an episode, have one twice, or are of something else. Raises ResultsError."""
     columns = ["set", "seed", *MEASURES]
     got = list(rows[0]) if rows else []
@@ -69,7 +69,7 @@ def need_whole(rows: list[Row], task: Task) -> None:
             )
 
 
-def need_alike(row: Row, policy: str, task: Task) -> None:
+def check_equal(row: Row, policy: str, task: Task) -> None:
     """Run the episode of a row again. Raises ResultsError where it is another."""
     seed, each = int(row["seed"]), next(each for each in task.sets if each.name == row["set"])
     (again,) = episodes(policy, each, range(seed, seed + 1))

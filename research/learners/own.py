@@ -4,35 +4,35 @@ from pathlib import Path
 from threading import Event
 
 from research.episodes import Row
-from research.learners.watch import Asked, point
+from research.learners.watch import TrainingRequest, point
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.train.run import train
 from uuv_marl.train.training import Training, changed_fields
 from uuv_marl.train.validation import validate
 
 
-def learn(asked: Asked) -> list[Row]:
+def learn(asked: TrainingRequest) -> list[Row]:
     """As ``watch.Trainer`` says. Without a cost of contacts beyond the reward, which no other learner has."""
-    told = asked.task.training(steps=asked.agent_steps, seed=asked.seed).model_dump(mode="json")
-    training = Training(**changed_fields(told, {"ppo.contact_cost": [0.0, 0.0], **asked.settings}))
+    settings = asked.task.training(steps=asked.agent_steps, seed=asked.seed).model_dump(mode="json")
+    training = Training(**changed_fields(settings, {"ppo.contact_cost": [0.0, 0.0], **asked.settings}))
     curve: list[Row] = []
     run, late, n = asked.folder / "run", Event(), asked.task.num_vehicles
     for record in train(run, training, stop=late.is_set):
         minutes, steps, best = record.seconds / 60.0, record.agent_steps, record.best
         asked.report(max(steps / asked.agent_steps, minutes / asked.minutes))
-        if record.share is not None and record.whole is not None and record.contacts is not None:
-            curve.append(point(steps, minutes, record.share, record.whole, record.contacts / n))
+        if record.share is not None and record.swarm_success is not None and record.collisions is not None:
+            curve.append(point(steps, minutes, record.share, record.swarm_success, record.collisions / n))
         elif late.is_set():  # the minutes ended first
             last = max((run / "checkpoints").iterdir())
             judged = validate(str(last), training)
-            curve.append(point(steps, minutes, judged.share, judged.whole, judged.contacts / n))
+            curve.append(point(steps, minutes, judged.share, judged.swarm_success, judged.collisions / n))
             if best is None or judged.score >= best:
-                return _kept(last, asked, curve)
+                return _keep_best(last, asked, curve)
         if minutes >= asked.minutes:
             late.set()
-    return _kept(run / "best", asked, curve)
+    return _keep_best(run / "best", asked, curve)
 
 
-def _kept(policy: Path, asked: Asked, curve: list[Row]) -> list[Row]:
+def _keep_best(policy: Path, asked: TrainingRequest, curve: list[Row]) -> list[Row]:
     (policy / WEIGHTS_FILE).replace(asked.folder / WEIGHTS_FILE)
     return curve

@@ -40,7 +40,7 @@ def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list
     with house_style():
         drawn = [
             draw_curves(*shown, pictures / "learners_curves.png"),
-            draw_profiles(against_law(found_in(shown[1])), pictures / "learners_profiles.png"),
+            draw_profiles(against_controller(grouped_rows(shown[1])), pictures / "learners_profiles.png"),
         ]
     names = ("learners.md", "learners.csv.gz", "learners_curves.csv.gz", "learners_marl_eval.json")
     return [*(folder / name for name in names), *drawn]
@@ -56,46 +56,46 @@ def complete(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], lis
 def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     """The page's text, on ``complete`` passes."""
     curves, rows = complete(curves, rows)
-    found, made = found_in(rows), len({(row["task"], row["learner"], row["training"]) for row in curves})
+    rows_by_competitor, num_trainings = grouped_rows(rows), len({(row["task"], row["learner"], row["training"]) for row in curves})
     wanted = len(TASKS) * len(LEARNERS) * TRAININGS
     return Template(read_text("learners", "story.md")).substitute(
-        first=_first(found), tiers=_tiers(found), safety=_safety(found), pairs=_pairs(found), apart=_apart(found),
+        first=_first(rows_by_competitor), tiers=_tiers(rows_by_competitor), safety=_safety(rows_by_competitor), pairs=_pairs(rows_by_competitor), apart=_apart(rows_by_competitor),
         compute=_compute(curves), settings=_settings(), episodes=f"{len(rows):,}", steps=f"{AGENT_STEPS / 1e6:g}",
-        minutes=f"{MINUTES:g}", trainings=f"{made} trainings" + f" so far (of {wanted})" * (made < wanted),
+        minutes=f"{MINUTES:g}", trainings=f"{num_trainings} trainings" + f" so far (of {wanted})" * (num_trainings < wanted),
     )  # fmt: skip
 
 
-def found_in(rows: Iterable[Row]) -> Found:
+def grouped_rows(rows: Iterable[Row]) -> Found:
     """Rows by where they belong."""
-    found: dict[tuple[str, str], dict[str, dict[str, list[Row]]]] = {}
+    rows_by_competitor: dict[tuple[str, str], dict[str, dict[str, list[Row]]]] = {}
     for row in rows:
-        mine = found.setdefault((row["task"], row["learner"]), {}).setdefault(row["training"], {})
+        mine = rows_by_competitor.setdefault((row["task"], row["learner"]), {}).setdefault(row["training"], {})
         mine.setdefault(row["set"], []).append(row)
-    return found
+    return rows_by_competitor
 
 
-def scores(found: Found) -> dict[str, Float64]:
+def scores(rows_by_competitor: Found) -> dict[str, Float64]:
     """The headline of each learner's trainings on unseen seeds, shape (training, task)."""
-    return {who: np.concatenate([_values(found, task, who) for task in TASKS], axis=1) for who in LEARNERS}
+    return {competitor: np.concatenate([_values(rows_by_competitor, task, competitor) for task in TASKS], axis=1) for competitor in LEARNERS}
 
 
-def ranked(found: Found) -> dict[str, Float64]:
+def ranked(rows_by_competitor: Found) -> dict[str, Float64]:
     """The same in two digits: smaller differences are ties."""
-    return {who: every.round(2) for who, every in scores(found).items()}
+    return {competitor: every.round(2) for competitor, every in scores(rows_by_competitor).items()}
 
 
-def against_law(found: Found) -> dict[str, Float64]:
+def against_controller(rows_by_competitor: Found) -> dict[str, Float64]:
     """The headline over the best law's, both above what ``random`` has."""
-    law, least = (
-        np.array([_values(found, task, who).mean() for task, who in zip(TASKS, names, strict=True)], np.float64)
+    controller, least = (
+        np.array([_values(rows_by_competitor, task, competitor).mean() for task, competitor in zip(TASKS, names, strict=True)], np.float64)
         for names in ([task.policies[0] for task in TASKS.values()], ["random"] * len(TASKS))
     )
-    return {who: (every - least) / (law - least) for who, every in scores(found).items()}
+    return {competitor: (every - least) / (controller - least) for competitor, every in scores(rows_by_competitor).items()}
 
 
-def _values(found: Found, task: str, who: str, name: str = "share", each: str = "") -> Float64:
+def _values(rows_by_competitor: Found, task: str, competitor: str, name: str = "share", each: str = "") -> Float64:
     """A measure of each training, mean over the episodes of a set, shape (training, 1); on unseen seeds if none."""
-    return np.array([[_mean(sets[each or task], name)] for sets in found[task, who].values()], np.float64)
+    return np.array([[_mean(sets[each or task], name)] for sets in rows_by_competitor[task, competitor].values()], np.float64)
 
 
 def _mean(rows: Sequence[Row], name: str) -> float:
@@ -103,8 +103,8 @@ def _mean(rows: Sequence[Row], name: str) -> float:
     return float(np.mean(values)) if values else float("nan")
 
 
-def _told(found: Estimate) -> str:
-    return f"{short(found.point)} [{short(found.low)}, {short(found.high)}]"
+def _with_interval(estimate: Estimate) -> str:
+    return f"{short(estimate.point)} [{short(estimate.low)}, {short(estimate.high)}]"
 
 
 def _over_episodes(rows: Sequence[Row]) -> Estimate:
@@ -114,86 +114,86 @@ def _over_episodes(rows: Sequence[Row]) -> Estimate:
     return Estimate(point, max(point - half, 0.0), min(point + half, 1.0))
 
 
-def _first(found: Found) -> str:
+def _first(rows_by_competitor: Found) -> str:
     """Headline and whole swarms on unseen seeds, a column for each task, then all tasks."""
-    every, table = against_law(found), list[tuple[str, ...]]()
-    for who, own in scores(found).items():
-        whole = [_values(found, task, who, "whole").mean() for task in TASKS]
-        cells = [f"{_told(mean(own[:, k : k + 1]))}, {short(float(share))}" for k, share in enumerate(whole)]
-        table.append((who, *cells, _told(interquartile_mean(every[who])), _told(mean(every[who]))))
+    every, table = against_controller(rows_by_competitor), list[tuple[str, ...]]()
+    for competitor, own in scores(rows_by_competitor).items():
+        whole = [_values(rows_by_competitor, task, competitor, "swarm_success").mean() for task in TASKS]
+        cells = [f"{_with_interval(mean(own[:, k : k + 1]))}, {short(float(share))}" for k, share in enumerate(whole)]
+        table.append((competitor, *cells, _with_interval(interquartile_mean(every[competitor])), _with_interval(mean(every[competitor]))))
     for words in ("the best law", "oracle", "random"):
         named = {name: task.policies[0] if words == "the best law" else words for name, task in TASKS.items()}
         cells = [
-            _told(_over_episodes(found[task, who][""][task])) + f", {short(_mean(found[task, who][''][task], 'whole'))}"
-            if (task, who) in found else "–"
-            for task, who in named.items()
+            _with_interval(_over_episodes(rows_by_competitor[task, competitor][""][task])) + f", {short(_mean(rows_by_competitor[task, competitor][''][task], 'swarm_success'))}"
+            if (task, competitor) in rows_by_competitor else "–"
+            for task, competitor in named.items()
         ]  # fmt: skip
         table.append((words, *cells, "", ""))
     return markdown_table(("", *TASKS, "all, IQM", "all, mean"), table)
 
 
-def _everyone(found: Found, task: str) -> list[str]:
+def _everyone(rows_by_competitor: Found, task: str) -> list[str]:
     """Learners, then policies, then those from elsewhere."""
-    return [*LEARNERS, *(who for where, who in found if where == task and who not in LEARNERS)]
+    return [*LEARNERS, *(competitor for where, competitor in rows_by_competitor if where == task and competitor not in LEARNERS)]
 
 
-def _called(who: str) -> str:
+def _called(competitor: str) -> str:
     """A policy of the package with what it gets beyond sonar; learners and those from elsewhere by their names."""
-    return who if who in LEARNERS or who.endswith("(checked)") else named(who)
+    return competitor if competitor in LEARNERS or competitor.endswith("(checked)") else named(competitor)
 
 
-def _tiers(found: Found) -> str:
+def _tiers(rows_by_competitor: Found) -> str:
     """The headline in each set, a table for each task."""
     tables: list[str] = []
     for task in TASKS.values():
         names = [each.name for each in task.sets]
         rows = [
-            (_called(who), *(short(float(_values(found, task.name, who, each=name).mean())) for name in names))
-            for who in _everyone(found, task.name)
+            (_called(competitor), *(short(float(_values(rows_by_competitor, task.name, competitor, each=name).mean())) for name in names))
+            for competitor in _everyone(rows_by_competitor, task.name)
         ]
         tables.append(markdown_table(("", *names), rows))
     return "\n".join(tables)
 
 
-def _safety(found: Found) -> str:
+def _safety(rows_by_competitor: Found) -> str:
     """Contacts, distances and time on unseen seeds."""
-    ways = {"contacts": "{:.3f}", "to_obstacles": "{:.1f} m", "to_others": "{:.1f} m", "time": "{:.2f}"}
+    formats = {"collisions": "{:.3f}", "to_obstacles": "{:.1f} m", "to_others": "{:.1f} m", "time_ratio": "{:.2f}"}
     table: list[tuple[str, ...]] = []
     for task in TASKS:
-        for who in _everyone(found, task):
+        for competitor in _everyone(rows_by_competitor, task):
             cells = [
-                way.format(float(np.nanmean(_values(found, task, who, name))))
-                if _number(found, task, who, name) >= _FEW else "–"
-                for name, way in ways.items()
+                spec.format(float(np.nanmean(_values(rows_by_competitor, task, competitor, name))))
+                if _number(rows_by_competitor, task, competitor, name) >= _FEW else "–"
+                for name, spec in formats.items()
             ]  # fmt: skip
-            table.append((task, _called(who), *cells))
-    return markdown_table(("task", "", *(name.replace("_", " ") for name in ways)), table)
+            table.append((task, _called(competitor), *cells))
+    return markdown_table(("task", "", *(name.replace("_", " ") for name in formats)), table)
 
 
-def _number(found: Found, task: str, who: str, name: str) -> int:
+def _number(rows_by_competitor: Found, task: str, competitor: str, name: str) -> int:
     """How many episodes on unseen seeds have this measure."""
-    return sum(len(measured(sets[task], name)) for sets in found[task, who].values())
+    return sum(len(measured(sets[task], name)) for sets in rows_by_competitor[task, competitor].values())
 
 
-def _pairs(found: Found) -> str:
+def _pairs(rows_by_competitor: Found) -> str:
     """Probability of improvement over all tasks."""
-    every = ranked(found)
-    table = [(f"{one} over {other}", _told(improvement(every[one], every[other])))
+    every = ranked(rows_by_competitor)
+    table = [(f"{one} over {other}", _with_interval(improvement(every[one], every[other])))
              for one, other in combinations(LEARNERS, 2)]  # fmt: skip
     return markdown_table(("", "probability"), table)
 
 
-def _apart(found: Found) -> str:
+def _apart(rows_by_competitor: Found) -> str:
     """Pairs that are told apart on each task: the interval holds no one half."""
-    every, table = ranked(found), list[tuple[str, ...]]()
+    every, table = ranked(rows_by_competitor), list[tuple[str, ...]]()
     if (num := min(map(len, every.values()))) < _ENOUGH:
         return f"Each learner has {num} of {TRAININGS} trainings so far, too few to tell anyone apart.\n"
     for k, task in enumerate(TASKS):
         apart: list[str] = []
         for one, other in combinations(LEARNERS, 2):
-            told = improvement(every[one][:, k : k + 1], every[other][:, k : k + 1])
-            if told.low > 0.5 or told.high < 0.5:
-                apart.append(f"{one} over {other}" if told.low > 0.5 else f"{other} over {one}")
+            estimate = improvement(every[one][:, k : k + 1], every[other][:, k : k + 1])
+            if estimate.low > 0.5 or estimate.high < 0.5:
+                apart.append(f"{one} over {other}" if estimate.low > 0.5 else f"{other} over {one}")
         table.append((task, str(len(apart)), ", ".join(apart) or "–"))
     return markdown_table(("task", "pairs", "told apart"), table)
 
@@ -201,20 +201,20 @@ def _apart(found: Found) -> str:
 def _compute(curves: Sequence[Row]) -> str:
     """Agent-steps and processor time of a training, mean."""
     table: list[tuple[str, ...]] = []
-    for who in LEARNERS:
+    for competitor in LEARNERS:
         cells: list[str] = []
         for task in TASKS:
-            last = {row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, who)}.values()
+            last = {row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, competitor)}.values()
             steps, minutes = (float(np.mean(measured(last, name))) for name in ("agent_steps", "minutes"))
             cells.append(f"{steps / 1e6:.1f} M, {minutes:.1f} min")
-        table.append((who, *cells))
+        table.append((competitor, *cells))
     return markdown_table(("", *TASKS), table)
 
 
 def _settings() -> str:
     """What differs from the trainers' defaults."""
     table = [
-        (each.name, each.by, ", ".join(f"`{name}` {value}" for name, value in each.settings.items()) or "none")
+        (each.name, each.trainer, ", ".join(f"`{name}` {value}" for name, value in each.settings.items()) or "none")
         for each in LEARNERS.values()
     ]
     return markdown_table(("", "trainer", "settings"), table)

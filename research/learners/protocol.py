@@ -9,18 +9,18 @@ from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.training import Training, overrides_for
 
 PROTOCOL = "protocol.toml"
-_TOLD: dict[str, Any] = read_toml("learners", PROTOCOL)
-TRAININGS: int = _TOLD["trainings"]
+_DATA: dict[str, Any] = read_toml("learners", PROTOCOL)
+TRAININGS: int = _DATA["trainings"]
 """Of each learner on each task, with seeds from 0 on."""
-AGENT_STEPS: int = _TOLD["agent_steps"]
-MINUTES: float = _TOLD["minutes"]
-MEASURES: int = _TOLD["measures"]
-TRIED_ON: list[str] = _TOLD["tried_on"]
+AGENT_STEPS: int = _DATA["agent_steps"]
+MINUTES: float = _DATA["minutes"]
+MEASURES: int = _DATA["measures"]
+TRIED_ON: list[str] = _DATA["tried_on"]
 SEA, SEA_LEVEL = "sea", 1
 """Name of a set in the sea, and the level of the robustness axis ``X`` there."""
 
 
-class Judged(NamedTuple):
+class EvaluationSet(NamedTuple):
     """Episodes of one kind."""
 
     name: str
@@ -38,11 +38,11 @@ class Task(NamedTuple):
     num_vehicles: int
     policies: tuple[str, ...]
     """Run beside the learners: the best law without a privilege, then others."""
-    tiers: tuple[tuple[Judged, ...], ...]
+    tiers: tuple[tuple[EvaluationSet, ...], ...]
     """Sets of unseen seeds; of unseen sizes and ranges; of unseen kinds of maps and the sea."""
 
     @property
-    def sets(self) -> tuple[Judged, ...]:
+    def sets(self) -> tuple[EvaluationSet, ...]:
         """Of all tiers."""
         return tuple(each for tier in self.tiers for each in tier)
 
@@ -55,7 +55,7 @@ class Task(NamedTuple):
         """A training of ours on it, which also says what validations are of all learners."""
         return Training(
             scenario=self.name, sizes=[self.num_vehicles], validations=MEASURES,
-            validation_episodes=_TOLD["validation_episodes"], **more,
+            validation_episodes=_DATA["validation_episodes"], **more,
         )  # fmt: skip
 
 
@@ -63,7 +63,7 @@ class Learner(NamedTuple):
     """Who learns, and how."""
 
     name: str
-    by: str
+    trainer: str
     """Whose trainer: ``own``, ``sb3``, ``benchmarl``."""
     tried: tuple[dict[str, object], ...]
     """Settings that were tried."""
@@ -76,25 +76,25 @@ class Learner(NamedTuple):
         return self.tried[self.chosen]
 
 
-def _task(told: Mapping[str, Any]) -> Task:
-    task: str = told["name"]
-    own: dict[str, object] = {"swarm.num_vehicles": told["num_vehicles"]}
-    seeds = [range(_TOLD["first"], _TOLD["first"] + count) for count in _TOLD["tiers"]]
-    tiers: list[list[Judged]] = [[Judged(task, task, own, seeds[0])], [], []]
+def _task(table: Mapping[str, Any]) -> Task:
+    task: str = table["name"]
+    own: dict[str, object] = {"swarm.num_vehicles": table["num_vehicles"]}
+    seeds = [range(_DATA["first"], _DATA["first"] + count) for count in _DATA["tiers"]]
+    tiers: list[list[EvaluationSet]] = [[EvaluationSet(task, task, own, seeds[0])], [], []]
     for tier, key in ((1, "two"), (2, "three")):
-        for change in told[key]:
+        for change in table[key]:
             if change == SEA:
                 sea = AXES["X"].overrides(SEA_LEVEL, load_scenario(task).trajectory.speed_mps)
-                tiers[tier].append(Judged(f"{task}-{SEA}", task, own | sea, seeds[tier]))
+                tiers[tier].append(EvaluationSet(f"{task}-{SEA}", task, own | sea, seeds[tier]))
             else:
                 other = {**change}
                 name, scenario = other.pop("name"), other.pop("scenario", task)
-                tiers[tier].append(Judged(name, scenario, own | other if scenario == task else other, seeds[tier]))
-    return Task(task, told["num_vehicles"], tuple(told["policies"]), tuple(map(tuple, tiers)))
+                tiers[tier].append(EvaluationSet(name, scenario, own | other if scenario == task else other, seeds[tier]))
+    return Task(task, table["num_vehicles"], tuple(table["policies"]), tuple(map(tuple, tiers)))
 
 
-TASKS = {told["name"]: _task(told) for told in _TOLD["tasks"]}
+TASKS = {table["name"]: _task(table) for table in _DATA["tasks"]}
 LEARNERS = {
-    name: Learner(name, told["by"], tuple({**told["always"], **each} for each in told["tried"]), told["chosen"])
-    for name, told in _TOLD["learners"].items()
+    name: Learner(name, table["by"], tuple({**table["always"], **each} for each in table["tried"]), table["chosen"])
+    for name, table in _DATA["learners"].items()
 }

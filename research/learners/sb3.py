@@ -11,7 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
 from research.episodes import Row
-from research.learners.watch import Asked, Watch
+from research.learners.watch import TrainingRequest, Watch
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.train.rows import TRAINING_SEEDS
@@ -44,17 +44,17 @@ class _Measured(BaseCallback):
                 candidate.replace(self._folder / WEIGHTS_FILE)
 
 
-def learn(asked: Asked) -> list[Row]:
+def learn(asked: TrainingRequest) -> list[Row]:
     """As ``watch.Trainer`` says."""
     torch.set_num_threads(1)
-    told, task, watch = dict(asked.settings), asked.task, Watch(asked)
+    settings, task, watch = dict(asked.settings), asked.task, Watch(asked)
     worlds = max(1, round(ROWS / task.num_vehicles))
     env = VecNormalize(SwarmVecEnv(task.scenario, worlds, observe="closeness"), norm_obs=False)
-    rate = float(told.pop("learning_rate"))
+    rate = float(settings.pop("learning_rate"))
     model = PPO(
-        "MlpPolicy", env, n_steps=STEPS, policy_kwargs={"net_arch": [64, 64], "log_std_init": told.pop("log_std_init")},
+        "MlpPolicy", env, n_steps=STEPS, policy_kwargs={"net_arch": [64, 64], "log_std_init": settings.pop("log_std_init")},
         learning_rate=lambda left: rate * max(left, 0.02), seed=TRAINING_SEEDS[0] + 1000 * asked.seed,
-        device="cpu", **told,
+        device="cpu", **settings,
     )  # fmt: skip
     measured = _Measured(watch, asked.folder)
     model.learn(asked.agent_steps, callback=measured)

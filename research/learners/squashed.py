@@ -22,8 +22,8 @@ class Squashed(Policy):
     """
 
     yaw_damping_nms: ClassVar[float] = 600.0
-    decides_every_s: ClassVar[float | None] = 0.5
-    wishes_force: ClassVar[bool] = True
+    decision_period_s: ClassVar[float | None] = 0.5
+    outputs_force: ClassVar[bool] = True
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, path: str) -> None:
         super().__init__(scenario, num_worlds)

@@ -53,8 +53,8 @@ def improvement(one: Float64, other: Float64) -> Estimate:
 def profiles(scores: Mapping[str, Float64], levels: Float64) -> dict[str, Float64]:
     """Share of the scores (training, task) above each level, and its interval: shape (3, level), by learner."""
     with _seeded():
-        found, ends = create_performance_profile(dict(scores), levels, reps=_OF_PROFILES)
-    return {name: np.stack([found[name], *ends[name]]) for name in scores}
+        profile, ends = create_performance_profile(dict(scores), levels, reps=_OF_PROFILES)
+    return {name: np.stack([profile[name], *ends[name]]) for name in scores}
 
 
 def _estimate(points: Mapping[str, Float64], ends: Mapping[str, Float64]) -> Estimate:

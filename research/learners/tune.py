@@ -11,7 +11,7 @@ from research import FOLDER
 from research.episodes import Row, read_rows, write_rows
 from research.learners.cells import emptied, trainer_of
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRIED_ON
-from research.learners.watch import Asked, Report
+from research.learners.watch import TrainingRequest, Report
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 from uuv_marl.errors import ResultsError
 
@@ -35,29 +35,29 @@ def main(
     with explained(FOLDER):
         if learner not in LEARNERS:
             raise ResultsError(f"learner must be one of {', '.join(LEARNERS)}, got {learner!r}")
-        who = LEARNERS[learner]
+        learner_config = LEARNERS[learner]
         rows: list[Row] = []
         with working(f"Finished trials are in {output}") as bar:
-            for k, settings in enumerate(who.tried):
+            for k, settings in enumerate(learner_config.tried):
                 path = output / f"{learner}-{k}.csv"
                 if not path.exists():
-                    told = progress_line(bar, f"{learner}, trial {k + 1} of {len(who.tried)}")
-                    write_rows(path, [_trial(learner, k, settings, output / f"{learner}-{k}", told)])
+                    report = progress_line(bar, f"{learner}, trial {k + 1} of {len(learner_config.tried)}")
+                    write_rows(path, [_trial(learner, k, settings, output / f"{learner}-{k}", report)])
                 rows += read_rows(path)
         write_rows(output / f"{learner}.csv", rows)
         for row in sorted(rows, key=lambda row: -float(row["score"])):
             console.print(f"  {row['score']}  trial {row['trial']}: {row['settings']}", highlight=False)
 
 
-def _trial(learner: str, k: int, settings: dict[str, object], folder: Path, told: Report) -> Row:
+def _trial(learner: str, k: int, settings: dict[str, object], folder: Path, report: Report) -> Row:
     """One setting on all tasks that are tried on."""
     scores: dict[str, str] = {}
     for name in TRIED_ON:
         (folder / name).mkdir(parents=True, exist_ok=True)
         emptied(folder / name)  # of a trial that was cut off
-        asked = Asked(TASKS[name], SEED, folder / name, settings, AGENT_STEPS // PART, MINUTES / PART, told)
+        asked = TrainingRequest(TASKS[name], SEED, folder / name, settings, AGENT_STEPS // PART, MINUTES / PART, report)
         curve = trainer_of(LEARNERS[learner])(asked)
-        scores[name] = f"{max((float(row['share']) + float(row['whole'])) / 2.0 for row in curve):.4f}"
+        scores[name] = f"{max((float(row['share']) + float(row['swarm_success'])) / 2.0 for row in curve):.4f}"
     score = float(np.mean([float(each) for each in scores.values()]))
     return {"learner": learner, "trial": str(k), "score": f"{score:.4f}", **scores, "settings": json.dumps(settings)}
 

@@ -13,7 +13,7 @@ Report = Callable[[float], None]
 """Called with the share of the budget that is spent."""
 
 
-class Asked(NamedTuple):
+class TrainingRequest(NamedTuple):
     """A training that a trainer is asked for."""
 
     task: Task
@@ -29,14 +29,14 @@ class Asked(NamedTuple):
     report: Report
 
 
-Trainer = Callable[[Asked], list[Row]]
+Trainer = Callable[[TrainingRequest], list[Row]]
 """Trains, leaves its best policy, and gives the curve: a row for each measurement."""
 
 
 class Watch:
     """Counts processor time, measuring apart, and measures a policy in even parts of the budget."""
 
-    def __init__(self, asked: Asked) -> None:
+    def __init__(self, asked: TrainingRequest) -> None:
         self.curve: list[Row] = []
         """A row for each measurement."""
         self._asked, self._training = asked, asked.task.training(steps=asked.agent_steps)
@@ -67,7 +67,7 @@ class Watch:
         minutes, begin, vehicles = self.minutes, time.process_time(), self._asked.task.num_vehicles
         judged = validate(policy, self._training)
         self._apart += time.process_time() - begin
-        self.curve.append(point(agent_steps, minutes, judged.share, judged.whole, judged.contacts / vehicles))
+        self.curve.append(point(agent_steps, minutes, judged.share, judged.swarm_success, judged.collisions / vehicles))
         better = judged.score >= self._best
         self._best = max(self._best, judged.score)
         return better
@@ -76,6 +76,6 @@ class Watch:
 def point(agent_steps: int, minutes: float, share: float, whole: float, contacts: float) -> Row:
     """A row of a curve; the contacts are those of a vehicle."""
     return {
-        "agent_steps": str(agent_steps), "minutes": f"{minutes:.2f}", "share": f"{share:.4f}", "whole": f"{whole:.4f}",
-        "contacts": f"{contacts:.3f}",
+        "agent_steps": str(agent_steps), "minutes": f"{minutes:.2f}", "share": f"{share:.4f}", "swarm_success": f"{whole:.4f}",
+        "collisions": f"{contacts:.3f}",
     }  # fmt: skip

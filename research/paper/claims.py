@@ -33,7 +33,7 @@ class Claim(NamedTuple):
     metric: str = ""
     measure: str = ""
     """Where it is no metric: a function of ``measures``, of each trace and of what is ``given``."""
-    given: Mapping[str, object] = NOTHING
+    constants: Mapping[str, object] = NOTHING
     combined: str = ""
     """Of several cases: ``ratio`` of the first to the second, or the smallest ``gain`` from each to the next."""
     least: float = -np.inf
@@ -45,11 +45,11 @@ class Claim(NamedTuple):
 
     def values(self, suite: Suite) -> Float64:
         """What is measured, by seed."""
-        found = [self._of(suite, BY_NAME[name]) for name in self.cases]
+        values = [self._of(suite, BY_NAME[name]) for name in self.cases]
         if self.combined == "gain":
-            return np.diff(found, axis=0).min(axis=0)
+            return np.diff(values, axis=0).min(axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return found[0] / found[1] if self.combined == "ratio" else found[0]
+            return values[0] / values[1] if self.combined == "ratio" else values[0]
 
     def holds(self, values: Float64) -> Bool:
         """Whether the claim holds, by seed."""
@@ -60,7 +60,7 @@ class Claim(NamedTuple):
         if self.metric:
             return suite.metric(case, self.metric)
         measure: Callable[..., float] = getattr(measures, self.measure)
-        return np.array([measure(trace, **self.given) for trace in suite.traces(case)])
+        return np.array([measure(trace, **self.constants) for trace in suite.traces(case)])
 
 
 CLAIMS = tuple(Claim(**table) for table in stated("claim"))

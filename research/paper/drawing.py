@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from research.columns import Columns
 from research.paper.measures import corner_times
-from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, draw_course
+from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, draw_map
 from uuv_marl.benchmark.suite import Case, Suite, Trace
 from uuv_marl.types import Int64
 
@@ -20,7 +20,7 @@ def plan(ax: Axes, case: Case, title: str = "") -> None:
     """The paper's plan view: its first coordinate (north) to the right; trajectory and obstacles of a case."""
     scenario = case.load()
     discs = [(*obstacle.centre_m, obstacle.radius_m) for obstacle in scenario.obstacles]
-    draw_course(ax, np.array(scenario.trajectory.waypoints_m), discs)
+    draw_map(ax, np.array(scenario.trajectory.waypoints_m), discs)
     for k, (x, y, _) in enumerate(discs if len(discs) > 1 else ()):
         ax.annotate(f"{k + 1}", (x, y), ha="center", va="center", color="white", fontsize=8, zorder=4)
     ax.set(xlabel="x, north [m]", ylabel="y, east [m]", title=title)
@@ -70,14 +70,14 @@ def route_table(suite: Suite, case: Case) -> Columns:
     """Routes of seed 0: a row for each vehicle and second."""
     trace = suite.trace(case, 0)
     position, time = trace["route_position"], trace["route_time_s"]
-    kept: Int64 = np.unique(np.append(np.arange(0, len(time), 2), len(time) - 1))
+    routes: Int64 = np.unique(np.append(np.arange(0, len(time), 2), len(time) - 1))
     vehicles = int(position.shape[1])
     return {
-        "vehicle": np.repeat(np.arange(vehicles), len(kept)),
-        "group": np.repeat(start_groups(trace), len(kept)),
-        "time_s": np.tile(time[kept], vehicles),
-        "x_m": position[kept, :, 0].T.ravel(),
-        "y_m": position[kept, :, 1].T.ravel(),
+        "vehicle": np.repeat(np.arange(vehicles), len(routes)),
+        "group": np.repeat(start_groups(trace), len(routes)),
+        "time_s": np.tile(time[routes], vehicles),
+        "x_m": position[routes, :, 0].T.ravel(),
+        "y_m": position[routes, :, 1].T.ravel(),
     }
 
 

@@ -42,17 +42,17 @@ def draw_distances(axes: Sequence[Axes], table: Columns, case: Case) -> None:
         axes[1].axhline(value, color=BLACK, linestyle=style, linewidth=1.2, label=f"paper's smallest: {value:g} m")
     for value, style, label in (
         (scenario.constraints.s_o_m, ":", "keep clear (s_o)"),
-        (scenario.contact.hull_radius_m, "--", "collision"),
+        (scenario.collision.hull_radius_m, "--", "collision"),
     ):
         axes[1].axhline(value, color=ORANGE, linestyle=style, linewidth=1.0, label=f"{label}: {value:g} m")
     axes[1].set_ylim(-2.0, 40.0)
 
 
-def draw_11(made: Tables) -> Figure:
+def draw_11(computed: Tables) -> Figure:
     """Routes past one obstacle, and the distance over time."""
     figure, axes = panels(3, size=(4.6, 4.6))
-    draw_routes(axes[0], made["figure-11a"], SINGLE, "routes")
-    draw_distances(axes[1:], made["figure-11b"], SINGLE)
+    draw_routes(axes[0], computed["figure-11a"], SINGLE, "routes")
+    draw_distances(axes[1:], computed["figure-11b"], SINGLE)
     return legend(figure, columns=6)
 
 
@@ -69,11 +69,11 @@ def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
     def gain(case: Case) -> float:
         return float(getattr(case.parameters.get("gains", BioInspiredGains()), symbol))
 
-    def draw(made: Tables) -> Figure:
+    def draw(computed: Tables) -> Figure:
         figure, axes = panels(2)
         for ax, key, case, words in zip(axes, "ab", (small, large), ("too small", "too large"), strict=True):
             title = f"({key}) {symbol} {words}: {gain(case):g} (Table 1: {gain(SINGLE):g})"
-            draw_routes(ax, made[f"{name}{key}"], case, title)
+            draw_routes(ax, computed[f"{name}{key}"], case, title)
         return legend(figure, columns=4)
 
     tables = {f"{name}a": (route_table, small), f"{name}b": (route_table, large)}
@@ -90,23 +90,23 @@ def part(name: str, cases: tuple[Case, ...], tables: Mapping[str, Made], draw: C
         draw: makes the picture of the tables.
     """
 
-    def made(suite: Suite, _report: Share) -> Tables:
+    def compute(suite: Suite, _report: Share) -> Tables:
         return {key: make(suite, case) for key, (make, case) in tables.items()}
 
-    return Part(name, cases, made, draw)
+    return Part(name, cases, compute, draw)
 
 
-def draw_14(made: Tables) -> Figure:
+def draw_14(computed: Tables) -> Figure:
     """Routes among four obstacles."""
     figure, (ax,) = panels(1, size=(7.0, 6.8))
-    draw_routes(ax, made["figure-14"], MULTI)
+    draw_routes(ax, computed["figure-14"], MULTI)
     return legend(figure, columns=4)
 
 
-def draw_15(made: Tables) -> Figure:
+def draw_15(computed: Tables) -> Figure:
     """Distance from each of four obstacles over time: the whole range, and the part below 40 m."""
     figure, axes = panels(2)
-    draw_distances(axes, made["figure-15"], MULTI)
+    draw_distances(axes, computed["figure-15"], MULTI)
     return legend(figure, columns=4)
 
 

@@ -36,11 +36,11 @@ def figure_7(suite: Suite, _report: Share) -> Tables:
     return {"figure-7a": at(0), "figure-7b": at(-1)}
 
 
-def draw_7(made: Tables) -> Figure:
+def draw_7(computed: Tables) -> Figure:
     """Circles, and arrows for the velocities; an arrow of the fastest is 25 m long in each panel."""
     figure, axes = panels(2)
     for ax, name, words in zip(axes, ("figure-7a", "figure-7b"), ("start", "end"), strict=True):
-        table = made[name]
+        table = computed[name]
         fastest = float(f"{np.hypot(table['velocity_x_mps'], table['velocity_y_mps']).max():.1g}")
         drawing.plan(ax, TRACKING, f"({name[-1]}) {words}, t = {float(table['time_s'][0]):g} s")
         for group, colour, label in drawing.GROUPS:
@@ -65,12 +65,12 @@ def figure_8(suite: Suite, _report: Share) -> Tables:
     }
 
 
-def draw_8(made: Tables) -> Figure:
+def draw_8(computed: Tables) -> Figure:
     """Routes, and the centre's route over the trajectory."""
     figure, (left, right) = panels(2)
-    drawing.draw_routes(left, made["figure-8a"], TRACKING, "(a) every vehicle")
+    drawing.draw_routes(left, computed["figure-8a"], TRACKING, "(a) every vehicle")
     drawing.plan(right, TRACKING, "(b) centre of the swarm")
-    centre = made["figure-8b"]
+    centre = computed["figure-8b"]
     right.plot(centre["centre_x_m"], centre["centre_y_m"], color=GREEN, label="route of the swarm's centre")
     return legend(figure, columns=4)
 
@@ -103,10 +103,10 @@ def figure_9(suite: Suite, _report: Share) -> Tables:
     }
 
 
-def draw_9(made: Tables) -> Figure:
+def draw_9(computed: Tables) -> Figure:
     """Every heading and their mean, how far they agree, and the centre's deviation."""
     figure, (left, middle, right) = panels(3, size=(4.4, 4.4))
-    every, mean, deviation = (made[f"figure-9{letter}"] for letter in "acb")
+    every, mean, deviation = (computed[f"figure-9{letter}"] for letter in "acb")
     left.plot(every["time_s"], every["heading_deg"], ",", color=BLUE, alpha=0.25)
     left.plot([], [], ".", color=BLUE, label="heading of a vehicle")
     left.plot(mean["time_s"], mean["mean_heading_deg"], color=ORANGE, label="mean heading")
@@ -131,20 +131,20 @@ def figure_10(suite: Suite, _report: Share) -> Tables:
     return {"figure-10": {name: trace[name][::5] for name in ("time_s", "max_spacing_m", "min_spacing_m")}}
 
 
-def draw_10(made: Tables) -> Figure:
+def draw_10(computed: Tables) -> Figure:
     """Each by itself, so that its changes can be seen, with the paper's numbers and the bounds."""
     figure, axes = panels(2)
-    table, scenario, law = made["figure-10"], TRACKING.load(), PAPER["tracking", "bio_inspired"]
+    table, scenario, controller = computed["figure-10"], TRACKING.load(), PAPER["tracking", "bio_inspired"]
     for ax, name, words in zip(axes, ("max_spacing_m", "min_spacing_m"), ("(a) largest", "(b) smallest"), strict=True):
         ax.plot(table["time_s"], table[name], color=BLUE, label="ours")
         drawing.mark_corners(ax, TRACKING)
         drawing.against_time(ax, f"{words[4:]} distance between two vehicles [m]", words)
         ax.set_ylim(0.0, 1.05 * float(table[name].max()))
     for value, style, colour, label in (
-        (law.mean_min_spacing_m, "--", GREEN, "paper, time mean of the smallest"),
-        (law.min_spacing_m, "-.", GREEN, "paper, smallest"),
+        (controller.mean_min_spacing_m, "--", GREEN, "paper, time mean of the smallest"),
+        (controller.min_spacing_m, "-.", GREEN, "paper, smallest"),
         (scenario.constraints.s_u_m, ":", ORANGE, "keep apart (s_u)"),
-        (2.0 * scenario.contact.hull_radius_m, "--", ORANGE, "collision"),
+        (2.0 * scenario.collision.hull_radius_m, "--", ORANGE, "collision"),
     ):
         if value is not None:
             axes[1].axhline(value, color=colour, linestyle=style, linewidth=1.0, label=f"{label}: {value:g} m")

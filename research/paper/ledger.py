@@ -93,14 +93,14 @@ def number_entry(number: Number, values: Float64) -> Entry:
     row = Entry(
         number.section, "number", number.quantity, number.unit, " and ".join(f"{value:g}" for value in number.paper)
     )
-    found = values[np.isfinite(values)]
-    if not found.size:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         return row._replace(verdict="differs", why="no seed gives one")
-    e = estimate(found.tolist())
-    relative, worst = difference(e.iqm, number.paper), found.max() if number.unit == "s" else found.min()
+    e = estimate(finite.tolist())
+    relative, worst = difference(e.iqm, number.paper), finite.max() if number.unit == "s" else finite.min()
     why = "" if abs(relative) <= CLOSE else number.why
-    if found.size < values.size:
-        why = f"{values.size - found.size} of {values.size} seeds never arrive; {why}"
+    if finite.size < values.size:
+        why = f"{values.size - finite.size} of {values.size} seeds never arrive; {why}"
     return Entry(*row[:5], *e, float(worst), relative, verdict(relative), why)
 
 
@@ -112,10 +112,10 @@ def claim_entry(claim: Claim, values: Float64) -> Entry:
         claim.section, "claim", f"{claim.says}: {claim.measured}", claim.unit, f"holds {_limits(claim)}",
         verdict=words, why="" if held == of else claim.why,
     )  # fmt: skip
-    found = values[np.isfinite(values)]
-    if not found.size:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         return row
-    e, worst = estimate(found.tolist()), found[np.argmin(np.minimum(found - claim.least, claim.most - found))]
+    e, worst = estimate(finite.tolist()), finite[np.argmin(np.minimum(finite - claim.least, claim.most - finite))]
     return row._replace(ours=e.iqm, low=e.low, high=e.high, worst=float(worst))
 
 
@@ -127,7 +127,7 @@ def _limits(claim: Claim) -> str:
     return f"up to {claim.most:g}" if np.isinf(claim.least) else f"from {claim.least:g} to {claim.most:g}"
 
 
-def given_entries() -> list[Entry]:
+def stated_entries() -> list[Entry]:
     """What the paper sets, against the scenarios and gains that are run."""
     tracking, single, multi = (case.load() for case in SCENARIOS)
     arrays = {array.kind: array for array in tracking.sonar.arrays}
@@ -138,7 +138,7 @@ def given_entries() -> list[Entry]:
         ("Table 1", "delta_n", "m", 60, gains.delta_n),
         ("Table 1", "zeta_o", "N/m", 8, gains.zeta_o),
         ("Table 1", "delta_o", "m", 80, gains.delta_o),
-        ("Table 1", "t_r", "s", 0.1, tracking.timing.control_hold_s),
+        ("Table 1", "t_r", "s", 0.1, tracking.timing.control_step_s),
         ("Table 1", "phi_i", "deg", 120, arrays["passive"].aperture_deg),
         ("Table 1", "theta_i", "deg", 120, arrays["active"].aperture_deg),
         ("Table 1", "R_i", "m", 500, arrays["passive"].range_m),
@@ -183,7 +183,7 @@ def ledger(suite: Suite) -> list[Entry]:
     return [
         *(number_entry(number, suite.metric(number.case, number.metric)) for number in NUMBERS),
         *(claim_entry(claim, claim.values(suite)) for claim in CLAIMS),
-        *given_entries(),
+        *stated_entries(),
         *assumption_entries(),
     ]
 

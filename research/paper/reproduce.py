@@ -56,7 +56,7 @@ def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> 
         if name not in NAMES:
             raise ResultsError(f"--only {name} is unknown; there are {', '.join(NAMES)}")
     parts = [part for part in PARTS if not only or part.name in only]
-    suite, made = Suite(folder / "runs", seeds), list[Path]()
+    suite, paths = Suite(folder / "runs", seeds), list[Path]()
     work = [len(part.cases) or _COMPUTED for part in parts]
     for k, part in enumerate(parts):
 
@@ -64,12 +64,12 @@ def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> 
             report(what, (sum(work[:k]) + share * work[k]) / sum(work))
 
         note(0.0)
-        made.append(make(part, suite, folder, note))
+        paths.append(make(part, suite, folder, note))
     if not only or LEDGER in only:
         suite.run(ALL, lambda _, share: report(LEDGER, share))
-        made += write_ledger(folder, ledger(suite), seeds)
-        made += write_page(folder, suite)
-    return made
+        paths += write_ledger(folder, ledger(suite), seeds)
+        paths += write_page(folder, suite)
+    return paths
 
 
 def make(part: Part, suite: Suite, folder: Path, report: Share) -> Path:
@@ -82,9 +82,9 @@ def make(part: Part, suite: Suite, folder: Path, report: Share) -> Path:
         report: is called with the share of the work that is done.
     """
     stamp, code = folder / "runs" / f"{part.name}.json", _code()
-    kept: dict[str, Any] = json.loads(stamp.read_text(encoding="utf-8")) if stamp.exists() else {}
-    paths = [folder / "data" / f"{name}.csv" for name in kept.get("tables", ())]
-    if kept.get("code") != code or not all(path.exists() for path in paths):
+    reusable: dict[str, Any] = json.loads(stamp.read_text(encoding="utf-8")) if stamp.exists() else {}
+    paths = [folder / "data" / f"{name}.csv" for name in reusable.get("tables", ())]
+    if reusable.get("code") != code or not all(path.exists() for path in paths):
         suite.run(part.cases, lambda _, share: report(share))
         tables = part.tables(suite, report)
         paths = [folder / "data" / f"{name}.csv" for name in tables]

@@ -34,9 +34,9 @@ def table_2(suite: Suite, _report: Share) -> Tables:
     return {"table-2": columns(rows)}
 
 
-def draw(made: Tables) -> Figure:
+def draw(computed: Tables) -> Figure:
     """Every seed, side by side so that all can be seen, and the paper's value."""
-    by_policy = groups(made["table-2"], "policy")
+    by_policy = groups(computed["table-2"], "policy")
     figure, axes = panels(2)
     for ax, (name, words) in zip(axes, _HEADS.items(), strict=True):
         for k, own in enumerate(by_policy.values()):

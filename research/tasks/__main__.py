@@ -36,11 +36,11 @@ def main(
         if task not in STUDIES:
             raise ResultsError(f"task must be one of {', '.join(STUDIES)}, got {task!r}")
         with working(f"The finished episodes are in {output}") as bar:
-            told, sets = progress_line(bar, task), list(STUDIES[task].sets.values())
+            progress, sets = progress_line(bar, task), list(STUDIES[task].sets.values())
             rows = run(
-                output, sets, only or [], seeds, STUDIES[task].metrics, lambda what, share: told(share, what[-60:])
+                output, sets, only or [], seeds, STUDIES[task].metrics, lambda what, share: progress(share, what[-60:])
             )
-            told(1.0)
+            progress(1.0)
         if not only:
             with locked(output, wait_s=60.0):
                 write_rows(output / f"{task}.csv.gz", rows)

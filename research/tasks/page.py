@@ -19,12 +19,12 @@ Found = Mapping[tuple[str, str], Sequence[Row]]
 Columns = Mapping[str, Sequence[str]]
 """Sets by the head of their column."""
 _RESAMPLES = 2000
-_NO_LAWS = ("oracle", "carrot_informed", "random", "idle", "research.blind")
+_NOT_CONTROLLERS = ("oracle", "carrot_informed", "random", "idle", "research.blind")
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
     "found_share": ("found", lambda values, _: short(float(np.mean(values)))),
     "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
     "untouched_share": ("untouched", lambda values, _: short(float(np.mean(values)))),
-    "collisions": ("contacts", lambda values, n: f"{np.mean(values) / n:.2f}"),
+    "collisions": ("collisions", lambda values, n: f"{np.mean(values) / n:.2f}"),
     "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
     "whole_ratio": ("time of the last", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
     "min_obstacle_distance_m": ("to obstacles", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
@@ -40,21 +40,21 @@ def report(task: str, rows: Sequence[Row]) -> str:
         task: a name of ``STUDIES``.
         rows: episodes, as ``TASK.csv.gz`` holds them.
     """
-    found: dict[tuple[str, str], list[Row]] = {}
+    rows_by_set: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        found.setdefault((row["policy"], row["set"]), []).append(row)
+        rows_by_set.setdefault((row["policy"], row["set"]), []).append(row)
     study = STUDIES[task]
     kinds = {name.split("-")[1]: [name] for name in study.own if "-" in name}
     return Template(read_text("tasks", "stories", f"{task}.md")).substitute(
         episodes=f"{sum(row['set'] not in study.final.values() for row in rows):,}",
-        tiers=_shares(found, study, _tiers(task)),
-        kinds=_measures(found, study, kinds),
-        measures=_measures(found, study, {}),
+        tiers=_shares(rows_by_set, study, _tiers(task)),
+        kinds=_measures(rows_by_set, study, kinds),
+        measures=_measures(rows_by_set, study, {}),
         many=_measures(
-            found, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
+            rows_by_set, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
-        final=_final(found, study),
-        informed=_shares(found, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "untouched_share"),
+        final=_final(rows_by_set, study),
+        informed=_shares(rows_by_set, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "untouched_share"),
     )
 
 
@@ -66,28 +66,28 @@ def _tiers(task: str) -> Columns:
     }
 
 
-def _shares(found: Found, study: Study, columns: Columns, share: str = "") -> str:
+def _shares(rows_by_set: Found, study: Study, columns: Columns, share: str = "") -> str:
     """The headline, or another ``share``, with its interval, and whole swarms, for policies that ran on all sets."""
     share = share or study.headline
     table = [
-        (named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'whole')}" for mine in cells))
-        for policy in _policies(found)
-        if (cells := _cells(found, policy, columns))
+        (named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'swarm_success')}" for mine in cells))
+        for policy in _policies(rows_by_set)
+        if (cells := _cells(rows_by_set, policy, columns))
     ]
     return markdown_table(("policy", *columns), table)
 
 
-def _measures(found: Found, study: Study, columns: Columns) -> str:
+def _measures(rows_by_set: Found, study: Study, columns: Columns) -> str:
     """The headline and the share of whole swarms in each column, or of the medium tier, and other measures."""
     table: list[tuple[str, ...]] = []
-    for policy in _policies(found):
-        cells = [found.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names]
+    for policy in _policies(rows_by_set):
+        cells = [rows_by_set.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names]
         if every := [row for rows in cells for row in rows]:
-            shares = [[_mean([rows], name) for name in (study.headline, "whole")] if rows else ["–"] for rows in cells]
+            shares = [[_mean([rows], name) for name in (study.headline, "swarm_success")] if rows else ["–"] for rows in cells]
             own = [", ".join(two) for two in shares] if columns else shares[0]
             rest = (_MEASURES[name][1](measured(every, name), _size(every[0])) for name in _shown(study))
             table.append((named(policy), *own, *rest))
-    heads = (*columns,) if columns else (study.headline.replace("_", " "), "whole")
+    heads = (*columns,) if columns else (study.headline.replace("_", " "), "swarm_success")
     return markdown_table(("policy", *heads, *(_MEASURES[name][0] for name in _shown(study))), table)
 
 
@@ -103,22 +103,22 @@ def _size(row: Row) -> int:
     return int(last) if last.isdigit() else load_scenario(scenario).swarm.num_vehicles
 
 
-def _final(found: Found, study: Study) -> str:
+def _final(rows_by_set: Found, study: Study) -> str:
     """The headline and whole swarms on the final seeds, and by how much a network is above the best law there."""
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
-        mine = {policy: rows for (policy, where), rows in found.items() if where == name}
+        mine = {policy: rows for (policy, where), rows in rows_by_set.items() if where == name}
         shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
-        laws = [
+        controllers = [
             policy for policy in mine
-            if not (is_trained(policy) or policy.startswith(_NO_LAWS) or "_informed" in policy)
+            if not (is_trained(policy) or policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy)
         ]  # fmt: skip
-        best = max(laws, key=lambda law: shares[law].mean())
+        best = max(controllers, key=lambda controller: shares[controller].mean())
         heads += [scenario, "above the best law"]
         for policy, rows in mine.items():
             gain = _with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
-            told = f"{_with_interval([shares[policy]])}, {_mean([rows], 'whole')}"
-            table.setdefault(policy, [named(policy)]).extend((told, gain))
+            score_text = f"{_with_interval([shares[policy]])}, {_mean([rows], 'swarm_success')}"
+            table.setdefault(policy, [named(policy)]).extend((score_text, gain))
     return markdown_table(heads, table.values())
 
 
@@ -128,13 +128,13 @@ def named(policy: str) -> str:
     return f"{policy} with {', '.join(beyond)}" if beyond else policy
 
 
-def _policies(found: Found) -> list[str]:
-    return list(dict.fromkeys(policy for policy, _ in found))
+def _policies(rows_by_set: Found) -> list[str]:
+    return list(dict.fromkeys(policy for policy, _ in rows_by_set))
 
 
-def _cells(found: Found, policy: str, columns: Columns) -> list[list[Sequence[Row]]]:
+def _cells(rows_by_set: Found, policy: str, columns: Columns) -> list[list[Sequence[Row]]]:
     """The rows of a policy in each set of each column; nothing if some are missing."""
-    cells = [[found.get((policy, name), ()) for name in names] for names in columns.values()]
+    cells = [[rows_by_set.get((policy, name), ()) for name in names] for names in columns.values()]
     return cells if all(rows for mine in cells for rows in mine) else []
 
 

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 from research.data import read_toml
 from research.sets import EpisodeSet
 
-_TOLD: dict[str, Any] = read_toml("tasks", "studies.toml")
-SEEDS: int = _TOLD["seeds"]
+_DATA: dict[str, Any] = read_toml("tasks", "studies.toml")
+SEEDS: int = _DATA["seeds"]
 """Episodes of each policy on each set, from seed 0 on."""
-FINAL = range(*_TOLD["final"])
+FINAL = range(*_DATA["final"])
 """Seeds of the final sets, on which nothing is run before its weights are frozen."""
 _FINAL = "final"
 SIZE, INFORMED = "swarm.num_vehicles", "task.informed"
@@ -43,27 +43,27 @@ def set_name(scenario: str, kind: str = "", number: int = 0) -> str:
     return "-".join([scenario, *([kind] if kind else []), *([str(number)] if number else [])])
 
 
-def _study(task: str, told: dict[str, Any]) -> Study:
+def _study(task: str, table: dict[str, Any]) -> Study:
     """One table of ``studies.toml``."""
     changes: dict[str, tuple[str, dict[str, object]]] = {}
     policies: dict[str, dict[str, range]] = {}
-    for run in told["runs"]:
+    for run in table["runs"]:
         own = {field: run[key] for field, key in ((SIZE, "num_vehicles"), (INFORMED, "informed")) if key in run}
         seeds = FINAL if run.get(_FINAL) else range(SEEDS)
         for scenario in run["scenarios"]:
             for kind in run.get("kinds", [_FINAL if run.get(_FINAL) else ""]):
                 name = set_name(scenario, kind, *own.values())
                 changes[name] = scenario, ({"task.kinds": [kind], **own} if "kinds" in run else own)
-                policies.setdefault(name, {}).update(dict.fromkeys(_TOLD["policies"][run["policies"]], seeds))
+                policies.setdefault(name, {}).update(dict.fromkeys(_DATA["policies"][run["policies"]], seeds))
     sets = {name: EpisodeSet(name, scenario, policies[name], own) for name, (scenario, own) in changes.items()}
     own = (
         name for name, (scenario, fields) in changes.items()
         if scenario == task and not name.endswith(_FINAL) and not {SIZE, INFORMED} & {*fields}
     )  # fmt: skip
-    return Study(sets, task, tuple(own), tuple(told["metrics"]))
+    return Study(sets, task, tuple(own), tuple(table["metrics"]))
 
 
-STUDIES = {name: _study(name, _TOLD[name]) for name in ("hard_water", "two_swarms", "few_informed", "silent_targets")}
+STUDIES = {name: _study(name, _DATA[name]) for name in ("hard_water", "two_swarms", "few_informed", "silent_targets")}
 """By task."""
 SETS = tuple(each for study in STUDIES.values() for each in study.sets.values())
 """All of them."""

@@ -57,12 +57,12 @@ def main(
         if others:
             names = ", ".join(sorted({path.name for path in others}))
             console.print(f"Left out, because they hold no episodes: {names}.", highlight=False)
-        found = check.only(rows, only or [], policy or [])
+        selected = check.only(rows, only or [], policy or [])
         find_modules(policy or [])
         seed = check.fresh_seed() if seed is None else seed
-        drawn = check.draw(found, sample, seed)
+        drawn = check.draw(selected, sample, seed)
         console.print(
-            f"{len(drawn):,} of {len(found):,} rows, drawn with --seed {seed}; another seed draws others.",
+            f"{len(drawn):,} of {len(selected):,} rows, drawn with --seed {seed}; another seed draws others.",
             highlight=False,
         )
         verdicts: list[Verdict] = []
@@ -78,7 +78,7 @@ def main(
         except KeyboardInterrupt:
             stopped = True
         _show(verdicts)
-        console.print(check.summary(verdicts, len(found)), highlight=False)
+        console.print(check.summary(verdicts, len(selected)), highlight=False)
         if stopped:
             console.print(f"Stopped after {len(verdicts)} of {len(drawn)} rows.")
             raise typer.Exit(130)

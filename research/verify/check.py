@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 
 from research.blind import BLIND
 from research.verify.rows import NoEpisodesError, Row, rows_of
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.registry import GUARDED, OWN
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
@@ -74,19 +74,19 @@ def _docs() -> Path:
 
 def only(rows: Sequence[Row], places: Collection[str], policies: Collection[str]) -> list[Row]:
     """The rows of these sets or scenarios and of these policies; empty means all. Raises ResultsError for none."""
-    for what, wanted, there in (
+    for what, wanted, existing in (
         ("set or scenario", places, {row.place for row in rows}),
         ("policy", policies, {policy_of(row) for row in rows}),
     ):
         for name in wanted:
-            if name not in there:
-                raise ResultsError(f"no episode has the {what} {name!r}; there are {', '.join(sorted(there))}")
-    found = [
+            if name not in existing:
+                raise ResultsError(f"no episode has the {what} {name!r}; there are {', '.join(sorted(existing))}")
+    selected = [
         row for row in rows if row.place in (places or {row.place}) and policy_of(row) in (policies or {policy_of(row)})
     ]
-    if not found:
+    if not selected:
         raise ResultsError("no episode has both this set or scenario and this policy; leave one of the two out")
-    return found
+    return selected
 
 
 def policy_of(row: Row) -> str:
@@ -114,7 +114,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
         report: called with the share of the episode that is done.
     """
     try:
-        _need_trust(policy_of(row), allowed)
+        _check_trust(policy_of(row), allowed)
         run = _rerun(row, report)
     except DivergenceError as error:
         return Verdict(row, [Difference("episode", "ended", f"diverged: {error}")])
@@ -124,7 +124,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
     return Verdict(row, [Difference(f, row.cells[f], now[f]) for f in row.kind.measured if row.cells[f] != now[f]])
 
 
-def _need_trust(policy: str, allowed: Collection[str]) -> None:
+def _check_trust(policy: str, allowed: Collection[str]) -> None:
     plain = policy.removeprefix(BLIND).removeprefix(OWN).removeprefix(GUARDED)
     if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
         raise PolicyError(f"policy {policy!r} is not part of the package; if you trust it, give --policy {policy}")
@@ -135,7 +135,7 @@ def _rerun(row: Row, report: Callable[[float], None]) -> Run:
         raise ResultsError(f"seed must be a whole number, got {row.cells['seed']!r}")
     source, seed = row.kind.source(row.cells), int(row.cells["seed"])
     with blaming(source.policy):
-        for event in evaluate(granted(source.policy, source.scenario), source.policy, [seed], None):
+        for event in evaluate(with_policy_requirements(source.policy, source.scenario), source.policy, [seed], None):
             if isinstance(event, Run):
                 return event
             report(event.share)

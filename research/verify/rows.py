@@ -127,10 +127,10 @@ def _of(case: Case) -> Source:
 
 
 def _set(cells: Cells) -> Source:
-    found = next((each for each in (*heldout.SETS, *studies.SETS) if each.name == cells["set"]), None)
-    if found is None:
+    episode_set = next((each for each in (*heldout.SETS, *studies.SETS) if each.name == cells["set"]), None)
+    if episode_set is None:
         raise ResultsError(f"there is no set {cells['set']!r} in this version")
-    return _of(Case(found.name, found.scenario, runnable(cells["policy"]), found.overrides))
+    return _of(Case(episode_set.name, episode_set.scenario, runnable(cells["policy"]), episode_set.overrides))
 
 
 def _learned(cells: Cells) -> Source:
@@ -143,9 +143,9 @@ def _learned(cells: Cells) -> Source:
         if policy not in LEARNERS or not cells["training"].isdecimal():
             raise ResultsError(f"there is no training {cells['training']!r} of a learner {policy!r} in this version")
         cell = learners.Cell(task, LEARNERS[policy], int(cells["training"]))
-        if not cell.kept.exists():
-            raise PolicyError(f"of {cell.kept.stem} no policy is kept; python -m research.learners trains it again")
-        policy = cell.policy(cell.kept)
+        if not cell.shipped_weights.exists():
+            raise PolicyError(f"of {cell.shipped_weights.stem} no policy is kept; python -m research.learners trains it again")
+        policy = cell.policy(cell.shipped_weights)
     return Source(load_scenario(each.scenario, overrides=each.overrides), policy)
 
 
@@ -155,7 +155,7 @@ def _learned_written(cells: Cells, metrics: Metrics) -> Sequence[str]:
 
 def _robustness(cells: Cells) -> Source:
     scenario, axis, level = cells["scenario"], cells["axis"], cells["level"]
-    levels = {CALM: ("0",)} | {name: tuple(map(str, found.levels)) for name, found in AXES.items()}
+    levels = {CALM: ("0",)} | {name: tuple(map(str, data.levels)) for name, data in AXES.items()}
     if level not in levels.get(axis, ()):
         raise ResultsError(f"there is no level {level!r} of axis {axis!r} in this version")
     return _of(robustness.case_of(scenario, axis, int(level), cells["policy"]))
@@ -188,9 +188,9 @@ def _flat(metrics: Metrics) -> dict[str, str]:
 
 
 def _benchmarked(content: Content, cells: Cells) -> Source:
-    policy, told = cells["policy"], content["scenarios"][cells["scenario"]]
+    policy, scenario_data = cells["policy"], content["scenarios"][cells["scenario"]]
     try:
-        scenario = Scenario.model_validate_json(json.dumps(told))
+        scenario = Scenario.model_validate_json(json.dumps(scenario_data))
     except ValueError as error:
         raise ScenarioError(f"the scenario has the fields of another version ({error})") from None
     if knowledge(policy)["source"] != content["policies"][policy]["source"]:

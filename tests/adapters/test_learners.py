@@ -57,18 +57,18 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
 
 def test_a_folder_has_one_protocol(tmp_path):
     for _ in range(2):
-        cells.need_protocol(tmp_path / "new")
+        cells.check_protocol(tmp_path / "new")
     path = tmp_path / "new" / "protocol.toml"
     path.write_text(path.read_text().replace("first = 7000", "first = 8000"))
     with pytest.raises(ResultsError, match="was made by another protocol, see .*; remove it, or give another --output"):
-        cells.need_protocol(tmp_path / "new")
+        cells.check_protocol(tmp_path / "new")
 
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_training_that_runs_out_of_time_is_measured_at_its_end(name, tmp_path, monkeypatch):
     monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
     task = TASKS["hard_water"]
-    asked = watch.Asked(task, 0, tmp_path, LEARNERS[name].settings, 5_000_000, 0.02, quiet)
+    asked = watch.TrainingRequest(task, 0, tmp_path, LEARNERS[name].settings, 5_000_000, 0.02, quiet)
     curve = cells.trainer_of(LEARNERS[name])(asked)
     assert 1 <= len(curve) <= protocol.MEASURES
     assert 0.02 <= float(curve[-1]["minutes"]) < 0.2
@@ -87,7 +87,7 @@ def test_what_isac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
     monkeypatch.setattr(isac, "tensors_of", lambda actor: actors.append(actor) or usual(actor))
     monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
     task = TASKS["hard_water"]
-    isac.learn(watch.Asked(task, 0, tmp_path, LEARNERS["ISAC"].settings, 25_000, 1.0, quiet))
+    isac.learn(watch.TrainingRequest(task, 0, tmp_path, LEARNERS["ISAC"].settings, 25_000, 1.0, quiet))
     (tmp_path / "now").write_bytes(safetensors.numpy.save(usual(actors[0])))
     swarm = Swarm(task.scenario, 3)
     percept = swarm.reset(10_100)
@@ -116,7 +116,7 @@ def invented(better=()):
                 if who in LEARNERS:
                     curves += [
                         place
-                        | {"agent_steps": str(k), "minutes": "1.00", "share": "0.1", "whole": "0", "contacts": "2"}
+                        | {"agent_steps": str(k), "minutes": "1.00", "share": "0.1", "whole": "0", "collisions": "2"}
                         for k in (1000, 2000)
                     ]
     return curves, rows
@@ -136,7 +136,7 @@ def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monk
     for task in TASKS:
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
         assert all(f"ISAC over {other}" in row for other in LEARNERS if other != "ISAC")
-    assert not any(" over " in row for row in page._apart(page.found_in(alike(rows))).splitlines())
+    assert not any(" over " in row for row in page._apart(page.grouped_rows(alike(rows))).splitlines())
 
 
 def test_the_page_shows_the_trainings_that_all_learners_have():
@@ -148,7 +148,7 @@ def test_the_page_shows_the_trainings_that_all_learners_have():
     shown = page.complete(lacking, rows)
     assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
     assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
-    assert "too few to tell anyone apart" in page._apart(page.found_in(shown[1]))
+    assert "too few to tell anyone apart" in page._apart(page.grouped_rows(shown[1]))
 
 
 def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
@@ -161,7 +161,7 @@ def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
 def test_what_the_page_finds_is_in_the_shipped_rows():
     files = ("research/learners/curves.csv.gz", "docs/learners.csv.gz")
     curves, rows = page.complete(*(read_rows(FOLDER / file) for file in files))
-    found = page.found_in(rows)
+    found = page.grouped_rows(rows)
     every = page.scores(found)
     laws = {name: float(page._values(found, name, task.policies[0])[0, 0]) for name, task in TASKS.items()}
     means = {who: dict(zip(TASKS, own.mean(axis=0), strict=True)) for who, own in every.items()}
@@ -226,7 +226,7 @@ def test_all_learners_have_one_axis():
 
 
 def test_a_step_is_the_nearest_measure_and_after_its_end_a_training_stays_at_its_last():
-    place = {"task": "hard_water", "learner": next(iter(LEARNERS)), "training": "0", "whole": "0", "contacts": "0"}
+    place = {"task": "hard_water", "learner": next(iter(LEARNERS)), "training": "0", "whole": "0", "collisions": "0"}
     ends = {400_000: "0.1", 700_000: "0.2", 1_600_000: "0.3"}
     curve = [{**place, "agent_steps": str(k), "minutes": "1", "share": share} for k, share in ends.items()]
     run = marl_eval(curve, [])["uuv_marl"]["hard_water"][place["learner"]]["seed_0"]
@@ -245,21 +245,21 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
     rows = list(cells.every(few, "scout", quiet))
     page.write_rows(tmp_path / "rows.csv.gz", rows)
     assert read_rows(tmp_path / "rows.csv.gz") == rows
-    others.need_whole(rows, few)
+    others.check_complete(rows, few)
     for row in rows[::3]:
-        others.need_alike(row, "scout", few)
+        others.check_equal(row, "scout", few)
     with pytest.raises(ResultsError, match="set hard_water must have the seeds 7000 to 7001 once each, got 1 rows"):
-        others.need_whole(rows[1:], few)
+        others.check_complete(rows[1:], few)
     with pytest.raises(ResultsError, match="set hard_water, seed 7000 came again with to_others 9.9, now"):
-        others.need_alike({**rows[0], "to_others": "9.9"}, "scout", few)
+        others.check_equal({**rows[0], "to_others": "9.9"}, "scout", few)
     with pytest.raises(ResultsError, match="came again with"):
-        others.need_alike(rows[0], "random", few)
+        others.check_equal(rows[0], "random", few)
     with pytest.raises(ResultsError, match="set must be one of hard_water, .*, got 'lake'"):
-        others.need_whole([{**rows[0], "set": "lake"}], few)
+        others.check_complete([{**rows[0], "set": "lake"}], few)
     with pytest.raises(ResultsError, match="the columns must be set, .*, got no rows"):
-        others.need_whole([], few)
+        others.check_complete([], few)
     with pytest.raises(ResultsError, match="the columns must be set, seed, share, .*, got set, .*, colour"):
-        others.need_whole([{**row, "colour": "blue"} for row in rows], few)
+        others.check_complete([{**row, "colour": "blue"} for row in rows], few)
 
 
 @pytest.mark.parametrize("name", LEARNERS)

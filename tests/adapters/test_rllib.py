@@ -27,7 +27,7 @@ from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
-LOSES = {"disturbance.loss_times_s": [1.0, 2.0]}
+LOSES = {"losses.times_s": [1.0, 2.0]}
 EXAMPLE = ROOT / "examples" / "training" / "rllib.py"
 spec = importlib.util.spec_from_file_location("rllib_example", EXAMPLE)
 assert spec
@@ -102,10 +102,10 @@ def test_a_lost_vehicle_leaves_alone_and_the_time_limit_truncates_the_others():
 
 
 def test_the_loss_of_everybody_terminates_all():
-    env = SwarmMultiAgentEnv({"num_vehicles": 2, "overrides": {"contact.ends_vehicle": True}})
+    env = SwarmMultiAgentEnv({"num_vehicles": 2, "overrides": {"collision.ends_vehicle": True}})
     env.reset(seed=0)
     swarm = env._env.swarm
-    north, east, radius = swarm.course.obstacles[0, 0]
+    north, east, radius = swarm.world_map.obstacles[0, 0]
     swarm.state.eta[0] = north - radius - 1.05, east, 0.0  # about to touch
     swarm.state.nu[0] = 2.0, 0.0, 0.0
     _, _, terminateds, truncateds, _ = env.step(dict.fromkeys(env.agents, np.zeros(2)))
@@ -179,7 +179,7 @@ def test_every_runner_starts_from_its_own_world(started):
     try:
         algorithm.train()
         fields = algorithm.env_runner_group.foreach_env_runner(
-            lambda it: it.env.envs[0].unwrapped._env.swarm.course.obstacles.copy(), local_env_runner=False
+            lambda it: it.env.envs[0].unwrapped._env.swarm.world_map.obstacles.copy(), local_env_runner=False
         )
     finally:
         algorithm.stop()
@@ -187,7 +187,7 @@ def test_every_runner_starts_from_its_own_world(started):
     for seed in (123_001, 123_002):
         env = uuv_marl.parallel_env("training_field", num_vehicles=5)
         env.reset(seed=seed)
-        expected.append(env.swarm.course.obstacles)
+        expected.append(env.swarm.world_map.obstacles)
     assert sorted(field.tobytes() for field in fields) == sorted(field.tobytes() for field in expected)
 
 

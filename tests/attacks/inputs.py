@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 import uuv_marl
 from tests.nets import ANYWHERE
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
@@ -103,7 +103,7 @@ def fields(rng, folder):
 def scenarios_that_run(rng, folder):
     """What was accepted must work: a few decisions of an environment and of a policy, finite and within bounds."""
     scenario = changed_scenario(rng, 2)
-    if scenario.swarm.num_vehicles > 60 or scenario.timing.holds_per_decision * scenario.timing.steps_per_hold > 2000:
+    if scenario.swarm.num_vehicles > 60 or scenario.timing.control_steps_per_decision * scenario.timing.integration_steps_per_control_step > 2000:
         return
     env = uuv_marl.parallel_env(scenario, max_cycles=12)
     observations, _ = env.reset(seed=int(rng.integers(10**6)))
@@ -117,7 +117,7 @@ def scenarios_that_run(rng, folder):
         finite(list(rewards.values()))
     name = pick(rng, ("bio_inspired", "sff", "sdc", "mappo"))
     try:
-        suited = granted(name, scenario)
+        suited = with_policy_requirements(name, scenario)
         policy = make(name, suited)
     except (PolicyError, ScenarioError):
         return
@@ -283,10 +283,10 @@ def foreign_percepts(rng, folder):
     """A policy is handed the percepts of another swarm, or numbers that no sonar gives."""
     name = pick(rng, ANYWHERE)
     n, worlds = int(rng.integers(1, 7)), int(rng.integers(1, 4))
-    scenario = granted(name, load_scenario("single_obstacle", num_vehicles=n))
+    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=n))
     policy = make(name, scenario, worlds)
     policy.reset(0)
-    other = granted(
+    other = with_policy_requirements(
         pick(rng, (name, "sdc", "idle")), load_scenario("single_obstacle", num_vehicles=int(rng.integers(1, 7)))
     )
     swarm = Swarm(pick(rng, (scenario, other)), pick(rng, (worlds, worlds, 1, 4)))
@@ -304,7 +304,7 @@ def foreign_percepts(rng, folder):
 
 def snapshots(rng, folder):
     scenario = load_scenario(pick(rng, ("lossy", "random_field", "starter")), num_vehicles=7)
-    scenario = load_scenario(scenario, overrides={"disturbance.loss_times_s": [1.0, 2.0]})
+    scenario = load_scenario(scenario, overrides={"losses.times_s": [1.0, 2.0]})
     swarm = Swarm(scenario, 2)
     swarm.reset(3)
     snapshot = swarm.snapshot()
@@ -374,7 +374,7 @@ def checkpoints(rng, folder):
         data = bytearray(safetensors.numpy.save(tensors, {"uuv_marl": json.dumps(card)}))
     path = folder / "policy.safetensors"
     path.write_bytes(bytes(data))
-    scenario = granted(str(folder), load_scenario("random_field", num_vehicles=4))
+    scenario = with_policy_requirements(str(folder), load_scenario("random_field", num_vehicles=4))
     policy, swarm = make(str(folder), scenario), Swarm(scenario)
     finite(policy.act(swarm.reset(0)))
 

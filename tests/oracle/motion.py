@@ -83,14 +83,14 @@ def decide(state, action, scenario, given=(0.0, 0.0), flow=(0.0, 0.0)):
     act, timing, first, demand = scenario.actuators, scenario.timing, state[2], 0.0
     lags, h = (act.thrust_lag_s, act.yaw_lag_s), timing.integration_step_s
     action = limited(action, scenario)
-    for hold in range(timing.holds_per_decision):
+    for hold in range(timing.control_steps_per_decision):
         a = held(action, state[2] - first, scenario) if hold else action
         asked = forces(a, scenario)
         if act.kind != "rudder":
             asked[1] = np.clip(asked[1] - act.yaw_damping_nms * state[5], -act.max_torque_nm, act.max_torque_nm)
-        demand += (max(a**2) if act.kind == "rudder" else sum(a**2)) / timing.holds_per_decision
+        demand += (max(a**2) if act.kind == "rudder" else sum(a**2)) / timing.control_steps_per_decision
         asked[1] *= act.yaw_authority
-        for _ in range(timing.steps_per_hold):
+        for _ in range(timing.integration_steps_per_control_step):
             left = np.array([[math.exp(-s * h / lag) if lag else 0.0 for lag in lags] for s in (0.0, 0.5, 1.0)])
             taus = asked + (np.array(given) - asked) * left
             state, given = advance(state, taus, np.array(flow), h, scenario), taus[2]

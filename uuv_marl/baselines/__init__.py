@@ -23,6 +23,6 @@ Arguments of compiled functions have the same names and the same meaning everywh
 
 from uuv_marl.baselines.env_policy import EnvPolicy
 from uuv_marl.baselines.policy import Policy, PolicyError
-from uuv_marl.baselines.registry import POLICIES, granted, make
+from uuv_marl.baselines.registry import POLICIES, with_policy_requirements, make
 
-__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "granted", "make"]
+__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "with_policy_requirements", "make"]

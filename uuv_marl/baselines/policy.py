@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.baselines.grants import need_granted
+from uuv_marl.baselines.requirements import check_requirements
 from uuv_marl.baselines.rudder import Rudder, steer_by_rudder
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Clock, Percept, PerceptLayout
@@ -79,11 +79,11 @@ class Policy:
     """Inner loop that the policy was designed with [N m s], on a vehicle of ``full_torque_nm``: ``inner_loop_nms``."""
     identity: ClassVar[bool | str] = False
     """Whether it acts by a vehicle's index, which no vehicle perceives; or the parameter that makes it do so."""
-    decides_every_s: ClassVar[float | None] = None
+    decision_period_s: ClassVar[float | None] = None
     """Period between decisions that the policy needs [s]; None if it is made for any."""
     full_torque_nm: ClassVar[float] = 3000.0
     """Full torque of that vehicle [N m], ``literature_185`` where nothing else is said."""
-    wishes_force: ClassVar[bool] = False
+    outputs_force: ClassVar[bool] = False
     """Whether ``decide`` gives a wished force in the body frame, as shares of full thrust and torque
     (``write_action``). Where the vehicle has a rudder ``drive`` then gives thrust and rudder (``steer_by_rudder``);
     else what ``decide`` gives goes to the actuators as it is."""
@@ -93,17 +93,17 @@ class Policy:
         """The policy's name in messages."""
         if type(self).act is not Policy.act or type(self).decide is Policy.decide:
             raise PolicyError(f"policy {self.name!r} must define decide(percept), and leave act, which calls it, alone")
-        need_granted(self.name, self, scenario)
+        check_requirements(self.name, self, scenario)
         if num_worlds < 1:
             raise PolicyError(f"num_worlds must be at least 1, got {num_worlds}")
         self.scenario = scenario
         self.num_worlds = num_worlds
         self.layout = PerceptLayout.of(scenario)
-        told = "link" in scenario.sonar.channels
-        self.at = self.layout.offsets if told else self.layout.message_offsets
+        has_link = "link" in scenario.sonar.channels
+        self.at = self.layout.offsets if has_link else self.layout.message_offsets
         """Where each field starts in a flat percept; the link's fields are the modem's where only that is granted."""
         self.limits = Limits.of(scenario)
-        self.rudder = Rudder.of(scenario) if self.wishes_force else None
+        self.rudder = Rudder.of(scenario) if self.outputs_force else None
         """Turns wished forces into actions; None where the policy gives actions itself."""
         self.clamps: Int64 = np.zeros(num_worlds, np.int64)
         """How often a numerical clamp bound since the reset, shape (world,)."""
@@ -123,9 +123,9 @@ class Policy:
         self.memory: Any = allocate(self.Memory, sizes) if self.Memory else ()
         """What is remembered, the arrays of ``Memory``."""
 
-    def declare_as(self, other: Any) -> None:
+    def copy_requirements(self, other: Any) -> None:
         """Declare what another does: a policy inside, or the card of a training. To be called before ``__init__``."""
-        for name in ("channels", "yaw_damping_nms", "full_torque_nm", "decides_every_s", "wishes_force"):
+        for name in ("channels", "yaw_damping_nms", "full_torque_nm", "decision_period_s", "outputs_force"):
             setattr(self, name, getattr(other, name))
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
@@ -163,11 +163,11 @@ class Policy:
         Raises:
             PolicyError: the percept is of another swarm; or the policy has a memory and a decision was left out.
         """
-        self.hear(percept)
+        self.update_memory(percept)
         return self.drive(percept, self.decide(percept))
 
     @final
-    def hear(self, percept: Percept) -> None:
+    def update_memory(self, percept: Percept) -> None:
         """Remember what is perceived, where it is new: before ``decide``."""
         if self.Memory is not None:
             self.flat(percept)
@@ -181,14 +181,14 @@ class Policy:
         raise NotImplementedError
 
     @final
-    def drive(self, percept: Percept, wish: Float32) -> Float32:
+    def drive(self, percept: Percept, output: Float32) -> Float32:
         """The actions for what ``decide`` gave, shape (world, vehicle, 2), which may be overwritten; after it."""
         if self.rudder is not None:
-            steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, wish)
-        self.taken(wish)
-        return wish
+            steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, output)
+        self.record_action(output)
+        return output
 
-    def taken(self, action: Float32) -> None:
+    def record_action(self, action: Float32) -> None:
         """Remember the actions taken, if ``Memory`` has a place for them; again if others than ``act`` gave."""
         if "action" in getattr(self.Memory, "_fields", ()):
             self.memory.action[self.active] = action[self.active]
@@ -225,9 +225,9 @@ class Policy:
             PolicyError: an array is missing, or has another shape or type.
         """
         for name, array in self._arrays().items():
-            given = snapshot.get(name)
-            if given is None or given.shape != array.shape or given.dtype != array.dtype:
-                got = "nothing" if given is None else f"{given.dtype} of shape {given.shape}"
+            saved = snapshot.get(name)
+            if saved is None or saved.shape != array.shape or saved.dtype != array.dtype:
+                got = "nothing" if saved is None else f"{saved.dtype} of shape {saved.shape}"
                 raise PolicyError(f"the snapshot's {name} must be {array.dtype} of shape {array.shape}, got {got}")
         for name, array in self._arrays().items():
             array[...] = snapshot[name]

@@ -7,16 +7,16 @@ import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple, overload
 
-from uuv_marl.baselines.bug.law import TangentBug
+from uuv_marl.baselines.bug.controller import TangentBug
 from uuv_marl.baselines.comparators.apf import Apf
 from uuv_marl.baselines.comparators.leader_follower import LeaderFollower
 from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaberInformed
 from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
-from uuv_marl.baselines.comparators.pull import Pull
+from uuv_marl.baselines.comparators.proportional import ProportionalTracking
 from uuv_marl.baselines.env_policy import EnvPolicy, HasSwarm, environment
-from uuv_marl.baselines.grants import channels_in, inner_loop_nms
-from uuv_marl.baselines.learned.around import Around
+from uuv_marl.baselines.requirements import resolved_channels, inner_loop_nms
+from uuv_marl.baselines.learned.residual import ResidualPolicy
 from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained, shipped
 from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
@@ -27,7 +27,7 @@ from uuv_marl.baselines.random_idle import Idle, Random
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.baselines.scout.carrot import Carrot, CarrotInformed
-from uuv_marl.baselines.scout.law import Scout
+from uuv_marl.baselines.scout.controller import Scout
 from uuv_marl.baselines.scout.seeker import NearestTarget
 from uuv_marl.errors import ScenarioError
 from uuv_marl.modules import named_object
@@ -52,7 +52,7 @@ POLICIES: dict[str, Kind] = {
     "olfati_saber_informed": OlfatiSaberInformed,
     "orca_informed": OrcaInformed,
     "leader_follower": LeaderFollower,
-    "pull": Pull,
+    "pull": ProportionalTracking,
     "oracle": Oracle,
     "tangent_bug": TangentBug,
     "mappo": shipped("mappo", "Trained by MAPPO on random_field, end to end."),
@@ -75,7 +75,7 @@ OWN = "own_clock:"
 the scenario fixes others for all (``timing.fixed``); made for any clock, it decides at every control hold."""
 
 
-class Named(NamedTuple):
+class ParsedPolicy(NamedTuple):
     """What the name of a policy says."""
 
     kind: Kind
@@ -83,7 +83,7 @@ class Named(NamedTuple):
     """Values by parameter, as the user wrote them."""
 
 
-def parse_policy(name: str) -> Named:
+def parse_policy(name: str) -> ParsedPolicy:
     """A policy from its name: ``[own_clock:][guarded:]NAME[,key=value ...]``.
 
     Args:
@@ -102,7 +102,7 @@ def parse_policy(name: str) -> Named:
     if wrong is not None:
         raise PolicyError(f"policy {name!r}: {wrong!r} must be key=value, such as bio_inspired,zeta_n=0.5")
     parts = [pair.partition("=") for pair in pairs]
-    return Named(_kind(plain), {key.strip(): value.strip() for key, _, value in parts})
+    return ParsedPolicy(_kind(plain), {key.strip(): value.strip() for key, _, value in parts})
 
 
 def policy_class(name: str) -> Kind:
@@ -117,12 +117,12 @@ def _kind(name: str) -> Kind:
         return trained
     if ":" in name:
         try:
-            made = named_object(name)
+            policy_type = named_object(name)
         except ImportError as error:
             raise PolicyError(f"policy {name!r} {error}") from None
-        if not (isinstance(made, type) and issubclass(made, Policy)):
-            raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {made!r}")
-        return made
+        if not (isinstance(policy_type, type) and issubclass(policy_type, Policy)):
+            raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {policy_type!r}")
+        return policy_type
     if name not in POLICIES:
         near = difflib.get_close_matches(name, POLICIES, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]!r}? " if near else ""
@@ -143,13 +143,13 @@ def uses_identity(name: str) -> bool:
     """Whether the policy of that name acts by a vehicle's index, which no vehicle perceives."""
     kind, written = parse_policy(name)
     if isinstance(kind, Trained):
-        law = kind.checkpoint.card.around
-        return bool(law) and uses_identity(law)
+        base = kind.checkpoint.card.base_controller
+        return bool(base) and uses_identity(base)
     by = kind.identity
     return bool(_value(written.get(by, "false"))) if isinstance(by, str) else by
 
 
-def granted(name: str, scenario: Scenario) -> Scenario:
+def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels, the inner loop (``inner_loop_nms``) and the clock that a policy declares.
 
     Where the scenario fixes inner loop and clock for all (``timing.fixed``), only the channels, unless the name begins
@@ -157,20 +157,20 @@ def granted(name: str, scenario: Scenario) -> Scenario:
     If the scenario has ``modem``, a policy that declares ``link`` gets ``modem`` instead. There are two exceptions: a
     policy that declares both, and a trained policy, which knows only the channels of its training.
     """
-    return granted_to(name, policy_class(name), scenario)
+    return with_requirements(name, policy_class(name), scenario)
 
 
-def granted_to(name: str, declared: Any, scenario: Scenario) -> Scenario:
+def with_requirements(name: str, declared: Any, scenario: Scenario) -> Scenario:
     """``granted`` for a policy of that name, by what it declared (``Declared``)."""
     timing, own = scenario.timing, name.startswith(OWN)
     changes: dict[str, object] = {
-        "sonar.channels": list(declared.channels) if is_trained(name) else channels_in(scenario, declared.channels)
+        "sonar.channels": list(declared.channels) if is_trained(name) else resolved_channels(scenario, declared.channels)
     }
     if own or not timing.fixed:
         loop = inner_loop_nms(declared.yaw_damping_nms, declared.full_torque_nm, scenario)
-        usual = timing.control_hold_s if timing.fixed else timing.decision_period_s
+        usual = timing.control_step_s if timing.fixed else timing.decision_period_s
         changes["actuators.yaw_damping_nms"] = loop
-        changes["timing.decision_period_s"] = declared.decides_every_s or usual
+        changes["timing.decision_period_s"] = declared.decision_period_s or usual
         changes["timing.fixed"] = False
     try:
         return load_scenario(scenario, overrides=changes)
@@ -200,28 +200,28 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
     """
     kind, written = parse_policy(name)
     if isinstance(target, Scenario):
-        return _made(name, kind, target, num_worlds, {**written, **parameters})
+        return _with_filter(name, kind, target, num_worlds, {**written, **parameters})
     scenario, swarm, agents = environment(target, name)
-    policy = _made(name, kind, scenario, swarm.num_worlds, {**written, **parameters})
+    policy = _with_filter(name, kind, scenario, swarm.num_worlds, {**written, **parameters})
     return EnvPolicy(policy, swarm, agents)
 
 
-def _made(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
+def _with_filter(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
     """The policy with these parameters, inside the safety filter where its name says so."""
     name = name.removeprefix(OWN)
     if not name.startswith(GUARDED):
-        return _alone(name, kind, scenario, num_worlds, parameters)
+        return _without_filter(name, kind, scenario, num_worlds, parameters)
     barrier = parameters.pop("barrier", GUARD)
     if not isinstance(barrier, Barrier):
         raise PolicyError(
             f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
             "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
         )
-    inner = _alone(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
+    inner = _without_filter(name.removeprefix(GUARDED), kind, scenario, num_worlds, parameters)
     return Guarded(scenario, num_worlds, inner=inner, barrier=barrier)
 
 
-def _alone(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
+def _without_filter(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
     """The policy with these parameters: keyword arguments of its kind, and single gains."""
     constructor: Any = kind
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
@@ -230,7 +230,7 @@ def _alone(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameter
     values = {key: _value(value) for key, value in parameters.items()}
     policy: Policy = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
     if isinstance(kind, Trained):
-        policy = beside(policy, kind.checkpoint.card)
+        policy = compose(policy, kind.checkpoint.card)
     policy.name = name
     if values:
         gains: Any = getattr(policy, "gains", None)
@@ -239,15 +239,15 @@ def _alone(name: str, kind: Kind, scenario: Scenario, num_worlds: int, parameter
     return policy
 
 
-def need_law(name: str) -> None:
+def check_base_controller(name: str) -> None:
     """Refuse what no network can be around, as a checkpoint runs what it names. Raises PolicyError."""
     plain = name.partition(",")[0]
     if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
-        laws = ", ".join(known for known, kind in POLICIES.items() if not isinstance(kind, Trained))
-        raise PolicyError(f"a network can be around one of the laws {laws}, got {name!r}")
+        controllers = ", ".join(known for known, kind in POLICIES.items() if not isinstance(kind, Trained))
+        raise PolicyError(f"a network can be around one of the laws {controllers}, got {name!r}")
 
 
-def beside(network: Policy, card: Card) -> Policy:
+def compose(network: Policy, card: Card) -> Policy:
     """A network with what its card says decides beside it: a law, to whose actions its own are added; the filter.
 
     Args:
@@ -258,9 +258,9 @@ def beside(network: Policy, card: Card) -> Policy:
         PolicyError: there is no such law, or it has not what it needs.
     """
     scenario, num_worlds = network.scenario, network.num_worlds
-    if card.around:
-        need_law(card.around)
-        network = Around(scenario, num_worlds, law=make(card.around, scenario, num_worlds), inner=network)
+    if card.base_controller:
+        check_base_controller(card.base_controller)
+        network = ResidualPolicy(scenario, num_worlds, base=make(card.base_controller, scenario, num_worlds), inner=network)
     return Guarded(scenario, num_worlds, inner=network) if card.filter else network
 
 
@@ -268,10 +268,10 @@ def _gain(name: str, key: str, value: object, gains: Any, known: Sequence[str]) 
     """A gain's value. Raises PolicyError unless the policy has that gain and the value is a finite number."""
     fields: tuple[str, ...] = getattr(gains, "_fields", ())
     if key not in fields:
-        there = [*known, *fields]
-        near = difflib.get_close_matches(key, there, n=1)
+        names = [*known, *fields]
+        near = difflib.get_close_matches(key, names, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise PolicyError(f"policy {name!r} has no parameter {key!r}; {hint}It has {', '.join(there) or 'none'}")
+        raise PolicyError(f"policy {name!r} has no parameter {key!r}; {hint}It has {', '.join(names) or 'none'}")
     value = plain(value)
     if not (isinstance(value, float | int) and math.isfinite(value)):
         raise PolicyError(f"policy {name!r}: the gain {key} must be a finite number, got {value!r}")

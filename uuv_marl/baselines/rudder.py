@@ -28,7 +28,7 @@ class Rudder(NamedTuple):
     """Yaw moment of the rudder at its limit, over the squared flow [kg]."""
     steerage: float
     """Speed below which the rudder has little flow."""
-    holding: float
+    holding_thrust: float
     """Thrust that holds that speed, over full thrust [1]."""
 
     @staticmethod
@@ -45,7 +45,7 @@ class Rudder(NamedTuple):
             lever_arm=actuators.lever_arm_m,
             full_moment=actuators.rudder[1] * math.radians(actuators.rudder_max_deg),
             steerage=speed,
-            holding=(hull.X_u + hull.X_uu * speed) * speed / actuators.max_force_n,
+            holding_thrust=(hull.X_u + hull.X_uu * speed) * speed / actuators.max_force_n,
         )
 
 
@@ -70,5 +70,5 @@ def steer_by_rudder(flat: Float32, at: Starts, fin: Rudder, action: Float32) -> 
             flow = max(u, fin.steerage)
             share = f_y * fin.lever_arm / (fin.full_moment * flow * flow)
             thrust = max(float(action[w, i, 0]), -fin.astern)
-            action[w, i, 0] = max(thrust, fin.holding) if u < fin.steerage else thrust
+            action[w, i, 0] = max(thrust, fin.holding_thrust) if u < fin.steerage else thrust
             action[w, i, 1] = min(max(share, -1.0), 1.0)

@@ -38,7 +38,7 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
 
 
 @compiled
-def wished_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, float]:
+def steady_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, float]:
     """The velocity [m/s] at which the resistance equals an action's force. Eq. 22 backwards."""
     f_x, f_y = a_x * limits.max_force, a_y * limits.max_torque / limits.lever_arm
     force = math.hypot(f_x, f_y)
@@ -54,4 +54,4 @@ def wished_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, floa
 @compiled
 def full_speed(limits: Limits) -> float:
     """The speed [m/s] at which the resistance equals full thrust."""
-    return wished_velocity(1.0, 0.0, limits)[0]
+    return steady_velocity(1.0, 0.0, limits)[0]

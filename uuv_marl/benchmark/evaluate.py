@@ -135,14 +135,14 @@ def _batch(
             if swarm.facts.diverged[w] >= 0:
                 diverged.append(f"seed {seeds[w]}: {swarm.divergence(w)}")
                 continue
-            course, discs = swarm.course, int(swarm.course.num_obstacles[w])
+            world_map, discs = swarm.world_map, int(swarm.world_map.num_obstacles[w])
             yield Run(
                 seed=seeds[w],
                 metrics=recorder.metrics(w, int(actor.clamps[w])),
                 series=recorder.series(w),
                 routes=_routes(swarm, samples, w),
-                obstacles=course.obstacles[w, :discs].astype(np.float32),
-                waypoints=course.waypoints[w, 0, : int(course.last[w, 0]) + 1].astype(np.float32),
+                obstacles=world_map.obstacles[w, :discs].astype(np.float32),
+                waypoints=world_map.waypoints[w, 0, : int(world_map.last[w, 0]) + 1].astype(np.float32),
             )
         active &= ~ended
         actor.active[:] = active

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from uuv_marl.benchmark.results import Results
-from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, PINK, draw_course, house_style, legend, panels, save
+from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, PINK, draw_map, house_style, legend, panels, save
 from uuv_marl.extras import pictures
 from uuv_marl.scenario import Scenario, conditions, disturbances
 from uuv_marl.sim.swarm import Swarm
@@ -35,13 +35,13 @@ def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Se
     present = [policy for policy in policies if results.select(scenario, policy, seeds)]
     if not present:
         return []
-    constraints, hull_m = results.scenarios[scenario].constraints, results.scenarios[scenario].contact.hull_radius_m
+    constraints, hull_m = results.scenarios[scenario].constraints, results.scenarios[scenario].collision.hull_radius_m
     curves = {p: [results.trace(scenario, p, row.seed) for row in results.select(scenario, p, seeds)] for p in present}
     where = _where(results.scenarios[scenario], f"{len(seeds)} seeds")
-    made: dict[str, Figure] = {}
+    figures: dict[str, Figure] = {}
     with house_style():
         if shown := [p for p in present if results.has(scenario, p, 0)]:
-            made["routes"] = _routes(results, scenario, shown)
+            figures["routes"] = _routes(results, scenario, shown)
         if curves[present[0]][0]["obstacles"].size:
             limits = {"keep clear (s_o)": constraints.s_o_m, "collision": hull_m}
             figure, axes = _over_time(curves, _nearest, limits, "distance to the nearest obstacle [m]")
@@ -52,21 +52,21 @@ def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Se
             for ax in axes:
                 ax.axhspan(low, 0.0, color="0.85", zorder=0, label="inside the obstacle")
             figure.suptitle(f"How near the swarm comes to obstacles' surfaces: {where}")
-            made["obstacle_distance"] = figure
+            figures["obstacle_distance"] = figure
         limits = {"keep apart (s_u)": constraints.s_u_m, "collision": 2.0 * hull_m}
         figure, axes = _over_time(curves, lambda trace: trace["min_spacing_m"], limits, "smallest spacing [m]")
         axes[0].set_ylim(bottom=0.0)
         figure.suptitle(f"How near the two closest vehicles are: {where}")
-        made["spacing"] = figure
-        for figure in (figure for name, figure in made.items() if name != "routes"):
+        figures["spacing"] = figure
+        for figure in (figure for name, figure in figures.items() if name != "routes"):
             legend(figure, figure.axes[-1])
-        return [save(figure, results.folder / "figures" / f"{scenario}_{name}.png") for name, figure in made.items()]
+        return [save(figure, results.folder / "figures" / f"{scenario}_{name}.png") for name, figure in figures.items()]
 
 
 def _where(scenario: Scenario, seeds: str) -> str:
     """What a picture is of; in a second line what disturbs it, if anything does."""
-    sea = f"\n{conditions(scenario)}" if disturbances(scenario) else ""
-    return f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles ({scenario.vehicle.name}), {seeds}{sea}"
+    conditions_line = f"\n{conditions(scenario)}" if disturbances(scenario) else ""
+    return f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles ({scenario.vehicle.name}), {seeds}{conditions_line}"
 
 
 def _grid(num: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
@@ -82,7 +82,7 @@ def _grid(num: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
 
 def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
     figure, axes = _grid(len(policies), (3.4, 3.6))
-    hull_m = results.scenarios[scenario].contact.hull_radius_m
+    hull_m = results.scenarios[scenario].collision.hull_radius_m
     traces = [results.trace(scenario, policy, 0) for policy in policies]
     longest = max(float(trace["route_time_s"][-1]) for trace in traces)
     swarm, lines = Swarm(results.scenarios[scenario]), None
@@ -103,14 +103,14 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
             lines.set_linewidth(np.where(groups.informed, 1.5, 0.5).tolist() * len(legs))
             ax.plot([], [], color=BLACK, linewidth=1.5, label="thick: perceives l(t)")
         ax.add_collection(lines)
-        for k, (team, way) in enumerate(groups.ways.values()):
+        for k, (team, corners) in enumerate(groups.paths.values()):
             discs = trace["obstacles"][: 0 if k else None, [1, 0, 2]]
-            draw_course(ax, way[:, ::-1], discs, None if team is None else colours[team])
+            draw_map(ax, corners[:, ::-1], discs, None if team is None else colours[team])
         for (label, k, mark), (team, colour) in product((("start", 0, "o"), ("end", -1, ".")), enumerate(colours)):
             place, fill = trace["route_position"][k, groups.team == team], "none" if mark == "o" else colour
             name = label if len(colours) == 1 else f"{label} of group {team + 1}"
             ax.plot(*place.T[::-1], mark, color=colour, mfc=fill, ms=3, mew=0.5, label=name)
-        contacts = _contacts(trace, hull_m)
+        contacts = _collisions_of(trace, hull_m)
         ax.plot(*contacts.T[::-1], "x", color=ORANGE, ms=8, mew=2.0, zorder=6, label="collision")
         ax.set_title(f"{policy[-28:]}\n{_outcome(results.select(scenario, policy, [0])[0].metrics)}")
     figure.supxlabel("east [m]")
@@ -133,9 +133,9 @@ def _outcome(metrics: Mapping[str, Any]) -> str:
     return f"{arrived}, {collisions or 'no'} collision{'' if collisions == 1 else 's'}"
 
 
-def _contacts(trace: Trace, hull_m: float) -> Float32:
+def _collisions_of(trace: Trace, hull_m: float) -> Float32:
     """Where contacts begin, shape (contact, 2): the vehicle that is nearest to another, or to an obstacle."""
-    found: list[Float32] = []
+    points: list[Float32] = []
     for distance, limit, of_pair in (
         (trace["min_spacing_m"], 2.0 * hull_m, True),
         (_nearest(trace), hull_m, False),
@@ -148,8 +148,8 @@ def _contacts(trace: Trace, hull_m: float) -> Float32:
             else:
                 discs = trace["obstacles"]
                 gap = np.linalg.norm(place[:, None] - discs[:, :2], axis=-1) - discs[:, 2]
-            found.append(place[np.argmin(np.nan_to_num(gap, nan=np.inf).min(axis=1))])  # the lost are nowhere
-    return np.array(found, np.float32).reshape(-1, 2)
+            points.append(place[np.argmin(np.nan_to_num(gap, nan=np.inf).min(axis=1))])  # the lost are nowhere
+    return np.array(points, np.float32).reshape(-1, 2)
 
 
 def _nearest(trace: Trace) -> Float32:
@@ -186,8 +186,8 @@ def _band(series: Sequence[tuple[Float32, Float32]]) -> tuple[Float64, ...]:
     """Time, lowest, median and highest, as long as more than half of the seeds are under way."""
     grid = np.arange(0.0, max(float(time[-1]) for time, _ in series), _GRID_S)
     curves = np.array([np.interp(grid, time, values, right=np.nan) for time, values in series])
-    kept = np.isfinite(curves).sum(axis=0) > len(series) / 2
-    curves = curves[:, kept]
+    sampled = np.isfinite(curves).sum(axis=0) > len(series) / 2
+    curves = curves[:, sampled]
     if not curves.size:
-        return grid[kept], grid[kept], grid[kept], grid[kept]
-    return grid[kept], np.nanmin(curves, axis=0), np.nanmedian(curves, axis=0), np.nanmax(curves, axis=0)
+        return grid[sampled], grid[sampled], grid[sampled], grid[sampled]
+    return grid[sampled], np.nanmin(curves, axis=0), np.nanmedian(curves, axis=0), np.nanmax(curves, axis=0)

@@ -9,9 +9,9 @@ from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 
 
-def need_pandas(who: str) -> Any:
+def import_pandas(feature: str) -> Any:
     """Pandas, which comes with an extra. Raises MissingExtraError, which names who needs it."""
-    with extra("analysis", who):
+    with extra("analysis", feature):
         return importlib.import_module("pandas")
 
 
@@ -30,7 +30,7 @@ def load(path: UserPath) -> Any:
         MissingExtraError: pandas is not installed.
         ResultsError: the file is no results.json of this version.
     """
-    pandas = need_pandas("uuv_marl.benchmark.load")
+    pandas = import_pandas("uuv_marl.benchmark.load")
     path = user_path(path)
     file = path / FILE if path.is_dir() else path
     records: list[dict[str, Any]] = []
@@ -42,6 +42,6 @@ def load(path: UserPath) -> Any:
         key = {"scenario": row.scenario, "policy": row.policy, "seed": row.seed}
         usual = {**key, **metrics, **shares}
         every = usual | {f"task_{name}" if name in {*usual, "trace"} else name: value for name, value in own.items()}
-        told = {name: math.nan if value is None else value for name, value in every.items()}
-        records.append({**told, "trace": str(trace_path(file.parent, *row[:3]))})
+        values = {name: math.nan if value is None else value for name, value in every.items()}
+        records.append({**values, "trace": str(trace_path(file.parent, *row[:3]))})
     return pandas.DataFrame.from_records(records)

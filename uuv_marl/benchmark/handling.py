@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.scenario import Scenario, load_scenario, load_vehicle, variant_names, vehicle_names
-from uuv_marl.sim.sea.actuation import actuation, followed
+from uuv_marl.sim.disturbances.actuation import actuation, followed
 from uuv_marl.sim.vehicle import STILL, State6, actuators, advance_lagging, plant
 
 STEPS_S = (0.1, 0.05, 0.025, 0.0125, 0.00625)
@@ -49,13 +49,13 @@ def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_
     """
     p, numbers, h = plant(scenario), actuation(scenario), scenario.timing.integration_step_s
     now: State6 = (0.0, 0.0, 0.0, speed_mps, 0.0, 0.0)
-    given = (0.0, 0.0)
+    forces = (0.0, 0.0)
     for _ in range(round(seconds / h)):
         thrust, steer = actuators(*action, now[5], p)
-        u_0, u_1, u_2 = followed(thrust, given[0], numbers.thrust_half, numbers.thrust_whole)
-        r_0, r_1, r_2 = followed(steer, given[1], numbers.yaw_half, numbers.yaw_whole)
+        u_0, u_1, u_2 = followed(thrust, forces[0], numbers.thrust_half, numbers.thrust_whole)
+        r_0, r_1, r_2 = followed(steer, forces[1], numbers.yaw_half, numbers.yaw_whole)
         now = advance_lagging(now, (u_0, r_0), (u_1, r_1), (u_2, r_2), STILL, h, p)
-        given = u_2, r_2
+        forces = u_2, r_2
         yield now
 
 

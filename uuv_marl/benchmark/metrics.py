@@ -50,16 +50,16 @@ def measure(swarm: Swarm) -> Sample:
     living = np.maximum(alive.sum(axis=1), 1)
     psi = state.eta[:, :, 2]
     order = np.hypot((np.cos(psi) * alive).sum(axis=1), (np.sin(psi) * alive).sum(axis=1)) / living
-    anybody = alive.any(axis=1)
+    any_alive = alive.any(axis=1)
     return Sample(
         time_s=facts.time_s.copy(),
         min_spacing_m=facts.min_spacing.copy(),
         max_spacing_m=facts.max_spacing.copy(),
         centre_error_m=np.hypot(*(facts.centre - swarm.mean_reference[:, :2]).T),
-        order_parameter=np.where(anybody, order, np.nan),
-        within_s_l=(anybody & (np.where(alive, facts.away, 0.0).max(axis=1) <= constraints.s_l_m)).astype(np.float64),
-        within_s_o=(anybody & (facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m)).astype(np.float64),
-        within_s_u=(anybody & (facts.min_spacing >= constraints.s_u_m)).astype(np.float64),
+        order_parameter=np.where(any_alive, order, np.nan),
+        within_s_l=(any_alive & (np.where(alive, facts.away, 0.0).max(axis=1) <= constraints.s_l_m)).astype(np.float64),
+        within_s_o=(any_alive & (facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m)).astype(np.float64),
+        within_s_u=(any_alive & (facts.min_spacing >= constraints.s_u_m)).astype(np.float64),
         effort=(facts.effort * alive).sum(axis=1) / living,
         saturation=facts.saturated.copy(),
     )
@@ -86,7 +86,7 @@ class MetricsRecorder:
     def series(self, world: int) -> dict[str, Float32]:
         """A world's samples over time: every field of ``Sample``, and ``obstacle_distance_m`` (time, obstacle)."""
         columns = {name: values.astype(np.float32) for name, values in self._table(world).items()}
-        num = int(self._swarm.course.num_obstacles[world])
+        num = int(self._swarm.world_map.num_obstacles[world])
         distances = np.array([clearance[world, :num] for clearance in self._clearances], np.float32)
         return {**columns, "obstacle_distance_m": distances.reshape(len(self._samples), num)}
 
@@ -98,9 +98,9 @@ class MetricsRecorder:
         all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
         own = _own(self._swarm.task, world)
         judged = self._success.metrics(world) if self._success else Success()
-        times = facts.arrival_s[world] if self._swarm.task.leads else np.full(4, np.nan)
+        times = facts.arrival_s[world] if self._swarm.task.has_goal else np.full(4, np.nan)
         arrived, within_1_m, within_5_m, within_10_m = map(_number, times)
-        made: Metrics = {
+        metrics: Metrics = {
             "task_time_s": arrived,
             "time_within_1_m_s": within_1_m,
             "time_within_5_m_s": within_5_m,
@@ -128,8 +128,8 @@ class MetricsRecorder:
             **judged,
         }
         if own:
-            made["task"] = own
-        return made
+            metrics["task"] = own
+        return metrics
 
     def _table(self, world: int) -> dict[str, Float64]:
         """A world's samples over time, shape (time,) each."""

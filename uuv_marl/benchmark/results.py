@@ -21,7 +21,7 @@ from typing_extensions import TypedDict
 
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
-from uuv_marl.baselines.grants import Declared
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.registry import policy_class, uses_identity
@@ -52,7 +52,7 @@ class ResultRow(NamedTuple):
     metrics: Metrics
 
 
-class Knowledge(TypedDict):
+class PolicyInfo(TypedDict):
     """What a policy has beyond the percept; a hash of its file, if it is a user's."""
 
     channels: list[str]
@@ -60,7 +60,7 @@ class Knowledge(TypedDict):
     """The policy's inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
     identity: NotRequired[Literal[True]]
     """Where it acts by a vehicle's index."""
-    decides_every_s: NotRequired[float]
+    decision_period_s: NotRequired[float]
     """Period between decisions, where it needs one."""
     source: str | None
     policy_class: NotRequired[str]
@@ -77,7 +77,7 @@ class Content(TypedDict):
     versions: dict[str, str]
     machine: dict[str, str | int | None]
     scenarios: dict[str, dict[str, Any]]
-    policies: dict[str, Knowledge]
+    policies: dict[str, PolicyInfo]
     runs: list[ResultRow]
 
 
@@ -124,7 +124,7 @@ class Results:
         self.folder = folder = user_path(folder)
         self._traces = traces
         self.scenarios = {scenario.name: scenario for scenario in scenarios}
-        self.policies: dict[str, Knowledge] = {}
+        self.policies: dict[str, PolicyInfo] = {}
         self._dumps = {name: scenario.model_dump(mode="json") for name, scenario in self.scenarios.items()}
         self._route_seeds = route_seeds
         self._fingerprint, self._versions = source_fingerprint(), _versions() | _tasks(self.scenarios.values())
@@ -143,10 +143,10 @@ class Results:
             raise ResultsError(
                 f"{self._path} comes from other code of uuv_marl; {elsewhere}, so that no table mixes the two"
             )
-        for library, here in self._versions.items():
-            if (there := content["versions"].get(library, here)) != here:
+        for library, this_version in self._versions.items():
+            if (saved_version := content["versions"].get(library, this_version)) != this_version:
                 raise ResultsError(
-                    f"{self._path} comes from {library} {there}, and here is {here}; {elsewhere}, so that no table "
+                    f"{self._path} comes from {library} {saved_version}, and here is {this_version}; {elsewhere}, so that no table "
                     "mixes the two"
                 )
         for name, dump in self._dumps.items():
@@ -168,7 +168,7 @@ class Results:
 
     def use(self, policy: str) -> None:
         """Record a policy's knowledge and file before its first run. Raises ResultsError if its file has changed."""
-        now = knowledge(policy)
+        now = policy_info(policy)
         if self.policies.setdefault(policy, now)["source"] != now["source"]:
             raise ResultsError(
                 f"{self._path} holds runs of {policy!r} as it was before its file changed; give --anew to drop "
@@ -177,7 +177,7 @@ class Results:
 
     def forget_changed(self, policy: str) -> None:
         """Drop a policy's runs if its file has changed since."""
-        if policy in self.policies and self.policies[policy]["source"] != knowledge(policy)["source"]:
+        if policy in self.policies and self.policies[policy]["source"] != policy_info(policy)["source"]:
             del self.policies[policy]
             self._runs = {key: metrics for key, metrics in self._runs.items() if key[1] != policy}
 
@@ -257,29 +257,29 @@ def load_trace(path: UserPath) -> dict[str, Float32]:
         ) from error
 
 
-def knowledge(policy: str) -> Knowledge:
+def policy_info(policy: str) -> PolicyInfo:
     """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
-    made = policy_class(policy)
-    if isinstance(made, Trained):
-        source = made.checkpoint.digest
+    policy_type = policy_class(policy)
+    if isinstance(policy_type, Trained):
+        source = policy_type.checkpoint.digest
     else:
-        file = inspect.getsourcefile(made)
+        file = inspect.getsourcefile(policy_type)
         source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
-    damping = made.yaw_damping_nms * (Policy.full_torque_nm / made.full_torque_nm)
-    known = Knowledge(channels=list(made.channels), yaw_damping_nms=damping, source=source)
+    damping = policy_type.yaw_damping_nms * (Policy.full_torque_nm / policy_type.full_torque_nm)
+    known = PolicyInfo(channels=list(policy_type.channels), yaw_damping_nms=damping, source=source)
     if uses_identity(policy):
         known["identity"] = True
-    if made.decides_every_s:
-        known["decides_every_s"] = made.decides_every_s
-    if isinstance(made, Trained):
-        known["policy_class"] = made.checkpoint.card.policy_class
+    if policy_type.decision_period_s:
+        known["decision_period_s"] = policy_type.decision_period_s
+    if isinstance(policy_type, Trained):
+        known["policy_class"] = policy_type.checkpoint.card.policy_class
     return known
 
 
-def declared(known: Knowledge) -> Declared:
+def requirements_of(known: PolicyInfo) -> PolicyRequirements:
     """What a policy declared of which this is known."""
-    every = known.get("decides_every_s")
-    return Declared(known["channels"], known["yaw_damping_nms"], Policy.full_torque_nm, every)
+    every = known.get("decision_period_s")
+    return PolicyRequirements(known["channels"], known["yaw_damping_nms"], Policy.full_torque_nm, every)
 
 
 def source_fingerprint() -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rich.table import Table as RichTable
 
 from uuv_marl.atomic import write_text, writing
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.registry import OWN, is_trained
 from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
@@ -68,7 +68,7 @@ def run_missing(
             done, fresh, share = len(seeds) - len(missing), 0, 0.0
             report(scenario.name, policy, done / len(seeds))
             with blaming(policy):
-                for event in evaluate(granted(policy, scenario), policy, missing, **parameters):
+                for event in evaluate(with_policy_requirements(policy, scenario), policy, missing, **parameters):
                     if isinstance(event, Run):
                         results.add(scenario.name, policy, event)
                         fresh += 1

@@ -48,18 +48,18 @@ def panels(
 
 def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> Figure:
     """The figure with one legend for all panels, each label once: below them, or in an empty panel."""
-    found: dict[str, Artist] = {}
+    handles: dict[str, Artist] = {}
     for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
+            handles.setdefault(label, handle)
     if into is None:
-        figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns)
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
     else:
-        into.legend(found.values(), found.keys(), loc="center", fontsize=9)
+        into.legend(handles.values(), handles.keys(), loc="center", fontsize=9)
     return figure
 
 
-def draw_course(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | None = None) -> None:
+def draw_map(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | None = None) -> None:
     """Trajectory, its goal (one waypoint: that alone) in a team's colour, and obstacles (across, up, radius) [m]."""
     name, size = ("trajectory of l(t)", 11) if len(waypoints) > 1 else ("", 5)
     ax.plot(*waypoints.T, "--", color=team or BLACK, linewidth=1.0, zorder=3, label=name)

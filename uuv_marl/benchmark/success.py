@@ -37,10 +37,10 @@ class SuccessRecorder:
     def update(self, active: Bool) -> None:
         """Look at the swarm after a reset or step of the ``active`` worlds."""
         swarm, facts = self._swarm, self._swarm.facts
-        self._failed |= active[:, None] & facts.lost & (facts.contacts == 0)
+        self._failed |= active[:, None] & facts.lost & (facts.vehicle_collisions == 0)
         now = active & ~self._judged & (facts.time_s >= swarm.duration_s + GRACE_S - 1e-9)
-        there = now[:, None] & swarm.state.alive
-        self._offset[there] = (swarm.state.eta[:, :, :2] - swarm.own_reference[:, :, :2])[there]
+        judged = now[:, None] & swarm.state.alive
+        self._offset[judged] = (swarm.state.eta[:, :, :2] - swarm.own_reference[:, :, :2])[judged]
         self._judged |= now
 
     def metrics(self, world: int) -> Success:
@@ -51,7 +51,7 @@ class SuccessRecorder:
             return Success(
                 success_share=None, safe_share=None, done_share=None, swarm_success=None, vehicles_faulty=faulty
             )
-        safe, offset = ~self._swarm.state.touched[world, healthy], self._offset[world, healthy]
+        safe, offset = ~self._swarm.state.collided[world, healthy], self._offset[world, healthy]
         done = np.hypot(*offset.T) <= self._spread
         centred = bool(np.hypot(*offset.mean(axis=0)) <= CENTRE_M)
         return Success(

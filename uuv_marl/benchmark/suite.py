@@ -66,7 +66,7 @@ class Suite:
         self.seeds = range(seeds)
         self._open: dict[str, Results] = {}
 
-    def run(self, cases: Sequence[Case], report: Report, *, anew: bool = False) -> None:
+    def run(self, cases: Sequence[Case], report: Report, *, restart: bool = False) -> None:
         """Run what is missing of these cases.
 
         ``report`` is called as it goes on; ``anew`` drops runs of policies whose file has changed since.
@@ -80,7 +80,7 @@ class Suite:
             def note(_scenario: str, policy: str, share: float, k: int = k, name: str = case.name) -> None:
                 report(f"{name}: {policy}", (sum(work[:k]) + share * work[k]) / sum(work))
 
-            if anew:
+            if restart:
                 self.results(case).forget_changed(case.policy)
             seeds = self.seeds_of(case)
             run_missing(self.results(case), [case.load()], [case.policy], seeds, note, **case.parameters)

@@ -8,9 +8,9 @@ from rich.markup import escape
 from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
-from uuv_marl.baselines.registry import OWN, granted_to
+from uuv_marl.baselines.registry import OWN, with_requirements
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
-from uuv_marl.benchmark.results import Knowledge, ResultRow, Results, declared
+from uuv_marl.benchmark.results import PolicyInfo, ResultRow, Results, requirements_of
 from uuv_marl.scenario import Scenario, differences
 from uuv_marl.tasks import Task
 from uuv_marl.types import Float64
@@ -34,7 +34,7 @@ class TableRow(NamedTuple):
     """A row of the table, a text for each of ``HEADERS``; estimates as ``mean [low, high]``."""
 
     policy: str
-    knows: str
+    requirements: str
     arrived: str
     time: str
     slowest: str
@@ -50,7 +50,7 @@ class TableRow(NamedTuple):
 
 CAPTION = (
     "Interquartile mean over seeds [95 % bootstrap interval]; worst seed; times over the seeds that arrived. "
-    "Arrived is the paper's success: the whole swarm rests at the end, or where arrival.by = passage has "
+    "Arrived is the paper's success: the whole swarm rests at the end, or where arrival.criterion = passage has "
     "passed it, whether it touched anything or not. "
     "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles, and its time mean. "
     "Within Eq. 7: mean share of the time in which all vehicles are within s_l of l(t), keep s_o from obstacles, "
@@ -119,8 +119,8 @@ def table_rows(results: Results, scenario: str, policies: Sequence[str], seeds: 
         if runs:
             paper = PAPER.get((scenario, policy)) if as_in_paper else None
             known = results.policies[policy]
-            knows = _knows(loaded, policy, known)
-            rows.append(_cells(policy, knows, runs, paper))
+            requirements = _requirements_text(loaded, policy, known)
+            rows.append(_cells(policy, requirements, runs, paper))
     return rows
 
 
@@ -142,7 +142,7 @@ _TASK_CAPTION = (
 
 def task_caption(task: type[Task]) -> str:
     """What the columns of ``task_headers`` are."""
-    own = "".join(f" {name}: {told}." for name, told in task.columns.items())
+    own = "".join(f" {name}: {meaning}." for name, meaning in task.columns.items())
     return _TASK_CAPTION + own
 
 
@@ -153,12 +153,12 @@ def task_rows(results: Results, scenario: str, policies: Sequence[str], seeds: S
     for cells in table_rows(results, scenario, policies, seeds):
         own = [run.metrics.get("task", {}) for run in results.select(scenario, cells.policy, seeds)]
         shares = [value for run in own if (value := run.get("untouched_share")) is not None]
-        told = [
+        task_cells = [
             estimate_text([value for run in own if (value := run.get(name)) is not None], ".3g") for name in columns
         ]
         rows.append((
-            cells.policy, cells.knows, f"{sum(run.get('whole') == 1.0 for run in own)}/{len(own)}",
-            f"{np.mean(shares):.1%}" if shares else _NOTHING, *told, cells.distance, cells.nearest, cells.spacing,
+            cells.policy, cells.requirements, f"{sum(run.get('swarm_success') == 1.0 for run in own)}/{len(own)}",
+            f"{np.mean(shares):.1%}" if shares else _NOTHING, *task_cells, cells.distance, cells.nearest, cells.spacing,
             cells.closest, cells.collisions,
         ))  # fmt: skip
     return rows
@@ -181,7 +181,7 @@ def task_table(
     return table
 
 
-def _cells(policy: str, knows: str, runs: Sequence[ResultRow], paper: PaperFigure | None) -> TableRow:
+def _cells(policy: str, requirements: str, runs: Sequence[ResultRow], paper: PaperFigure | None) -> TableRow:
     """A policy's row.
 
     Args:
@@ -198,7 +198,7 @@ def _cells(policy: str, knows: str, runs: Sequence[ResultRow], paper: PaperFigur
 
     return TableRow(
         policy=policy,
-        knows=knows,
+        requirements=requirements,
         arrived=f"{len(times)}/{len(runs)}",
         time=estimate_text(times, ".1f"),
         slowest=f"{max(times):.1f}" if times else _NOTHING,
@@ -225,17 +225,17 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def _knows(scenario: Scenario, policy: str, known: Knowledge) -> str:
+def _requirements_text(scenario: Scenario, policy: str, known: PolicyInfo) -> str:
     """What a policy has beyond the percept on a scenario, and beyond what all others have there."""
-    told = [known["policy_class"]] if "policy_class" in known else []
-    has = granted_to(policy, declared(known), scenario)
-    told += [*has.sonar.channels, *(["identity"] if "identity" in known else [])]
+    texts = [known["policy_class"]] if "policy_class" in known else []
+    has = with_requirements(policy, requirements_of(known), scenario)
+    texts += [*has.sonar.channels, *(["identity"] if "identity" in known else [])]
     if has.timing.decision_period_s != scenario.timing.decision_period_s:
-        told.append(f"a decision every {has.timing.decision_period_s:g} s")
+        texts.append(f"a decision every {has.timing.decision_period_s:g} s")
     damping = has.actuators.yaw_damping_nms
     if damping and (policy.startswith(OWN) or not scenario.timing.fixed):
-        told.append(f"yaw damping {damping:g} N m s")
-    return ", ".join(told) or _NOTHING
+        texts.append(f"yaw damping {damping:g} N m s")
+    return ", ".join(texts) or _NOTHING
 
 
 def _paper_cell(paper: PaperFigure | None) -> str:
@@ -272,7 +272,7 @@ def rich_table(title: str, rows: Sequence[TableRow], width: int) -> RichTable:
             text.partition(" [")[0] if narrow else text for text in (c.time, c.distance, c.spacing)
         )
         cells = (
-            c.policy if c.knows == _NOTHING else f"{c.policy}\n({c.knows})",
+            c.policy if c.requirements == _NOTHING else f"{c.policy}\n({c.requirements})",
             c.arrived,
             f"{time}\nworst {c.slowest}",
             f"{distance}\nworst {c.nearest}",

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing, write_text
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.comparators import apf, leader_follower, olfati_saber, orca
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
@@ -191,7 +191,7 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
     output = user_path(output)
     space, name, policy = SPACES[policy], policy, policy.partition(".")[0]
     where, own_task = space.scenario, space.scenario != SCENARIO
-    scenario = granted(policy, load_scenario(where))
+    scenario = with_policy_requirements(policy, load_scenario(where))
     seeds = SEEDS if not own_task else MAPS[: FEWER.get(where, len(MAPS))]
 
     def objective(trial: optuna.Trial) -> float:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from uuv_marl.cli.console import (
-    Anew,
+    Restart,
     changes_of,
     console,
     explained,
@@ -49,7 +49,7 @@ def benchmark(
         typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
     ] = None,
     output: Annotated[Path, path_option("Folder of results, table and pictures.")] = Path("results/benchmark"),
-    anew: Anew = False,
+    restart: Restart = False,
 ) -> None:
     """Compare policies on scenarios over seeds.
 
@@ -60,7 +60,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import POLICIES, granted, make
+        from uuv_marl.baselines import POLICIES, with_policy_requirements, make
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.replay.command import command
@@ -74,14 +74,14 @@ def benchmark(
             raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
         policies = list(dict.fromkeys(policy or runner.default_policies(scenarios)))
         for name, loaded in itertools.product(policies, scenarios):
-            make(name, granted(name, loaded))  # refused now, not after hours of others' runs
+            make(name, with_policy_requirements(name, loaded))  # refused now, not after hours of others' runs
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
             line = functools.cache(lambda name, policy_name: progress_line(bar, f"{name}: {policy_name}"))
             report = lambda name, policy_name, share: line(name, policy_name)(share)  # noqa: E731
 
-            for name in policies if anew else ():
+            for name in policies if restart else ():
                 results.forget_changed(name)
             runner.run_missing(results, scenarios, policies, wanted, report)
             tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)

@@ -31,7 +31,7 @@ def _width() -> int | None:
 
 console = Console(width=_width())
 errors = Console(stderr=True)
-Anew = Annotated[
+Restart = Annotated[
     bool, typer.Option("--anew", help="Drop the runs of policies whose file has changed since, and run these again.")
 ]
 
@@ -58,14 +58,14 @@ def path(text: str | Path) -> Path:
     return user_path(text)
 
 
-def path_option(told: str) -> Any:
+def path_option(help_text: str) -> Any:
     """An option that takes a path, with its help."""
-    return typer.Option(parser=path, help=told)
+    return typer.Option(parser=path, help=help_text)
 
 
-def path_argument(told: str, **more: Any) -> Any:
+def path_argument(help_text: str, **more: Any) -> Any:
     """An argument that takes a path, with its help, and more of what ``typer.Argument`` takes."""
-    return typer.Argument(parser=path, help=told, **more)
+    return typer.Argument(parser=path, help=help_text, **more)
 
 
 @contextmanager
@@ -119,7 +119,7 @@ def progress_line(bar: Progress, name: str, total: float = 1.0) -> Callable[...,
 
 
 @contextmanager
-def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
+def working(message: str, alone: Path | None = None) -> Iterator[Progress]:
     """The progress bar of a long work. Ctrl-C ends the command and says what is kept: "The trials are in x".
 
     Args:
@@ -130,7 +130,7 @@ def working(kept: str, alone: Path | None = None) -> Iterator[Progress]:
         with nullcontext() if alone is None else locked(alone), progress_bar() as bar:
             yield bar
     except KeyboardInterrupt:
-        say(f"Stopped. {kept}; the same command continues.")
+        say(f"Stopped. {message}; the same command continues.")
         raise typer.Exit(130) from None
 
 

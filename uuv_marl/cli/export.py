@@ -35,7 +35,7 @@ def export(
         from uuv_marl.train.training import overrides_for
 
         kind = policy_class(policy)
-        told = kind.checkpoint.card.training if isinstance(kind, Trained) else {}
-        name, own = scenario or told.get("scenario", "starter"), told.get("overrides", {}) if scenario is None else {}
+        training = kind.checkpoint.card.training if isinstance(kind, Trained) else {}
+        name, own = scenario or training.get("scenario", "starter"), training.get("overrides", {}) if scenario is None else {}
         write_onnx(policy, load_scenario(name, overrides=overrides_for(name, own)), output)
         say(f"Model: {output}")

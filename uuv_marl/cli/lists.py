@@ -84,11 +84,11 @@ def _policies() -> Table:
     from uuv_marl.baselines.registry import uses_identity
 
     table = Table("name", "beyond sonar", "yaw damping [N m s]", "decides every [s]", "what")
-    for name, made in POLICIES.items():
-        every = f"{made.decides_every_s:g}" if made.decides_every_s else "-"
-        what = (made.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
-        beyond = [*made.channels, *(["identity"] if uses_identity(name) else [])]
-        table.add_row(name, ", ".join(beyond) or "-", f"{made.yaw_damping_nms:g}", every, what)
+    for name, policy_type in POLICIES.items():
+        every = f"{policy_type.decision_period_s:g}" if policy_type.decision_period_s else "-"
+        what = (policy_type.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
+        beyond = [*policy_type.channels, *(["identity"] if uses_identity(name) else [])]
+        table.add_row(name, ", ".join(beyond) or "-", f"{policy_type.yaw_damping_nms:g}", every, what)
     return table
 
 

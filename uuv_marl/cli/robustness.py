@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import Anew, explained, find_modules, path_option, say, working
+from uuv_marl.cli.console import Restart, explained, find_modules, path_option, say, working
 
 
 def robustness(
@@ -30,7 +30,7 @@ def robustness(
         list[str] | None, typer.Option(help="Name or TOML file. Repeat it for several. Default: random_field.")
     ] = None,
     seeds: Annotated[int | None, typer.Option(min=1, max=10_000, help="Seeds 0 to SEEDS - 1. Default: 20.")] = None,
-    anew: Anew = False,
+    restart: Restart = False,
     output: Annotated[Path, path_option("Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:
     """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
@@ -44,10 +44,10 @@ def robustness(
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """
     with explained():
-        from uuv_marl.benchmark.frame import need_pandas
+        from uuv_marl.benchmark.frame import import_pandas
         from uuv_marl.benchmark.robustness import axes, job, page
 
-        need_pandas("uuv-marl robustness")
+        import_pandas("uuv-marl robustness")
         plan = job.QUICK if quick else job.SHIPPED
         plan = plan._replace(
             axes=axes.known(axis) if axis else plan.axes,
@@ -63,7 +63,7 @@ def robustness(
             def report(what: str, share: float) -> None:
                 bar.update(task, completed=share, description=what[-60:])
 
-            episodes = job.run(output, plan, report, anew=anew)
+            episodes = job.run(output, plan, report, restart=restart)
             written = [*page.write_robustness_report(output), episodes]
             report("robustness", 1.0)
         for path in written:

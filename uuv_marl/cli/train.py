@@ -23,15 +23,15 @@ from uuv_marl.cli.console import (
     say,
 )
 
-_TOLD = "swarms whole {whole:.0%}, vehicles {share:.0%}, contacts {contacts:.1f} an episode"
+_SUMMARY = "swarms whole {whole:.0%}, vehicles {share:.0%}, contacts {contacts:.1f} an episode"
 
 
 def _whole_number(text: str) -> int:
     """A number such as 3000000 or 3e6."""
-    found = re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15})?(e[0-9]{1,2})?", str(text)) and Decimal(text)
-    if not found or found < 1 or found != int(found):
+    number = re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15})?(e[0-9]{1,2})?", str(text)) and Decimal(text)
+    if not number or number < 1 or number != int(number):
         raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give a number such as 3000000 or 3e6")
-    return int(found)
+    return int(number)
 
 
 def train_command(
@@ -88,7 +88,7 @@ def train_command(
             from uuv_marl.train import run
         from uuv_marl.errors import TrainingError
         from uuv_marl.train.folder import TrainingFolder
-        from uuv_marl.train.training import Training, changed_fields, told_by
+        from uuv_marl.train.training import Training, changed_fields, recipe_fields
 
         find_modules([":" if resume else scenario, *(overrides or [])])  # a folder may name modules, too
         named = {"minutes": minutes, "steps": steps, "seed": seed}
@@ -98,13 +98,13 @@ def train_command(
             folder = TrainingFolder(output, None)
             training, until = folder.training, folder.budget_with(minutes, steps)
         else:
-            told = told_by(scenario)
+            fields_given = recipe_fields(scenario)
             for name in {"minutes", "steps"} & changes.keys():
-                told.pop("steps" if name == "minutes" else "minutes", None)
+                fields_given.pop("steps" if name == "minutes" else "minutes", None)
             fields = overridden(overrides or [])
             if twice := next((name for name in changes if name in fields), None):
                 raise TrainingError(f"--{twice} and --set {twice} are both given; leave one out")
-            training = Training(**changed_fields(told, {**fields, **changes}))
+            training = Training(**changed_fields(fields_given, {**fields, **changes}))
             until = training.budget
         with _stoppable(output) as stop:
             how: Any = {"say": say, "stop": stop}
@@ -113,22 +113,22 @@ def train_command(
         say(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png")
         if (output / "best").is_dir():
             best, worst = run.best_of(output)
-            told = f"{_TOLD.format(**best._asdict())}, after {best.seconds / 60.0:.1f} min"
-            say(f"Its validation was the best: {told}. The worst episode of it:")
+            fields_given = f"{_SUMMARY.format(**best._asdict())}, after {best.seconds / 60.0:.1f} min"
+            say(f"Its validation was the best: {fields_given}. The worst episode of it:")
             say(f"  {worst}")
 
 
-_GIVEN = {"overrides": "--set", "scenario": "the scenario"}
+_OPTIONS = {"overrides": "--set", "scenario": "the scenario"}
 
 
 def _alone(context: typer.Context) -> None:
     """Refuse what the folder says already."""
     for name in context.params:
         source = context.get_parameter_source(name)
-        told = source is not None and source.name == "COMMANDLINE"
-        if told and name not in ("resume", "output", "steps", "minutes"):
+        on_command_line = source is not None and source.name == "COMMANDLINE"
+        if on_command_line and name not in ("resume", "output", "steps", "minutes"):
             raise typer.BadParameter(
-                f"--resume goes on with the training that the folder holds; leave out {_GIVEN.get(name, f'--{name}')}"
+                f"--resume goes on with the training that the folder holds; leave out {_OPTIONS.get(name, f'--{name}')}"
             )
 
 
@@ -138,8 +138,8 @@ def _follow(records: Iterator[Any], training: Any, until: float) -> str:
     with progress_bar() as bar:
         report = progress_line(bar, "starting", until)
         for record in records:
-            if record.whole is not None:
-                judged = _TOLD.format(**record._asdict())
+            if record.swarm_success is not None:
+                judged = _SUMMARY.format(**record._asdict())
                 time = "" if record.time_s is None else f", time {record.time_s:.0f} s"
                 console.print(f"  {record.seconds / 60.0:5.1f} min  {judged}{time}", highlight=False)
             last = f"{judged}, {record.agent_steps / max(record.seconds, 1e-9):,.0f} agent-steps/s"

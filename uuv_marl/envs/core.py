@@ -13,15 +13,15 @@ from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
-from uuv_marl.scenario.overrides import given_in
+from uuv_marl.scenario.overrides import override_of
 from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.observation import Observe, observation_layout, observer
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.task import Payment, Task, paid
+from uuv_marl.tasks.task import StepReward, Task, checked_reward
 from uuv_marl.types import Bool, Float32, Float64
 
 ScenarioLike = UserPath | Scenario | Mapping[str, object]
-Reward = Literal["dense", "sparse", "team", "geodesic", "led"] | RewardFunction
+Reward = Literal["dense", "sparse", "team", "geodesic", "leader"] | RewardFunction
 
 
 class StepResult(NamedTuple):
@@ -42,9 +42,9 @@ class StepResult(NamedTuple):
     """Shape (world,): the arrival of the swarm ends the episode, or all vehicles are lost."""
     world_truncated: Bool
     """Shape (world,): the time limit ends the episode."""
-    weighted: Float64 | None
+    term_values: Float64 | None
     """The reward's terms, shape (term, world, vehicle); None for a user's own reward."""
-    named: tuple[str, ...]
+    term_names: tuple[str, ...]
     """Their names."""
 
     @property
@@ -52,8 +52,8 @@ class StepResult(NamedTuple):
         """The reward's terms by name; empty for a user's own reward."""
         return (
             {}
-            if self.weighted is None or not self.weighted.size
-            else dict(zip(self.named, self.weighted, strict=False))
+            if self.term_values is None or not self.term_values.size
+            else dict(zip(self.term_names, self.term_values, strict=False))
         )
 
     @property
@@ -97,7 +97,7 @@ class BatchedEnv:
                 f"the rewards of task {scenario.task.name!r}"
             )
         if reward in self.task.rewards:
-            self.task.paying = str(reward)
+            self.task.reward_name = str(reward)
         self.state_layout = state_layout(scenario)
         self._waiting = set(range(num_worlds))
         """Worlds that were never reset."""
@@ -142,7 +142,7 @@ class BatchedEnv:
         observe(0, self.swarm.num_worlds)  # no threads, so that a forked process can reset
         return observation
 
-    def need_reset(self, what: str) -> None:
+    def check_reset(self, what: str) -> None:
         """Raise RuntimeError if a world was never reset."""
         if self._waiting:
             raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
@@ -153,16 +153,16 @@ class BatchedEnv:
         A world whose episode is over keeps its state, ``world_terminated`` and ``world_truncated``, and its reward is
         0, until it is reset.
         """
-        self.need_reset("step")
+        self.check_reset("step")
         swarm = self.swarm
         before, running = swarm.state.alive.copy(), ~self.over
-        observation, payment = self._simulated(action, running)
+        observation, step_reward = self._simulated(action, running)
         np.add(self.collisions, swarm.facts.collisions, out=self.collisions, where=running)
         alive = swarm.state.alive
-        reward, world_reward, weighted = self._rewards(before & running[:, None], payment)
+        reward, world_reward, term_values = self._rewards(before & running[:, None], step_reward)
         world_terminated, world_truncated = swarm.endings()
         if self._max_cycles is not None:
-            last_tick = self._max_cycles * swarm.scenario.timing.holds_per_decision
+            last_tick = self._max_cycles * swarm.scenario.timing.control_steps_per_decision
             world_truncated |= (swarm.state.tick >= last_tick) & ~world_terminated
         self.over = world_terminated | world_truncated
         return StepResult(
@@ -174,43 +174,43 @@ class BatchedEnv:
             world_reward=world_reward,
             world_terminated=world_terminated,
             world_truncated=world_truncated,
-            weighted=weighted,
-            named=tuple(self.task.terms),
+            term_values=term_values,
+            term_names=tuple(self.task.terms),
         )
 
-    def _simulated(self, action: ArrayLike, running: Bool) -> tuple[Float32, Payment]:
+    def _simulated(self, action: ArrayLike, running: Bool) -> tuple[Float32, StepReward]:
         """One decision of the worlds that are ``running``; all observations, and what those worlds pay."""
         swarm, task = self.swarm, self.task
         observation, observe = observer(swarm.percept, self.layout)
-        payment = task.payment(task.paying, running, kept=self._keep_terms)
-        if payment is not None and not swarm.told:
-            threaded = payment
+        step_reward = task.step_reward(task.reward_name, running, keep_terms=self._keep_terms)
+        if step_reward is not None and not swarm.task_fields:
+            threaded = step_reward
 
-            def tell(begin: int, end: int) -> None:
+            def observe_and_fill(begin: int, end: int) -> None:
                 observe(begin, end)
-                threaded.pay(begin, end)
+                threaded.fill(begin, end)
 
-            swarm.step(action, running, tell)
-            return observation, payment
+            swarm.step(action, running, observe_and_fill)
+            return observation, step_reward
         swarm.step(action, running)
         observe(0, swarm.num_worlds)
-        if payment is None:
-            payment = paid(task, running)
+        if step_reward is None:
+            step_reward = checked_reward(task, running)
         else:
-            payment.pay(0, swarm.num_worlds)
-        return observation, payment
+            step_reward.fill(0, swarm.num_worlds)
+        return observation, step_reward
 
     def state(self) -> Float32:
         """The global state of every world, shape (world, entry), see ``uuv_marl.envs.state.state_table``."""
-        self.need_reset("state()")
+        self.check_reset("state()")
         return global_state(self.swarm, self.state_layout)
 
-    def _rewards(self, before: Bool, payment: Payment) -> tuple[Float64, Float64, Float64 | None]:
+    def _rewards(self, before: Bool, step_reward: StepReward) -> tuple[Float64, Float64, Float64 | None]:
         """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step."""
         if callable(self._reward):
             own = own_reward(self._reward, self.swarm, before)
             return own, own.mean(axis=1), None
-        reward, terms = payment.reward, payment.terms
+        reward, terms = step_reward.reward, step_reward.terms
         mean = reward.sum(axis=1) / self.swarm.num_vehicles  # twice as fast as reward.mean(axis=1), and its bits
         if self._reward == "team":
             # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
@@ -262,7 +262,7 @@ def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
     if not isinstance(cast(object, overrides), Mapping):
         return load_scenario(scenario, overrides=overrides)  # which says what overrides must be
     for name, field in _FIELDS.items():
-        own, other = changes.get(name), given_in(overrides, field)
+        own, other = changes.get(name), override_of(overrides, field)
         if own is not None and other is not None and own != other:
             raise ScenarioError(f"{name} = {own} and the override {field} = {other} differ; leave one out")
     more = {field: changes[name] for name, field in _FIELDS.items() if changes.get(name) is not None}
@@ -309,5 +309,5 @@ def refuse_losses(scenario: Scenario, api: str) -> None:
         raise ScenarioError(
             f"{api} can't show that a vehicle is lost, which can happen in scenario {scenario.name!r}; use "
             "uuv_marl.parallel_env, vector_env or the TorchRL or RLlib environment, or override "
-            "disturbance.loss_times_s=[] and contact.ends_vehicle=false, and leave out faults of kind member"
+            "losses.times_s=[] and collision.ends_vehicle=false, and leave out faults of kind member"
         )

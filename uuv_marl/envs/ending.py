@@ -8,8 +8,8 @@ from uuv_marl.envs.core import BatchedEnv
 def succeeded(batch: BatchedEnv, world: int, vehicle: int | None = None) -> bool:
     """``is_success`` of ``ending``."""
     alive, diverged = batch.swarm.state.alive[world], batch.swarm.facts.diverged[world] >= 0
-    there = alive.any() if vehicle is None else alive[vehicle]
-    return bool(there and not diverged and batch.task.success(world, vehicle))
+    present = alive.any() if vehicle is None else alive[vehicle]
+    return bool(present and not diverged and batch.task.success(world, vehicle))
 
 
 def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:

@@ -66,8 +66,8 @@ class SpecMixin:
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         if spec is not None:
-            told = {name: getattr(value, "value", value) for name, value in spec.kwargs.items()}  # of an enumeration
-            spec = replace(spec, kwargs={name: plain(value) for name, value in told.items()})
+            arguments = {name: getattr(value, "value", value) for name, value in spec.kwargs.items()}  # of an enumeration
+            spec = replace(spec, kwargs={name: plain(value) for name, value in arguments.items()})
         self._spec = spec
 
 
@@ -76,7 +76,7 @@ class RenderMixin(EnvMixin):
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
-        self._batch.need_reset("render()")
+        self._batch.check_reset("render()")
         return self._renderer.draw()
 
     def close(self) -> None:

@@ -104,7 +104,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
             RuntimeError: before ``reset``, or with actions after the episode's end.
         """
         if not self.agents:
-            self._batch.need_reset("step")
+            self._batch.check_reset("step")
             if actions:
                 raise RuntimeError("the episode is over; call reset() to start another")
             return {}, {}, {}, {}, {}
@@ -136,32 +136,32 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         try:
             rows = [actions[agent] for agent in self.agents]
             masked = np.ma.MaskedArray in set(map(type, rows))  # an array of them would lose the masks
-            given = None if masked else action_array(np.array(rows), (len(rows), 2), "actions")
+            values = None if masked else action_array(np.array(rows), (len(rows), 2), "actions")
         except (LookupError, TypeError, ValueError, RuntimeError, OverflowError):
-            given = None
-        if given is None or not math.isfinite(np.vdot(given, given)):  # quick; finite numbers may overflow in it
-            given = self._one_by_one(actions)
-        if len(actions) > len(given) and not actions.keys() <= self._index.keys():
+            values = None
+        if values is None or not math.isfinite(np.vdot(values, values)):  # quick; finite numbers may overflow in it
+            values = self._one_by_one(actions)
+        if len(actions) > len(values) and not actions.keys() <= self._index.keys():
             unknown = min(actions.keys() - self._index.keys(), key=str)
             raise ValueError(f"there is no agent {unknown!r}; agents are uuv_0 to {self.possible_agents[-1]}")
-        if len(given) == len(self.possible_agents):
-            return given[None]
+        if len(values) == len(self.possible_agents):
+            return values[None]
         array = np.zeros((1, len(self.possible_agents), 2), np.float32)
-        array[0, self._rows] = given
+        array[0, self._rows] = values
         return array
 
     def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
         """Every agent's action. Raises ValueError with the first agent whose action can't be used."""
         if not isinstance(actions, Mapping):
             raise TypeError(f"actions must be a dictionary with an action for each agent, got {type(actions).__name__}")
-        given: list[Float32] = []
+        rows: list[Float32] = []
         for agent in self.agents:
             if agent not in actions:
                 raise ValueError(f"the action of {agent} is missing; give one for each of env.agents")
-            given.append(action_array(cast(ArrayLike, actions[agent]), (2,), f"the action of {agent}"))
-            if not np.isfinite(given[-1]).all():
-                raise ValueError(f"the action of {agent} must be finite, got {given[-1].tolist()}")
-        return np.array(given)
+            rows.append(action_array(cast(ArrayLike, actions[agent]), (2,), f"the action of {agent}"))
+            if not np.isfinite(rows[-1]).all():
+                raise ValueError(f"the action of {agent} must be finite, got {rows[-1].tolist()}")
+        return np.array(rows)
 
     def state(self) -> Float32:
         """The global state for centralised critics, explained by ``uuv_marl.envs.state.state_table``."""

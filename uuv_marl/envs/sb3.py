@@ -165,7 +165,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of every world."""
-        self._batch.need_reset("render()")
+        self._batch.check_reset("render()")
         return [self._renderer.draw(world) for world in range(self._shape[0])]
 
     def close(self) -> None:

@@ -8,13 +8,13 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.envs.core import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
 from uuv_marl.scenario import Scenario, ScenarioError
-from uuv_marl.scenario.overrides import given_in
+from uuv_marl.scenario.overrides import override_of
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
 from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32
@@ -63,9 +63,9 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
         asked, overrides = changed(scenario, **changes), changes.get("overrides") or {}
-        given = {field for field in (_HEARD, _LOOP, _CLOCK) if given_in(overrides, field) is not None}
-        given |= {_CLOCK} if changes.get("decision_period") is not None else set()
-        suited = _suited(others, changed(scenario), asked, given)
+        overridden = {field for field in (_HEARD, _LOOP, _CLOCK) if override_of(overrides, field) is not None}
+        overridden |= {_CLOCK} if changes.get("decision_period") is not None else set()
+        suited = _suited(others, changed(scenario), asked, overridden)
         batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make(others, self.scenario)
@@ -117,21 +117,21 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
 _HEARD, _LOOP, _CLOCK = "sonar.channels", "actuators.yaw_damping_nms", "timing.decision_period_s"
 
 
-def _suited(others: str, bare: Scenario, asked: Scenario, given: set[str]) -> Scenario:
+def _suited(others: str, bare: Scenario, asked: Scenario, overridden: set[str]) -> Scenario:
     """The scenario as the others need it. Raises ScenarioError where that would drop fields that were given."""
-    suited = granted(others, asked)
+    suited = with_policy_requirements(others, asked)
     remedy = "leave it out, or choose other others"
-    heard = suited.sonar.channels
-    dropped = {*asked.sonar.channels} - {*heard} - ({"link"} if "modem" in heard else set())
-    if dropped and (_HEARD in given or asked.sonar.channels != bare.sonar.channels):
+    channels = suited.sonar.channels
+    dropped = {*asked.sonar.channels} - {*channels} - ({"link"} if "modem" in channels else set())
+    if dropped and (_HEARD in overridden or asked.sonar.channels != bare.sonar.channels):
         raise ScenarioError(
             f"{_HEARD} can't hold {', '.join(sorted(dropped))}: with {others!r} the learner has "
-            f"{', '.join(heard) or 'no channels'}; {remedy}"
+            f"{', '.join(channels) or 'no channels'}; {remedy}"
         )
     for name in (_LOOP, _CLOCK):
         section, field = name.split(".")
         wanted, granted_now = (getattr(getattr(each, section), field) for each in (asked, suited))
-        if name in given and not math.isclose(wanted, granted_now, rel_tol=1e-9):
+        if name in overridden and not math.isclose(wanted, granted_now, rel_tol=1e-9):
             raise ScenarioError(
                 f"{name} can't be {wanted:g}: with {others!r} all vehicles have {granted_now:g}; {remedy}"
             )

@@ -15,7 +15,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
     n, m = scenario.swarm.num_vehicles, scenario.max_obstacles
     speed = PerceptField("obstacle_velocity", (m, 2), SPEED, "per obstacle that moves: its velocity, north and east")
     observed = scenario.task_class.observed
-    told = (row._replace(shape=(n, *row.shape), meaning=f"per vehicle: {row.meaning}") for row in observed)
+    vehicle_rows = (row._replace(shape=(n, *row.shape), meaning=f"per vehicle: {row.meaning}") for row in observed)
     groups = scenario.task_class.sizes(scenario).get("group", 1)
     return (
         PerceptField("alive", (n,), FLAG, "per vehicle: 1, or 0 once it is lost"),
@@ -30,7 +30,7 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
         PerceptField("obstacle_position", (m, 2), POSITION, "per obstacle: centre relative to l(t), north and east"),
         PerceptField("obstacle_radius", (m,), LENGTH, "per obstacle: radius"),
         *([speed] if scenario.traffic.moves else []),
-        *told,
+        *vehicle_rows,
     )
 
 
@@ -41,12 +41,12 @@ def state_layout(scenario: Scenario) -> PerceptLayout:
 
 def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
     """The state of every world, scaled by its layout, shape (world, entry), float32; lost vehicles are zero."""
-    state, course, facts = swarm.state, swarm.course, swarm.facts
+    state, world_map, facts = swarm.state, swarm.world_map, swarm.facts
     m = swarm.scenario.max_obstacles
     alive, reference = state.alive[:, :, None].astype(np.float64), swarm.mean_reference
     origin = reference[:, None, :2]
-    obstacles = course.obstacles[:, :m]
-    present = (np.arange(m) < course.num_obstacles[:, None])[:, :, None]
+    obstacles = world_map.obstacles[:, :m]
+    present = (np.arange(m) < world_map.num_obstacles[:, None])[:, :, None]
     fields = (
         alive,
         (state.eta[:, :, :2] - origin) * alive,
@@ -54,12 +54,12 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
         swarm.velocity * alive,
         state.nu[:, :, 2:] * alive,
         reference[:, 2:],
-        np.take_along_axis(course.waypoints, course.last[:, :, None, None], axis=2)[:, :, 0] - origin,
+        np.take_along_axis(world_map.waypoints, world_map.last[:, :, None, None], axis=2)[:, :, 0] - origin,
         facts.time_s / swarm.time_limit_s,
         present,
         (obstacles[:, :, :2] - origin) * present,
         obstacles[:, :, 2:] * present,
-        *([course.obstacle_velocity[:, :m]] if swarm.scenario.traffic.moves else []),
+        *([world_map.obstacle_velocity[:, :m]] if swarm.scenario.traffic.moves else []),
         *(swarm.percept[row.name] for row in swarm.scenario.task_class.observed),
     )
     rows = [np.reshape(field, (swarm.num_worlds, -1)) for field in fields]

@@ -120,10 +120,10 @@ class SwarmEnv(EnvMixin, EnvBase):
         group |= _endings(terminated, truncated)
         root = {"state": self._batch.state(), **_endings(world_terminated, world_truncated)}
         batch = self.batch_size
-        made = TensorDict({key: torch.from_numpy(array) for key, array in root.items()}, batch)
+        tensordict = TensorDict({key: torch.from_numpy(array) for key, array in root.items()}, batch)
         inner = {key: torch.from_numpy(array) for key, array in group.items()}
-        made.set(GROUP, TensorDict(inner, (*batch, self.swarm.num_vehicles)))
-        return made.to(self.device)
+        tensordict.set(GROUP, TensorDict(inner, (*batch, self.swarm.num_vehicles)))
+        return tensordict.to(self.device)
 
 
 def _endings(terminated: Bool, truncated: Bool) -> dict[str, Bool]:

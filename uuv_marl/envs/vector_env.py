@@ -149,7 +149,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
 
     def render(self) -> tuple[Any, ...]:
         """A picture (height, width, 3) of every world."""
-        self._batch.need_reset("render()")
+        self._batch.check_reset("render()")
         return tuple(self._renderer.draw(world) for world in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
@@ -157,13 +157,13 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         self._renderer.close()
 
 
-def _autoreset_mode(told: AutoresetMode | str) -> AutoresetMode:
+def _autoreset_mode(mode_name: AutoresetMode | str) -> AutoresetMode:
     """The mode of this name or value."""
-    found = next((mode for mode in AutoresetMode if told in (mode, mode.value, mode.name)), None)
-    if found is None:
+    match = next((mode for mode in AutoresetMode if mode_name in (mode, mode.value, mode.name)), None)
+    if match is None:
         known = ", ".join(repr(mode.value) for mode in AutoresetMode)
-        raise ValueError(f"autoreset_mode must be one of {known}, got {told!r}")
-    return found
+        raise ValueError(f"autoreset_mode must be one of {known}, got {mode_name!r}")
+    return match
 
 
 def _masked(infos: Infos, mask: Bool) -> Infos:

@@ -79,7 +79,7 @@ def _episode(recording: Recording) -> dict[str, Any]:
         "period_s": scenario.timing.decision_period_s,
         "metrics": recording.metrics,
         "constraints": {"s_l_m": limits.s_l_m, "s_o_m": limits.s_o_m, "s_u_m": limits.s_u_m},
-        "contact_m": scenario.contact.hull_radius_m,
+        "contact_m": scenario.collision.hull_radius_m,
         "arrival": {
             "radius_m": arrival.radius_m,
             "spread_m": arrival.spread_m * growth(scenario.swarm.num_vehicles),
@@ -87,7 +87,7 @@ def _episode(recording: Recording) -> dict[str, Any]:
         },
         "conditions": conditions(scenario),
         "current": None if recording.water is None else _current(scenario),
-        "ways": [{"team": team, "corners": way.round(2).ravel().tolist()} for team, way in groups.ways.values()],
+        "paths": [{"team": team, "corners": path.round(2).ravel().tolist()} for team, path in groups.paths.values()],
         "team": groups.team.tolist(),
         "uninformed": np.flatnonzero(~groups.informed).tolist(),
         "sonar": _sonar(scenario),
@@ -121,9 +121,9 @@ def _sonar(scenario: Scenario) -> list[dict[str, Any]]:
 
 
 def _arrays(recording: Recording) -> dict[str, Any]:
-    tick_s = recording.scenario.timing.control_hold_s
+    tick_s = recording.scenario.timing.control_step_s
     smooth = {
-        "reference": np.concatenate([recording.references[:, g] for g in recording.groups.ways], axis=1),
+        "reference": np.concatenate([recording.references[:, g] for g in recording.groups.paths], axis=1),
         "position": recording.position,
         "heading": unwrapped(recording.heading),
         "speed": recording.speed,
@@ -139,7 +139,7 @@ def _arrays(recording: Recording) -> dict[str, Any]:
     arrays |= {name: _bits(np.asarray(values, np.float32)) for name, values in exact.items()}
     if recording.inspections:
         inspected = list(recording.inspections)
-        arrays["heard"] = _whole(np.stack([sonar.heard for sonar in recording.inspections.values()], axis=1), 1)
+        arrays["detected_index"] = _whole(np.stack([sonar.detected_index for sonar in recording.inspections.values()], axis=1), 1)
         smooth["inspected_heading"] = unwrapped(recording.heading[:, inspected])
         for name in ("neighbour", "echo_range", "echo_position", "action"):
             smooth[name] = np.stack([getattr(sonar, name) for sonar in recording.inspections.values()], axis=1)

@@ -69,8 +69,8 @@ def _partner(i: int, left: Int32, position: Float32, touch_m: float) -> int | No
 
 def losses(time_s: Float32, alive: Bool) -> list[Event]:
     """An event for each vehicle at the first sample without it; ``alive`` has shape (time, vehicle)."""
-    gone, who = np.nonzero(alive[:-1] & ~alive[1:])
-    return [Event(float(time_s[t + 1]), "lost", (i,)) for t, i in zip(gone.tolist(), who.tolist(), strict=True)]
+    gone, vehicles = np.nonzero(alive[:-1] & ~alive[1:])
+    return [Event(float(time_s[t + 1]), "lost", (i,)) for t, i in zip(gone.tolist(), vehicles.tolist(), strict=True)]
 
 
 def arrival(task_time_s: float | None) -> list[Event]:

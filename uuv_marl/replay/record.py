@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.events import arrival, contacts, losses, near_misses
@@ -42,7 +42,7 @@ def record(
         DivergenceError: the integration step could not follow a vehicle.
     """
     watched = checked(inspect, scenario)
-    scenario = granted(policy, scenario)
+    scenario = with_policy_requirements(policy, scenario)
     tape = _Tape(watched)
     with blaming(policy):
         for event in evaluate(scenario, policy, [seed], tape):
@@ -86,7 +86,7 @@ class _Tape:
             self._groups = groups_of(swarm)
         self._add("references", facts.reference[0, :, :2])
         self._add("marks", swarm.task.marks(0))
-        self._add("traffic", swarm.course.obstacles[0, : swarm.course.num_obstacles[0], :2])
+        self._add("traffic", swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0], :2])
         self._add("drift", swarm.flow_field().drift)
         self._eddies = swarm.flow_field().eddies
         self._add("position", eta[:, :2])
@@ -96,9 +96,9 @@ class _Tape:
         self._add("spacing", facts.spacing[0])
         self._add("clearance", facts.clearance[0])
         self._add("alive", swarm.state.alive[0], np.bool_)
-        self._add("contacts", facts.contacts[0], np.int32)
+        self._add("contacts", facts.vehicle_collisions[0], np.int32)
         self._add("collisions", facts.collisions[0], np.int32)
-        self._add("heard", swarm.heard[0, seen], np.int32)
+        self._add("detected_index", swarm.detected_index[0, seen], np.int32)
         for name in ("neighbour", "echo", "echo_range", "echo_position"):
             self._add(name, percept[name][0, seen])
         if action is not None:
@@ -148,10 +148,10 @@ class _Tape:
         asked[:steps] = self._actions
         asked = _where(tape["alive"][:, list(self._inspect)], asked)
         echo = tape["echo"] > 0
-        neighbour = _where(tape["heard"] >= 0, tape["neighbour"])
+        neighbour = _where(tape["detected_index"] >= 0, tape["neighbour"])
         reach, place = _where(echo, tape["echo_range"]), _where(echo, tape["echo_position"])
         return {
-            i: Inspection(tape["heard"][:, k], neighbour[:, k], reach[:, k], place[:, k], asked[:, k])
+            i: Inspection(tape["detected_index"][:, k], neighbour[:, k], reach[:, k], place[:, k], asked[:, k])
             for k, i in enumerate(self._inspect)
         }
 
@@ -160,7 +160,7 @@ def _events(scenario: Scenario, tape: dict[str, NDArray[Any]], run: Run) -> list
     """All events in the order of time."""
     time, limits = tape["time_s"], scenario.constraints
     events = [
-        *contacts(time, tape["contacts"], tape["clearance"], tape["position"], scenario.contact.hull_radius_m),
+        *contacts(time, tape["contacts"], tape["clearance"], tape["position"], scenario.collision.hull_radius_m),
         *near_misses("near", time, tape["spacing"] < limits.s_u_m),
         *near_misses("near_obstacle", time, tape["clearance"] < limits.s_o_m),
         *losses(time, tape["alive"]),
@@ -169,9 +169,9 @@ def _events(scenario: Scenario, tape: dict[str, NDArray[Any]], run: Run) -> list
     return sorted(events, key=lambda event: event.time_s)
 
 
-def _where(there: NDArray[Any], values: NDArray[Any]) -> Float32:
+def _where(valid: NDArray[Any], values: NDArray[Any]) -> Float32:
     """The values, NaN where they are not ``there``, whose axes are the first ones of the values."""
-    return np.where(there.reshape(there.shape + (1,) * (values.ndim - there.ndim)), values, np.float32(np.nan))
+    return np.where(valid.reshape(valid.shape + (1,) * (values.ndim - valid.ndim)), values, np.float32(np.nan))
 
 
 def finite(values: Float32) -> Float32:

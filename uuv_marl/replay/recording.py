@@ -27,7 +27,7 @@ class Inspection(NamedTuple):
     Positions are in its body frame, x forward and y starboard [m].
     """
 
-    heard: Int32
+    detected_index: Int32
     """Index of the vehicle heard in each sub-sector, -1 for none, shape (time, sector)."""
     neighbour: Float32
     """Position of that vehicle, NaN for none, shape (time, sector, 2)."""

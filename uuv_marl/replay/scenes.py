@@ -5,7 +5,7 @@ import numpy as np
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, SonarView
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.recording import Event, Inspection, Recording
-from uuv_marl.sim.sea.current import FlowField
+from uuv_marl.sim.disturbances.current import FlowField
 from uuv_marl.types import Bool
 
 
@@ -89,7 +89,7 @@ class Scenes:
         if i is None or not self._alive[k, i]:
             return None
         inspection: Inspection = self.recording.inspections[i]
-        return SonarView(i, inspection.neighbour[k][inspection.heard[k] >= 0], inspection.echo_range[k])
+        return SonarView(i, inspection.neighbour[k][inspection.detected_index[k] >= 0], inspection.echo_range[k])
 
 
 def _distance(metres: float) -> float:

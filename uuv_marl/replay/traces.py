@@ -7,9 +7,9 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from pydantic import ValidationError
 
-from uuv_marl.baselines.registry import granted_to
+from uuv_marl.baselines.registry import with_requirements
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.benchmark.results import FILE, Content, declared, load_trace, read_content, trace_path
+from uuv_marl.benchmark.results import FILE, Content, requirements_of, load_trace, read_content, trace_path
 from uuv_marl.errors import ReplayError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay.command import command
@@ -18,7 +18,7 @@ from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Recording, Water
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.files import frozen
-from uuv_marl.sim.sea.current import Flow, advance_gust, water
+from uuv_marl.sim.disturbances.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.world import move_obstacles
@@ -173,7 +173,7 @@ def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
             f"{saved.folder / FILE} describes {name!r} in the words of another version of uuv_marl ({field}: "
             f"{first['msg']}); run the benchmark again"
         ) from None
-    return granted_to(policy, declared(saved.content["policies"][policy]), scenario)
+    return with_requirements(policy, requirements_of(saved.content["policies"][policy]), scenario)
 
 
 def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:
@@ -195,7 +195,7 @@ def _water(swarm: Swarm, time_s: Float32) -> Water | None:
         return None
     numbers, tick = water(scenario), 0
     drift = np.zeros((len(time_s), 2), np.float32)
-    for k, until in enumerate(np.rint(time_s / scenario.timing.control_hold_s).astype(int).tolist()):
+    for k, until in enumerate(np.rint(time_s / scenario.timing.control_step_s).astype(int).tolist()):
         while tick < until:
             tick += 1
             advance_gust(0, swarm.keys[0], tick, numbers, cast(Flow, swarm.currents))
@@ -207,23 +207,23 @@ def _traffic(swarm: Swarm, time_s: Float32) -> Float32 | None:
     """Where the scenario's traffic was since the reset."""
     if not swarm.scenario.traffic.moves:
         return None
-    hold_s, places = swarm.scenario.timing.control_hold_s, list[Float64]()
-    for tick in np.rint(time_s / hold_s).astype(int).tolist():
-        move_obstacles(0, tick, swarm.course, hold_s)
-        places.append(swarm.course.obstacles[0, : swarm.course.num_obstacles[0], :2].copy())
+    control_step_s, places = swarm.scenario.timing.control_step_s, list[Float64]()
+    for tick in np.rint(time_s / control_step_s).astype(int).tolist():
+        move_obstacles(0, tick, swarm.world_map, control_step_s)
+        places.append(swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0], :2].copy())
     return np.array(places, np.float32)
 
 
 def _references(swarm: Swarm, time_s: Float32) -> Float32:
     """Where each group's l(t) was, shape (time, group, 2)."""
-    course, passes = swarm.course, swarm.scenario.arrival.by == "passage"
-    ways = list(zip(course.waypoints[0], course.times[0], course.last[0].tolist(), strict=True))
-    return np.array([[reference(t, *way, passes)[:2] for way in ways] for t in time_s.tolist()], np.float32)
+    world_map, passes = swarm.world_map, swarm.scenario.arrival.criterion == "passage"
+    trajectories = list(zip(world_map.waypoints[0], world_map.times[0], world_map.last[0].tolist(), strict=True))
+    return np.array([[reference(t, *trajectory, passes)[:2] for trajectory in trajectories] for t in time_s.tolist()], np.float32)
 
 
 def _events(scenario: Scenario, trace: dict[str, Float32], metrics: Metrics) -> list[Event]:
     """What the series say, so that nobody is named but the lost; in the order of time."""
-    time, hull, limits = trace["time_s"], scenario.contact.hull_radius_m, scenario.constraints
+    time, hull, limits = trace["time_s"], scenario.collision.hull_radius_m, scenario.constraints
     spacing, clearance = trace["min_spacing_m"], trace["obstacle_distance_m"].min(axis=1, initial=np.inf)
     marks = [
         event

@@ -5,7 +5,7 @@ shipped scenarios, every number with its source.
 """
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario.conditions import IDEAL, conditions, disturbances, hears_ideally
+from uuv_marl.scenario.conditions import IDEAL, conditions, disturbances, sonar_is_ideal
 from uuv_marl.scenario.fields import MAX_RANGE_M
 from uuv_marl.scenario.files import differences, load_scenario, scenario_names, show, to_toml
 from uuv_marl.scenario.overrides import parse_override
@@ -15,6 +15,6 @@ from uuv_marl.scenario.vehicle_files import load_vehicle, show_vehicle, variant_
 
 __all__ = [
     "IDEAL", "MAX_RANGE_M", "Scenario", "ScenarioError", "conditions", "differences", "disturbances",
-    "growth", "hears_ideally", "load_scenario", "load_vehicle",
+    "growth", "sonar_is_ideal", "load_scenario", "load_vehicle",
     "parse_override", "scenario_names", "show", "show_vehicle", "to_toml", "variant_names", "vehicle_names",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 """A scenario's disturbances in a few words, for headers of tables, pages and pictures."""
 
 from uuv_marl.scenario.scenario import Scenario
-from uuv_marl.scenario.sea import Fault
+from uuv_marl.scenario.disturbance_sections import Fault
 
 IDEAL = "still water, no noise, no delay"
 """The conditions of a scenario in which nothing is on."""
@@ -15,17 +15,17 @@ def conditions(scenario: Scenario) -> str:
 def disturbances(scenario: Scenario) -> list[str]:
     """A phrase with numbers for each disturbance that is on."""
     traffic = scenario.traffic
-    moving = f"{traffic.share:.3g} of obstacles move at {traffic.speed_mps:g} m/s, {traffic.way_m:g} m to and fro"
-    return [*sea_disturbances(scenario), *([moving] if traffic.moves else [])]
+    moving = f"{traffic.share:.3g} of obstacles move at {traffic.speed_mps:g} m/s, {traffic.amplitude_m:g} m to and fro"
+    return [*vehicle_disturbances(scenario), *([moving] if traffic.moves else [])]
 
 
-def sea_disturbances(scenario: Scenario) -> list[str]:
+def vehicle_disturbances(scenario: Scenario) -> list[str]:
     """Those of the sea itself, which acts on vehicles; not those of the obstacles."""
     parts = (_current(scenario), _latency(scenario), _noise(scenario), _rest(scenario))
     return [phrase for part in parts for phrase, on in part.items() if on]
 
 
-def hears_ideally(scenario: Scenario) -> bool:
+def sonar_is_ideal(scenario: Scenario) -> bool:
     """Whether sonars hear without delay, noise or loss."""
     deaf = any(fault.kind == "array" and fault.share > 0.0 for fault in scenario.faults)
     return not deaf and not any([*_latency(scenario).values(), *_noise(scenario).values()])
@@ -69,7 +69,7 @@ def _noise(scenario: Scenario) -> dict[str, bool]:
 def _rest(scenario: Scenario) -> dict[str, bool]:
     navigation, actuators, mismatch = scenario.navigation, scenario.actuators, scenario.mismatch
     shares = (mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
-    broken = {f"{_told(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults}
+    broken = {f"{_fault_phrase(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults}
     every_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
     lost = scenario.modem.loss_probability
     return {
@@ -84,7 +84,7 @@ def _rest(scenario: Scenario) -> dict[str, bool]:
     }
 
 
-def _told(fault: Fault) -> str:
+def _fault_phrase(fault: Fault) -> str:
     """A fault, and what it leaves."""
     left = f" to {fault.efficiency:.3g}" if fault.efficiency > 0.0 else ""
     return f"{fault.kind if fault.array is None else f'{fault.array} array'} fault{left}"

@@ -54,15 +54,15 @@ def _nearest(location: Sequence[str | int]) -> str:
     every = list(_fields(Scenario))
     here = dict.fromkeys(field.removeprefix(prefix).partition(".")[0] for field in every if field.startswith(prefix))
     leaves = {field.rpartition(".")[2]: field for field in reversed(every)}
-    told = ".".join(map(str, (*location[:-1], "")))
-    near = [leaves[last]] if last in leaves else _like(last, {name: told + name for name in here})
+    location_text = ".".join(map(str, (*location[:-1], "")))
+    near = [leaves[last]] if last in leaves else _like(last, {name: location_text + name for name in here})
     near = near or _like(last, leaves)
     return f"; did you mean {near[0]!r}?" if near else f"; the fields here are {', '.join(here)}"
 
 
-def _like(name: str, there: Mapping[str, str]) -> list[str]:
+def _like(name: str, names: Mapping[str, str]) -> list[str]:
     """What stands beside the name that is most like this one, if there is any."""
-    return [there[like] for like in difflib.get_close_matches(name, there, n=1, cutoff=0.5)]
+    return [names[like] for like in difflib.get_close_matches(name, names, n=1, cutoff=0.5)]
 
 
 def _fields(model: Any, prefix: str = "") -> Iterator[str]:

@@ -67,14 +67,14 @@ def assign(data: dict[str, Any], field: str, value: Any) -> None:
 
 def leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Fields by the names that ``assign`` takes, instead of tables within tables."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for key, value in data.items():
         table = isinstance(value, dict)
-        found |= leaves(cast(dict[str, Any], value), f"{prefix}{key}.") if table else {prefix + key: value}
-    return found
+        values |= leaves(cast(dict[str, Any], value), f"{prefix}{key}.") if table else {prefix + key: value}
+    return values
 
 
-def given_in(overrides: Mapping[str, object], field: str) -> object | None:
+def override_of(overrides: Mapping[str, object], field: str) -> object | None:
     """What overrides give a field, by its name with a dot or in its section's table; None if nothing."""
     section, _, name = field.partition(".")
     table = plain(overrides.get(section)) if name else None
@@ -117,8 +117,8 @@ def _index(entries: Sequence[Any], part: str, field: str) -> int:
     places = {str(k): k for k in range(len(entries))}
     tables = {k: cast(dict[str, Any], entry) for k, entry in enumerate(entries) if isinstance(entry, dict)}
     names = {str(table["name"]): k for k, table in tables.items() if "name" in table}
-    found = (places | names).get(part)
-    if found is None:
+    index = (places | names).get(part)
+    if index is None:
         known = f"use one of {', '.join(names or places)}" if entries else "the list is empty: give it as a whole"
         raise ScenarioError(f"{short(field)} is unknown: there is no entry {shown(part)}; {known}")
-    return found
+    return index

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from uuv_marl.scenario import fields, hardware, sea, sections
+from uuv_marl.scenario import fields, hardware, disturbance_sections, sections
 from uuv_marl.scenario.task import TaskSettings, check_channels, check_task, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
@@ -45,18 +45,18 @@ class Scenario(fields.Section):
     sonar: hardware.Sonar
     timing: sections.Timing
     constraints: sections.Constraints
-    contact: sections.Contact
+    collision: sections.Collision
     arrival: sections.Arrival
     time_limit: sections.TimeLimit
-    disturbance: sections.Disturbance
-    current: sea.Current
-    traffic: sea.Traffic
-    latency: sea.Latency
-    noise: sea.Noise
-    navigation: sea.Navigation
-    modem: sea.Modem
-    mismatch: sea.Mismatch
-    faults: Annotated[tuple[sea.Fault, ...], Field(max_length=64)]
+    losses: sections.Losses
+    current: disturbance_sections.Current
+    traffic: disturbance_sections.Traffic
+    latency: disturbance_sections.Latency
+    noise: disturbance_sections.Noise
+    navigation: disturbance_sections.Navigation
+    modem: disturbance_sections.Modem
+    mismatch: disturbance_sections.Mismatch
+    faults: Annotated[tuple[disturbance_sections.Fault, ...], Field(max_length=64)]
     reward: sections.Reward
     task: Annotated[TaskSettings, BeforeValidator(named_task)]
     """What the swarm is to do: its name, or ``module:Class``, alone or in a table with the task's own numbers."""
@@ -81,7 +81,7 @@ class Scenario(fields.Section):
     def loses_vehicles(self) -> bool:
         """Whether a vehicle can be lost before the episode ends."""
         broken = any(fault.kind == "member" and fault.share > 0.0 for fault in self.faults)
-        return bool(self.disturbance.loss_times_s) or self.contact.ends_vehicle or broken
+        return bool(self.losses.times_s) or self.collision.ends_vehicle or broken
 
     @property
     def max_eddies(self) -> int:
@@ -97,7 +97,7 @@ class Scenario(fields.Section):
         check_task(self.task)
         check_channels(self.task, self.sonar.channels)
         _check_start(self)
-        _check_course(self)
+        _check_map(self)
         _check_traffic(self)
         _check_losses(self)
         _check_times(self)
@@ -115,11 +115,11 @@ class Scenario(fields.Section):
 
 def _check_start(scenario: Scenario) -> None:
     """The vehicles fit into the start area at their spacing, which keeps their hulls apart."""
-    start, n, apart = scenario.start, scenario.swarm.num_vehicles, 2 * scenario.contact.hull_radius_m
+    start, n, apart = scenario.start, scenario.swarm.num_vehicles, 2 * scenario.collision.hull_radius_m
     if start.spacing_m < apart:
         raise ValueError(
             f"start.spacing_m must be at least two hull radii = {apart:g}, got {start.spacing_m:g}; "
-            "raise it or lower contact.hull_radius_m"
+            "raise it or lower collision.hull_radius_m"
         )
     if start.gap_m < start.spacing_m and n > 1:
         raise ValueError(
@@ -135,7 +135,7 @@ def _check_start(scenario: Scenario) -> None:
         )
 
 
-def _check_course(scenario: Scenario) -> None:
+def _check_map(scenario: Scenario) -> None:
     """One trajectory, and no obstacle on its start or end."""
     points, clear = scenario.trajectory.waypoints_m, scenario.constraints.s_o_m
     if (points is None) == (scenario.random_field is None):
@@ -152,9 +152,9 @@ def _check_course(scenario: Scenario) -> None:
         where = f"obstacles.{k} at {list(centre)} m, radius {obstacle.radius_m:g} m,"
         if scenario.start.distance(scenario.swarm.num_vehicles, points[0], points[1], centre) < apart:
             raise ValueError(f"{where} lies on the start; keep {clear:g} m from the two start rectangles")
-        way = scenario.traffic.way_m if scenario.traffic.moves else 0.0
-        if math.dist(centre, points[-1]) < apart + way:
-            raise ValueError(f"{where} lies on the trajectory's end; keep {clear + way:g} m from it")
+        amplitude = scenario.traffic.amplitude_m if scenario.traffic.moves else 0.0
+        if math.dist(centre, points[-1]) < apart + amplitude:
+            raise ValueError(f"{where} lies on the trajectory's end; keep {clear + amplitude:g} m from it")
 
 
 def _check_traffic(scenario: Scenario) -> None:
@@ -167,27 +167,27 @@ def _check_traffic(scenario: Scenario) -> None:
             f"traffic.speed_mps must be 0 for task {scenario.task.name!r}, whose walls would open and close, got "
             f"{traffic.speed_mps:g}; leave it out"
         )
-    least = traffic.speed_mps * scenario.timing.control_hold_s
-    if traffic.way_m < least:
+    least = traffic.speed_mps * scenario.timing.control_step_s
+    if traffic.amplitude_m < least:
         raise ValueError(
-            f"traffic.way_m must be at least {least:g}, which traffic.speed_mps = {traffic.speed_mps:g} makes in a "
-            f"control hold, got {traffic.way_m:g}; raise it or lower the speed"
+            f"traffic.amplitude_m must be at least {least:g}, which traffic.speed_mps = {traffic.speed_mps:g} makes in a "
+            f"control hold, got {traffic.amplitude_m:g}; raise it or lower the speed"
         )
     most = math.inf if scenario.random_field is None else scenario.random_field.end_clear_m - scenario.constraints.s_o_m
-    if traffic.way_m > most:
+    if traffic.amplitude_m > most:
         raise ValueError(
-            f"traffic.way_m must be at most random_field.end_clear_m - constraints.s_o_m = {most:g}, so that no "
-            f"obstacle comes to the trajectory's end, got {traffic.way_m:g}; lower it"
+            f"traffic.amplitude_m must be at most random_field.end_clear_m - constraints.s_o_m = {most:g}, so that no "
+            f"obstacle comes to the trajectory's end, got {traffic.amplitude_m:g}; lower it"
         )
 
 
 def _check_losses(scenario: Scenario) -> None:
     """Somebody is left."""
-    losses, n = len(scenario.disturbance.loss_times_s), scenario.swarm.num_vehicles
+    losses, n = len(scenario.losses.times_s), scenario.swarm.num_vehicles
     members = sum(math.ceil(fault.share * n - 1e-9) for fault in scenario.faults if fault.kind == "member")
     if losses + members >= n:
         raise ValueError(
-            f"{'faults and ' if members else ''}disturbance.loss_times_s may lose {min(losses + members, n)} of {n} "
+            f"{'faults and ' if members else ''}losses.times_s may lose {min(losses + members, n)} of {n} "
             f"vehicles; at least one must remain: {'lower a share, ' if members else ''}shorten it or raise "
             "swarm.num_vehicles"
         )
@@ -200,7 +200,7 @@ def _check_times(scenario: Scenario) -> None:
     if field is not None:
         duration = field.legs[0] * field.leg_length_m[0] / scenario.trajectory.speed_mps
     shortest = scenario.time_limit.of(duration)
-    period, steps = timing.decision_period_s, timing.holds_per_decision * timing.steps_per_hold
+    period, steps = timing.decision_period_s, timing.control_steps_per_decision * timing.integration_steps_per_control_step
     if period > shortest:
         raise ValueError(
             f"timing.decision_period_s must be at most the shortest time limit = {shortest:g}, got {period:g}; "
@@ -223,19 +223,19 @@ def _check_sonar(scenario: Scenario) -> None:
             f"latency.active_period_s must be at least {least:.4g}, in which sound returns from the active arrays' "
             f"range of {far:g} m, or 0 (at every control hold), got {latency.active_period_s:g}"
         )
-    readings = latency.processing_s / scenario.timing.control_hold_s
+    readings = latency.processing_s / scenario.timing.control_step_s
     if readings > MAX_READINGS:
         raise ValueError(
             f"latency.processing_s = {latency.processing_s:g} is {readings:,.0f} control holds; at most {MAX_READINGS} "
-            "readings are kept: lower it or raise timing.control_hold_s"
+            "readings are kept: lower it or raise timing.control_step_s"
         )
     longest = max(array.range_m for array in scenario.sonar.arrays)
-    past = longest / latency.sound_speed_mps / scenario.timing.control_hold_s
+    past = longest / latency.sound_speed_mps / scenario.timing.control_step_s
     if latency.travel_time and past > MAX_PAST:
         raise ValueError(
             f"latency.sound_speed_mps = {latency.sound_speed_mps:g} takes sound {past:,.0f} control holds across the "
             f"longest range of {longest:g} m; positions of at most {MAX_PAST:,} are kept: raise it or "
-            "timing.control_hold_s, or set latency.travel_time = false"
+            "timing.control_step_s, or set latency.travel_time = false"
         )
 
 

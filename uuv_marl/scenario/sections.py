@@ -145,7 +145,7 @@ class RandomField(Section):
 class Timing(Section):
     """Three clocks."""
 
-    control_hold_s: Clock
+    control_step_s: Clock
     """t_r: time for which body forces are held."""
     integration_step_s: Clock
     """Runge-Kutta step, of which the control hold is a multiple."""
@@ -156,17 +156,17 @@ class Timing(Section):
     policy alike; if not, a policy is granted what it declares of them."""
 
     @property
-    def holds_per_decision(self) -> int:
+    def control_steps_per_decision(self) -> int:
         """Control holds in a decision period."""
-        return round(self.decision_period_s / self.control_hold_s)
+        return round(self.decision_period_s / self.control_step_s)
 
     @property
-    def steps_per_hold(self) -> int:
+    def integration_steps_per_control_step(self) -> int:
         """Integration steps in a control hold."""
-        return round(self.control_hold_s / self.integration_step_s)
+        return round(self.control_step_s / self.integration_step_s)
 
     def _check(self) -> None:
-        for long, short in (("control_hold_s", "integration_step_s"), ("decision_period_s", "control_hold_s")):
+        for long, short in (("control_step_s", "integration_step_s"), ("decision_period_s", "control_step_s")):
             ratio = getattr(self, long) / getattr(self, short)
             if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
                 raise ValueError(
@@ -186,7 +186,7 @@ class Constraints(Section):
     """Smallest distance between vehicles."""
 
 
-class Contact(Section):
+class Collision(Section):
     """What counts as a collision: two hulls, or a hull and an obstacle, overlap."""
 
     hull_radius_m: Positive
@@ -200,7 +200,7 @@ class Contact(Section):
 class Arrival(Section):
     """When the task is done: at rest at the trajectory's end, or in passage, for hulls that can't stop."""
 
-    by: Literal["rest", "passage"] = "rest"
+    criterion: Literal["rest", "passage"] = "rest"
     """In passage l(t) continues along the last leg beyond the end. The swarm has arrived once l(t) and the swarm's
     centre have crossed the line through the end across that leg, with every vehicle within ``spread_m`` of the centre's
     place along the leg. ``radius_m`` and ``dwell_s`` have no effect then."""
@@ -227,15 +227,15 @@ class TimeLimit(Section):
         return self.factor * duration_s + self.extra_s
 
 
-class Disturbance(Section):
+class Losses(Section):
     """Losses of vehicles at set times."""
 
-    loss_times_s: Annotated[tuple[NonNegative, ...], Field(max_length=16384)]
+    times_s: Annotated[tuple[NonNegative, ...], Field(max_length=16384)]
     """At each of these times a vehicle, drawn by the seed, is lost."""
 
     def _check(self) -> None:
-        if list(self.loss_times_s) != sorted(self.loss_times_s):
-            raise ValueError(f"disturbance.loss_times_s must not fall, got {list(self.loss_times_s)}; sort them")
+        if list(self.times_s) != sorted(self.times_s):
+            raise ValueError(f"losses.times_s must not fall, got {list(self.times_s)}; sort them")
 
 
 class Reward(Section):

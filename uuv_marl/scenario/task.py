@@ -20,9 +20,9 @@ class TaskSettings(Section):
     """One of ``uuv_marl.tasks.TASKS``, or ``module:Class`` for a user's own."""
 
 
-def named_task(given: Any) -> Any:
+def named_task(value: Any) -> Any:
     """A table with a task's name, where the name alone was given."""
-    return {"name": given} if isinstance(given, str) else given
+    return {"name": value} if isinstance(value, str) else value
 
 
 def shipped_tasks() -> dict[str, str]:
@@ -65,14 +65,14 @@ def task_class(name: str) -> Any:
             f"task {name!r} is unknown; {hint}There are {', '.join(tasks)}, and module:Class for your own"
         )
     try:
-        made = named_object(tasks.get(name, name))
+        task_type = named_object(tasks.get(name, name))
     except ImportError as error:
         raise ScenarioError(f"task {name!r} {error}; give module:Class of a module that Python finds") from None
     base: Any = named_object("uuv_marl.tasks:Task")
-    if not (isinstance(made, type) and issubclass(made, base)):
-        raise ScenarioError(f"task {name!r} must be a subclass of uuv_marl.tasks.Task, got {made!r}")
-    cast(Any, made).check()
-    return made
+    if not (isinstance(task_type, type) and issubclass(task_type, base)):
+        raise ScenarioError(f"task {name!r} must be a subclass of uuv_marl.tasks.Task, got {task_type!r}")
+    cast(Any, task_type).check()
+    return task_type
 
 
 def task_numbers(task: TaskSettings) -> Any:
@@ -88,12 +88,12 @@ def task_numbers(task: TaskSettings) -> Any:
         first = error.errors()[0]
         field = ".".join(map(str, ("task", *first["loc"])))
         if first["type"] == "extra_forbidden":
-            there = ", ".join(numbers.model_fields) or "none of its own"
-            raise ScenarioError(f"{field} is unknown; the numbers of task {task.name!r} are {there}") from None
+            fields = ", ".join(numbers.model_fields) or "none of its own"
+            raise ScenarioError(f"{field} is unknown; the numbers of task {task.name!r} are {fields}") from None
         if "ctx" in first and first["type"] == "value_error":
-            told = str(first["ctx"]["error"])
-            raise ScenarioError(f"{field} {told}" if first["loc"] else told) from None
+            reason = str(first["ctx"]["error"])
+            raise ScenarioError(f"{field} {reason}" if first["loc"] else reason) from None
         if first["type"] == "missing" and len(first["loc"]) == 1:
-            told = f"a task by name takes it as in {{'name': {task.name!r}, '{first['loc'][-1]}': ...}}"
-            raise ScenarioError(f"{field} is missing; {told}") from None
+            reason = f"a task by name takes it as in {{'name': {task.name!r}, '{first['loc'][-1]}': ...}}"
+            raise ScenarioError(f"{field} is missing; {reason}") from None
         raise ScenarioError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None

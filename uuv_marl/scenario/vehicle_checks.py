@@ -39,11 +39,11 @@ def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_
     _check_damping(vehicle)
     _check_lift(vehicle)
     _check_step(vehicle, actuators, timing, speed_mps)
-    damping, hold = actuators.yaw_damping_nms, timing.control_hold_s
-    if not damping / inertia[2, 2] * hold < SAMPLED_LIMIT:
+    damping, control_step_s = actuators.yaw_damping_nms, timing.control_step_s
+    if not damping / inertia[2, 2] * control_step_s < SAMPLED_LIMIT:
         raise ValueError(
-            f"actuators.yaw_damping_nms = {damping:g} is unstable when held for timing.control_hold_s = {hold:g}; "
-            f"use less than {SAMPLED_LIMIT * inertia[2, 2] / hold:.4g}"
+            f"actuators.yaw_damping_nms = {damping:g} is unstable when held for timing.control_step_s = {control_step_s:g}; "
+            f"use less than {SAMPLED_LIMIT * inertia[2, 2] / control_step_s:.4g}"
         )
 
 
@@ -133,7 +133,7 @@ def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float)
     """
     h = timing.integration_step_s
     if not can_follow(p, limits, speed_mps, h):
-        shorter = [step for k in range(1, 16) if (step := timing.control_hold_s / 2**k) < h]
+        shorter = [step for k in range(1, 16) if (step := timing.control_step_s / 2**k) < h]
         remedy = next(
             (f"use at most {step:.3g}, or " for step in shorter if can_follow(p, limits, speed_mps, step)), ""
         )

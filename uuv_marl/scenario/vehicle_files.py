@@ -13,7 +13,7 @@ from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.messages import short, shown
 
 VEHICLES = Path(__file__).resolve().parent / "vehicles"
-_GIVEN = {"vehicle": set(Vehicle.model_fields), "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"}}
+_FIELDS_BY_SECTION = {"vehicle": set(Vehicle.model_fields), "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"}}
 _OPTIONAL: dict[str, dict[str, Any]] = {
     section: {name: field.default for name, field in model.model_fields.items() if not field.is_required()}
     for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
@@ -69,18 +69,18 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
     """A vehicle's file, which must be complete: numbers of two vehicles are never mixed without a word."""
     plain, chosen = _without_variants(name)
     file = read_toml(_find_vehicle(plain, beside))
-    for section, fields in _GIVEN.items():
-        given = file.data.get(section)
+    for section, fields in _FIELDS_BY_SECTION.items():
+        table = file.data.get(section)
         needed = fields - _OPTIONAL[section].keys()
-        missing = sorted(needed - set(cast(dict[str, Any], given) if isinstance(given, dict) else ()))
+        missing = sorted(needed - set(cast(dict[str, Any], table) if isinstance(table, dict) else ()))
         if missing:
             raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; add this number to the file")
-    other = next((key for key in file.data if key not in {*_GIVEN, "variants"}), None)
+    other = next((key for key in file.data if key not in {*_FIELDS_BY_SECTION, "variants"}), None)
     if other is not None:
         raise ScenarioError(
             f"vehicle {file.path} holds {shown(other)}; it may hold vehicle and actuators only, and variants of them"
         )
-    data = {section: {**_OPTIONAL[section], **file.data[section]} for section in _GIVEN}
+    data = {section: {**_OPTIONAL[section], **file.data[section]} for section in _FIELDS_BY_SECTION}
     for variant in chosen:
         data = merged(data, _variant(file, variant))
     if chosen:
@@ -90,7 +90,7 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
 
 def left_out(vehicle: object) -> dict[str, Any] | None:
     """What a whole vehicle may leave out, and what it is then; None for a table with only some numbers of a vehicle."""
-    needed = _GIVEN["vehicle"] - _OPTIONAL["vehicle"].keys()
+    needed = _FIELDS_BY_SECTION["vehicle"] - _OPTIONAL["vehicle"].keys()
     whole = isinstance(vehicle, dict) and needed <= cast(dict[str, Any], vehicle).keys()
     return dict(_OPTIONAL["vehicle"]) if whole else None
 
@@ -101,15 +101,15 @@ def _variant(file: File, name: str) -> dict[str, Any]:
     variants = cast(dict[str, Any], every) if isinstance(every, dict) else {}
     changes = variants.get(name)
     if changes is None:
-        there = f"it has {', '.join(variants)}" if variants else "it has none"
-        raise ScenarioError(f"vehicle {file.path.stem} has no variant {shown(name)}; {there}")
+        variants_text = f"it has {', '.join(variants)}" if variants else "it has none"
+        raise ScenarioError(f"vehicle {file.path.stem} has no variant {shown(name)}; {variants_text}")
     if not isinstance(changes, dict) or not all(
         isinstance(part, dict) for part in cast(dict[str, Any], changes).values()
     ):
         raise ScenarioError(
             f"vehicle {file.path}: variants.{short(name)} must hold tables, such as [variants.{short(name)}.vehicle]"
         )
-    other = next((key for key in cast(dict[str, Any], changes) if key not in _GIVEN), None)
+    other = next((key for key in cast(dict[str, Any], changes) if key not in _FIELDS_BY_SECTION), None)
     if other is not None:
         raise ScenarioError(
             f"vehicle {file.path}: variants.{short(name)} holds {shown(other)}; it may hold vehicle and actuators only"

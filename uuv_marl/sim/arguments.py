@@ -43,10 +43,10 @@ def world_seeds(seed: SeedLike, worlds: Sequence[int]) -> list[int | None]:
         return [None] * len(worlds)
     if not isinstance(seed, list | tuple) and np.ndim(cast(ArrayLike, seed)) == 0:
         return [whole_number("seed", seed, 0) + w for w in worlds]
-    given = cast(Sequence[int | None], seed)
-    if len(given) != len(worlds):
-        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(given)}")
-    return [None if value is None else whole_number("seed", value, 0) for value in given]
+    seeds = cast(Sequence[int | None], seed)
+    if len(seeds) != len(worlds):
+        raise ValueError(f"seed must hold one seed for each of {len(worlds)} worlds, got {len(seeds)}")
+    return [None if value is None else whole_number("seed", value, 0) for value in seeds]
 
 
 def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> Float32:
@@ -62,19 +62,19 @@ def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> Float
             tensor that NumPy can't read, or has another shape.
     """
     try:
-        given, reason = np.asarray(action), ""
+        array, reason = np.asarray(action), ""
     except (TypeError, ValueError, RuntimeError, OverflowError) as error:  # ragged; a tensor with a gradient, on a GPU
-        given, reason = np.empty(0, object), f" ({error})"
+        array, reason = np.empty(0, object), f" ({error})"
     masked = isinstance(action, np.ma.MaskedArray)
-    if masked or given.dtype.kind not in "fiub":
-        found = "a masked array" if masked else reprlib.repr(action)
-        raise ValueError(f"{whose} must hold real numbers, got {found}{reason}")
-    if given.shape != shape:
-        raise ValueError(f"{whose} must have shape {shape}, got {given.shape}")
-    if given.dtype == np.float32:
-        return given
+    if masked or array.dtype.kind not in "fiub":
+        text = "a masked array" if masked else reprlib.repr(action)
+        raise ValueError(f"{whose} must hold real numbers, got {text}{reason}")
+    if array.shape != shape:
+        raise ValueError(f"{whose} must have shape {shape}, got {array.shape}")
+    if array.dtype == np.float32:
+        return array
     with rounding():
-        return np.asarray(given, np.float32)
+        return np.asarray(array, np.float32)
 
 
 def rounding() -> np.errstate:

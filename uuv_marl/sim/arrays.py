@@ -21,11 +21,11 @@ class State(NamedTuple):
     ]
     tick: Annotated[Int64, "world", "Control holds since the reset."]
     dwell: Annotated[Int64, "world radius", "Control holds for which the swarm has rested within each arrival radius."]
-    touched: Annotated[Bool, "world vehicle", "Whether the vehicle has touched anything since the reset."]
+    collided: Annotated[Bool, "world vehicle", "Whether the vehicle has touched anything since the reset."]
 
 
 @described
-class Course(NamedTuple):
+class WorldMap(NamedTuple):
     """What a reset draws."""
 
     waypoints: Annotated[Float64, "world group point 2", "Corners of each group's trajectory [m], padded."]
@@ -40,7 +40,7 @@ class Course(NamedTuple):
     swing: Annotated[
         Float64, "world obstacle 4", "Of one that moves to and fro: its place and velocity at the start [m, m/s]."
     ]
-    swing_holds: Annotated[
+    swing_control_steps: Annotated[
         Int64, "world obstacle", "Control holds from there to where it turns; 0 if it does not move to and fro."
     ]
     num_obstacles: Annotated[Int64, "world", "Obstacles that there are.", Bounds(0, "obstacle", 1)]
@@ -52,7 +52,7 @@ class Senses(NamedTuple):
     """What was heard at the latest step, and the percept made of it."""
 
     heading: Annotated[Float64, "world vehicle 2", "Cosine and sine of psi."]
-    heard: Annotated[Int32, "world vehicle sector", "Index of the vehicle heard, -1 for none.", Bounds(-1, "vehicle")]
+    detected_index: Annotated[Int32, "world vehicle sector", "Index of the vehicle heard, -1 for none.", Bounds(-1, "vehicle")]
     percept: Annotated[Float32, "world vehicle entry", "Flat percepts in physical units, zero for the lost."]
 
 
@@ -63,7 +63,7 @@ class Facts(NamedTuple):
     time_s: Annotated[Float64, "world", "Time since the reset."]
     reference: Annotated[Float64, "world group 4", "Position (north, east) and velocity of each group's l(t)."]
     away: Annotated[Float64, "world vehicle", "Distance to its own reference; the last one for the lost."]
-    was_away: Annotated[Float64, "world vehicle", "The same at the end of the step before."]
+    away_before: Annotated[Float64, "world vehicle", "The same at the end of the step before."]
     centre: Annotated[Float64, "world 2", "Mean position of the living."]
     spacing: Annotated[Float64, "world vehicle", "Smallest distance to another vehicle; infinite for the lost."]
     min_spacing: Annotated[Float64, "world", "The smallest of them."]
@@ -72,7 +72,7 @@ class Facts(NamedTuple):
     obstacle_clearance: Annotated[
         Float64, "world obstacle", "Smallest distance from its surface to a vehicle; infinite in the padding."
     ]
-    contacts: Annotated[Int64, "world vehicle", "Contact episodes of the vehicle that began."]
+    vehicle_collisions: Annotated[Int64, "world vehicle", "Contact episodes of the vehicle that began."]
     collisions: Annotated[Int64, "world", "Contact episodes that began."]
     lost: Annotated[Bool, "world vehicle", "True for vehicles lost in this step."]
     effort: Annotated[Float64, "world vehicle", "Mean squared action, as a share of full force or rudder."]
@@ -87,6 +87,6 @@ class World(NamedTuple):
     """All that changes, for a batch of worlds; the first axis of every array is the world."""
 
     state: State
-    course: Course
+    world_map: WorldMap
     facts: Facts
     senses: Senses

@@ -74,8 +74,8 @@ def _make(folder: Path) -> None:
     Loading compiled code executes it; so does starting the Python that root has installed.
     """
     folder.mkdir(parents=True, exist_ok=True, mode=0o755)
-    found = folder.stat()
-    if hasattr(os, "getuid") and (found.st_uid not in (os.getuid(), 0) or found.st_mode & 0o022):
+    status = folder.stat()
+    if hasattr(os, "getuid") and (status.st_uid not in (os.getuid(), 0) or status.st_mode & 0o022):
         raise OSError(0, "it belongs to another user, or others may write to it")
 
 
@@ -132,16 +132,16 @@ class _Cache(caching.FunctionCache):
         """What was compiled for these types, or None."""
         index = Path(self._cache_file._index_path)
         try:
-            found: Any = caching.FunctionCache.load_overload(self, sig, target_context)
+            overload: Any = caching.FunctionCache.load_overload(self, sig, target_context)
         except Exception:  # a file cut off by a power cut raises whatever unpickling meets
-            found = None
+            overload = None
             with contextlib.suppress(OSError):
                 index.unlink(missing_ok=True)
-        if found is None:
+        if overload is None:
             _announce(cast(Cache, cache()))
         else:
             _touch(index)
-        return found
+        return overload
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
@@ -165,8 +165,8 @@ def _announce(place: Cache) -> None:
     """Say that compiling takes long, and tidy up meanwhile."""
     global _last_compiled  # noqa: PLW0603 - a clock of this process
     if time.monotonic() - _last_compiled > _QUIET_S:
-        kept = "is kept in %s" if place.writable else "can't be kept, since %s can't be written to"
-        _log.warning(f"Compiling a part of uuv_marl: this takes up to a minute, and {kept}.", place.folder)
+        remaining = "is kept in %s" if place.writable else "can't be kept, since %s can't be written to"
+        _log.warning(f"Compiling a part of uuv_marl: this takes up to a minute, and {remaining}.", place.folder)
         if place.writable:
             prune(place.folder.parent)
     _last_compiled = time.monotonic()

@@ -11,9 +11,9 @@ from uuv_marl.sim.cells import max_cells
 from uuv_marl.sim.compiled import entry
 from uuv_marl.sim.entry_points import observe, step_worlds
 from uuv_marl.sim.model import model
-from uuv_marl.sim.sea.sea import Sea
+from uuv_marl.sim.disturbances.disturbances import Disturbances
 from uuv_marl.sim.threads import num_threads, on_threads
-from uuv_marl.sim.workspace import scratch
+from uuv_marl.sim.workspace import workspace_buffers
 from uuv_marl.types import Bool, Float32
 
 _LEAST = 200
@@ -29,12 +29,12 @@ class Engine:
     Few vehicles run in the calling thread; worlds with many are shared among threads.
     """
 
-    def __init__(self, scenario: Scenario, world: World, sea: Sea | None) -> None:
+    def __init__(self, scenario: Scenario, world: World, disturbances: Disturbances | None) -> None:
         n, self._num_worlds = scenario.swarm.num_vehicles, len(world.state.tick)
         self._threads = max(1, min(self._num_worlds, num_threads(), self._num_worlds * n // _LEAST))
         self._head = _HEAD // n
-        room = scratch(self._threads, n, scenario.sonar.num_sectors, max_cells(n), world.course.obstacles.shape[1])
-        self._numbers = (world, model(scenario), room, sea)
+        buffers = workspace_buffers(self._threads, n, scenario.sonar.num_sectors, max_cells(n), world.world_map.obstacles.shape[1])
+        self._numbers = (world, model(scenario), buffers, disturbances)
         self._every = np.ones(self._num_worlds, np.bool_)
 
     @functools.cached_property
@@ -54,7 +54,7 @@ class Engine:
         """Facts and percepts of world w from its state and course, as after a reset."""
         self._observe(w, *self._numbers)
 
-    def step(self, action: Float32, active: Bool | None, then: Callable[[int, int], None] | None = None) -> bool:
+    def step(self, action: Float32, active: Bool | None, on_stepped: Callable[[int, int], None] | None = None) -> bool:
         """One decision period of the worlds that are ``active``, shape (world,), default all; whether any has diverged.
 
         ``action``, shape (world, vehicle, 2), is finite but for the lost. A world that has diverged stays as it is.
@@ -62,12 +62,12 @@ class Engine:
         """
         running = self._every if active is None else np.ascontiguousarray(active)
 
-        def some(thread: int, begin: int, end: int) -> bool:
+        def step_range(thread: int, begin: int, end: int) -> bool:
             diverged = self._step(thread, begin, end, running, action, *self._numbers)
-            if then is not None:
-                then(begin, end)
+            if on_stepped is not None:
+                on_stepped(begin, end)
             return diverged
 
         if self._threads == 1:
-            return some(0, 0, self._num_worlds)
-        return on_threads(some, self._num_worlds, self._threads, self._head)
+            return step_range(0, 0, self._num_worlds)
+        return on_threads(step_range, self._num_worlds, self._threads, self._head)

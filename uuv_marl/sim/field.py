@@ -20,7 +20,7 @@ class Field(NamedTuple):
     obstacles: Float64
 
 
-def draw_field(scenario: Scenario, rng: np.random.Generator) -> Field:
+def sample_field(scenario: Scenario, rng: np.random.Generator) -> Field:
     """The world's trajectory and obstacles."""
     if scenario.random_field is None:
         obstacles = [(*obstacle.centre_m, obstacle.radius_m) for obstacle in scenario.obstacles]

@@ -22,20 +22,20 @@ _CELL_SPACINGS = 1.25
 class Rules(NamedTuple):
     """Clocks, thresholds, and the schedule of losses. Lengths in m."""
 
-    hold_s: float
+    control_step_s: float
     step_s: float
-    holds: int
+    control_steps: int
     """Control holds of a decision."""
     steps: int
     """Integration steps of a control hold."""
-    hull: float
+    hull_radius: float
     """Radius of a hull."""
-    contact_ends: bool
+    collision_ends: bool
     """Whether a vehicle that touches something is lost."""
-    contact_stops: bool
+    collision_stops: bool
     """Whether it stands still there."""
     passes: bool
-    """Whether the swarm arrives in passage, and l(t) goes on beyond the end (``arrival.by``)."""
+    """Whether the swarm arrives in passage, and l(t) goes on beyond the end (``arrival.criterion``)."""
     dwell_ticks: int
     """Control holds that the swarm must rest to have arrived; 0 in passage."""
     spread: float
@@ -64,19 +64,19 @@ def model(scenario: Scenario) -> Model:
 def rules(scenario: Scenario) -> Rules:
     """Clocks, thresholds and losses of a scenario."""
     timing, arrival = scenario.timing, scenario.arrival
-    passes, losses_s = arrival.by == "passage", np.array(scenario.disturbance.loss_times_s, np.float64)
+    passes, losses_s = arrival.criterion == "passage", np.array(scenario.losses.times_s, np.float64)
     return Rules(
-        hold_s=timing.control_hold_s,
+        control_step_s=timing.control_step_s,
         step_s=timing.integration_step_s,
-        holds=timing.holds_per_decision,
-        steps=timing.steps_per_hold,
-        hull=scenario.contact.hull_radius_m,
-        contact_ends=scenario.contact.ends_vehicle,
-        contact_stops=scenario.contact.stops,
+        control_steps=timing.control_steps_per_decision,
+        steps=timing.integration_steps_per_control_step,
+        hull_radius=scenario.collision.hull_radius_m,
+        collision_ends=scenario.collision.ends_vehicle,
+        collision_stops=scenario.collision.stops,
         passes=passes,
-        dwell_ticks=0 if passes else round(arrival.dwell_s / timing.control_hold_s),
+        dwell_ticks=0 if passes else round(arrival.dwell_s / timing.control_step_s),
         spread=arrival.spread_m * growth(scenario.swarm.num_vehicles),
         arrival_radii=np.array([math.inf if passes else arrival.radius_m, *ARRIVAL_RADII_M]),
-        loss_ticks=np.maximum(np.ceil(losses_s / timing.control_hold_s - 1e-9), 1).astype(np.int64),
+        loss_ticks=np.maximum(np.ceil(losses_s / timing.control_step_s - 1e-9), 1).astype(np.int64),
         cell_side=_CELL_SPACINGS * scenario.start.spacing_m,
     )

@@ -5,10 +5,10 @@ Obstacles are columns, over which loops pass on vector registers. What is passed
 
 import math
 
-from uuv_marl.sim.arrays import Course, World
+from uuv_marl.sim.arrays import WorldMap, World
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.model import Rules
-from uuv_marl.sim.workspace import MOST_NEARBY, Obstacles, Unnamed, named
+from uuv_marl.sim.workspace import MOST_NEARBY, Obstacles, ObstacleBuffers, obstacle_columns
 
 Edges = tuple[float, float, float, float]
 """Lower and upper edge of a cone of directions, north and east each; all 0 for all directions."""
@@ -21,21 +21,21 @@ _SKIN_M = 5.0
 
 
 @compiled_inline
-def load_obstacles(w: int, course: Course, room: Unnamed) -> None:
+def load_obstacles(w: int, world_map: WorldMap, buffers: ObstacleBuffers) -> None:
     """The columns of world w's obstacles, all of them chosen; which are nearby is forgotten."""
-    obstacles = named(room)
-    obstacles.num_nearby[: course.group.shape[1]] = -1
-    for k in range(course.num_obstacles[w]):
-        obstacles.x[k], obstacles.y[k] = course.obstacles[w, k, 0], course.obstacles[w, k, 1]
-        obstacles.radius[k], obstacles.chosen[k] = course.obstacles[w, k, 2], k
+    obstacles = obstacle_columns(buffers)
+    obstacles.num_nearby[: world_map.group.shape[1]] = -1
+    for k in range(world_map.num_obstacles[w]):
+        obstacles.x[k], obstacles.y[k] = world_map.obstacles[w, k, 0], world_map.obstacles[w, k, 1]
+        obstacles.radius[k], obstacles.chosen[k] = world_map.obstacles[w, k, 2], k
 
 
 @compiled_inline
-def load_places(w: int, course: Course, room: Unnamed) -> None:
+def load_places(w: int, world_map: WorldMap, buffers: ObstacleBuffers) -> None:
     """The columns of where world w's obstacles are, once they may have moved."""
-    obstacles = named(room)
-    for k in range(course.num_obstacles[w]):
-        obstacles.x[k], obstacles.y[k] = course.obstacles[w, k, 0], course.obstacles[w, k, 1]
+    obstacles = obstacle_columns(buffers)
+    for k in range(world_map.num_obstacles[w]):
+        obstacles.x[k], obstacles.y[k] = world_map.obstacles[w, k, 0], world_map.obstacles[w, k, 1]
 
 
 @compiled_inline
@@ -59,26 +59,26 @@ def choose(num: int, x: float, y: float, reach: float, cone: Edges, obstacles: O
 
 
 @compiled_inner
-def remember_nearby(w: int, world: World, rules: Rules, room: Unnamed) -> None:
+def remember_nearby(w: int, world: World, rules: Rules, buffers: ObstacleBuffers) -> None:
     """Remember which obstacles may come near each vehicle until the next decision.
 
     How near that is, is guessed from the clearance of the step before. The room is written.
     """
-    obstacles = named(room)
-    eta, num, fastest = world.state.eta, world.course.num_obstacles[w], 0.0
-    velocity, swing = world.course.obstacle_velocity, world.course.swing
+    obstacles = obstacle_columns(buffers)
+    eta, num, fastest = world.state.eta, world.world_map.num_obstacles[w], 0.0
+    velocity, swing = world.world_map.obstacle_velocity, world.world_map.swing
     for k in range(num):
         fastest = max(fastest, abs(velocity[w, k, 0]) + abs(velocity[w, k, 1]))
         fastest = max(fastest, abs(swing[w, k, 2]) + abs(swing[w, k, 3]))
     for i in range(eta.shape[1]):
         x, y, first = eta[w, i, 0], eta[w, i, 1], i * MOST_NEARBY
-        reach = max(world.facts.clearance[w, i], rules.hull) + _SKIN_M
+        reach = max(world.facts.clearance[w, i], rules.hull_radius) + _SKIN_M
         num_nearby = choose(num, x, y, reach, _EVERYWHERE, obstacles)
         if num_nearby <= MOST_NEARBY:
             for t in range(num_nearby):
                 obstacles.nearby[first + t] = obstacles.chosen[t]
             obstacles.num_nearby[i], obstacles.from_x[i], obstacles.from_y[i] = num_nearby, x, y
-            obstacles.beyond[i] = reach - fastest * rules.holds * rules.hold_s
+            obstacles.beyond[i] = reach - fastest * rules.control_steps * rules.control_step_s
 
 
 @compiled_inline

@@ -89,7 +89,7 @@ def _scale(begin: int, end: int, flat: Float32, inverse: Float32, observation: F
 def _weigh(begin: int, end: int, flat: Float32, at: Starts, rest: int, inverse: Float32, observation: Float32) -> None:
     """Fill ``closeness``; what stands in the percept from entry ``rest`` on is scaled as everywhere."""
     see = fields(flat, at)
-    sectors, active = see.heard.shape[2], see.echo.shape[2]
+    sectors, active = see.detected.shape[2], see.echo.shape[2]
     for w in range(begin, end):
         for i in range(flat.shape[1]):
             out = observation[w, i]
@@ -104,7 +104,7 @@ def _weigh(begin: int, end: int, flat: Float32, at: Starts, rest: int, inverse: 
             for s in range(sectors):
                 x, y = see.neighbour[w, i, s, 0], see.neighbour[w, i, s, 1]
                 d = np.sqrt(x * x + y * y)
-                out[k + s] = 8.0 / (d + 4.0) if see.heard[w, i, s] > 0.0 else 0.0
+                out[k + s] = 8.0 / (d + 4.0) if see.detected[w, i, s] > 0.0 else 0.0
                 turn = out[k + s] / max(d, 1e-6)
                 out[k + sectors + 2 * s], out[k + sectors + 2 * s + 1] = turn * x, turn * y
             k += 3 * sectors

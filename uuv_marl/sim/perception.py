@@ -6,12 +6,12 @@ from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import MAX_RANGE_M
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
-from uuv_marl.sim.hearing import Pose
+from uuv_marl.sim.detection import Pose
 from uuv_marl.sim.model import Model
 from uuv_marl.sim.nearby import choose
 from uuv_marl.sim.sonar import SonarSuite, cross
 from uuv_marl.sim.views import Fields
-from uuv_marl.sim.workspace import MOST_NEARBY, Unnamed, Workspace, named
+from uuv_marl.sim.workspace import MOST_NEARBY, ObstacleBuffers, Workspace, obstacle_columns
 
 
 @compiled_inline
@@ -60,7 +60,7 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 
     The vehicle's percept is cleared and written.
     """
-    cells, listener, course = workspace.cells, workspace.listener, world.course
+    cells, listener, world_map = workspace.cells, workspace.listener, world.world_map
     nu, reference, i = world.state.nu, world.facts.reference, cells.vehicle[p]
     x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(world.senses.percept.shape[2]):
@@ -68,16 +68,16 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
     see.velocity[w, i, 0] = saturate(nu[w, i, 0], MAX_SPEED)
     see.velocity[w, i, 1] = saturate(nu[w, i, 1], MAX_SPEED)
     see.yaw_rate[w, i, 0] = saturate(nu[w, i, 2], MAX_SPEED)
-    if course.informed[w, i]:
-        l_t = reference[w, course.group[w, i]]
+    if world_map.informed[w, i]:
+        l_t = reference[w, world_map.group[w, i]]
         v_x, v_y = l_t[2], l_t[3]
         see.reference[w, i, 0], see.reference[w, i, 1] = toward(l_t[0] - x, l_t[1] - y, c, s)
         see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
         see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
-    for k in range(see.heard.shape[2]):
-        j = listener.heard[k]
-        see.heard[w, i, k] = 1.0 if j >= 0 else 0.0
-        see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = listener.kept_ahead[k], listener.kept_abeam[k]
+    for k in range(see.detected.shape[2]):
+        j = listener.detected_index[k]
+        see.detected[w, i, k] = 1.0 if j >= 0 else 0.0
+        see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = listener.detected_ahead[k], listener.detected_abeam[k]
         if see.link_identity.shape[2] > 0 and j >= 0:
             c_j, s_j = cells.cos[cells.entry[j]], cells.sin[cells.entry[j]]
             v_x, v_y = c_j * nu[w, j, 0] - s_j * nu[w, j, 1], s_j * nu[w, j, 0] + c_j * nu[w, j, 1]
@@ -86,7 +86,7 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
             see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     if see.compass.shape[2] > 0:
         see.compass[w, i, 0], see.compass[w, i, 1] = c, s
-    obstacles, num = named(workspace.obstacles), course.num_obstacles[w]
+    obstacles, num = obstacle_columns(workspace.obstacles), world_map.num_obstacles[w]
     if num > MOST_NEARBY:
         l_x, l_y, u_x, u_y = model.suite.cone
         cone = c * l_x - s * l_y, s * l_x + c * l_y, c * u_x - s * u_y, s * u_x + c * u_y
@@ -100,12 +100,12 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 
 
 @compiled_inner
-def write_echoes(i: int, w: int, num: int, pose: Pose, room: Unnamed, suite: SonarSuite, see: Fields) -> None:
+def write_echoes(i: int, w: int, num: int, pose: Pose, buffers: ObstacleBuffers, suite: SonarSuite, see: Fields) -> None:
     """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
 
     Of the obstacles the first ``num`` chosen count. What was written stays where nothing is heard.
     """
-    (x, y, c, s), obstacles = pose, named(room)
+    (x, y, c, s), obstacles = pose, obstacle_columns(buffers)
     for t in range(num):
         m = obstacles.chosen[t]
         dx, dy = obstacles.x[m] - x, obstacles.y[m] - y

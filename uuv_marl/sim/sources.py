@@ -29,13 +29,13 @@ def source_key(module: str, settings: str = "") -> str | None:
 def reached_modules(module: str) -> frozenset[str]:
     """The module, and those of its own package and of uuv_marl that it imports, directly or through others."""
     packages = {"uuv_marl", module.partition(".")[0]}
-    found, waiting = set[str](), {module}
+    modules, waiting = set[str](), {module}
     while waiting:
         name = waiting.pop()
-        found.add(name)
-        named = {other for other in _named(name) if other.partition(".")[0] in packages} - found
+        modules.add(name)
+        named = {other for other in _named(name) if other.partition(".")[0] in packages} - modules
         waiting |= {other for other in named if _is_module(other)}
-    return frozenset(found)
+    return frozenset(modules)
 
 
 @functools.cache

@@ -6,7 +6,7 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.nearby import nearest_surface
-from uuv_marl.sim.workspace import Cells, Obstacles, Unnamed, named
+from uuv_marl.sim.workspace import Cells, Obstacles, ObstacleBuffers, obstacle_columns
 from uuv_marl.types import Float64
 
 NOWHERE = (math.inf, math.inf, 0.0)
@@ -56,14 +56,14 @@ def nearest_squared(p: int, cells: Cells, grid: Grid) -> float:
                 dx, dy = cells.x[q] - x, cells.y[q] - y
                 squared = dx * dx + dy * dy
                 least = squared if squared < least and q != p else least
-        everybody = top == 0 and left == 0 and bottom == grid.rows - 1 and right == grid.columns - 1
-        if least <= reach * reach or everybody:
+        covers_all = top == 0 and left == 0 and bottom == grid.rows - 1 and right == grid.columns - 1
+        if least <= reach * reach or covers_all:
             return least
         reach *= 2.0
 
 
 @compiled_inner
-def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, grid: Grid) -> int:
+def new_collisions(w: int, p: int, touch: float, before: Float64, cells: Cells, grid: Grid) -> int:
     """Contact episodes of one vehicle that begin: others that are near now and were not one control hold ago.
 
     ``touch``: distance of two centres below which they are in contact [m].
@@ -90,48 +90,48 @@ def new_contacts(w: int, p: int, touch: float, before: Float64, cells: Cells, gr
 
 
 @compiled_inner
-def measure_vehicles(w: int, hull: float, world: World, cells: Cells, grid: Grid) -> int:
+def measure_vehicles(w: int, hull_radius: float, world: World, cells: Cells, grid: Grid) -> int:
     """Lower the spacing of the living and raise their contacts; how many episodes between vehicles began.
 
     A contact episode begins where two hulls overlap now and did not one control hold ago.
     """
     before, facts = world.state.before, world.facts
-    touch, began = 2.0 * hull, 0
+    touch, began = 2.0 * hull_radius, 0
     find_nearest(cells, grid)
     for p in range(grid.living):
         i = cells.vehicle[p]
         facts.spacing[w, i] = min(facts.spacing[w, i], math.sqrt(cells.nearest[p]))
         if cells.nearest[p] < touch * touch:
-            new = new_contacts(w, p, touch, before, cells, grid)
-            facts.contacts[w, i] += new
-            world.state.touched[w, i] = world.state.touched[w, i] or new > 0
+            new = new_collisions(w, p, touch, before, cells, grid)
+            facts.vehicle_collisions[w, i] += new
+            world.state.collided[w, i] = world.state.collided[w, i] or new > 0
             began += new
     return began // 2
 
 
 @compiled_inner
-def measure_obstacles(w: int, hull: float, world: World, room: Unnamed, cells: Cells, grid: Grid) -> int:
+def measure_obstacles(w: int, hull_radius: float, world: World, buffers: ObstacleBuffers, cells: Cells, grid: Grid) -> int:
     """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began.
 
     A contact episode begins where a hull meets an obstacle now and did not one control hold ago; either may have moved.
     ``state.obstacles_before`` is written, too.
     """
-    num, facts, obstacles_before = world.course.num_obstacles[w], world.facts, world.state.obstacles_before
-    obstacles, began = named(room), 0
+    num, facts, obstacles_before = world.world_map.num_obstacles[w], world.facts, world.state.obstacles_before
+    obstacles, began = obstacle_columns(buffers), 0
     obstacles.squared[:num] = math.inf
     for p in range(grid.living):
         i, x, y = cells.vehicle[p], cells.x[p], cells.y[p]
         nearest, others = nearest_surface(i, x, y, obstacles)
-        if nearest >= hull and others > nearest:
+        if nearest >= hull_radius and others > nearest:
             facts.clearance[w, i] = min(facts.clearance[w, i], nearest)
             lower_squares(num, x, y, obstacles)
         else:
-            began += meet_obstacles(w, i, x, y, hull, world, obstacles)
+            began += meet_obstacles(w, i, x, y, hull_radius, world, obstacles)
     for k in range(num):
         gap = math.sqrt(obstacles.squared[k]) - obstacles.radius[k]
         facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], gap)
         for c in range(3):
-            obstacles_before[w, k, c] = world.course.obstacles[w, k, c]
+            obstacles_before[w, k, c] = world.world_map.obstacles[w, k, c]
     for k in range(num, obstacles_before.shape[1]):
         obstacles_before[w, k, 0], obstacles_before[w, k, 1], obstacles_before[w, k, 2] = NOWHERE
     return began
@@ -147,20 +147,20 @@ def lower_squares(num: int, x: float, y: float, obstacles: Obstacles) -> None:
 
 
 @compiled_inline
-def meet_obstacles(w: int, i: int, x: float, y: float, hull: float, world: World, obstacles: Obstacles) -> int:
+def meet_obstacles(w: int, i: int, x: float, y: float, hull_radius: float, world: World, obstacles: Obstacles) -> int:
     """Lower vehicle i's clearance, at (x, y), and the obstacles', and raise its contacts; how many episodes began."""
     facts, before, obstacles_before, began = world.facts, world.state.before, world.state.obstacles_before, 0
-    for k in range(world.course.num_obstacles[w]):
+    for k in range(world.world_map.num_obstacles[w]):
         dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
         gap = math.sqrt(dx * dx + dy * dy) - obstacles.radius[k]
         facts.clearance[w, i] = min(facts.clearance[w, i], gap)
         facts.obstacle_clearance[w, k] = min(facts.obstacle_clearance[w, k], gap)
-        if gap >= hull:
+        if gap >= hull_radius:
             continue
         was_x, was_y = obstacles_before[w, k, 0] - before[w, i, 0], obstacles_before[w, k, 1] - before[w, i, 1]
-        if math.sqrt(was_x * was_x + was_y * was_y) - obstacles_before[w, k, 2] >= hull:
-            facts.contacts[w, i] += 1
-            world.state.touched[w, i] = True
+        if math.sqrt(was_x * was_x + was_y * was_y) - obstacles_before[w, k, 2] >= hull_radius:
+            facts.vehicle_collisions[w, i] += 1
+            world.state.collided[w, i] = True
             began += 1
     return began
 

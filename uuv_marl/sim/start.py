@@ -53,12 +53,12 @@ def scatter(candidates: Float64, gap: float, placed: Float64) -> int:
 
     Both have shape (disc, 3): two coordinates and a radius [m], 0 for a point.
     """
-    found = 0
+    num_placed = 0
     for k in range(candidates.shape[0]):
-        if found == placed.shape[0]:
+        if num_placed == placed.shape[0]:
             break
         free = True
-        for m in range(found):
+        for m in range(num_placed):
             dx, dy = candidates[k, 0] - placed[m, 0], candidates[k, 1] - placed[m, 1]
             near = candidates[k, 2] + placed[m, 2] + gap
             if dx * dx + dy * dy < near * near:
@@ -66,6 +66,6 @@ def scatter(candidates: Float64, gap: float, placed: Float64) -> int:
                 break
         if free:
             for c in range(3):
-                placed[found, c] = candidates[k, c]
-            found += 1
-    return found
+                placed[num_placed, c] = candidates[k, c]
+            num_placed += 1
+    return num_placed

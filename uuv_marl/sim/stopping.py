@@ -1,4 +1,4 @@
-"""Contacts that hurt (``contact.stops``): a hull that runs into a surface or another hull stands still there.
+"""Contacts that hurt (``collision.stops``): a hull that runs into a surface or another hull stands still there.
 
 An impulse between them, through the hulls' middles and without friction, takes the velocity into it: perfectly
 inelastic, so that energy never rises, and that of two hulls keeps their momentum (added mass included).
@@ -11,48 +11,48 @@ from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.motion import load_one
 from uuv_marl.sim.nearby import ROUND_M, nearest_surface
-from uuv_marl.sim.sea.actuation import own_plant
-from uuv_marl.sim.sea.sea import Sea
+from uuv_marl.sim.disturbances.actuation import own_plant
+from uuv_marl.sim.disturbances.disturbances import Disturbances
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
-from uuv_marl.sim.workspace import Workspace, named
+from uuv_marl.sim.workspace import Workspace, obstacle_columns
 
 SINK_M = 0.001
 """How deep a hull is left in what it touches [m], so that it stays one contact while it presses on. Assumed."""
 
 
 @compiled_inner
-def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, own: Workspace, sea: Sea | None) -> None:
+def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, own: Workspace, disturbances: Disturbances | None) -> None:
     """Hulls of world w that have run into something are put at its surface, and lose their velocity into it.
 
     Of two hulls each gives way by half. States are written, and their columns.
     """
-    state, course, touch, obstacles = world.state, world.course, 2.0 * rules.hull, named(own.obstacles)
+    state, world_map, touch, obstacles = world.state, world.world_map, 2.0 * rules.hull_radius, obstacle_columns(own.obstacles)
     for i in range(state.eta.shape[1]):
         if not state.alive[w, i]:
             continue
-        clear = min(nearest_surface(i, state.eta[w, i, 0], state.eta[w, i, 1], obstacles)) > rules.hull + ROUND_M
-        for k in range(0 if clear else course.num_obstacles[w]):
-            near = course.obstacles[w, k, 2] + rules.hull
-            dx, dy = state.eta[w, i, 0] - course.obstacles[w, k, 0], state.eta[w, i, 1] - course.obstacles[w, k, 1]
+        clear = min(nearest_surface(i, state.eta[w, i, 0], state.eta[w, i, 1], obstacles)) > rules.hull_radius + ROUND_M
+        for k in range(0 if clear else world_map.num_obstacles[w]):
+            near = world_map.obstacles[w, k, 2] + rules.hull_radius
+            dx, dy = state.eta[w, i, 0] - world_map.obstacles[w, k, 0], state.eta[w, i, 1] - world_map.obstacles[w, k, 1]
             if dx * dx + dy * dy < near * near:
                 d, n_x, n_y = length_and_direction(dx, dy)
-                give_way(w, i, n_x, n_y, max(near - d - SINK_M, 0.0), world)
-                speed, yields = along(w, i, n_x, n_y, world, plant, sea)
-                speed -= n_x * course.obstacle_velocity[w, k, 0] + n_y * course.obstacle_velocity[w, k, 1]
-                push(w, i, n_x, n_y, max(-speed, 0.0) / yields, world, plant, sea)
+                displace(w, i, n_x, n_y, max(near - d - SINK_M, 0.0), world)
+                speed, yields = along(w, i, n_x, n_y, world, plant, disturbances)
+                speed -= n_x * world_map.obstacle_velocity[w, k, 0] + n_y * world_map.obstacle_velocity[w, k, 1]
+                push(w, i, n_x, n_y, max(-speed, 0.0) / yields, world, plant, disturbances)
         for j in range(i):
             dx, dy = state.eta[w, i, 0] - state.eta[w, j, 0], state.eta[w, i, 1] - state.eta[w, j, 1]
             if state.alive[w, j] and dx * dx + dy * dy < touch * touch:
                 d, n_x, n_y = length_and_direction(dx, dy)
                 half = 0.5 * max(touch - d - SINK_M, 0.0)
-                give_way(w, i, n_x, n_y, half, world)
-                give_way(w, j, -n_x, -n_y, half, world)
-                speed_i, yields_i = along(w, i, n_x, n_y, world, plant, sea)
-                speed_j, yields_j = along(w, j, n_x, n_y, world, plant, sea)
+                displace(w, i, n_x, n_y, half, world)
+                displace(w, j, -n_x, -n_y, half, world)
+                speed_i, yields_i = along(w, i, n_x, n_y, world, plant, disturbances)
+                speed_j, yields_j = along(w, j, n_x, n_y, world, plant, disturbances)
                 impulse = max(speed_j - speed_i, 0.0) / (yields_i + yields_j)
-                push(w, i, n_x, n_y, impulse, world, plant, sea)
-                push(w, j, -n_x, -n_y, impulse, world, plant, sea)
+                push(w, i, n_x, n_y, impulse, world, plant, disturbances)
+                push(w, j, -n_x, -n_y, impulse, world, plant, disturbances)
     for i in range(state.eta.shape[1]):
         load_one(w, i, state, own.now)
 
@@ -65,31 +65,31 @@ def length_and_direction(dx: float, dy: float) -> tuple[float, float, float]:
 
 
 @compiled_inner
-def give_way(w: int, i: int, n_x: float, n_y: float, by: float, world: World) -> None:
+def displace(w: int, i: int, n_x: float, n_y: float, distance: float, world: World) -> None:
     """Move a vehicle along a direction [m]."""
-    world.state.eta[w, i, 0] += by * n_x
-    world.state.eta[w, i, 1] += by * n_y
+    world.state.eta[w, i, 0] += distance * n_x
+    world.state.eta[w, i, 1] += distance * n_y
 
 
 @compiled_inner
-def along(w: int, i: int, n_x: float, n_y: float, world: World, plant: Plant, sea: Sea | None) -> tuple[float, float]:
+def along(w: int, i: int, n_x: float, n_y: float, world: World, plant: Plant, disturbances: Disturbances | None) -> tuple[float, float]:
     """A vehicle's velocity over ground along a direction [m/s], and what an impulse adds to it [1/kg]."""
     c, s = cos_sin(world.state.eta[w, i, 2])
     ahead, abeam = c * n_x + s * n_y, c * n_y - s * n_x
     speed = ahead * world.state.nu[w, i, 0] + abeam * world.state.nu[w, i, 1]
-    if sea is not None:
-        speed += n_x * sea.flow.flow[w, i, 0] + n_y * sea.flow.flow[w, i, 1]
-        plant = own_plant(w, i, sea.hull)
+    if disturbances is not None:
+        speed += n_x * disturbances.flow.flow[w, i, 0] + n_y * disturbances.flow.flow[w, i, 1]
+        plant = own_plant(w, i, disturbances.hull)
     return speed, ahead * ahead * plant.inverse_11 + abeam * abeam * plant.inverse_22
 
 
 @compiled_inner
 def push(
-    w: int, i: int, n_x: float, n_y: float, impulse: float, world: World, plant: Plant, sea: Sea | None
+    w: int, i: int, n_x: float, n_y: float, impulse: float, world: World, plant: Plant, disturbances: Disturbances | None
 ) -> None:  # fmt: skip
     """Give a vehicle an impulse along a direction [N s], as its own inertia (Eq. 2) answers it."""
-    if sea is not None:
-        plant = own_plant(w, i, sea.hull)
+    if disturbances is not None:
+        plant = own_plant(w, i, disturbances.hull)
     c, s = cos_sin(world.state.eta[w, i, 2])
     abeam = impulse * (c * n_y - s * n_x)
     world.state.nu[w, i, 0] += plant.inverse_11 * impulse * (c * n_x + s * n_y)

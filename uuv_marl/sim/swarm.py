@@ -7,21 +7,21 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.percept import Clock, Percept, PerceptLayout, told_rows
+from uuv_marl.percept import Clock, Percept, PerceptLayout, task_fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
-from uuv_marl.sim.arrays import Course, Facts, Senses, State, World
-from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.arrays import WorldMap, Facts, Senses, State, World
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.engine import Engine
 from uuv_marl.sim.model import ARRIVAL_RADII_M
 from uuv_marl.sim.random import episode_key
-from uuv_marl.sim.sea.actuation import hit
-from uuv_marl.sim.sea.current import Flow, FlowField, flow_field
-from uuv_marl.sim.sea.sea import draw_sea, make_sea, sea_tables
+from uuv_marl.sim.disturbances.actuation import hit
+from uuv_marl.sim.disturbances.current import Flow, FlowField, flow_field
+from uuv_marl.sim.disturbances.disturbances import sample_disturbances, make_disturbances, disturbance_tables
 from uuv_marl.sim.spacing import NOWHERE
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
-from uuv_marl.sim.traffic import draw_traffic
+from uuv_marl.sim.traffic import sample_traffic
 from uuv_marl.types import Bool, Float64, Int32
 
 _log = logging.getLogger("uuv_marl")
@@ -43,7 +43,7 @@ class Swarm:
         self.scenario = scenario
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
-        self.told = told_rows(scenario)
+        self.task_fields = task_fields(scenario)
         """Rows of the percept that the task writes, not the engine."""
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
@@ -53,12 +53,12 @@ class Swarm:
         self._seeds = np.zeros(num_worlds, np.uint64)
         kind = scenario.task_class
         self._sizes = _sizes(scenario, num_worlds, self.layout.size) | kind.sizes(scenario)
-        self.state, self.course = allocate(State, self._sizes), allocate(Course, self._sizes)
+        self.state, self.world_map = allocate(State, self._sizes), allocate(WorldMap, self._sizes)
         self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)
-        self._world = World(self.state, self.course, self.facts, self._senses)
+        self._world = World(self.state, self.world_map, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
-        self._sea = make_sea(scenario, self.keys, self._sizes)
-        self._engine = Engine(scenario, self._world, self._sea)
+        self._disturbances = make_disturbances(scenario, self.keys, self._sizes)
+        self._engine = Engine(scenario, self._world, self._disturbances)
         self.task: Any = kind(self)
         """What the swarm is to do, a ``uuv_marl.tasks.Task``. The water asks it what to draw, and lets it observe."""
         self._task_memory: dict[str, NDArray[Any]] = {} if kind.Memory is None else self.task.memory._asdict()
@@ -71,9 +71,9 @@ class Swarm:
         )
 
     @property
-    def heard(self) -> Int32:
+    def detected_index(self) -> Int32:
         """Index of the vehicle heard in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
-        return self._senses.heard
+        return self._senses.detected_index
 
     @property
     def heading(self) -> Float64:
@@ -83,7 +83,7 @@ class Swarm:
     @property
     def own_reference(self) -> Float64:
         """Place and velocity of every vehicle's l(t), north and east [m, m/s], shape (world, vehicle, 4)."""
-        return np.take_along_axis(self.facts.reference, self.course.group[:, :, None], axis=1)
+        return np.take_along_axis(self.facts.reference, self.world_map.group[:, :, None], axis=1)
 
     @property
     def mean_reference(self) -> Float64:
@@ -93,7 +93,7 @@ class Swarm:
     @property
     def flow(self) -> Float64:
         """Velocity of the water at each vehicle, north and east [m/s], shape (world, vehicle, 2)."""
-        return np.zeros_like(self.state.before) if self._sea is None else self._sea.flow.flow
+        return np.zeros_like(self.state.before) if self._disturbances is None else self._disturbances.flow.flow
 
     @property
     def currents(self) -> Flow | None:
@@ -102,29 +102,29 @@ class Swarm:
         ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of your own: the water at the
         vehicles is computed from them at the end of each control hold. A reset draws them anew.
         """
-        return None if self._sea is None else self._sea.flow
+        return None if self._disturbances is None else self._disturbances.flow
 
     def flow_field(self, world: int = 0) -> FlowField:
         """How the water of a world moves now: ``swarm.flow_field().at([[100.0, 200.0]])``, north and east [m]."""
-        if self._sea is None:
+        if self._disturbances is None:
             return FlowField(np.zeros(2), np.zeros((0, 3)), self.scenario.current.eddy_core_m)
-        return flow_field(world, self._sea.water.core, self._sea.flow)
+        return flow_field(world, self._disturbances.water.core, self._disturbances.flow)
 
     @property
     def velocity(self) -> Float64:
         """Every vehicle's velocity over ground, surge and sway in its body frame [m/s], shape (world, vehicle, 2)."""
-        if self._sea is None:
+        if self._disturbances is None:
             return self.state.nu[:, :, :2]
-        (c, s), (x, y) = np.moveaxis(self.heading, -1, 0), np.moveaxis(self._sea.flow.flow, -1, 0)
+        (c, s), (x, y) = np.moveaxis(self.heading, -1, 0), np.moveaxis(self._disturbances.flow.flow, -1, 0)
         drift = np.stack([c * x + s * y, c * y - s * x], axis=-1)
         return self.state.nu[:, :, :2] + drift * self.state.alive[:, :, None]
 
     @property
     def compass(self) -> Float64:
         """Cosine and sine of every vehicle's heading as its own compass has it, shape (world, vehicle, 2)."""
-        if self._sea is None:
+        if self._disturbances is None:
             return self.heading
-        (c, s), (x, y) = np.moveaxis(self._sea.track.bias, -1, 0), np.moveaxis(self.heading, -1, 0)
+        (c, s), (x, y) = np.moveaxis(self._disturbances.navigation_errors.bias, -1, 0), np.moveaxis(self.heading, -1, 0)
         return np.stack([c * x - s * y, c * y + s * x], axis=-1)
 
     @property
@@ -140,7 +140,7 @@ class Swarm:
     @property
     def faulty(self) -> Bool:
         """Vehicles that a fault of the scenario has hit since the reset, shape (world, vehicle)."""
-        return np.zeros_like(self.state.alive) if self._sea is None else hit(self.state.tick, self._sea.hull)
+        return np.zeros_like(self.state.alive) if self._disturbances is None else hit(self.state.tick, self._disturbances.hull)
 
     @property
     def arrived(self) -> Bool:
@@ -186,38 +186,38 @@ class Swarm:
             stream = self._rngs[w] if own is None else np.random.default_rng(own)
             self._reset_world(w, stream or np.random.default_rng())
             self._seeds[w] = self.keys[w] if own is None or own >= 2**64 else own
-        self._tell(np.isin(np.arange(self.num_worlds), list(chosen)))
+        self._write_task_fields(np.isin(np.arange(self.num_worlds), list(chosen)))
         return self.percept
 
     def _reset_world(self, w: int, rng: np.random.Generator) -> None:
         self._rngs[w], self.keys[w] = rng, episode_key(rng)
         for array in self._task_memory.values():
             array[w] = 0
-        drawn: Draw = self.task.draw(w, rng)
+        drawn: EpisodeSetup = self.task.draw(w, rng)
         if drawn.duration_s > (longest := self.task.longest_s(self.scenario)) + 1e-9:
             raise ValueError(
                 f"task {self.scenario.task.name!r} drew duration_s = {drawn.duration_s:g}, and its longest_s gives "
                 f"{longest:g}; override longest_s, so that every episode ends in time"
             )
-        state, course, m = self.state, self.course, len(drawn.obstacles)
+        state, world_map, m = self.state, self.world_map, len(drawn.obstacles)
         for g, (waypoints, times) in enumerate(zip(drawn.waypoints, drawn.times, strict=True)):
             points = len(waypoints)
-            course.waypoints[w, g, :points], course.waypoints[w, g, points:] = waypoints, waypoints[-1]
-            course.times[w, g, :points], course.times[w, g, points:] = times, times[-1]
-            course.last[w, g] = points - 1
-        course.group[w], course.informed[w] = drawn.group, drawn.informed
+            world_map.waypoints[w, g, :points], world_map.waypoints[w, g, points:] = waypoints, waypoints[-1]
+            world_map.times[w, g, :points], world_map.times[w, g, points:] = times, times[-1]
+            world_map.last[w, g] = points - 1
+        world_map.group[w], world_map.informed[w] = drawn.group, drawn.informed
         self._duration_s[w] = drawn.duration_s
-        course.obstacles[w, :m], course.obstacles[w, m:] = drawn.obstacles, 0.0
-        course.num_obstacles[w] = m
-        draw_traffic(w, self.keys[w], self.scenario, course)
+        world_map.obstacles[w, :m], world_map.obstacles[w, m:] = drawn.obstacles, 0.0
+        world_map.num_obstacles[w] = m
+        sample_traffic(w, self.keys[w], self.scenario, world_map)
         state.eta[w], state.nu[w] = drawn.eta, drawn.nu
         state.before[w] = state.eta[w, :, :2]
         state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, drawn.obstacles
-        course.losses[w] = rng.permutation(self.num_vehicles)[: course.losses.shape[1]]
+        world_map.losses[w] = rng.permutation(self.num_vehicles)[: world_map.losses.shape[1]]
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
-        if self._sea is not None:
-            draw_sea(w, self.scenario, course, drawn.duration_s, self._sea)
+        if self._disturbances is not None:
+            sample_disturbances(w, self.scenario, world_map, drawn.duration_s, self._disturbances)
         self._engine.observe(w)
         self.task.begin(w)
 
@@ -230,7 +230,7 @@ class Swarm:
         self._check_indices(self._arrays())
         for w in range(self.num_worlds):
             self._engine.observe(w)
-        self._tell(self._ready)
+        self._write_task_fields(self._ready)
         return self.percept
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
@@ -245,9 +245,9 @@ class Swarm:
         """
         arrays = self._arrays()
         for name, (shape, kind) in {name: (a.shape, a.dtype) for name, a in arrays.items()}.items():
-            given = snapshot.get(name)
-            if given is None or given.shape != shape or given.dtype != kind:
-                got = "nothing" if given is None else f"{given.dtype} of shape {given.shape}"
+            saved = snapshot.get(name)
+            if saved is None or saved.shape != shape or saved.dtype != kind:
+                got = "nothing" if saved is None else f"{saved.dtype} of shape {saved.shape}"
                 raise ValueError(f"the snapshot's {name} must be {kind} of shape {shape}, got {got}")
         self._check_indices(snapshot)
         self._rngs = unpacked(snapshot.get("streams", np.zeros(0)), self.num_worlds)
@@ -258,7 +258,7 @@ class Swarm:
 
     def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
-        for table in (*self._world, *sea_tables(self._sea)):
+        for table in (*self._world, *disturbance_tables(self._disturbances)):
             check(cast(type[Any], type(table)), arrays, self._sizes)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
@@ -266,12 +266,12 @@ class Swarm:
             "duration_s": self._duration_s,
             "keys": self.keys,
             "seeds": self._seeds,
-            **{k: array for table in (*self._world, *sea_tables(self._sea)) for k, array in table._asdict().items()},
+            **{k: array for table in (*self._world, *disturbance_tables(self._disturbances)) for k, array in table._asdict().items()},
             **{f"task.{name}": array for name, array in self._task_memory.items()},
         }
 
     def step(
-        self, action: ArrayLike, active: Bool | None = None, then: Callable[[int, int], None] | None = None
+        self, action: ArrayLike, active: Bool | None = None, on_stepped: Callable[[int, int], None] | None = None
     ) -> Percept:
         """Advance by one decision period.
 
@@ -294,22 +294,22 @@ class Swarm:
             raise RuntimeError(f"world {int(np.argmin(self._ready))} was stepped before reset; call reset() first")
         running = self._ready if active is None else active
         self.task.move(running)
-        diverged = self._engine.step(np.ascontiguousarray(action), active, then)
+        diverged = self._engine.step(np.ascontiguousarray(action), active, on_stepped)
         self.task.update(running)
-        self._tell(running)
+        self._write_task_fields(running)
         if diverged:
             for w in np.flatnonzero((self.facts.diverged >= 0) & ~self._warned):
                 _log.warning(self.divergence(int(w)))
                 self._warned[w] = True
         return self.percept
 
-    def _tell(self, worlds: Bool) -> None:
+    def _write_task_fields(self, worlds: Bool) -> None:
         """Write what the task lets the living of these worlds observe, shape (world,), into their percepts."""
-        if not self.told:
+        if not self.task_fields:
             return
-        told, percept, there = self.task.observe(worlds), self.percept, worlds[:, None] & self.state.alive
-        for field in self.told:
-            percept[field.name][there] = np.clip(told[field.name][there], field.kind.low, field.kind.high)
+        rows, percept, observing = self.task.observe(worlds), self.percept, worlds[:, None] & self.state.alive
+        for field in self.task_fields:
+            percept[field.name][observing] = np.clip(rows[field.name][observing], field.kind.low, field.kind.high)
 
 
 def _sizes(scenario: Scenario, worlds: int, entries: int) -> dict[str, int]:
@@ -321,7 +321,7 @@ def _sizes(scenario: Scenario, worlds: int, entries: int) -> dict[str, int]:
         "group": 1,
         "point": field.legs[1] + 1 if field else len(scenario.trajectory.waypoints_m or ()),
         "obstacle": max(scenario.max_obstacles, 1),
-        "loss": len(scenario.disturbance.loss_times_s),
+        "loss": len(scenario.losses.times_s),
         "sector": scenario.sonar.num_sectors,
         "radius": 1 + len(ARRIVAL_RADII_M),
         "entry": entries,

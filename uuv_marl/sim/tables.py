@@ -44,14 +44,14 @@ class ArraySpec(NamedTuple):
 @functools.cache
 def array_specs(table: type[Any]) -> dict[str, ArraySpec]:
     """The arrays of a table by name, in order."""
-    found: dict[str, ArraySpec] = {}
+    specs: dict[str, ArraySpec] = {}
     for name, hint in get_type_hints(table, include_extras=True).items():
         axes, meaning, *bounds = hint.__metadata__
         dtype = hint.__origin__
-        while told := get_args(dtype):  # the number's type is the last and innermost, in NumPy 2.5's new NDArray, too
-            dtype = told[-1]
-        found[name] = ArraySpec(dtype, tuple(axes.split()), meaning, bounds[0] if bounds else None)
-    return found
+        while dtypes := get_args(dtype):  # the number's type is the last and innermost, in NumPy 2.5's new NDArray, too
+            dtype = dtypes[-1]
+        specs[name] = ArraySpec(dtype, tuple(axes.split()), meaning, bounds[0] if bounds else None)
+    return specs
 
 
 def allocate(table: type[T], sizes: Mapping[str, int]) -> T:

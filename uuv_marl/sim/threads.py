@@ -64,10 +64,10 @@ def on_threads(work: Callable[[int, int, int], bool], amount: int, threads: int,
     for part in parts[1:]:
         _helpers().put(functools.partial(do, part))
     try:
-        found = work(*parts[0])
+        result = work(*parts[0])
     finally:  # wait where an error or Ctrl-C ends the caller's part, too: all parts write to the same arrays
         others = [done.get() for _ in parts[1:]]
     for other in others:
         if isinstance(other, BaseException):
             raise other
-    return found or any(others)
+    return result or any(others)

@@ -27,7 +27,7 @@ class Fields(NamedTuple):
     """Shape (world, vehicle, 2)."""
     reference_velocity: Float32
     """Shape (world, vehicle, 2)."""
-    heard: Float32
+    detected: Float32
     """Shape (world, vehicle, sector)."""
     neighbour: Float32
     """Shape (world, vehicle, sector, 2)."""
@@ -48,13 +48,13 @@ class Fields(NamedTuple):
 @compiled_inline
 def fields(flat: Float32, at: Starts) -> Fields:
     """Views of flat percepts (world, vehicle, entry)."""
-    sectors, active = at.neighbour - at.heard, at.echo_range - at.echo
+    sectors, active = at.neighbour - at.detected, at.echo_range - at.echo
     return Fields(
         velocity=part(flat, at.velocity, 2)[0],
         yaw_rate=part(flat, at.yaw_rate, 1)[0],
         reference=part(flat, at.reference, 2)[0],
         reference_velocity=part(flat, at.reference_velocity, 2)[0],
-        heard=part(flat, at.heard, sectors)[0],
+        detected=part(flat, at.detected, sectors)[0],
         neighbour=pairs(flat, at.neighbour, sectors)[0],
         echo=part(flat, at.echo, active)[0],
         echo_range=part(flat, at.echo_range, active)[0],
@@ -65,7 +65,7 @@ def fields(flat: Float32, at: Starts) -> Fields:
     )
 
 
-class SeaFields(NamedTuple):
+class DisturbanceFields(NamedTuple):
     """Fields that a disturbed world can grant beyond ``Fields``, in the table's order; empty where not granted."""
 
     ground_velocity: Float32
@@ -85,10 +85,10 @@ class SeaFields(NamedTuple):
 
 
 @compiled_inline
-def sea_fields(flat: Float32, at: Starts) -> SeaFields:
+def disturbance_fields(flat: Float32, at: Starts) -> DisturbanceFields:
     """Views of flat percepts (world, vehicle, entry)."""
-    sectors = at.neighbour - at.heard
-    return SeaFields(
+    sectors = at.neighbour - at.detected
+    return DisturbanceFields(
         ground_velocity=part(flat, at.ground_velocity, 2)[0],
         water_velocity=part(flat, at.water_velocity, 2)[0],
         age=part(flat, at.age, sectors)[0],

@@ -52,10 +52,10 @@ class Cells(NamedTuple):
 class Listener(NamedTuple):
     """One listener: what it hears in each sub-sector and beyond all, and whom it listens to."""
 
-    heard: Annotated[Int64, "sector", "Index of the vehicle heard, -1 for none."]
-    kept: Annotated[Float64, "sector", "Its squared distance, before the squared range [m2]."]
-    kept_ahead: Annotated[Float64, "sector", "How far it is ahead [m], 0 for none."]
-    kept_abeam: Annotated[Float64, "sector", "How far it is to starboard [m], 0 for none."]
+    detected_index: Annotated[Int64, "sector", "Index of the vehicle heard, -1 for none."]
+    detected_squared: Annotated[Float64, "sector", "Its squared distance, before the squared range [m2]."]
+    detected_ahead: Annotated[Float64, "sector", "How far it is ahead [m], 0 for none."]
+    detected_abeam: Annotated[Float64, "sector", "How far it is to starboard [m], 0 for none."]
     nearest: Annotated[Float64, "sector", "Smallest squared distance so far [m2]."]
     x: Annotated[Float64, "vehicle", "Position of those gathered from a box of cells, north [m]."]
     y: Annotated[Float64, "vehicle", "Position of those gathered from a box of cells, east [m]."]
@@ -86,12 +86,12 @@ class Obstacles(NamedTuple):
     num_nearby: Annotated[Int64, "nearby", "How many those are, -1 where they are not known."]
 
 
-class Unnamed(NamedTuple):
+class ObstacleBuffers(NamedTuple):
     """``Obstacles`` in two arrays, since each that is passed on costs time; ``named`` tells them apart."""
 
     reals: Float64
     """Shape (column, obstacle)."""
-    wholes: Int64
+    integers: Int64
     """Shape (column, nearby)."""
 
 
@@ -101,52 +101,52 @@ class Workspace(NamedTuple):
     now: Columns
     cells: Cells
     listener: Listener
-    obstacles: Unnamed
+    obstacles: ObstacleBuffers
 
 
 TABLES = (Columns, Cells, Listener, Obstacles)
 
 
-class Scratch(NamedTuple):
+class WorkspaceBuffers(NamedTuple):
     """The desks of all threads, in few arrays, since each that is passed from Python costs time."""
 
     reals: Float64
     """Shape (thread, column, vehicle)."""
-    wholes: Int64
+    integers: Int64
     """Shape (thread, column, vehicle)."""
     shorts: Int32
     """Shape (thread, column, vehicle)."""
     sector_reals: Float64
     """Shape (thread, column, sector)."""
-    sector_wholes: Int64
+    sector_integers: Int64
     """Shape (thread, column, sector)."""
-    cell_wholes: Int64
+    cell_integers: Int64
     """Shape (thread, column, cell)."""
     obstacle_reals: Float64
     """Shape (thread, column, obstacle)."""
-    nearby_wholes: Int64
+    nearby_integers: Int64
     """Shape (thread, column, nearby)."""
 
 
-def scratch(threads: int, num_vehicles: int, num_sectors: int, num_cells: int, num_obstacles: int) -> Scratch:
+def workspace_buffers(threads: int, num_vehicles: int, num_sectors: int, num_cells: int, num_obstacles: int) -> WorkspaceBuffers:
     """A column for each array of a workspace, and a cache line between one thread's and the next's."""
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
     lengths["obstacle"] = max(num_obstacles, num_vehicles) + 9
     lengths["nearby"] = max(num_obstacles, MOST_NEARBY * num_vehicles) + 9
     kinds = [(spec.axes, spec.dtype) for table in TABLES for spec in array_specs(table).values()]
 
-    def room(axis: str, dtype: type[Any]) -> NDArray[Any]:
+    def columns(axis: str, dtype: type[Any]) -> NDArray[Any]:
         return np.zeros((threads, kinds.count(((axis,), dtype)), lengths[axis]), dtype)
 
-    return Scratch(
-        reals=room("vehicle", np.float64),
-        wholes=room("vehicle", np.int64),
-        shorts=room("vehicle", np.int32),
-        sector_reals=room("sector", np.float64),
-        sector_wholes=room("sector", np.int64),
-        cell_wholes=room("cell", np.int64),
-        obstacle_reals=room("obstacle", np.float64),
-        nearby_wholes=room("nearby", np.int64),
+    return WorkspaceBuffers(
+        reals=columns("vehicle", np.float64),
+        integers=columns("vehicle", np.int64),
+        shorts=columns("vehicle", np.int32),
+        sector_reals=columns("sector", np.float64),
+        sector_integers=columns("sector", np.int64),
+        cell_integers=columns("cell", np.int64),
+        obstacle_reals=columns("obstacle", np.float64),
+        nearby_integers=columns("nearby", np.int64),
     )
 
 
@@ -166,10 +166,10 @@ _NOW, _CELLS, _LISTENER, _OBSTACLES = _columns()
 
 
 @compiled_inner
-def workspace(room: Scratch, t: int) -> Workspace:
+def workspace(buffers: WorkspaceBuffers, t: int) -> Workspace:
     """Thread t's scratch by name."""
-    reals, wholes, shorts = room.reals[t], room.wholes[t], room.shorts[t]
-    sector_reals, sector_wholes, cell_wholes = room.sector_reals[t], room.sector_wholes[t], room.cell_wholes[t]
+    reals, integers, shorts = buffers.reals[t], buffers.integers[t], buffers.shorts[t]
+    sector_reals, sector_integers, cell_integers = buffers.sector_reals[t], buffers.sector_integers[t], buffers.cell_integers[t]
     n, c, e = _NOW, _CELLS, _LISTENER
     return Workspace(
         Columns(
@@ -178,25 +178,25 @@ def workspace(room: Scratch, t: int) -> Workspace:
             a_x=reals[n.a_x], a_y=reals[n.a_y], psi_0=reals[n.psi_0], effort=reals[n.effort],
         ),
         Cells(
-            x=reals[c.x], y=reals[c.y], cos=reals[c.cos], sin=reals[c.sin], vehicle=wholes[c.vehicle],
-            entry=wholes[c.entry], nearest=reals[c.nearest], some=wholes[c.some], first=cell_wholes[c.first],
+            x=reals[c.x], y=reals[c.y], cos=reals[c.cos], sin=reals[c.sin], vehicle=integers[c.vehicle],
+            entry=integers[c.entry], nearest=reals[c.nearest], some=integers[c.some], first=cell_integers[c.first],
         ),
         Listener(
-            heard=sector_wholes[e.heard], kept=sector_reals[e.kept], kept_ahead=sector_reals[e.kept_ahead],
-            kept_abeam=sector_reals[e.kept_abeam], nearest=sector_reals[e.nearest], x=reals[e.x], y=reals[e.y],
-            vehicle=wholes[e.vehicle], squared=reals[e.squared], ahead=reals[e.ahead], abeam=reals[e.abeam],
-            bin=shorts[e.bin], sector=wholes[e.sector], some=shorts[e.some],
+            detected_index=sector_integers[e.detected_index], detected_squared=sector_reals[e.detected_squared], detected_ahead=sector_reals[e.detected_ahead],
+            detected_abeam=sector_reals[e.detected_abeam], nearest=sector_reals[e.nearest], x=reals[e.x], y=reals[e.y],
+            vehicle=integers[e.vehicle], squared=reals[e.squared], ahead=reals[e.ahead], abeam=reals[e.abeam],
+            bin=shorts[e.bin], sector=integers[e.sector], some=shorts[e.some],
         ),
-        Unnamed(room.obstacle_reals[t], room.nearby_wholes[t]),
+        ObstacleBuffers(buffers.obstacle_reals[t], buffers.nearby_integers[t]),
     )  # fmt: skip
 
 
 @compiled_inline
-def named(room: Unnamed) -> Obstacles:
+def obstacle_columns(buffers: ObstacleBuffers) -> Obstacles:
     """A world's obstacles by name."""
-    reals, wholes, o = room.reals, room.wholes, _OBSTACLES
+    reals, integers, o = buffers.reals, buffers.integers, _OBSTACLES
     return Obstacles(
         x=reals[o.x], y=reals[o.y], radius=reals[o.radius], squared=reals[o.squared], ahead=reals[o.ahead],
         abeam=reals[o.abeam], gap=reals[o.gap], from_x=reals[o.from_x], from_y=reals[o.from_y],
-        beyond=reals[o.beyond], chosen=wholes[o.chosen], nearby=wholes[o.nearby], num_nearby=wholes[o.num_nearby],
+        beyond=reals[o.beyond], chosen=integers[o.chosen], nearby=integers[o.nearby], num_nearby=integers[o.num_nearby],
     )  # fmt: skip

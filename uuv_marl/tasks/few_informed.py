@@ -7,7 +7,7 @@ import numpy as np
 
 from uuv_marl.percept import FLAG, PerceptField, Table
 from uuv_marl.scenario.fields import Positive, within
-from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.reach import Reach, ReachNumbers
@@ -33,11 +33,11 @@ class FewInformed(Reach):
     """
 
     Numbers = FewInformedNumbers
-    place: ClassVar[str] = Task.place
+    reference_label: ClassVar[str] = Task.reference_label
     observed: ClassVar[Table] = (
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )
-    rewards: ClassVar[tuple[str, ...]] = ("dense", "led")
+    rewards: ClassVar[tuple[str, ...]] = ("dense", "leader")
     terms: ClassVar[Mapping[str, str]] = {
         **Reach.terms,
         "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
@@ -46,9 +46,9 @@ class FewInformed(Reach):
     }
     headline: ClassVar[str] = "uninformed_share"
     columns: ClassVar[Mapping[str, str]] = {"uninformed_share": "share of the uninformed vehicles that succeed [1]"}
-    guide: ClassVar[str] = "leader_follower"
+    reference_policy: ClassVar[str] = "leader_follower"
 
-    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
         """As the scenario says; the start is turned, obstacles in it are left out, and the informed are drawn."""
         drawn, scenario, n = Task.draw(self, world, rng), self.swarm.scenario, self.swarm.num_vehicles
         (first, second), (c, s) = drawn.waypoints[0][:2], cos_sin(rng.uniform(-np.pi, np.pi))
@@ -63,19 +63,19 @@ class FewInformed(Reach):
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """Who is informed."""
-        return {"informed": self.swarm.course.informed[:, :, None].astype(np.float64)}
+        return {"informed": self.swarm.world_map.informed[:, :, None].astype(np.float64)}
 
     def reward(self, running: Bool) -> Terms:
         """With the reward ``led`` the informed are paid the mean of all, but for their own loss; the others as ever."""
-        terms, informed = super().reward(running), self.swarm.course.informed
-        if self.paying != "led":
+        terms, informed = super().reward(running), self.swarm.world_map.informed
+        if self.reward_name != "leader":
             return terms
         mean = {name: np.where(informed, own.mean(axis=1, keepdims=True), own) for name, own in terms.items()}
         return mean | {"loss": terms["loss"]}
 
-    def there(self) -> Bool:
+    def at_goal(self) -> Bool:
         """Vehicles within ``near_m`` of l(t), once it rests at its end."""
-        return (self.swarm.facts.time_s >= self.swarm.duration_s)[:, None] & super().there()
+        return (self.swarm.facts.time_s >= self.swarm.duration_s)[:, None] & super().at_goal()
 
     def done(self) -> Bool:
         """No world: the time limit ends the episode, so that passing by is not enough."""
@@ -83,6 +83,6 @@ class FewInformed(Reach):
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also the headline; None where all are informed."""
-        uninformed = ~self.swarm.course.informed[world]
+        uninformed = ~self.swarm.world_map.informed[world]
         share = float(self.succeeded()[world, uninformed].mean()) if uninformed.any() else None
         return {**super().metrics(world), "uninformed_share": share}

@@ -19,7 +19,7 @@ from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.task import Payment, Task, Terms
+from uuv_marl.tasks.task import StepReward, Task, Terms
 from uuv_marl.types import Bool, Float64
 
 TRACKING, OBSTACLE, SPACING, EFFORT, COLLISION, LOSS, ARRIVAL, PROGRESS = range(8)
@@ -48,29 +48,29 @@ class Follow(Task):
         super().__init__(swarm)
         self._weights = reward_weights(swarm.scenario)
 
-    def payment(self, name: str, running: Bool, *, kept: bool = True) -> Payment:
+    def step_reward(self, name: str, running: Bool, *, keep_terms: bool = True) -> StepReward:
         """Pay while worlds are stepped: the weighted terms of ``dense``, or those of ``sparse``."""
         swarm = self.swarm
         worlds, n = swarm.num_worlds, swarm.num_vehicles
-        terms = np.zeros((len(self.terms) - (name == "sparse"), worlds if kept else 0, n))
+        terms = np.zeros((len(self.terms) - (name == "sparse"), worlds if keep_terms else 0, n))
         reward, limit_s = np.zeros((worlds, n)), swarm.time_limit_s
 
-        def pay(begin: int, end: int) -> None:
+        def fill(begin: int, end: int) -> None:
             _fill_some(begin, end, running, limit_s, swarm.state, swarm.facts, self._weights, terms, reward)
 
-        return Payment(reward, terms, pay)
+        return StepReward(reward, terms, fill)
 
     def reward(self, running: Bool) -> Terms:
         """The weighted terms of the latest step; zero for vehicles lost before."""
-        payment = self.payment("dense", running)
-        payment.pay(0, self.swarm.num_worlds)
-        return dict(zip(self.terms, payment.terms, strict=True))
+        step_reward = self.step_reward("dense", running)
+        step_reward.fill(0, self.swarm.num_worlds)
+        return dict(zip(self.terms, step_reward.terms, strict=True))
 
     def done(self) -> Bool:
         """Worlds whose swarm has arrived, unless ``arrival.ends_episode`` is false."""
         return self.swarm.arrived & self.swarm.scenario.arrival.ends_episode
 
-    def there(self) -> Bool:
+    def at_goal(self) -> Bool:
         """All vehicles of a swarm that has arrived: the paper's success is the swarm's."""
         return np.broadcast_to(self.swarm.arrived[:, None], self.swarm.state.alive.shape)
 
@@ -114,7 +114,7 @@ def reward_weights(scenario: Scenario) -> RewardWeights:
         timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
         weight.collision, weight.arrival, weight.progress_m, weight.progress_far_m,
         limit.s_l_m, limit.s_o_m, limit.s_u_m,
-        settled_s=(dwell + timing.holds_per_decision - 0.5) * timing.control_hold_s,
+        settled_s=(dwell + timing.control_steps_per_decision - 0.5) * timing.control_step_s,
     )  # fmt: skip
 
 
@@ -134,7 +134,7 @@ def _fill(
     arrived = not math.isnan(facts.arrival_s[w, 0])
     arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is
     far, dense = weights.progress_far_m, terms.shape[0] > PROGRESS
-    kept = terms.shape[1] > 0
+    store_terms = terms.shape[1] > 0
     for i in range(state.alive.shape[1]):
         alive, lost = state.alive[w, i], facts.lost[w, i]
         if not (alive or lost):
@@ -144,7 +144,7 @@ def _fill(
         obstacle = -weights.obstacle * weights.period_s * shortfall(1.0 - facts.clearance[w, i] / weights.s_o_m)
         spacing = -weights.spacing * weights.period_s * shortfall(1.0 - facts.spacing[w, i] / weights.s_u_m)
         effort = -weights.effort * weights.period_s * facts.effort[w, i]
-        collision = -weights.collision * facts.contacts[w, i]
+        collision = -weights.collision * facts.vehicle_collisions[w, i]
         loss, arrival, progress = 0.0, 0.0, 0.0
         if lost:
             left = (far - min(away, far)) / weights.progress_m if dense else 0.0
@@ -153,9 +153,9 @@ def _fill(
             arrival = weights.arrival
         if dense and (arrives or not arrived):
             left = 0.0 if arrives else min(away, far)
-            progress = (min(facts.was_away[w, i], far) - left) / weights.progress_m
+            progress = (min(facts.away_before[w, i], far) - left) / weights.progress_m
         reward[w, i] = 0.0 + tracking + obstacle + spacing + effort + collision + loss + arrival + progress
-        if kept:
+        if store_terms:
             terms[TRACKING, w, i], terms[OBSTACLE, w, i], terms[SPACING, w, i] = tracking, obstacle, spacing
             terms[EFFORT, w, i], terms[COLLISION, w, i], terms[LOSS, w, i] = effort, collision, loss
             terms[ARRIVAL, w, i] = arrival

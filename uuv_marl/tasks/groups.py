@@ -15,17 +15,17 @@ class Groups(NamedTuple):
     """Team of each vehicle, which pictures show in one of four colours, 0 to 3, shape (vehicle,)."""
     informed: Bool
     """Whether a vehicle perceives its reference, shape (vehicle,)."""
-    ways: dict[int, tuple[int | None, Float64]]
+    paths: dict[int, tuple[int | None, Float64]]
     """By the group's index its team, None for one group alone, and the corners of its trajectory, north and east [m],
     shape (point, 2); of several groups, or where the task leads nowhere, only the last where it rests."""
 
 
 def groups_of(swarm: Swarm, w: int = 0) -> Groups:
     """The groups of a world as it was drawn."""
-    course, team, ways = swarm.course, np.asarray(swarm.task.teams(w), np.int64) % 4, {}
-    found, first = np.unique(course.group[w], return_index=True)
-    for g, i in zip(found.tolist(), first.tolist(), strict=True):
-        corners, rests = course.waypoints[w, g, : course.last[w, g] + 1].copy(), not course.times[w, g].any()
-        short = corners[-1:] if rests and (len(found) > 1 or not swarm.task.leads) else corners
-        ways[g] = (int(team[i]) if len(found) > 1 else None, short)
-    return Groups(team, course.informed[w].copy(), ways)
+    world_map, team, paths = swarm.world_map, np.asarray(swarm.task.teams(w), np.int64) % 4, {}
+    indices, first = np.unique(world_map.group[w], return_index=True)
+    for g, i in zip(indices.tolist(), first.tolist(), strict=True):
+        corners, rests = world_map.waypoints[w, g, : world_map.last[w, g] + 1].copy(), not world_map.times[w, g].any()
+        short = corners[-1:] if rests and (len(indices) > 1 or not swarm.task.has_goal) else corners
+        paths[g] = (int(team[i]) if len(indices) > 1 else None, short)
+    return Groups(team, world_map.informed[w].copy(), paths)

@@ -10,14 +10,14 @@ from uuv_marl.percept import Table
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.scenario.fields import Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
-from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
-from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, tell_way
+from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_path
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
-from uuv_marl.tasks.maps.ways import CELL_M, WayGrid, distances, free_cells, reached
+from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Terms
 from uuv_marl.types import Bool, Float64, Int64
@@ -84,10 +84,10 @@ class HardWaterNumbers(ReachNumbers):
                 f"shortest ends at {far:g}; raise it to at least {self.first_wall_m + self.goal_clear_m:g}"
             )
 
-    def grid(self) -> WayGrid:
+    def grid(self) -> MapGrid:
         """Cells that hold the largest water."""
         rows = int((self.behind_m + self.length_m[1] + self.beyond_m) / CELL_M) + 1
-        return WayGrid(-self.behind_m, -self.half_width_m[1], rows, int(2.0 * self.half_width_m[1] / CELL_M) + 1)
+        return MapGrid(-self.behind_m, -self.half_width_m[1], rows, int(2.0 * self.half_width_m[1] / CELL_M) + 1)
 
 
 class Map(NamedTuple):
@@ -105,11 +105,11 @@ class Map(NamedTuple):
 class HardWaterMemory(NamedTuple):
     """What ``hard_water`` remembers."""
 
-    there_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
     best_s: Annotated[Float64, "world vehicle", "Length of its free way at the start over full speed [s]."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
-    way: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
-    lead: Annotated[Float64, "world led column", "Cost of the way on from each cell; no row without channel ``way``."]
+    path_length: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
+    path_cost: Annotated[Float64, "world led column", "Cost of the way on from each cell; no row without channel ``way``."]
     kind: Annotated[Float64, "world", "Index of the map's kind in ``KINDS``."]
 
 
@@ -121,7 +121,7 @@ class HardWater(Reach):
 
     Numbers = HardWaterNumbers
     Memory: ClassVar[type[Any] | None] = HardWaterMemory
-    channels: ClassVar[Mapping[str, Table]] = {"way": WAY}
+    channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
     rewards: ClassVar[tuple[str, ...]] = ("dense", "geodesic")
     traffic: ClassVar[bool] = False  # a wall whose discs move has gaps, and a gate may close
     columns: ClassVar[Mapping[str, str]] = {
@@ -130,15 +130,15 @@ class HardWater(Reach):
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
-        self._grid: WayGrid = self.numbers.grid()
-        self._was = np.zeros(swarm.state.alive.shape)
+        self._grid: MapGrid = self.numbers.grid()
+        self._remaining_before_m = np.zeros(swarm.state.alive.shape)
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
         """Room for the discs of a map, and for its cells."""
         grid = scenario.task_numbers.grid()
-        led = grid.rows if "way" in scenario.sonar.channels else 0
-        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "led": led}
+        cost_rows = grid.rows if "path" in scenario.sonar.channels else 0
+        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "led": cost_rows}
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
@@ -147,29 +147,29 @@ class HardWater(Reach):
         longest = numbers.length_m[1] + scenario.start.sides(n)[0]
         return 3.0 * longest / top_speed(scenario.vehicle, scenario.actuators) + QUEUE_S * n
 
-    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
         """A map that can be passed, turned at random; the start is the scenario's."""
-        scenario, memory, made = self.swarm.scenario, self.memory, self.draw_map(rng)
+        scenario, memory, sampled = self.swarm.scenario, self.memory, self.sample_map(rng)
         c, s = memory.turn[world] = cos_sin(rng.uniform(-np.pi, np.pi))
-        discs, goal = made.discs.copy(), rotated(np.array([[0.0, 0.0], [made.length, 0.0]]), c, s)
-        discs[:, :2] = rotated(made.discs[:, :2], c, s)
+        discs, goal = sampled.discs.copy(), rotated(np.array([[0.0, 0.0], [sampled.length, 0.0]]), c, s)
+        discs[:, :2] = rotated(sampled.discs[:, :2], c, s)
         eta, nu = start_state(scenario, goal, rng)
-        free = free_cells(made.discs, self._grid, scenario.contact.hull_radius_m)
-        memory.way[world] = np.minimum(distances(free, *self._grid.cell(made.length, 0.0)), FAR_M)
-        if memory.lead.size:
-            dear = np.sum([~free_cells(made.discs, self._grid, near) for near in _DEAR_M], axis=0)
-            price = 1.0 + _DEAR * dear + _NARROW * ~free_cells(made.discs, self._grid, self.numbers.clearance_m)
-            memory.lead[world] = distances(free, *self._grid.cell(made.length, 0.0), price)
-        memory.kind[world] = list(KINDS).index(made.kind)
+        free = free_cells(sampled.discs, self._grid, scenario.collision.hull_radius_m)
+        memory.path_length[world] = np.minimum(distances(free, *self._grid.cell(sampled.length, 0.0)), FAR_M)
+        if memory.path_cost.size:
+            dear = np.sum([~free_cells(sampled.discs, self._grid, near) for near in _DEAR_M], axis=0)
+            price = 1.0 + _DEAR * dear + _NARROW * ~free_cells(sampled.discs, self._grid, self.numbers.clearance_m)
+            memory.path_cost[world] = distances(free, *self._grid.cell(sampled.length, 0.0), price)
+        memory.kind[world] = list(KINDS).index(sampled.kind)
         n = len(eta)
-        ways = self._ways(np.full(n, world), eta[:, :2], goal[1])
-        memory.best_s[world] = ways / top_speed(scenario.vehicle, scenario.actuators)
-        return Draw(
+        path_lengths = self._path_lengths(np.full(n, world), eta[:, :2], goal[1])
+        memory.best_s[world] = path_lengths / top_speed(scenario.vehicle, scenario.actuators)
+        return EpisodeSetup(
             (goal,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
             duration_s=min(float(memory.best_s[world].max()) + QUEUE_S * n, self.longest_s(scenario)),
         )  # fmt: skip
 
-    def draw_map(self, rng: np.random.Generator) -> Map:
+    def sample_map(self, rng: np.random.Generator) -> Map:
         """A map in its own frame that can be passed.
 
         Raises:
@@ -183,28 +183,28 @@ class HardWater(Reach):
             own: MapKind = getattr(numbers, kind)
             walls = own.walls(rng, water)
             shore = banks(length, half, numbers.behind_m, numbers.beyond_m, numbers.bank_radius_m)
-            made = Map(kind, length, joined(walls, shore), tries)
-            if len(made.discs) <= MOST_DISCS and self._passable(made, walls, own.blocks()):
-                return made
+            sampled = Map(kind, length, joined(walls, shore), tries)
+            if len(sampled.discs) <= MOST_DISCS and self._passable(sampled, walls, own.blocks()):
+                return sampled
         raise ScenarioError(
             f"task {self.swarm.scenario.task.name!r} drew {MOST_TRIES} maps of {', '.join(numbers.kinds)}, and none "
             f"can be passed with task.clearance_m = {numbers.clearance_m:g}; widen the gaps, or lower the clearance"
         )
 
-    def _passable(self, made: Map, walls: Float64, blocks: bool) -> bool:
+    def _passable(self, sampled: Map, walls: Float64, blocks: bool) -> bool:
         """Whether a way leads from all of the start's box to the goal, and, where it should, not straight ahead."""
         numbers, scenario = self.numbers, self.swarm.scenario
         if blocks and not (np.abs(walls[:, 1]) < walls[:, 2] + numbers.clearance_m).any():
             return False
         length, width = scenario.start.sides(scenario.swarm.num_vehicles)
         side = width + scenario.start.gap_m / 2.0 + numbers.start_clear_m
-        free = free_cells(made.discs, self._grid, numbers.clearance_m)
-        led = reached(free, *self._grid.cell(made.length, 0.0))
+        free = free_cells(sampled.discs, self._grid, numbers.clearance_m)
+        reachable = reached(free, *self._grid.cell(sampled.length, 0.0))
         top, left = self._grid.cell(-length - numbers.start_clear_m, -side)
         bottom, right = self._grid.cell(numbers.start_clear_m, side)
-        return bool(led[top : bottom + 1, left : right + 1].all())
+        return bool(reachable[top : bottom + 1, left : right + 1].all())
 
-    def _ways(self, world: Int64, place: Float64, goal: Float64) -> Float64:
+    def _path_lengths(self, world: Int64, place: Float64, goal: Float64) -> Float64:
         """Length of the shortest free way [m] from places to a goal each, north and east, shape (place, 2).
 
         ``world`` is the world of each place, shape (place,).
@@ -215,54 +215,54 @@ class HardWater(Reach):
         r = np.minimum(np.maximum(row + _AROUND[0], 0), self._grid.rows - 1)
         k = np.minimum(np.maximum(column + _AROUND[1], 0), self._grid.columns - 1)
         off = np.hypot(x - (self._grid.x + r * CELL_M), y - (self._grid.y + k * CELL_M))
-        best = np.minimum((self.memory.way[world, r, k] + off).min(axis=0), FAR_M)
+        best = np.minimum((self.memory.path_length[world, r, k] + off).min(axis=0), FAR_M)
         return np.maximum(best, np.hypot(*(place - goal).T))
 
-    def ways(self, which: Bool | None = None) -> Float64:
+    def path_lengths(self, which: Bool | None = None) -> Float64:
         """Length of the shortest free way of vehicles to their goals now [m].
 
         Args:
             which: of which vehicles, shape (world, vehicle); the result has shape (vehicle,). None for all, and then
                 the shape is (world, vehicle).
         """
-        eta, goals = self.swarm.state.eta, self.swarm.course.waypoints[:, 0, 1]
+        eta, goals = self.swarm.state.eta, self.swarm.world_map.waypoints[:, 0, 1]
         chosen = np.ones(eta.shape[:2], np.bool_) if which is None else which
         world = np.nonzero(chosen)[0]
-        found = self._ways(world, eta[chosen][:, :2], goals[world])
-        return found.reshape(eta.shape[:2]) if which is None else found
+        lengths = self._path_lengths(world, eta[chosen][:, :2], goals[world])
+        return lengths.reshape(eta.shape[:2]) if which is None else lengths
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The rows of ``way``, where it is granted."""
         swarm, memory = self.swarm, self.memory
-        if not memory.lead.size:
+        if not memory.path_cost.size:
             return {}
         shape = swarm.state.alive.shape
-        way, walls = np.zeros((*shape, 2)), np.zeros((*shape, NUM_WALLS, 2))
-        tell_way(swarm.state, swarm.course, swarm.heading, memory.turn, memory.lead, self._grid, way, walls)
-        return {"way": way, "way_length": self.ways()[:, :, None], "way_walls": walls}
+        path, walls = np.zeros((*shape, 2)), np.zeros((*shape, NUM_WALLS, 2))
+        write_path(swarm.state, swarm.world_map, swarm.heading, memory.turn, memory.path_cost, self._grid, path, walls)
+        return {"path": path, "path_length": self.path_lengths()[:, :, None], "path_walls": walls}
 
     def move(self, running: Bool) -> None:  # noqa: ARG002
         """Before a step that pays for the way: how long it is."""
-        if self.paying == "geodesic":
-            self._was = self.ways()
+        if self.reward_name == "geodesic":
+            self._remaining_before_m = self.path_lengths()
 
-    def way_m(self) -> Float64:
+    def path_length_m(self) -> Float64:
         """The free way."""
-        return self.ways()
+        return self.path_lengths()
 
-    def left(self) -> tuple[Float64, Float64]:
+    def remaining_m(self) -> tuple[Float64, Float64]:
         """With the reward ``geodesic``, which knows the map, the free way; else the distance."""
-        return (self.ways(), self._was) if self.paying == "geodesic" else super().left()
+        return (self.path_lengths(), self._remaining_before_m) if self.reward_name == "geodesic" else super().remaining_m()
 
-    def there(self) -> Bool:
+    def at_goal(self) -> Bool:
         """Vehicles within ``near_m`` of the goal, along the free way."""
         near = self.swarm.facts.away <= self.numbers.near_m
-        near[near] = self.ways(near) <= self.numbers.near_m
+        near[near] = self.path_lengths(near) <= self.numbers.near_m
         return near
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also how long vehicles took, and the map's kind by its place in ``KINDS``."""
         memory = self.memory
-        took = memory.there_s[world] > 0.0
-        ratio = float((memory.there_s[world] / memory.best_s[world])[took].mean()) if took.any() else None
+        took = memory.first_at_goal_s[world] > 0.0
+        ratio = float((memory.first_at_goal_s[world] / memory.best_s[world])[took].mean()) if took.any() else None
         return {**super().metrics(world), "time_ratio": ratio, "kind": float(memory.kind[world])}

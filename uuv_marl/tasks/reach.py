@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from uuv_marl.scenario.fields import Positive, Section
-from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.task import Task, Terms
 from uuv_marl.types import Bool, Float64
@@ -19,10 +19,10 @@ class ReachNumbers(Section):
     """A vehicle is there within this distance of its goal. Assumed: about the radius of 54 vehicles at rest."""
 
 
-class Reached(NamedTuple):
+class ReachMemory(NamedTuple):
     """What ``reach`` remembers."""
 
-    there_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
 
 
 class Reach(Task):
@@ -33,8 +33,8 @@ class Reach(Task):
     """
 
     Numbers = ReachNumbers
-    Memory: ClassVar[type[Any] | None] = Reached
-    place: ClassVar[str] = "goal"
+    Memory: ClassVar[type[Any] | None] = ReachMemory
+    reference_label: ClassVar[str] = "goal"
     terms: ClassVar[Mapping[str, str]] = {
         "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
         "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
@@ -51,47 +51,47 @@ class Reach(Task):
         super().__init__(swarm)
         self._weight, self._limits = swarm.scenario.reward, swarm.scenario.constraints
 
-    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
         """As the scenario says, but l(t) rests at the end all along."""
         drawn = super().draw(world, rng)
         return drawn._replace(times=tuple(np.zeros_like(times) for times in drawn.times))
 
     def update(self, running: Bool) -> None:
         """When vehicles are there first."""
-        first = running[:, None] & self.there() & self.swarm.state.alive & (self.memory.there_s == 0.0)
-        self.memory.there_s[first] = np.broadcast_to(self.swarm.facts.time_s[:, None], first.shape)[first]
+        first = running[:, None] & self.at_goal() & self.swarm.state.alive & (self.memory.first_at_goal_s == 0.0)
+        self.memory.first_at_goal_s[first] = np.broadcast_to(self.swarm.facts.time_s[:, None], first.shape)[first]
 
     def reward(self, running: Bool) -> Terms:  # noqa: ARG002
         """The weighted terms of the latest step."""
         facts, weight, limits = self.swarm.facts, self._weight, self._limits
         dt, far = self.swarm.scenario.timing.decision_period_s, weight.progress_far_m
-        now, before = (np.minimum(left, far) for left in self.left())
+        now, before = (np.minimum(left, far) for left in self.remaining_m())
         left_s = np.maximum(self.swarm.time_limit_s - facts.time_s, 0.0)[:, None]
         worst = weight.collision + weight.arrival + (weight.obstacle + weight.spacing + weight.effort) * left_s
-        arrives = (self.memory.there_s > 0.0) & (self.memory.there_s == facts.time_s[:, None])
+        arrives = (self.memory.first_at_goal_s > 0.0) & (self.memory.first_at_goal_s == facts.time_s[:, None])
         return {
             "obstacle": -weight.obstacle * dt * np.clip(1.0 - facts.clearance / limits.s_o_m, 0.0, 1.0),
             "spacing": -weight.spacing * dt * np.clip(1.0 - facts.spacing / limits.s_u_m, 0.0, 1.0),
             "effort": -weight.effort * dt * facts.effort,
-            "collision": -weight.collision * facts.contacts,
+            "collision": -weight.collision * facts.vehicle_collisions,
             "loss": np.where(facts.lost, -1.0, 0.0) * (worst + (far - now) / weight.progress_m),
             "arrival": weight.arrival * arrives,
             "progress": (before - now) / weight.progress_m,
         }
 
-    def left(self) -> tuple[Float64, Float64]:
+    def remaining_m(self) -> tuple[Float64, Float64]:
         """What progress counts: how far vehicles are from their goals, and were before the step [m]."""
-        return self.swarm.facts.away, self.swarm.facts.was_away
+        return self.swarm.facts.away, self.swarm.facts.away_before
 
-    def came(self) -> Bool:
+    def arrived_before(self) -> Bool:
         """Vehicles that have been there."""
-        return self.memory.there_s > 0.0
+        return self.memory.first_at_goal_s > 0.0
 
     def done(self) -> Bool:
         """Worlds in which all living vehicles are there."""
         alive = self.swarm.state.alive
-        return np.logical_and((self.there() | ~alive).all(axis=1), alive.any(axis=1))
+        return np.logical_and((self.at_goal() | ~alive).all(axis=1), alive.any(axis=1))
 
-    def there(self) -> Bool:
+    def at_goal(self) -> Bool:
         """Vehicles within ``near_m`` of their goals."""
         return self.swarm.facts.away <= self.numbers.near_m

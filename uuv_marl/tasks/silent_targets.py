@@ -14,11 +14,11 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Positive, Section, within
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.tasks.maps.lead import NUM_WALLS, WAY, tell_walls
+from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_walls
 from uuv_marl.tasks.maps.walls import Range, between
 from uuv_marl.tasks.reach import Reach
 from uuv_marl.tasks.task import Task, Terms
@@ -64,11 +64,11 @@ class SilentTargetsNumbers(Section):
 class SilentTargetsMemory(NamedTuple):
     """What ``silent_targets`` remembers."""
 
-    there_s: Annotated[Float64, "world vehicle", "When the vehicle held a target first [s]; 0 before."]
-    left: Annotated[Float64, "world vehicle", "Distance to the nearest target that no nearer vehicle holds, or 0 [m]."]
-    was: Annotated[Float64, "world vehicle", "The same before the step."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle held a target first [s]; 0 before."]
+    remaining_m: Annotated[Float64, "world vehicle", "Distance to the nearest target that no nearer vehicle holds, or 0 [m]."]
+    remaining_before_m: Annotated[Float64, "world vehicle", "The same before the step."]
     speed: Annotated[Float64, "world target", "Speed of the target [m/s]."]
-    course: Annotated[Float64, "world target", "Where it goes, clockwise from north [rad]."]
+    heading: Annotated[Float64, "world target", "Where it goes, clockwise from north [rad]."]
     to_turn: Annotated[Float64, "world target", "How far it is yet to turn, clockwise [rad]."]
     turn_at: Annotated[Float64, "world target turn", "When it begins to turn [s]."]
     turn_by: Annotated[Float64, "world target turn", "By which angle [rad]."]
@@ -80,7 +80,7 @@ class SilentTargetsMemory(NamedTuple):
 
 @compiled
 def walk(
-    worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64, kept: SilentTargetsMemory,
+    worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64, memory: SilentTargetsMemory,
     velocity: Float64,
 ) -> None:  # fmt: skip
     """Fill the targets' velocities for the coming step; who would leave the box is mirrored at its side.
@@ -95,21 +95,21 @@ def walk(
         kept: the task's memory, which is changed.
         velocity: north and east, shape (world, target, 2).
     """
-    for w in range(kept.speed.shape[0]):
-        for k in range(kept.speed.shape[1] if worlds[w] else 0):
-            while kept.turns[w, k] < kept.turn_at.shape[2] and kept.turn_at[w, k, kept.turns[w, k]] <= time_s[w]:
-                kept.to_turn[w, k] = kept.turn_by[w, k, kept.turns[w, k]]
-                kept.turns[w, k] += 1
-            turn = min(max(kept.to_turn[w, k], -rate * period), rate * period)
-            kept.to_turn[w, k] -= turn
-            kept.course[w, k] += turn
-            c, s = cos_sin(kept.course[w, k])
-            way = kept.speed[w, k] * period
-            if abs(places[w, k, 0] + way * c) > half:
-                c, kept.course[w, k], kept.to_turn[w, k] = -c, math.pi - kept.course[w, k], -kept.to_turn[w, k]
-            if abs(places[w, k, 1] + way * s) > half:
-                s, kept.course[w, k], kept.to_turn[w, k] = -s, -kept.course[w, k], -kept.to_turn[w, k]
-            velocity[w, k, 0], velocity[w, k, 1] = kept.speed[w, k] * c, kept.speed[w, k] * s
+    for w in range(memory.speed.shape[0]):
+        for k in range(memory.speed.shape[1] if worlds[w] else 0):
+            while memory.turns[w, k] < memory.turn_at.shape[2] and memory.turn_at[w, k, memory.turns[w, k]] <= time_s[w]:
+                memory.to_turn[w, k] = memory.turn_by[w, k, memory.turns[w, k]]
+                memory.turns[w, k] += 1
+            turn = min(max(memory.to_turn[w, k], -rate * period), rate * period)
+            memory.to_turn[w, k] -= turn
+            memory.heading[w, k] += turn
+            c, s = cos_sin(memory.heading[w, k])
+            distance = memory.speed[w, k] * period
+            if abs(places[w, k, 0] + distance * c) > half:
+                c, memory.heading[w, k], memory.to_turn[w, k] = -c, math.pi - memory.heading[w, k], -memory.to_turn[w, k]
+            if abs(places[w, k, 1] + distance * s) > half:
+                s, memory.heading[w, k], memory.to_turn[w, k] = -s, -memory.heading[w, k], -memory.to_turn[w, k]
+            velocity[w, k, 0], velocity[w, k, 1] = memory.speed[w, k] * c, memory.speed[w, k] * s
 
 
 class SilentTargets(Reach):
@@ -127,24 +127,24 @@ class SilentTargets(Reach):
             "box", (2,), DIRECTION, "cosine and sine of the heading by compass from the first axis of the targets' box"
         ),
     )
-    channels: ClassVar[Mapping[str, Table]] = {"way": WAY}
+    channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
     terms: ClassVar[Mapping[str, str]] = {
-        **{name: told for name, told in Reach.terms.items() if name != "arrival"},
+        **{name: meaning for name, meaning in Reach.terms.items() if name != "arrival"},
         "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no vehicle "
         "nearer to it holds, 0 if there is none, D: progress_far_m, c: progress_m",
         "held": "+w_arrival · dt/T for each target that is held, to the vehicle nearest to it; T: the time limit",
     }
     traffic: ClassVar[bool] = False
-    leads: ClassVar[bool] = False
-    place: ClassVar[str] = "middle of the box"
-    marked: ClassVar[str] = "where a target is held"
+    has_goal: ClassVar[bool] = False
+    reference_label: ClassVar[str] = "middle of the box"
+    mark_label: ClassVar[str] = "where a target is held"
     headline: ClassVar[str] = "held_share"
     columns: ClassVar[Mapping[str, str]] = {
         "held_share": "share of the last half of the episode in which targets are held, mean over targets [1]",
         "found_share": "share of the targets that were ever held [1]",
         "found_s": "mean over targets of the time until they were held, the time limit if never [s]",
     }
-    guide: ClassVar[str] = "nearest_target"
+    reference_policy: ClassVar[str] = "nearest_target"
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
@@ -167,22 +167,22 @@ class SilentTargets(Reach):
         """The way along the box's side at full speed."""
         return scenario.task_numbers.side_m / top_speed(scenario.vehicle, scenario.actuators)
 
-    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
         """The scenario's start in the middle of the box, and targets anywhere but there, with all their turns."""
         numbers, scenario, memory = self.numbers, self.swarm.scenario, self.memory
         length, _ = scenario.start.sides(self.swarm.num_vehicles)
         eta, nu = start_state(scenario, np.array([[0.5 * length, 0.0], [length, 0.0]]), rng)
         (m, turns), n, full = memory.turn_at.shape[1:], len(eta), top_speed(scenario.vehicle, scenario.actuators)
-        discs = np.full((m, 3), scenario.contact.hull_radius_m)
+        discs = np.full((m, 3), scenario.collision.hull_radius_m)
         discs[:, :2] = [self._place(rng) for _ in range(m)]
         memory.speed[world] = [full * between(rng, numbers.speed_share) for _ in range(m)]
-        memory.course[world] = rng.uniform(-math.pi, math.pi, m)
+        memory.heading[world] = rng.uniform(-math.pi, math.pi, m)
         spans = np.array([[between(rng, numbers.turn_s) for _ in range(turns)] for _ in range(m)])
         memory.turn_at[world] = np.cumsum(spans, axis=1)
         memory.turn_by[world] = rng.uniform(-math.pi, math.pi, (m, turns))
         memory.found_s[world] = math.inf
         middle = np.array([[-1.0, 0.0], [0.0, 0.0]])
-        return Draw(
+        return EpisodeSetup(
             (middle,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
             duration_s=self.longest_s(scenario),
         )  # fmt: skip
@@ -197,19 +197,19 @@ class SilentTargets(Reach):
 
     def begin(self, world: int) -> None:
         """How far targets are."""
-        self.memory.left[world] = self._left()[world]
+        self.memory.remaining_m[world] = self._remaining_m()[world]
 
     def move(self, running: Bool) -> None:
         """Before a step: where targets go."""
-        numbers, course = self.numbers, self.swarm.course
+        numbers, world_map = self.numbers, self.swarm.world_map
         walk(
             running, self.swarm.facts.time_s, self.swarm.scenario.timing.decision_period_s, 0.5 * numbers.side_m,
-            math.radians(numbers.turn_dps), course.obstacles, self.memory, course.obstacle_velocity,
+            math.radians(numbers.turn_dps), world_map.obstacles, self.memory, world_map.obstacle_velocity,
         )  # fmt: skip
 
     def away(self) -> Float64:
         """Distance of every vehicle from every target [m], infinite for the lost; shape (world, vehicle, target)."""
-        state, targets = self.swarm.state, self.swarm.course.obstacles
+        state, targets = self.swarm.state, self.swarm.world_map.obstacles
         x, y = np.moveaxis(targets[:, None, :, :2] - state.eta[:, :, None, :2], -1, 0)
         return np.where(state.alive[:, :, None], np.sqrt(x * x + y * y), math.inf)
 
@@ -217,7 +217,7 @@ class SilentTargets(Reach):
         """Targets that are held, shape (world, target)."""
         return self.away().min(axis=1) <= self.numbers.held_m
 
-    def _left(self) -> Float64:
+    def _remaining_m(self) -> Float64:
         """Distance to the nearest target that no vehicle nearer to it holds [m], 0 where there is none."""
         away, nearest = self._nearest()
         left = np.where((nearest <= self.numbers.held_m) & (nearest < away), math.inf, away).min(axis=2)
@@ -228,7 +228,7 @@ class SilentTargets(Reach):
         away = self.away()
         return away, away.min(axis=1, keepdims=True)
 
-    def there(self) -> Bool:
+    def at_goal(self) -> Bool:
         """Vehicles that hold a target."""
         return self.away().min(axis=2) <= self.numbers.held_m
 
@@ -241,42 +241,42 @@ class SilentTargets(Reach):
         memory.judged[late] += 1.0
         found = running[:, None] & held
         memory.found_s[found] = np.minimum(memory.found_s, time_s[:, None])[found]
-        memory.was[running], memory.left[running] = memory.left[running], self._left()[running]
+        memory.remaining_before_m[running], memory.remaining_m[running] = memory.remaining_m[running], self._remaining_m()[running]
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The heading in the box, and where it is granted the way to one's own target."""
         swarm = self.swarm
-        told = {"box": swarm.compass}
-        return told | self._ways() if "way" in swarm.scenario.sonar.channels else told
+        fields = {"box": swarm.compass}
+        return fields | self._path_fields() if "path" in swarm.scenario.sonar.channels else fields
 
-    def _ways(self) -> dict[str, Float64]:
+    def _path_fields(self) -> dict[str, Float64]:
         """The rows of ``way``: to where one's own target is soon, of an assignment with the shortest ways in all."""
         swarm = self.swarm
-        course, away = swarm.course, self.away()
-        way, walls = np.zeros((*away.shape[:2], 2)), np.zeros((*away.shape[:2], NUM_WALLS, 2))
-        soon = course.obstacles[:, :, :2] + LEAD_S * course.obstacle_velocity
+        world_map, away = swarm.world_map, self.away()
+        path, walls = np.zeros((*away.shape[:2], 2)), np.zeros((*away.shape[:2], NUM_WALLS, 2))
+        soon = world_map.obstacles[:, :, :2] + LEAD_S * world_map.obstacle_velocity
         for w in range(len(away)):
             vehicle, target = linear_sum_assignment(np.minimum(away[w], 1e9))
-            way[w, vehicle] = soon[w, target] - swarm.state.eta[w, vehicle, :2]
-        (x, y), (c, s) = np.moveaxis(way, -1, 0), np.moveaxis(swarm.heading, -1, 0)
-        tell_walls(swarm.state, course, swarm.heading, walls)
+            path[w, vehicle] = soon[w, target] - swarm.state.eta[w, vehicle, :2]
+        (x, y), (c, s) = np.moveaxis(path, -1, 0), np.moveaxis(swarm.heading, -1, 0)
+        write_walls(swarm.state, world_map, swarm.heading, walls)
         return {
-            "way": np.stack([c * x + s * y, c * y - s * x], axis=-1),
-            "way_length": np.sqrt(x * x + y * y)[:, :, None],
-            "way_walls": walls,
+            "path": np.stack([c * x + s * y, c * y - s * x], axis=-1),
+            "path_length": np.sqrt(x * x + y * y)[:, :, None],
+            "path_walls": walls,
         }
 
     def reward(self, running: Bool) -> Terms:
         """For holding, not for arriving: paid once, who does not remember it leaves."""
         share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s
         away, nearest = self._nearest()
-        holds = ((away == nearest) & (nearest <= self.numbers.held_m)).sum(axis=2)
-        usual = {name: paid for name, paid in super().reward(running).items() if name in self.terms}
-        return {**usual, "held": self._weight.arrival * share[:, None] * holds}
+        num_held = ((away == nearest) & (nearest <= self.numbers.held_m)).sum(axis=2)
+        usual = {name: term for name, term in super().reward(running).items() if name in self.terms}
+        return {**usual, "held": self._weight.arrival * share[:, None] * num_held}
 
-    def left(self) -> tuple[Float64, Float64]:
+    def remaining_m(self) -> tuple[Float64, Float64]:
         """How far vehicles are from the nearest target that no nearer one holds, and were before the step [m]."""
-        return self.memory.left, self.memory.was
+        return self.memory.remaining_m, self.memory.remaining_before_m
 
     def done(self) -> Bool:
         """No world: the time limit ends the episode."""
@@ -284,7 +284,7 @@ class SilentTargets(Reach):
 
     def succeeded(self) -> Bool:
         """Vehicles that live and have touched nothing."""
-        return self.swarm.state.alive & ~self.swarm.state.touched
+        return self.swarm.state.alive & ~self.swarm.state.collided
 
     def success(self, world: int, vehicle: int | None = None) -> bool:
         """Of a vehicle, whether it has touched nothing; of all, whether all targets were held all of the last half."""
@@ -298,12 +298,12 @@ class SilentTargets(Reach):
         """Also the headline; ``whole`` is 1 if all targets were held all of the last half."""
         found, share = self.memory.found_s[world], self.held_share(world)
         return {
-            **super().metrics(world), "whole": float(share == 1.0), "held_share": share,
+            **super().metrics(world), "swarm_success": float(share == 1.0), "held_share": share,
             "found_share": float(np.isfinite(found).mean()),
             "found_s": float(np.minimum(found, self.swarm.time_limit_s[world]).mean()),
         }  # fmt: skip
 
     def marks(self, world: int) -> NDArray[np.floating[Any]]:
         """Circles in which targets are held."""
-        targets = self.swarm.course.obstacles[world, :, :2]
+        targets = self.swarm.world_map.obstacles[world, :, :2]
         return np.column_stack([targets, np.full(len(targets), self.numbers.held_m)])

@@ -10,7 +10,7 @@ from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.percept import CHANNELS, Table, percept_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
-from uuv_marl.sim.draw import Draw, usual_draw
+from uuv_marl.sim.episode_setup import EpisodeSetup, default_setup
 from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
@@ -21,38 +21,38 @@ Terms = Mapping[str, NDArray[np.floating[Any]]]
 """Arrays by name."""
 
 
-class Payment(NamedTuple):
+class StepReward(NamedTuple):
     """What pays a step while it is simulated, world by world. The arrays are zero before."""
 
     reward: Float64
     """Sum of the terms, shape (world, vehicle)."""
     terms: Float64
     """The weighted terms in the order of ``Task.terms``, shape (term, world, vehicle); no world if not kept."""
-    pay: Callable[[int, int], None]
+    fill: Callable[[int, int], None]
     """Fills both for a range of worlds, from its first to its end."""
 
 
-def paid(task: "Task", running: Bool) -> Payment:
+def checked_reward(task: "Task", running: Bool) -> StepReward:
     """What a task's ``reward`` gives for the latest step, for worlds that are ``running``.
 
     Raises:
         RewardError: terms are missing or unknown, of another shape, or not finite.
     """
-    given, swarm = task.reward(running), task.swarm
+    terms_given, swarm = task.reward(running), task.swarm
     name = type(task).__name__
-    if {*given} != {*task.terms}:
-        raise RewardError(f"reward of {name} must give the terms {', '.join(task.terms)}, got {', '.join(given)}")
+    if {*terms_given} != {*task.terms}:
+        raise RewardError(f"reward of {name} must give the terms {', '.join(task.terms)}, got {', '.join(terms_given)}")
     shape = (swarm.num_worlds, swarm.num_vehicles)
-    there = running[:, None] & (swarm.state.alive | swarm.facts.lost)
+    rewarded = running[:, None] & (swarm.state.alive | swarm.facts.lost)
     terms = np.zeros((len(task.terms), *shape))
     for k, term in enumerate(task.terms):
-        own = np.asarray(given[term], np.float64)
+        own = np.asarray(terms_given[term], np.float64)
         if own.shape != shape:
             raise RewardError(f"reward of {name} must give {term} as an array {shape}, got {own.shape}")
-        if not np.isfinite(own[there]).all():
+        if not np.isfinite(own[rewarded]).all():
             raise RewardError(f"reward of {name} must give finite numbers, got others in {term}")
-        terms[k][there] = own[there]
-    return Payment(terms.sum(axis=0), terms, lambda _begin, _end: None)
+        terms[k][rewarded] = own[rewarded]
+    return StepReward(terms.sum(axis=0), terms, lambda _begin, _end: None)
 
 
 class Task:
@@ -88,20 +88,20 @@ class Task:
     """The task's own metrics that tables show, with what they are and their unit."""
     traffic: ClassVar[bool] = True
     """Whether the scenario's ``traffic`` may move the obstacles that the task draws."""
-    leads: ClassVar[bool] = True
+    has_goal: ClassVar[bool] = True
     """Whether references say where to go: else no arrival is told, and pictures show a place."""
-    place: ClassVar[str] = "l(t), to follow"
+    reference_label: ClassVar[str] = "l(t), to follow"
     """What a reference is, in a legend's words; pictures call it by those before a comma."""
-    marked: ClassVar[str] = ""
+    mark_label: ClassVar[str] = ""
     """What ``marks`` are, in a legend's words."""
     ending: ClassVar[str] = "done"
     """Name of the ending of an episode that is ``done``."""
-    guide: ClassVar[str] = "bio_inspired"
+    reference_policy: ClassVar[str] = "bio_inspired"
     """Policy whose mean return is above that of ``idle`` and ``random``."""
 
     def __init__(self, swarm: Swarm) -> None:
         self.swarm = swarm
-        self.paying: str = self.rewards[0]
+        self.reward_name: str = self.rewards[0]
         """Which of ``rewards`` an environment pays."""
         self.numbers: Any = swarm.scenario.task_numbers
         sizes = {"world": swarm.num_worlds, "vehicle": swarm.num_vehicles, **self.sizes(swarm.scenario)}
@@ -140,9 +140,9 @@ class Task:
         """The largest ``duration_s`` that ``draw`` gives [s]."""
         return longest_duration(scenario)
 
-    def draw(self, world: int, rng: np.random.Generator) -> Draw:  # noqa: ARG002
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:  # noqa: ARG002
         """What a world starts from, drawn from its own generator; ``memory`` is cleared. VMAS: ``reset_world_at``."""
-        return usual_draw(self.swarm.scenario, rng)
+        return default_setup(self.swarm.scenario, rng)
 
     def begin(self, world: int) -> None:
         """A world was reset: look at how it stands, and remember what later hooks need."""
@@ -163,7 +163,7 @@ class Task:
         """What the latest step pays, weighted ``terms`` by name, shape (world, vehicle) each; VMAS: ``reward``."""
         return {}
 
-    def payment(self, name: str, running: Bool, *, kept: bool = True) -> Payment | None:  # noqa: ARG002
+    def step_reward(self, name: str, running: Bool, *, keep_terms: bool = True) -> StepReward | None:  # noqa: ARG002
         """Compiled pay for a reward by its name, its terms only if they are ``kept``; None for ``reward`` alone."""
         return None
 
@@ -173,14 +173,14 @@ class Task:
         """Worlds whose episode ends before the time limit, shape (world,); VMAS: ``done``."""
         return np.zeros(self.swarm.num_worlds, np.bool_)
 
-    def there(self) -> Bool:
+    def at_goal(self) -> Bool:
         """Vehicles that are where they should be now, shape (world, vehicle); a subclass without it is refused."""
         return np.ones_like(self.swarm.state.alive)
 
     def succeeded(self) -> Bool:
         """Vehicles that would have done their task if the episode ended now: there, alive, and untouched all along."""
         state = self.swarm.state
-        return self.there() & state.alive & ~state.touched
+        return self.at_goal() & state.alive & ~state.collided
 
     def arrived(self, world: int) -> bool:
         """Whether the task of a world is done, whether that ends the episode or not."""
@@ -193,11 +193,11 @@ class Task:
 
     # What is measured and drawn.
 
-    def way_m(self) -> Float64:
+    def path_length_m(self) -> Float64:
         """Length of the way that each vehicle has still to go [m], shape (world, vehicle): what a critic may know."""
         return self.swarm.facts.away
 
-    def came(self) -> Bool:
+    def arrived_before(self) -> Bool:
         """Vehicles that have been paid for their arrival, shape (world, vehicle), likewise."""
         return np.zeros_like(self.swarm.state.alive)
 
@@ -208,11 +208,11 @@ class Task:
         of vehicles that succeeded, and ``whole``, 1 if all did.
         """
         share = float(self.succeeded()[world].mean())
-        return {"untouched_share": share, "whole": float(share == 1.0)}
+        return {"untouched_share": share, "swarm_success": float(share == 1.0)}
 
     def teams(self, world: int) -> Int64:
         """Number of each vehicle's team, from 0 on, which pictures show in one colour, shape (vehicle,)."""
-        return self.swarm.course.group[world]
+        return self.swarm.world_map.group[world]
 
     def marks(self, world: int) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Circles to draw of the task: centre north, east and radius [m], shape (mark, 3); VMAS: ``extra_render``."""

@@ -12,11 +12,11 @@ from uuv_marl.percept import FLAG, PerceptField, Table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import NonNegative, Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
-from uuv_marl.sim.draw import Draw
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.tasks.maps.lead import AHEAD_M, NUM_WALLS, WAY, tell_walls
+from uuv_marl.tasks.maps.guidance import AHEAD_M, NUM_WALLS, PATH_FIELDS, write_walls
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Range, banks, between, joined, wall
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Terms
@@ -24,12 +24,12 @@ from uuv_marl.types import Bool, Float64, Int64
 
 _BEFORE_M = 5.0
 """How far from the wall's surface a way turns to the gap [m]."""
-_TURN = PerceptField("way_turn", (1,), FLAG, "1 if those of the other group that go first are through, else 0")
+_TURN = PerceptField("right_of_way", (1,), FLAG, "1 if those of the other group that go first are through, else 0")
 
 
-def in_axes(vectors: Float64, by: Float64) -> Float64:
+def in_axes(vectors: Float64, axes: Float64) -> Float64:
     """Vectors in axes that are turned by angles of which the cosine and sine are given, shape (..., 2) both."""
-    (x, y), (c, s) = np.moveaxis(vectors, -1, 0), np.moveaxis(by, -1, 0)
+    (x, y), (c, s) = np.moveaxis(vectors, -1, 0), np.moveaxis(axes, -1, 0)
     return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
 
@@ -65,14 +65,14 @@ class TwoSwarmsNumbers(ReachNumbers):
                 f"{self.half_width_m:g}, got {least:g} for it"
             )
 
-    def need_room(self, hull: float, length: float) -> None:
+    def check_space(self, hull_radius: float, length: float) -> None:
         """Raise ScenarioError where hulls of this radius don't fit through, or groups so long start in the wall."""
-        if self.gap_m[0] <= 2.0 * hull:
+        if self.gap_m[0] <= 2.0 * hull_radius:
             raise ScenarioError(
-                f"task.gap_m must be above {2.0 * hull:g}, two times contact.hull_radius_m, got {list(self.gap_m)}; "
+                f"task.gap_m must be above {2.0 * hull_radius:g}, two times collision.hull_radius_m, got {list(self.gap_m)}; "
                 "widen it"
             )
-        if self.apart_m < (least := 0.5 * length + self.radius_m + hull):
+        if self.apart_m < (least := 0.5 * length + self.radius_m + hull_radius):
             raise ScenarioError(
                 f"task.apart_m must be at least {least:g}, so that groups {length:g} m long start before the wall, "
                 f"got {self.apart_m:g}; raise it, or shrink start"
@@ -89,7 +89,7 @@ class TwoSwarmsNumbers(ReachNumbers):
 class TwoSwarmsMemory(NamedTuple):
     """What ``two_swarms`` remembers."""
 
-    there_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
     best_s: Annotated[Float64, "world vehicle", "Its straight way through the gap's middle over full speed [s]."]
     side: Annotated[Float64, "world vehicle", "1 for who goes along the frame's x, -1 for who comes against it."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
@@ -104,9 +104,9 @@ class TwoSwarms(Reach):
 
     Numbers = TwoSwarmsNumbers
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
-    channels: ClassVar[Mapping[str, Table]] = {"way": (*WAY, _TURN)}
+    channels: ClassVar[Mapping[str, Table]] = {"path": (*PATH_FIELDS, _TURN)}
     terms: ClassVar[Mapping[str, str]] = {
-        **{name: told for name, told in Reach.terms.items() if name != "arrival"},
+        **{name: meaning for name, meaning in Reach.terms.items() if name != "arrival"},
         "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "
         "is left until the limit T",
     }
@@ -115,14 +115,14 @@ class TwoSwarms(Reach):
         "whole_ratio": "the same of the last vehicle, if all came there [1]",
     }
     traffic: ClassVar[bool] = False
-    place: ClassVar[str] = "goal of a vehicle"
-    marked: ClassVar[str] = "where a vehicle is there"
-    guide: ClassVar[str] = "tangent_bug"
+    reference_label: ClassVar[str] = "goal of a vehicle"
+    mark_label: ClassVar[str] = "where a vehicle is there"
+    reference_policy: ClassVar[str] = "tangent_bug"
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
         numbers, (length, width) = self.numbers, swarm.scenario.start.sides(swarm.num_vehicles)
-        numbers.need_room(swarm.scenario.contact.hull_radius_m, length)
+        numbers.check_space(swarm.scenario.collision.hull_radius_m, length)
         if length / 2 > numbers.behind_m or width / 2 + numbers.aside_m > numbers.half_width_m:
             raise ScenarioError(
                 f"the groups must start in the water of task 'two_swarms': {length:g} x {width:g} m each, moved by "
@@ -141,7 +141,7 @@ class TwoSwarms(Reach):
         """The way between both groups' middles at full speed, for all maps."""
         return 2.0 * scenario.task_numbers.apart_m / top_speed(scenario.vehicle, scenario.actuators)
 
-    def draw(self, world: int, rng: np.random.Generator) -> Draw:
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
         """A wall with a gap, a group of the scenario's start on each side, all of it turned at random."""
         numbers, scenario, memory = self.numbers, self.swarm.scenario, self.memory
         gap, at = between(rng, numbers.gap_m), numbers.gap_aside_m * rng.uniform(-1.0, 1.0)
@@ -152,7 +152,7 @@ class TwoSwarms(Reach):
         memory.best_s[world] = _through(place, goal, at) / top_speed(scenario.vehicle, scenario.actuators)
         memory.turn[world], memory.gap[world] = (c, s), at
         discs[:, :2], eta[:, :2], n = in_axes(discs[:, :2], back), in_axes(place, back), len(eta)
-        return Draw(
+        return EpisodeSetup(
             tuple(np.stack([eta[:, :2], in_axes(goal, back)], axis=1)), (np.zeros(2),) * n, discs, eta, nu,
             group=np.arange(n), informed=np.ones(n, np.bool_), duration_s=self.longest_s(scenario),
         )  # fmt: skip
@@ -173,21 +173,21 @@ class TwoSwarms(Reach):
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The rows of ``way``, where it is granted: through the gap's middle, the port group first."""
         swarm, side = self.swarm, self.memory.side
-        if "way" not in swarm.scenario.sonar.channels:
+        if "path" not in swarm.scenario.sonar.channels:
             return {}
         turn, at = self.memory.turn[:, None], self.memory.gap[:, None]
-        place, goal = in_axes(swarm.state.eta[:, :, :2], turn), in_axes(swarm.course.waypoints[:, :, 1], turn)
+        place, goal = in_axes(swarm.state.eta[:, :, :2], turn), in_axes(swarm.world_map.waypoints[:, :, 1], turn)
         along, edge = place[:, :, 0] * side, self.numbers.radius_m + _BEFORE_M
         point = np.stack([side * np.maximum(along + AHEAD_M, -edge), np.broadcast_to(at, side.shape)], axis=2)
         point = np.where((along + AHEAD_M > edge)[:, :, None], goal, point)
-        to_come = (side > 0.0) & swarm.state.alive & ~swarm.state.touched & (along < edge)
+        to_come = (side > 0.0) & swarm.state.alive & ~swarm.state.collided & (along < edge)
         walls = np.zeros((*side.shape, NUM_WALLS, 2))
-        tell_walls(swarm.state, swarm.course, swarm.heading, walls)
+        write_walls(swarm.state, swarm.world_map, swarm.heading, walls)
         return {
-            "way": in_axes(in_axes(point - place, turn * [1.0, -1.0]), swarm.heading),
-            "way_length": np.where(along < 0.0, _through(place, goal, at), swarm.facts.away)[:, :, None],
-            "way_walls": walls,
-            "way_turn": ((side > 0.0) | ~to_come.any(axis=1, keepdims=True))[:, :, None].astype(np.float64),
+            "path": in_axes(in_axes(point - place, turn * [1.0, -1.0]), swarm.heading),
+            "path_length": np.where(along < 0.0, _through(place, goal, at), swarm.facts.away)[:, :, None],
+            "path_walls": walls,
+            "right_of_way": ((side > 0.0) | ~to_come.any(axis=1, keepdims=True))[:, :, None].astype(np.float64),
         }
 
     def reward(self, running: Bool) -> Terms:
@@ -195,17 +195,17 @@ class TwoSwarms(Reach):
         swarm, period = self.swarm, self.swarm.scenario.timing.decision_period_s
         left_s = swarm.time_limit_s - swarm.facts.time_s
         share = np.where(self.done(), left_s + period, period) / swarm.time_limit_s
-        usual = {name: paid for name, paid in super().reward(running).items() if name in self.terms}
-        return {**usual, "stay": self._weight.arrival * share[:, None] * self.there()}
+        usual = {name: term for name, term in super().reward(running).items() if name in self.terms}
+        return {**usual, "stay": self._weight.arrival * share[:, None] * self.at_goal()}
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also how long vehicles took, and the last of them."""
-        took, best = self.memory.there_s[world], self.memory.best_s[world]
-        came = took > 0.0
-        ratio = float((took / best)[came].mean()) if came.any() else None
+        took, best = self.memory.first_at_goal_s[world], self.memory.best_s[world]
+        arrived = took > 0.0
+        ratio = float((took / best)[arrived].mean()) if arrived.any() else None
         return {
             **super().metrics(world), "time_ratio": ratio,
-            "whole_ratio": float(took.max() / best.max()) if came.all() else None,
+            "whole_ratio": float(took.max() / best.max()) if arrived.all() else None,
         }  # fmt: skip
 
     def teams(self, world: int) -> Int64:
@@ -214,5 +214,5 @@ class TwoSwarms(Reach):
 
     def marks(self, world: int) -> NDArray[np.floating[Any]]:
         """The goals."""
-        goals = self.swarm.course.waypoints[world, :, 1]
+        goals = self.swarm.world_map.waypoints[world, :, 1]
         return np.column_stack([goals, np.full(len(goals), self.numbers.near_m)])

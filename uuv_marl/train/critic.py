@@ -25,7 +25,7 @@ def privileged(swarm: Swarm) -> Float32:
     drift = velocity.mean(axis=1) - swarm.mean_reference[:, 2:]
     error = facts.centre - swarm.mean_reference[:, :2]
     size = np.hypot(*error.T)[:, None]
-    way, away, came = swarm.task.way_m(), facts.away, swarm.task.came().astype(np.float64)
+    path_length, away, arrived_before = swarm.task.path_length_m(), facts.away, swarm.task.arrived_before().astype(np.float64)
     moves = np.abs(swarm.mean_reference[:, 2:]).max(axis=1) > 0.0
     left = np.where(moves, swarm.duration_s - facts.time_s, 0.0)
     columns = [
@@ -35,17 +35,17 @@ def privileged(swarm: Swarm) -> Float32:
         *_turned((drift / 4.0)[:, None], c, s),
         np.minimum(away.mean(axis=1, keepdims=True), 256.0) / 64.0,
         np.minimum(away.max(axis=1, keepdims=True), 512.0) / 128.0,
-        np.minimum(way, 512.0) / 128.0,
-        np.minimum(way.mean(axis=1, keepdims=True), 512.0) / 128.0,
-        came,
-        came.mean(axis=1, keepdims=True),
+        np.minimum(path_length, 512.0) / 128.0,
+        np.minimum(path_length.mean(axis=1, keepdims=True), 512.0) / 128.0,
+        arrived_before,
+        arrived_before.mean(axis=1, keepdims=True),
         8.0 / (facts.spacing + 4.0),
         20.0 / (np.maximum(facts.clearance, -5.0) + 10.0),
         8.0 / (facts.min_spacing[:, None] + 4.0),
         20.0 / (np.maximum(facts.clearance.min(axis=1, keepdims=True), -5.0) + 10.0),
         np.clip(left, 0.0, 200.0)[:, None] / 100.0,
         moves[:, None].astype(np.float64),
-        (state.dwell[:, :1] > 0) * (0.5 + 0.1 * state.dwell[:, :1] * swarm.scenario.timing.control_hold_s),
+        (state.dwell[:, :1] > 0) * (0.5 + 0.1 * state.dwell[:, :1] * swarm.scenario.timing.control_step_s),
     ]
     out = np.empty((*state.alive.shape, PRIVILEGED_SIZE), np.float32)
     for k, column in enumerate(columns):

@@ -28,9 +28,9 @@ def draw_curve(rows: Sequence[Sequence[str]], path: Path, title: str) -> None:
         figure, axes = panels(len(_SHOWN), 3, (4.2, 3.2))
         for ax, (what, columns) in zip(axes, _SHOWN.items(), strict=True):
             for name, label in columns.items():
-                told = [(float(row[2]) / 60.0, float(row[Record._fields.index(name)])) for row in rows
+                points = [(float(row[2]) / 60.0, float(row[Record._fields.index(name)])) for row in rows
                         if row[Record._fields.index(name)]]  # fmt: skip
-                ax.plot(*zip(*told, strict=True), "." if len(told) == 1 else "-", label=label)
+                ax.plot(*zip(*points, strict=True), "." if len(points) == 1 else "-", label=label)
             ax.set(xlabel="processor time [min]", ylabel=what)
         axes[0].set_ylim(-0.02, 1.02)
         axes[0].legend()

@@ -19,7 +19,7 @@ from uuv_marl.baselines.registry import parse_policy
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError, TrainingError
 from uuv_marl.train.training import Training
 
-_MADE_HERE = re.compile(r"\d{6,}(\.partial)?")
+_CHECKPOINT_NAME = re.compile(r"\d{6,}(\.partial)?")
 """Names of checkpoints; everything else under ``checkpoints`` is the user's."""
 _HIDDEN = re.compile(r"\..*|config\.partial\.json")
 """What a first start may leave behind that was killed before it wrote its settings."""
@@ -51,10 +51,10 @@ class Record(NamedTuple):
     """Share of the returns' variance that the critic explains."""
     best: float | None = None
     """Score of the best validation so far."""
-    whole: float | None = None
+    swarm_success: float | None = None
     """Of this iteration's validation, as ``validation.Judged`` has them; None without one."""
     share: float | None = None
-    contacts: float | None = None
+    collisions: float | None = None
     time_s: float | None = None
 
     def spent(self, training: Training) -> float:
@@ -81,12 +81,12 @@ class TrainingFolder:
         """The budget to which the training was to go when it was run last: agent-steps, or seconds."""
         self.record = Record()
         """The last iteration that is kept; iteration 0 where there is none."""
-        self.found = ""
+        self.resume_note = ""
         """What a resume goes on from, in words."""
         if training is None:
             self.training = self._read()
             self._find()
-            self.found += self.made_by
+            self.resume_note += self.version_note
             return
         self.training, self.until = training, training.budget
         if path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
@@ -96,9 +96,9 @@ class TrainingFolder:
         """The training that the folder holds."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
-            before, self.until, made_by = dict(config["scenarios"]), float(config["until"]), dict(config["versions"])
+            before, self.until, saved_versions = dict(config["scenarios"]), float(config["until"]), dict(config["versions"])
             training = Training(**config["training"])
-            now_there = _read_by(training)
+            scenarios_now = _read_by(training)
         except (ScenarioError, PolicyError, TrainingError) as error:
             raise ResultsError(
                 f"the training in {self.path} can't be made again here: {error}; resume it where it was begun"
@@ -108,21 +108,21 @@ class TrainingFolder:
                 f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
                 "empty --output"
             ) from None
-        for name, found in now_there.items():
-            for field, then, now in _differences(before.get(name, found), found):
+        for name, resume_note in scenarios_now.items():
+            for field, then, now in _differences(before.get(name, resume_note), resume_note):
                 raise ResultsError(
                     f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {name} as it was, or "
                     "begin anew with another --output"
                 )
-        other = [f"{name} {old}" for name, old in made_by.items() if old != versions().get(name)]
-        self.made_by = f"; so far it was made by {', '.join(other)}, so no longer bit for bit" if other else ""
+        other = [f"{name} {old}" for name, old in saved_versions.items() if old != versions().get(name)]
+        self.version_note = f"; so far it was made by {', '.join(other)}, so no longer bit for bit" if other else ""
         return training
 
     def _find(self) -> None:
         """The last whole checkpoint."""
         broken = ""
-        made = [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
-        for path in sorted(made, reverse=True):
+        checkpoints = [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
+        for path in sorted(checkpoints, reverse=True):
             try:
                 text = (path / "record.json").read_text(encoding="utf-8")
                 record = TypeAdapter(Record).validate_json(text)
@@ -133,11 +133,11 @@ class TrainingFolder:
             else:
                 self.record = record
                 done = f"iteration {record.iteration}, {record.agent_steps:,} agent-steps"
-                self.found = f"{broken}going on from {done}"
+                self.resume_note = f"{broken}going on from {done}"
                 return
         if broken:
             raise ResultsError(f"{broken}copy it again as a whole, or delete it to start at the beginning")
-        self.found = f"{self.path} holds no checkpoint yet: starting at the beginning"
+        self.resume_note = f"{self.path} holds no checkpoint yet: starting at the beginning"
 
     def budget_with(self, minutes: float | None, steps: int | None) -> float:
         """The budget to go on to, more of the training's own kind: agent-steps, or seconds.
@@ -146,10 +146,10 @@ class TrainingFolder:
             TrainingError: the training has the other kind.
         """
         kind, other = ("steps", "minutes") if self.training.steps else ("minutes", "steps")
-        told = {"minutes": minutes and 60.0 * minutes, "steps": steps}
-        if told[other] is not None:
+        budgets = {"minutes": minutes and 60.0 * minutes, "steps": steps}
+        if budgets[other] is not None:
             raise TrainingError(f"the training in {self.path} has a budget of {kind}; give --{kind}, not --{other}")
-        until = float(told[kind] or self.until)
+        until = float(budgets[kind] or self.until)
         if not math.isfinite(until):
             raise TrainingError(f"{kind} must be a finite number, got {until}")
         return until
@@ -175,8 +175,8 @@ class TrainingFolder:
         with writing(self._checkpoints):
             self._checkpoints.mkdir(exist_ok=True)
         # An iteration whose checkpoint was cut off will come again.
-        kept = [row for row in self.rows() if int(row[0]) <= self.record.iteration]
-        write_text(self._table, "".join(map(_line, [Record._fields, *kept])))
+        rows = [row for row in self.rows() if int(row[0]) <= self.record.iteration]
+        write_text(self._table, "".join(map(_line, [Record._fields, *rows])))
 
     def note(self, record: Record) -> None:
         """A row for an iteration."""
@@ -229,18 +229,18 @@ def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[
     TrainingFolder(path, training)  # refuses before anything is written
     with locked(path):
         folder = TrainingFolder(path, training)
-        if folder.found:
-            say(folder.found)
+        if folder.resume_note:
+            say(folder.resume_note)
         yield folder
 
 
 def _read_by(training: Training) -> dict[str, Any]:
     """What a training reads besides its description, by name: scenarios, whole, and the digest of a teacher's file."""
-    found: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
-    kind = parse_policy(training.teacher).kind if training.teacher else None
+    resume_note: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
+    kind = parse_policy(training.expert).kind if training.expert else None
     if isinstance(kind, Trained):
-        found[training.teacher] = {"teacher": f"{training.teacher} ({kind.checkpoint.digest})"}
-    return found
+        resume_note[training.expert] = {"teacher": f"{training.expert} ({kind.checkpoint.digest})"}
+    return resume_note
 
 
 def versions() -> dict[str, str]:
@@ -249,7 +249,7 @@ def versions() -> dict[str, str]:
 
 
 def _ours(path: Path) -> bool:
-    return bool(_MADE_HERE.fullmatch(path.name)) and path.is_dir() and not path.is_symlink()
+    return bool(_CHECKPOINT_NAME.fullmatch(path.name)) and path.is_dir() and not path.is_symlink()
 
 
 def _line(row: Sequence[object]) -> str:

@@ -49,18 +49,18 @@ class TorchOps:
 class TorchActor:
     """The policy's network, and its memory through time."""
 
-    def __init__(self, made: Architecture, sizes: Sizes, rng: np.random.Generator) -> None:
-        last = f"{len(made.hidden)}.weight"
+    def __init__(self, architecture: Architecture, sizes: Sizes, rng: np.random.Generator) -> None:
+        last = f"{len(architecture.hidden)}.weight"
         self.tensors = {
             name: started(shape, rng, 0.01 if name == last else 1.0 if name.startswith("gru") else math.sqrt(2.0))
-            for name, shape in shapes(made, sizes).items()
+            for name, shape in shapes(architecture, sizes).items()
         }
-        if made.memory:  # of each gate by itself
+        if architecture.memory:  # of each gate by itself
             own = self.tensors["gru.state_weight"]
             gates = [started((len(own), len(own)), rng, 1.0) for _ in range(3)]
             self.tensors["gru.state_weight"] = torch.cat(gates, 1).detach().requires_grad_()
-        self.units = made.hidden[-1] if made.memory else 0
-        self.network = Network(made, sizes, self.tensors, TorchOps)
+        self.units = architecture.hidden[-1] if architecture.memory else 0
+        self.network = Network(architecture, sizes, self.tensors, TorchOps)
 
     def act(self, x: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """Actions (row, 2) for observations (row, entry) and the memory's state, and its next state (row, unit)."""
@@ -70,14 +70,14 @@ class TorchActor:
         state = self.network.step(self.network.gates(z), state)
         return self.network.output(z, state), state
 
-    def through(self, x: Tensor, state: Tensor, goes_on: Tensor) -> tuple[Tensor, Tensor]:
+    def through(self, x: Tensor, state: Tensor, continues: Tensor) -> tuple[Tensor, Tensor]:
         """The same for a horizon: actions (time x row, 2), and the states after each decision (time x row, unit)."""
         flat = x.reshape(-1, x.shape[2])
         z = self.network.features(flat)
         if not self.units:
             return self.network.output(z), z[:, :0]
         states: list[Tensor] = []
-        for gates, alike in zip(self.network.gates(z).split(x.shape[1]), goes_on[:, :, None], strict=True):
+        for gates, alike in zip(self.network.gates(z).split(x.shape[1]), continues[:, :, None], strict=True):
             state = self.network.step(gates, state * alike)
             states.append(state)
         after = torch.cat(states)

@@ -16,13 +16,13 @@ def objective(training: Training) -> str:
     for part in training.parts:
         told.setdefault(_reward(training.reward, part.scenario), {})[part.name] = None
     lines = [f"Reward {name} on {', '.join(scenarios)}{terms}" for (name, terms), scenarios in told.items()]
-    by, teacher, pull = training.ppo, training.teacher, training.pull
-    start, end = by.contact_cost or (0.0, 0.0)
+    by, expert, pull = training.ppo, training.expert, training.pull
+    start, end = by.collision_cost or (0.0, 0.0)
     cost = f"a contact that begins costs {start:g} at the start and {end:g} at the end (ppo.contact_cost)"
     added = f"In addition {cost}" if start or end else "Nothing is added to the reward"
     lines.append(f"{added}; discount {by.gamma:g} a decision.")
-    if teacher:
-        lines.append(f"For {training.lesson:.0%} of the budget the network first imitates {teacher}, whatever is paid.")
+    if expert:
+        lines.append(f"For {training.lesson:.0%} of the budget the network first imitates {expert}, whatever is paid.")
     if pull:
         lines.append(f"Then {pull:g} times the mean squared distance from what it would do is added to PPO's loss.")
     return "\n".join(lines)

@@ -27,7 +27,7 @@ with extra("train", "training"):
 
 _CRITIC = (64, 64)
 """Units of the critic's layers, tanh."""
-_LESSON_EPOCHS = 2
+_IMITATION_EPOCHS = 2
 """Passes over a batch in a lesson."""
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
 """What the optimiser keeps of each tensor."""
@@ -47,11 +47,11 @@ class Rollout(NamedTuple):
     action: Tensor
     mean: Tensor
     """Mean action of the policy that sampled."""
-    told: Tensor
+    expert_action: Tensor
     """What the teacher would have done, if it was asked."""
     advantage: Tensor
     returns: Tensor
-    goes_on: Tensor
+    continues: Tensor
     """0 where an episode begins, else 1."""
     state: Tensor
     """The memory's before the first decision, shape (row, unit)."""
@@ -70,10 +70,10 @@ class Learner:
     """
 
     def __init__(
-        self, made: Architecture, sizes: Sizes, size: int, rows: int, by: Ppo, rng: np.random.Generator
+        self, architecture: Architecture, sizes: Sizes, size: int, rows: int, config: Ppo, rng: np.random.Generator
     ) -> None:
-        self.by, self._rng, self._features = by, rng, sum(size for _, size in sizes)
-        self.actor = TorchActor(made, sizes, rng)
+        self.config, self._rng, self._features = config, rng, sum(size for _, size in sizes)
+        self.actor = TorchActor(architecture, sizes, rng)
         wide = (size + self.actor.units, *_CRITIC, 1)
         self.critic = [started(shape, rng, math.sqrt(2.0) if shape[-1] > 1 else 1.0)
                        for a, b in itertools.pairwise(wide) for shape in ((a, b), (b,))]  # fmt: skip
@@ -81,18 +81,18 @@ class Learner:
         self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
         self.state = torch.zeros(rows, self.actor.units)
-        self.lesson = False
+        self.imitating = False
         """Whether the actor imitates a teacher, instead of what paid; set by ``teach``."""
-        self.pull = 0.0
+        self.imitation_weight = 0.0
         """Weight in PPO's loss of the squared distance from what the teacher would do [1]; set by ``teach``."""
 
-    def teach(self, lesson: bool, pull: float = 0.0) -> None:
+    def set_imitation(self, imitating: bool, imitation_weight: float = 0.0) -> None:
         """From now on the actor imitates a teacher, or learns what pays, with a ``pull`` to the teacher."""
-        if self.lesson and not lesson:  # with the old optimiser the first updates went twice as far, by ``Update.kl``
+        if self.imitating and not imitating:  # with the old optimiser the first updates went twice as far, by ``Update.kl``
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
-        self.lesson, self.pull = lesson, pull
+        self.imitating, self.imitation_weight = imitating, imitation_weight
 
-    def _judged(self, x: Tensor, state: Tensor) -> Tensor:
+    def _critic_output(self, x: Tensor, state: Tensor) -> Tensor:
         """The critic's output (row,), in the scale of returns, for what it sees (row, entry) and the memory's state."""
         x = torch.cat([x, state], 1)
         for k in range(0, len(self.critic), 2):
@@ -104,7 +104,7 @@ class Learner:
     def value(self, seen: Tensor, state: Tensor) -> Float32:
         """What the critic expects of returns, shape (row,)."""
         mean, std = self._scale()
-        return self._judged(seen, state).numpy() * np.float32(std) + np.float32(mean)
+        return self._critic_output(seen, state).numpy() * np.float32(std) + np.float32(mean)
 
     @torch.no_grad()
     def act(self, seen: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
@@ -113,36 +113,36 @@ class Learner:
 
     def sample(self, env: Rows, noise: float) -> tuple[Rollout, float]:
         """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
-        by, shape = self.by, (self.by.horizon, env.rows)
-        observation = torch.empty((by.horizon + 1, env.rows, env.size))
-        action, mean, told = torch.empty((3, *shape, 2))
-        states = torch.empty((by.horizon + 1, env.rows, self.actor.units))
-        reward, paid, ended = np.empty(shape, np.float32), 0.0, np.zeros((by.horizon + 1, env.rows), np.bool_)
+        config, shape = self.config, (self.config.horizon, env.rows)
+        observation = torch.empty((config.horizon + 1, env.rows, env.size))
+        action, mean, expert_action = torch.empty((3, *shape, 2))
+        states = torch.empty((config.horizon + 1, env.rows, self.actor.units))
+        reward, mean_reward, ended = np.empty(shape, np.float32), 0.0, np.zeros((config.horizon + 1, env.rows), np.bool_)
         first = self.state
-        for t in range(by.horizon):
+        for t in range(config.horizon):
             observation[t] = torch.from_numpy(env.observation)
             mean[t], states[t] = self.act(observation[t], self.state)
             drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t]
-            if self.lesson or self.pull:
-                told[t], done = map(torch.from_numpy, env.taught(acts.numpy()))
-                acts = done if self.lesson else acts
+            if self.imitating or self.imitation_weight:
+                expert_action[t], done = map(torch.from_numpy, env.query_expert(acts.numpy()))
+                acts = done if self.imitating else acts
             action[t] = acts + noise * torch.from_numpy(drawn)
-            came = env.step(action[t].numpy())
-            paid += float(came.reward.mean()) / by.horizon
-            reward[t], ended[t + 1] = came.reward, came.terminated | came.truncated
-            if len(came.final):
-                seen = torch.from_numpy(came.final)
-                after = self.act(seen, states[t][torch.from_numpy(came.truncated)])[1]
-                reward[t][came.truncated] += np.float32(by.gamma) * self.value(seen, after)
+            transition = env.step(action[t].numpy())
+            mean_reward += float(transition.reward.mean()) / config.horizon
+            reward[t], ended[t + 1] = transition.reward, transition.terminated | transition.truncated
+            if len(transition.final):
+                seen = torch.from_numpy(transition.final)
+                after = self.act(seen, states[t][torch.from_numpy(transition.truncated)])[1]
+                reward[t][transition.truncated] += np.float32(config.gamma) * self.value(seen, after)
             self.state = states[t] * torch.from_numpy(~ended[t + 1, :, None])
         observation[-1] = torch.from_numpy(env.observation)
         states[-1] = self.act(observation[-1], self.state)[1]
         rows = observation.flatten(0, 1), states.flatten(0, 1)
-        value = self.value(*rows).reshape(by.horizon + 1, -1)
-        advantage = gae(reward, value, ended[1:], by.gamma, by.gae_lambda)
-        goes_on = torch.from_numpy(~ended[:-1]).float()
+        value = self.value(*rows).reshape(config.horizon + 1, -1)
+        advantage = gae(reward, value, ended[1:], config.gamma, config.gae_lambda)
+        continues = torch.from_numpy(~ended[:-1]).float()
         arrays = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1])
-        return Rollout(observation[:-1], action, mean, told, *arrays, goes_on, first), paid
+        return Rollout(observation[:-1], action, mean, expert_action, *arrays, continues, first), mean_reward
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
         """Some epochs of PPO on a batch, or of its lesson, and of regression to its returns."""
@@ -156,31 +156,31 @@ class Learner:
             batch = Rollout(**mixed, state=torch.zeros(batch.action[..., 0].numel(), 0))
         (mean, std), kl = self._scale(), 0.0
         batch = batch._replace(returns=(batch.returns - mean) / std)
-        for _ in range(_LESSON_EPOCHS if self.lesson else self.by.epochs):
+        for _ in range(_IMITATION_EPOCHS if self.imitating else self.config.epochs):
             order = torch.from_numpy(self._rng.permutation(batch.action.shape[1]))
-            found = [self._descend(batch, rows, noise) for rows in order.chunk(self.by.minibatches)]
-            kl = sum(found) / len(found)
-            if kl > self.by.kl_stop and not self.lesson:
+            divergences = [self._descend(batch, rows, noise) for rows in order.chunk(self.config.minibatches)]
+            kl = sum(divergences) / len(divergences)
+            if kl > self.config.kl_stop and not self.imitating:
                 break
         return Update(kl, 1.0 - error)
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
         """One gradient step on some rows; the divergence from the policy that sampled, or from the teacher."""
-        x, action, old, told, advantage, returns, goes_on = (array.index_select(1, rows) for array in batch[:7])
-        new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], goes_on)
+        x, action, old, expert_action, advantage, returns, continues = (array.index_select(1, rows) for array in batch[:7])
+        new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], continues)
         action, old, advantage = action.reshape(-1, 2), old.reshape(-1, 2), advantage.reshape(-1)
         double = 2.0 * noise * noise
         ratio = (((action - old).square() - (action - new).square()).sum(-1) / double).exp()
-        clipped = ratio.clamp(1.0 - self.by.clip, 1.0 + self.by.clip)
-        apart = (new - (told.reshape(-1, 2) if self.lesson else old)).square().sum(-1).mean()
-        loss = apart if self.lesson else -torch.minimum(ratio * advantage, clipped * advantage).mean()
-        if self.pull:
-            loss = loss + self.pull * (new - told.reshape(-1, 2)).square().sum(-1).mean()
-        judged = self._judged(x.reshape(-1, x.shape[2]), states.detach())
+        clipped = ratio.clamp(1.0 - self.config.clip, 1.0 + self.config.clip)
+        apart = (new - (expert_action.reshape(-1, 2) if self.imitating else old)).square().sum(-1).mean()
+        loss = apart if self.imitating else -torch.minimum(ratio * advantage, clipped * advantage).mean()
+        if self.imitation_weight:
+            loss = loss + self.imitation_weight * (new - expert_action.reshape(-1, 2)).square().sum(-1).mean()
+        prediction = self._critic_output(x.reshape(-1, x.shape[2]), states.detach())
         self._optimiser.zero_grad()
-        (loss + (judged - returns.reshape(-1)).square().mean()).backward()
+        (loss + (prediction - returns.reshape(-1)).square().mean()).backward()
         for part in self._parts:
-            nn.utils.clip_grad_norm_(part, self.by.max_gradient)
+            nn.utils.clip_grad_norm_(part, self.config.max_gradient)
         self._optimiser.step()
         return apart.item() / double
 
@@ -195,7 +195,7 @@ class Learner:
     @torch.no_grad()
     def _follow(self, returns: Tensor) -> None:
         """Note these returns, and keep the critic's values where their scale moves (PopArt, Hessel et al. 2019)."""
-        first, (mean, std), decay = not self._moments.any(), self._scale(), self.by.value_decay
+        first, (mean, std), decay = not self._moments.any(), self._scale(), self.config.value_decay
         fresh = np.array([1.0, returns.mean().item(), returns.square().mean().item()])
         self._moments = decay * self._moments + (1.0 - decay) * fresh
         new_mean, new_std = self._scale()
@@ -214,8 +214,8 @@ class Learner:
         tensors |= {f"critic.{k}": x for k, x in enumerate(self.critic)}
         for k, moments in self._optimiser.state_dict()["state"].items():
             tensors |= {f"adam.{k}.{name}": x for name, x in moments.items()}
-        told = {"moments": self._moments.copy(), "lesson": np.array([self.lesson])}
-        return told | {name: x.detach().numpy().copy() for name, x in tensors.items()}
+        arrays = {"moments": self._moments.copy(), "imitating": np.array([self.imitating])}
+        return arrays | {name: x.detach().numpy().copy() for name, x in tensors.items()}
 
     @torch.no_grad()
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -227,7 +227,7 @@ class Learner:
         if not begun and np.array(arrays["moments"]).any():
             raise ValueError("the optimiser's arrays adam.* are missing")
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
-        self._moments, self.lesson = np.array(arrays["moments"]), bool(arrays["lesson"][0])
+        self._moments, self.imitating = np.array(arrays["moments"]), bool(arrays["imitating"][0])
         for name, x in [("state", self.state), *((f"actor.{name}", x) for name, x in self.actor.tensors.items()),
                         *((f"critic.{k}", x) for k, x in enumerate(self.critic))]:  # fmt: skip
             if tensors[name].shape != x.shape:
@@ -253,8 +253,8 @@ def gae(reward: Float32, value: Float32, ended: Bool, gamma: float, lam: float) 
     advantage = np.zeros_like(reward)
     ahead = np.zeros_like(reward[0])
     for t in reversed(range(len(reward))):
-        goes_on = np.float32(gamma) * ~ended[t]
-        ahead = reward[t] + goes_on * value[t + 1] - value[t] + np.float32(lam) * goes_on * ahead
+        continues = np.float32(gamma) * ~ended[t]
+        ahead = reward[t] + continues * value[t + 1] - value[t] + np.float32(lam) * continues * ahead
         advantage[t] = ahead
     return advantage
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from uuv_marl.baselines.learned.actor import bound, in_disc
 from uuv_marl.baselines.learned.checkpoint import Card
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
-from uuv_marl.baselines.registry import beside, make
+from uuv_marl.baselines.registry import compose, make
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, TrainingError
 from uuv_marl.percept import Percept
@@ -38,11 +38,11 @@ class Transition(NamedTuple):
     """What the critic would have seen next, for the truncated rows, in their order."""
 
 
-class Told(Policy):
+class ExternalActionPolicy(Policy):
     """Does what it is told: it stands where the network will."""
 
     def __init__(self, scenario: Scenario, num_worlds: int, card: Card) -> None:
-        self.declare_as(card)
+        self.copy_requirements(card)
         super().__init__(scenario, num_worlds)
         self.action = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
 
@@ -56,20 +56,20 @@ class Group:
 
     def __init__(self, training: Training, part: Part) -> None:
         scenario, card = part.scenario, training.card
-        paid = training.paid(scenario)
-        self.env = BatchedEnv(scenario, part.worlds, paid, observe="closeness", keep_terms=False)
-        self._told = Told(scenario, part.worlds, card)
-        self._acting = beside(self._told, card)
+        reward = training.reward_for(scenario)
+        self.env = BatchedEnv(scenario, part.worlds, reward, observe="closeness", keep_terms=False)
+        self._network_action = ExternalActionPolicy(scenario, part.worlds, card)
+        self._acting = compose(self._network_action, card)
         self._shape, self._state = (part.worlds, part.vehicles), training.critic == "state"
-        self.contact_cost = 0.0
+        self.collision_cost = 0.0
         """What a contact that begins costs beyond the reward."""
         try:
-            self._teacher = make(training.teacher, scenario, part.worlds) if training.teacher else None
+            self._expert = make(training.expert, scenario, part.worlds) if training.expert else None
         except PolicyError as error:
-            raise TrainingError(f"teacher = {training.teacher!r} can't teach on {part.name}: {error}") from None
-        self.teaching = 1.0
+            raise TrainingError(f"teacher = {training.expert!r} can't teach on {part.name}: {error}") from None
+        self.expert_share = 1.0
         """The share of worlds that start in which the teacher acts."""
-        self._teaches = np.ones(part.worlds, np.bool_)
+        self._expert_acts = np.ones(part.worlds, np.bool_)
 
     def seen(self, observation: Float32) -> Float32:
         """What the critic sees with these observations (world, vehicle, entry), shape (row, entry)."""
@@ -78,32 +78,32 @@ class Group:
 
     def start(self, seeds: Sequence[int], worlds: Sequence[int]) -> Float32:
         """Start these worlds; what all observe."""
-        if self._teacher is not None:
-            self._teacher.reset(seeds, worlds)
+        if self._expert is not None:
+            self._expert.reset(seeds, worlds)
         # By their seeds, which are drawn: it takes no random number of its own.
-        self._teaches[worlds] = [seed % 100 < 100.0 * self.teaching for seed in seeds]
+        self._expert_acts[worlds] = [seed % 100 < 100.0 * self.expert_share for seed in seeds]
         return self.env.reset(seeds, worlds)
 
-    def taught(self, action: Float32) -> tuple[Float32, Float32]:
+    def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
         """What the teacher would do, and what is done: that, in its own worlds, or ``action``; shape (row, 2)."""
-        said = cast(Policy, self._teacher).act(self.env.swarm.percept).reshape(-1, 2).copy()
-        return said, np.where(np.repeat(self._teaches, self._shape[1])[:, None], said, action)
+        expert_action = cast(Policy, self._expert).act(self.env.swarm.percept).reshape(-1, 2).copy()
+        return expert_action, np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
 
     def step(self, action: Float32, seeds: Seeds) -> tuple[Float32, Bool, Bool, Float32, Float32]:
         """Reward, done and cut off by row, what the critic sees now, and saw last of rows that were cut off."""
         env, n = self.env, self._shape[1]
         action = action.copy()
-        bound(action, in_disc(self._told))
+        bound(action, in_disc(self._network_action))
         action = action.reshape(*self._shape, 2)
-        if self._acting is not self._told:
-            self._told.action[...] = action
+        if self._acting is not self._network_action:
+            self._network_action.action[...] = action
             action = self._acting.act(env.swarm.percept)
-        if self._teacher is not None:
-            self._teacher.taken(action)
-        came = env.step(action)
-        reward = came.reward - self.contact_cost * env.swarm.facts.contacts
-        done, cut = np.repeat(came.world_terminated, n), np.repeat(came.world_truncated, n)
-        observation, over = came.observation, np.flatnonzero(came.over)
+        if self._expert is not None:
+            self._expert.record_action(action)
+        result = env.step(action)
+        reward = result.reward - self.collision_cost * env.swarm.facts.vehicle_collisions
+        done, cut = np.repeat(result.world_terminated, n), np.repeat(result.world_truncated, n)
+        observation, over = result.observation, np.flatnonzero(result.over)
         final = self.seen(observation)[cut] if cut.any() else np.zeros((0, 0), np.float32)
         if len(over):
             observation = self.start([int(seed) for seed in seeds(len(over))], over.tolist())
@@ -111,17 +111,17 @@ class Group:
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All that ``restore`` needs, but what was observed."""
-        lesson = {"teaches": self._teaches.copy()} | parts_of(teacher=self._teacher) if self._teacher else {}
-        return self.env.swarm.snapshot() | parts_of(acting=self._acting) | lesson
+        expert_state = {"expert_acts": self._expert_acts.copy()} | parts_of(expert=self._expert) if self._expert else {}
+        return self.env.swarm.snapshot() | parts_of(acting=self._acting) | expert_state
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot of a group of the same size."""
         self.env.reset(0)
         self.env.swarm.restore(snapshot)
         self._acting.restore(part_of(snapshot, "acting"))
-        if self._teacher is not None:
-            self._teacher.restore(part_of(snapshot, "teacher"))
-            self._teaches[...] = snapshot["teaches"]
+        if self._expert is not None:
+            self._expert.restore(part_of(snapshot, "expert"))
+            self._expert_acts[...] = snapshot["expert_acts"]
 
 
 class Rows:
@@ -148,20 +148,20 @@ class Rows:
             started = group.start([int(seed) for seed in seeds(len(worlds))], worlds)
             self.observation[rows] = group.seen(started)
 
-    def charge(self, contact_cost: float) -> None:
+    def set_collision_cost(self, collision_cost: float) -> None:
         """From now on a contact that begins costs so much beyond the reward."""
         for group in self.groups:
-            group.contact_cost = contact_cost
+            group.collision_cost = collision_cost
 
-    def teach(self, share: float) -> None:
+    def set_expert_share(self, share: float) -> None:
         """From now on the teacher acts in so many of the worlds that start."""
         for group in self.groups:
-            group.teaching = share
+            group.expert_share = share
 
-    def taught(self, action: Float32) -> tuple[Float32, Float32]:
+    def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
         """What the teacher would do, and what is done where the network does ``action``; shape (row, 2)."""
-        told = [group.taught(action[rows]) for group, rows in zip(self.groups, self._rows, strict=True)]
-        return np.concatenate([said for said, _ in told]), np.concatenate([done for _, done in told])
+        pairs = [group.query_expert(action[rows]) for group, rows in zip(self.groups, self._rows, strict=True)]
+        return np.concatenate([expert_action for expert_action, _ in pairs]), np.concatenate([done for _, done in pairs])
 
     def step(self, action: Float32) -> Transition:
         """Act, shape (row, 2)."""
@@ -176,8 +176,8 @@ class Rows:
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """All but the generator, for ``restore``."""
         groups = enumerate(group.snapshot() for group in self.groups)
-        kept = {f"{k}.{name}": array for k, group in groups for name, array in group.items()}
-        return kept | {"observation": self.observation.copy()}
+        arrays = {f"{k}.{name}": array for k, group in groups for name, array in group.items()}
+        return arrays | {"observation": self.observation.copy()}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot of rows for the same training."""

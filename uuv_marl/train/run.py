@@ -30,14 +30,14 @@ from uuv_marl.train.objective import objective
 from uuv_marl.train.ppo import Learner, annealed
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows
 from uuv_marl.train.training import Training
-from uuv_marl.train.validation import Judged, Worst, replay_command, validate
+from uuv_marl.train.validation import Validation, Worst, replay_command, validate
 
 with extra("train", "training"):
     import torch
 
-_TEACHER_ACTS, _NETWORK_ACTS = 0.2, 0.8
+_EXPERT_ACTS, _NETWORK_ACTS = 0.2, 0.8
 """Shares of a lesson until which the teacher acts in all worlds, and from which in none that starts."""
-_LESSON_NOISE, _LESSON_RATE = 0.2, (2e-3, 3e-4)
+_IMITATION_NOISE, _IMITATION_RATE = 0.2, (2e-3, 3e-4)
 """Noise of actions, and learning rates at the start and at the end of a lesson."""
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
 
@@ -142,23 +142,23 @@ class Trainer:
 
     def iterate(self, before: Record) -> Record:
         """Sample and update once."""
-        started, by = time.process_time(), self.training.ppo
+        started, config = time.process_time(), self.training.ppo
         share = before.spent(self.training) / self.training.budget
-        lesson = self.training.lesson if self.training.teacher else 0.0
-        self.learner.teach(share < lesson, self.training.pull if share >= lesson else 0.0)
-        if self.learner.lesson:
-            self.rows.teach((_NETWORK_ACTS - share / lesson) / (_NETWORK_ACTS - _TEACHER_ACTS))
-            noise, rate, share = _LESSON_NOISE, annealed(_LESSON_RATE, share / lesson), 0.0
+        imitation_share = self.training.imitation_share if self.training.expert else 0.0
+        self.learner.set_imitation(share < imitation_share, self.training.imitation_weight if share >= imitation_share else 0.0)
+        if self.learner.imitating:
+            self.rows.set_expert_share((_NETWORK_ACTS - share / imitation_share) / (_NETWORK_ACTS - _EXPERT_ACTS))
+            noise, rate, share = _IMITATION_NOISE, annealed(_IMITATION_RATE, share / imitation_share), 0.0
         else:
-            self.rows.teach(0.0)
-            share = (share - lesson) / (1.0 - lesson)
-            noise, rate = annealed(by.noise, share), annealed(by.learning_rate, share)
-        self.rows.charge(annealed(by.contact_cost or (0.0, 0.0), share))
+            self.rows.set_expert_share(0.0)
+            share = (share - imitation_share) / (1.0 - imitation_share)
+            noise, rate = annealed(config.noise, share), annealed(config.learning_rate, share)
+        self.rows.set_collision_cost(annealed(config.collision_cost or (0.0, 0.0), share))
         batch, reward = self.learner.sample(self.rows, noise)
         update = self.learner.update(batch, noise, rate)
         return Record(
             iteration=before.iteration + 1,
-            agent_steps=before.agent_steps + by.horizon * self.rows.rows,
+            agent_steps=before.agent_steps + config.horizon * self.rows.rows,
             seconds=before.seconds + time.process_time() - started,
             reward=reward,
             kl=update.kl,
@@ -175,12 +175,12 @@ class Trainer:
         random = json.dumps(self._rng.bit_generator.state)
         (folder / _RANDOM_FILE).write_text(random + "\n", encoding="utf-8")
 
-    def save_policy(self, folder: Path, record: Record, judged: Judged | None = None) -> None:
+    def save_policy(self, folder: Path, record: Record, validation: Validation | None = None) -> None:
         """The policy, with what is known of it."""
-        told = {**self.training.model_dump(mode="json"), "versions": versions(), "record": record._asdict()}
-        if judged is not None:
-            told["worst"] = judged.worst
-        card = self.training.card.model_copy(update={"training": told})
+        settings = {**self.training.model_dump(mode="json"), "versions": versions(), "record": record._asdict()}
+        if validation is not None:
+            settings["worst"] = validation.worst
+        card = self.training.card.model_copy(update={"training": settings})
         save_checkpoint(folder / WEIGHTS_FILE, card, self.learner.weights)
 
     def restore(self, folder: Path) -> None:
@@ -220,12 +220,12 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
     """The record with a validation of the policy as it stands, which becomes ``best`` where none was better."""
     candidate, best = output / "candidate", output / "best"
     trainer.save_policy(candidate, record)
-    judged = validate(str(candidate), trainer.training)
-    better = record.best is None or judged.score >= record.best
-    told = {name: value for name, value in judged._asdict().items() if name in Record._fields}
-    record = record._replace(best=judged.score if better else record.best, **told)
+    validation = validate(str(candidate), trainer.training)
+    better = record.best is None or validation.score >= record.best
+    fields = {name: value for name, value in validation._asdict().items() if name in Record._fields}
+    record = record._replace(best=validation.score if better else record.best, **fields)
     if better:
-        trainer.save_policy(candidate, record, judged)
+        trainer.save_policy(candidate, record, validation)
         best.mkdir(exist_ok=True)
         (candidate / WEIGHTS_FILE).replace(best / WEIGHTS_FILE)
     shutil.rmtree(candidate)
@@ -234,9 +234,9 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
 
 def best_of(output: Path) -> tuple[Record, str]:
     """Of a training's best policy: its iteration, and the command that shows the worst episode in its validation."""
-    told = dict(load_checkpoint(output / "best").card.training)
-    kept = {name: value for name, value in told.items() if name in Training.model_fields}
-    return Record(**told["record"]), replay_command(output / "best", Training(**kept), Worst(*told["worst"]))
+    training = dict(load_checkpoint(output / "best").card.training)
+    fields = {name: value for name, value in training.items() if name in Training.model_fields}
+    return Record(**training["record"]), replay_command(output / "best", Training(**fields), Worst(*training["worst"]))
 
 
 @contextmanager

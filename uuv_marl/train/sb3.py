@@ -53,6 +53,6 @@ def save_sb3(model: PPO, path: UserPath) -> None:
     layers = [*hidden[::2], policy.action_net]
     tensors = {f"{k}.weight": layer.weight.detach().cpu().numpy().T for k, layer in enumerate(layers)}
     tensors |= {f"{k}.bias": layer.bias.detach().cpu().numpy() for k, layer in enumerate(layers)}
-    made = Architecture(hidden=tuple(layer.out_features for layer in layers[:-1]))
-    told = {"algorithm": "PPO of Stable-Baselines3", "agent_steps": model.num_timesteps, "seed": model.seed}
-    save_checkpoint(path, card_of(env.scenario, network=made, training=told), tensors)
+    architecture = Architecture(hidden=tuple(layer.out_features for layer in layers[:-1]))
+    training = {"algorithm": "PPO of Stable-Baselines3", "agent_steps": model.num_timesteps, "seed": model.seed}
+    save_checkpoint(path, card_of(env.scenario, network=architecture, training=training), tensors)

@@ -8,12 +8,12 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, cast
 
 import pydantic
 
-from uuv_marl.baselines import granted
-from uuv_marl.baselines.grants import inner_loop_nms
+from uuv_marl.baselines import with_policy_requirements
+from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.registry import need_law
+from uuv_marl.baselines.registry import check_base_controller
 from uuv_marl.envs.core import Reward, refuse_losses
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
@@ -79,7 +79,7 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     noise: tuple[Positive, Positive] = (0.5, 0.1)
     """Standard deviation of actions [1], at the start and at the end. Noise is clipped at full force, and a policy that
     learned to make up for that overshoots without it: end with little."""
-    contact_cost: tuple[NotNegative, NotNegative] | None = None
+    collision_cost: tuple[NotNegative, NotNegative] | None = None
     """What a contact that begins costs beyond the reward, at the start and at the end, in equal ratios, or evenly from
     or to 0. If None: ``CONTACT_COST`` with the package's tasks and their rewards; nothing with one of your own."""
     max_gradient: Positive = 0.5
@@ -101,7 +101,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """What it is for, in words."""
     scenario: str = "starter"
     """Name or TOML file."""
-    also: tuple[str, ...] = ()
+    extra_scenarios: tuple[str, ...] = ()
     """Further scenarios for the same network, with the same observation, vehicle and clock; to equal parts."""
     overrides: dict[str, Any] = {}
     """Fields of ``scenario`` that differ from its file; ``OVERRIDES`` are added where they are not here."""
@@ -118,14 +118,14 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """What the policy's network is made of."""
     filter: bool = False
     """Whether actions pass the safety filter, in training as in use."""
-    around: str = ""
+    base_controller: str = ""
     """Name of a law to whose actions the network's are added, at half the force; none if empty."""
-    teacher: str = ""
+    expert: str = ""
     """Name of a policy that the network imitates before it learns from its reward; none if empty. At first the teacher
     acts, then the network more and more, always told what the teacher would do (as in DAgger, Ross et al. 2011)."""
-    lesson: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.4
+    imitation_share: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.4
     """How much of the budget it imitates, if there is a teacher; ``ppo`` begins after it."""
-    pull: NotNegative = 0.0
+    imitation_weight: NotNegative = 0.0
     """Weight in PPO's loss, after the lesson, of the mean squared distance from what the teacher would do [1]."""
     ppo: Ppo = Ppo()
     """Numbers of the algorithm."""
@@ -142,26 +142,26 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     checkpoint_every: Count = 20
     """Iterations."""
 
-    def __init__(self, **told: Any) -> None:
+    def __init__(self, **fields: Any) -> None:
         try:
-            super().__init__(**plain(told))
+            super().__init__(**plain(fields))
         except pydantic.ValidationError as error:
             raise _explained(error) from None
 
     @pydantic.model_validator(mode="after")
-    def _whole(self) -> Self:
+    def _check(self) -> Self:
         """Fill in what is left out, and refuse what can't be run."""
-        if self.teacher and self.around:
-            raise TrainingError(f"teacher {self.teacher!r} and around {self.around!r} are both given; leave one out")
-        if self.pull and not self.teacher:
-            raise TrainingError(f"pull = {self.pull:g} is to a teacher, and none is given; name one, or leave pull out")
+        if self.expert and self.base_controller:
+            raise TrainingError(f"teacher {self.expert!r} and around {self.base_controller!r} are both given; leave one out")
+        if self.imitation_weight and not self.expert:
+            raise TrainingError(f"pull = {self.imitation_weight:g} is to a teacher, and none is given; name one, or leave pull out")
         if self.minutes is not None and self.steps is not None:
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
         if self.minutes is None and self.steps is None:
             object.__setattr__(self, "minutes", 5.0)
-        if self.ppo.contact_cost is None:
+        if self.ppo.collision_cost is None:
             own = ":" in "".join([self.reward or "", *(each.task.name for each in self._scenarios.values())])
-            ppo = self.ppo.model_copy(update={"contact_cost": (0.0, 0.0) if own else CONTACT_COST})
+            ppo = self.ppo.model_copy(update={"collision_cost": (0.0, 0.0) if own else CONTACT_COST})
             object.__setattr__(self, "ppo", ppo)
         for name, scenario in self._scenarios.items():
             refuse_losses(scenario, "training")
@@ -171,8 +171,8 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
                     f"reward must be one of {', '.join(known)}, the rewards of task {scenario.task.name!r}, or "
                     f"module:function, got {self.reward!r}"
                 )
-            said = self._card(scenario)
-            if differs := next((f for f in Card.model_fields if getattr(said, f) != getattr(self.card, f)), None):
+            card = self._card(scenario)
+            if differs := next((f for f in Card.model_fields if getattr(card, f) != getattr(self.card, f)), None):
                 raise TrainingError(
                     f"also = {name!r} has another {differs} than {self.scenario!r}, and one network can't have both; "
                     "leave it out, or make them alike in a file of your own"
@@ -191,24 +191,24 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     @cached_property
     def _scenarios(self) -> dict[str, Scenario]:
-        if self.around:
-            need_law(self.around)
-        found = {
+        if self.base_controller:
+            check_base_controller(self.base_controller)
+        loaded = {
             name: load_scenario(name, overrides=overrides_for(name, self.overrides if name == self.scenario else {}))
-            for name in (self.scenario, *self.also)
+            for name in (self.scenario, *self.extra_scenarios)
         }
-        return {name: granted(self.around, each) if self.around else each for name, each in found.items()}
+        return {name: with_policy_requirements(self.base_controller, each) if self.base_controller else each for name, each in loaded.items()}
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
         """All swarms that are stepped at once: of each scenario its sizes."""
-        found: list[Part] = []
+        parts: list[Part] = []
         for name, scenario in self._scenarios.items():
             sizes = self.sizes or ((scenario.swarm.num_vehicles, 0),)
             share = ROWS / len(self._scenarios) / len(sizes)
             for n, worlds in sizes:
-                found.append(Part(name, load_scenario(scenario, num_vehicles=n), worlds or max(1, round(share / n))))
-        return tuple(found)
+                parts.append(Part(name, load_scenario(scenario, num_vehicles=n), worlds or max(1, round(share / n))))
+        return tuple(parts)
 
     @cached_property
     def card(self) -> Card:
@@ -216,9 +216,9 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
         return self._card(self.loaded)
 
     def _card(self, scenario: Scenario) -> Card:
-        return card_of(scenario, network=self.network, filter=self.filter, around=self.around)
+        return card_of(scenario, network=self.network, filter=self.filter, base_controller=self.base_controller)
 
-    def paid(self, scenario: Scenario) -> Reward:
+    def reward_for(self, scenario: Scenario) -> Reward:
         """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
         name = self.reward or scenario.task_class.rewards[0]
         if ":" not in name:
@@ -243,14 +243,14 @@ def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]
         ScenarioError: the scenario can't be loaded with them.
     """
     # With a hold of one's own the scenario's decision period may be no multiple of it; the training's takes its place.
-    clock = OVERRIDES if "timing.control_hold_s" in own else {}
+    clock = OVERRIDES if "timing.control_step_s" in own else {}
     bare = load_scenario(scenario, overrides={**clock, **own, _LOOP: own.get(_LOOP, 0.0)})
     if bare.timing.fixed:
         return dict(own)
     return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, Policy.full_torque_nm, bare), **own}
 
 
-def told_by(name: str) -> dict[str, Any]:
+def recipe_fields(name: str) -> dict[str, Any]:
     """Fields of a training by the name of a scenario, or from a TOML file: a scenario's, or a recipe with such fields.
 
     A recipe names its ``scenario``; no scenario's file does.
@@ -261,14 +261,14 @@ def told_by(name: str) -> dict[str, Any]:
     if not name.endswith(".toml"):
         return {"scenario": name}
     try:
-        told = tomllib.loads(user_path(name).read_text(encoding="utf-8"))
+        fields = tomllib.loads(user_path(name).read_text(encoding="utf-8"))
     except OSError as error:
         raise TrainingError(
             f"{name} can't be read ({error.strerror}); give a scenario's name, or a TOML file of a scenario or training"
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise TrainingError(f"{name} is no TOML ({error}); mend it there") from None
-    return told if "scenario" in told else {"scenario": name}
+    return fields if "scenario" in fields else {"scenario": name}
 
 
 TABLES: Mapping[str, Sequence[str]] = {
@@ -277,7 +277,7 @@ TABLES: Mapping[str, Sequence[str]] = {
 """Names of all fields, by table."""
 
 
-def changed_fields(told: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
+def changed_fields(fields: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
     """Fields of a training with others in their place: its own, or fields of the scenario, which become ``overrides``.
 
     Args:
@@ -287,23 +287,23 @@ def changed_fields(told: dict[str, Any], changes: Mapping[str, object]) -> dict[
     for field, value in changes.items():
         table, dot, _ = field.partition(".")
         if table in (TABLES if dot else Training.model_fields):
-            assign(told, field, value)
+            assign(fields, field, value)
         else:
-            told.setdefault("overrides", {})[field] = value
-    return told
+            fields.setdefault("overrides", {})[field] = value
+    return fields
 
 
 def _explained(error: pydantic.ValidationError) -> Exception:
     """What is wrong first, as an error of ours."""
     first = error.errors()[0]
     if first["type"] == "value_error" and "ctx" in first:
-        told = first["ctx"]["error"]
-        return told if isinstance(told, ScenarioError | TrainingError | PolicyError) else TrainingError(str(told))
+        cause = first["ctx"]["error"]
+        return cause if isinstance(cause, ScenarioError | TrainingError | PolicyError) else TrainingError(str(cause))
     *place, last = map(str, first["loc"])
     field = ".".join([*place, last])
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        there = TABLES.get(".".join(place), ())
-        near = difflib.get_close_matches(last, there, n=1)
-        remedy = f"did you mean {near[0]!r}?" if near else f"the fields here are {', '.join(there)}"
+        names = TABLES.get(".".join(place), ())
+        near = difflib.get_close_matches(last, names, n=1)
+        remedy = f"did you mean {near[0]!r}?" if near else f"the fields here are {', '.join(names)}"
         return TrainingError(f"{field} is unknown; {remedy}")
     return TrainingError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from uuv_marl.baselines import granted
+from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.scenario import load_scenario
@@ -27,14 +27,14 @@ class Worst(NamedTuple):
     seed: int
 
 
-class Judged(NamedTuple):
+class Validation(NamedTuple):
     """Episodes of a validation."""
 
-    whole: float
+    swarm_success: float
     """Share of episodes in which all vehicles did their task, and nobody touched anything (``Task.metrics``)."""
     share: float
     """The task's headline, such as the share of vehicles that did theirs untouched; in ``follow`` that of swarms."""
-    contacts: float
+    collisions: float
     """That began, mean over episodes."""
     time_s: float | None
     """Mean over whole episodes, of the time until the task was done."""
@@ -44,31 +44,31 @@ class Judged(NamedTuple):
     @property
     def score(self) -> float:
         """By which policies are chosen [1]: the mean of both shares."""
-        return (self.whole + self.share) / 2.0
+        return (self.swarm_success + self.share) / 2.0
 
 
-def validate(policy: str, training: Training) -> Judged:
+def validate(policy: str, training: Training) -> Validation:
     """Run a policy, by its name or path, on a training's validation seeds, with each scenario and size of swarm."""
     number = max(1, training.validation_episodes // len(training.parts))
     seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + number)
-    found = [(part, run) for part in training.parts for run in _runs(policy, part, seeds)]
-    shares, whole = zip(
-        *(shares_of(run.metrics, part.scenario.task_class.headline) for part, run in found), strict=True
+    runs = [(part, run) for part in training.parts for run in _runs(policy, part, seeds)]
+    shares, swarm_success = zip(
+        *(shares_of(run.metrics, part.scenario.task_class.headline) for part, run in runs), strict=True
     )
-    times = [_end_s(run) for (_, run), all_did in zip(found, whole, strict=True) if all_did]
-    contacts = [run.metrics["collisions"] for _, run in found]
-    part, run = found[min(range(len(found)), key=lambda k: (shares[k], -contacts[k]))]
-    return Judged(
-        whole=len(times) / len(found),
-        share=sum(shares) / len(found),
-        contacts=sum(contacts) / len(found),
+    times = [_end_s(run) for (_, run), all_did in zip(runs, swarm_success, strict=True) if all_did]
+    collisions = [run.metrics["collisions"] for _, run in runs]
+    part, run = runs[min(range(len(runs)), key=lambda k: (shares[k], -collisions[k]))]
+    return Validation(
+        swarm_success=len(times) / len(runs),
+        share=sum(shares) / len(runs),
+        collisions=sum(collisions) / len(runs),
         time_s=sum(times) / len(times) if times else None,
         worst=Worst(part.name, part.vehicles, run.seed),
     )
 
 
 def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
-    scenario = granted(policy, part.scenario)
+    scenario = with_policy_requirements(policy, part.scenario)
     yield from (event for event in evaluate(scenario, policy, seeds) if isinstance(event, Run))
 
 
@@ -82,8 +82,8 @@ def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
     """An episode's headline, and whether the swarm was whole; in ``follow`` whether it came and touched nothing."""
     own = metrics.get("task", {})
     if "whole" not in own:
-        whole = metrics["task_time_s"] is not None and not metrics["collisions"]
-        return float(whole), whole
+        swarm_success = metrics["task_time_s"] is not None and not metrics["collisions"]
+        return float(swarm_success), swarm_success
     share = own.get(headline)
     return (own["untouched_share"] if share is None else share) or 0.0, own["whole"] == 1.0
 
@@ -95,7 +95,7 @@ def replay_command(policy: Path, training: Training, worst: Worst) -> str:
     changes = {**leaves(overrides_for(name, own)), "swarm.num_vehicles": n}
     if n == load_scenario(name).swarm.num_vehicles:
         del changes["swarm.num_vehicles"]
-    kept = {field: value for field, value in changes.items() if field not in _EVERY_POLICYS_OWN}
-    sets = [f" --set {shlex.quote(f'{field}={json.dumps(value)}')}" for field, value in kept.items()]
+    fields = {field: value for field, value in changes.items() if field not in _EVERY_POLICYS_OWN}
+    sets = [f" --set {shlex.quote(f'{field}={json.dumps(value)}')}" for field, value in fields.items()]
     scenario, path = shlex.quote(name), shlex.quote(str(policy))
     return f"uuv-marl replay --scenario {scenario} --policy {path} --seed {seed}{''.join(sets)}"

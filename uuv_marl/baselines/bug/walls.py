@@ -33,7 +33,7 @@ class Walls(NamedTuple):
     side: Annotated[Float64, "world vehicle", "1 where it turns to starboard, -1 to port, 0 on the way to the goal."]
     hit_m: Annotated[Float64, "world vehicle", "Distance of the goal when the way was blocked [m]."]
     turned: Annotated[Float64, "world vehicle", "How often it turned back since then."]
-    way: Annotated[Float64, "world vehicle 2", "Unit vector of the way in the map."]
+    direction: Annotated[Float64, "world vehicle 2", "Unit vector of the way in the map."]
 
 
 WallsMemory = with_surroundings("WallsMemory", Walls)
@@ -42,21 +42,21 @@ WallsMemory = with_surroundings("WallsMemory", Walls)
 
 @compiled
 def update_walls(
-    flat: Float32, at: Starts, worlds: Bool, sectors: ActiveSectors, kept: Surroundings, walls: Walls
+    flat: Float32, at: Starts, worlds: Bool, sectors: ActiveSectors, memory: Surroundings, walls: Walls
 ) -> None:
     """Take every vehicle's echoes into its walls. ``flat`` and ``at``: the percept, and where its fields start."""
     see = fields(flat, at)
     for w in range(worlds.shape[0]):
         for i in range(walls.num.shape[1] if worlds[w] else 0):
-            if kept.begun[w, i] == 0.0:
+            if memory.begun[w, i] == 0.0:
                 walls.num[w, i] = walls.next[w, i] = walls.side[w, i] = 0.0
             for a in range(see.echo.shape[2]):
-                if kept.begun[w, i] > 0.0 and see.echo[w, i, a] > 0.0:
+                if memory.begun[w, i] > 0.0 and see.echo[w, i, a] > 0.0:
                     x, y = surface_point(w, i, a, see, sectors)
-                    x, y = to_map(x, y, kept.pose[w, i])
+                    x, y = to_map(x, y, memory.pose[w, i])
                     radius = 0.0
                     if sectors.centres:
-                        c_x, c_y = centre_of(w, i, a, see, kept)
+                        c_x, c_y = centre_of(w, i, a, see, memory)
                         x, y, radius = c_x, c_y, math.hypot(x - c_x, y - c_y)
                     _put(w, i, x, y, radius, walls)
 
@@ -77,14 +77,14 @@ def _put(w: int, i: int, x: float, y: float, radius: float, walls: Walls) -> Non
 
 @compiled
 def wall_planes(
-    w: int, i: int, period: float, barrier: Barrier, limits: Limits, kept: Surroundings, walls: Walls, planes: Float64
+    w: int, i: int, period: float, barrier: Barrier, limits: Limits, memory: Surroundings, walls: Walls, planes: Float64
 ) -> int:
     """Half-planes of velocity in the vehicle's map, n . v <= b, for the walls near enough to matter.
 
     Returns:
         How many there are.
     """
-    pose, rate, num = kept.pose[w, i], min(barrier.obstacle_rate, MOST_CLOSED / period), 0
+    pose, rate, num = memory.pose[w, i], min(barrier.obstacle_rate, MOST_CLOSED / period), 0
     fastest = full_speed(limits)
     for k in range(int(walls.num[w, i])):
         n_x, n_y = walls.echoes[w, i, k, 0] - pose[0], walls.echoes[w, i, k, 1] - pose[1]

@@ -45,7 +45,7 @@ class Apf(Policy):
         gains: instead of the tuned ones.
     """
 
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(
@@ -111,8 +111,8 @@ def _force(w: int, i: int, see: Fields, g: ApfGains, centres: bool) -> tuple[flo
     """Body-frame force on one vehicle [N], forward and to starboard, and how many bounds bound."""
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     f_x, f_y, bound = g.attraction * l_x, g.attraction * l_y, 0
-    for k in range(see.heard.shape[2]):
-        if see.heard[w, i, k] > 0.0:
+    for k in range(see.detected.shape[2]):
+        if see.detected[w, i, k] > 0.0:
             d_x, d_y, c = apf_neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
             f_x, f_y, bound = f_x + d_x, f_y + d_y, bound + c
     for a in range(see.echo.shape[2]):

@@ -15,8 +15,8 @@ import numpy as np
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.policy import Limits, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
-from uuv_marl.baselines.safety.remembering import Filtered
-from uuv_marl.baselines.scout.law import modulated, pushed
+from uuv_marl.baselines.safety.filtered import Filtered
+from uuv_marl.baselines.scout.controller import modulated, pushed
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -50,7 +50,7 @@ class LeaderFollowerGains(NamedTuple):
     """Away from a neighbour at no distance [m/s]."""
     push_range: float = 15.0
     """Where pushes end [m]."""
-    kept_s: float = 3.0
+    memory_s: float = 3.0
     """For how long a neighbour is remembered that is heard no more [s]."""
 
 
@@ -70,9 +70,9 @@ class LeaderFollower(Filtered):
         self.gains = gains or own_gains
 
     @property
-    def kept_s(self) -> float:
+    def memory_s(self) -> float:
         """For how long a neighbour is remembered that is heard no more [s]."""
-        return float(self.gains.kept_s)
+        return float(self.gains.memory_s)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
@@ -86,7 +86,7 @@ class LeaderFollower(Filtered):
         return action
 
 
-class Others(NamedTuple):
+class NeighbourSummary(NamedTuple):
     """What a vehicle makes of its neighbours, along its map's axes."""
 
     v_x: float
@@ -98,18 +98,18 @@ class Others(NamedTuple):
 
 
 @compiled
-def remembered(w: int, i: int, g: LeaderFollowerGains, kept: Surroundings) -> Others:
+def remembered(w: int, i: int, g: LeaderFollowerGains, memory: Surroundings) -> NeighbourSummary:
     """What it makes of those that it remembers."""
     v_x, v_y, weights, x, y, num = 0.0, 0.0, 1e-9, 0.0, 0.0, 0
-    for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] > 0.0:
-            x, y = x + kept.place[w, i, k, 0] - kept.pose[w, i, 0], y + kept.place[w, i, k, 1] - kept.pose[w, i, 1]
+    for k in range(memory.known.shape[2]):
+        if memory.known[w, i, k] > 0.0:
+            x, y = x + memory.place[w, i, k, 0] - memory.pose[w, i, 0], y + memory.place[w, i, k, 1] - memory.pose[w, i, 1]
             num += 1
-            if kept.known[w, i, k] >= g.sightings:
-                weight = math.exp(-kept.away[w, i, k] / g.near)
-                v_x, v_y = v_x + weight * kept.velocity[w, i, k, 0], v_y + weight * kept.velocity[w, i, k, 1]
+            if memory.known[w, i, k] >= g.sightings:
+                weight = math.exp(-memory.away[w, i, k] / g.near)
+                v_x, v_y = v_x + weight * memory.velocity[w, i, k, 0], v_y + weight * memory.velocity[w, i, k, 1]
                 weights += weight
-    return Others(v_x / weights, v_y / weights, x / max(num, 1), y / max(num, 1))
+    return NeighbourSummary(v_x / weights, v_y / weights, x / max(num, 1), y / max(num, 1))
 
 
 @compiled
@@ -120,7 +120,7 @@ def at_most(x: float, y: float, length: float) -> tuple[float, float]:
 
 
 @compiled
-def _following(others: Others, g: LeaderFollowerGains) -> tuple[float, float]:
+def _following(others: NeighbourSummary, g: LeaderFollowerGains) -> tuple[float, float]:
     """The velocity that a follower wishes [m/s]."""
     w_x, w_y = at_most(g.follow * others.v_x, g.follow * others.v_y, g.cruise)
     g_x, g_y = at_most(g.gather * others.x, g.gather * others.y, g.gather_mps)
@@ -128,10 +128,10 @@ def _following(others: Others, g: LeaderFollowerGains) -> tuple[float, float]:
 
 
 @compiled
-def _leading(w: int, i: int, others: Others, g: LeaderFollowerGains, kept: Surroundings) -> tuple[float, float]:
+def _leading(w: int, i: int, others: NeighbourSummary, g: LeaderFollowerGains, memory: Surroundings) -> tuple[float, float]:
     """The velocity that a leader wishes [m/s]."""
-    at, speed = kept.reference[w, i], kept.reference_speed[w, i]
-    to_x, to_y = at[0] - kept.pose[w, i, 0], at[1] - kept.pose[w, i, 1]
+    at, speed = memory.reference[w, i], memory.reference_speed[w, i]
+    to_x, to_y = at[0] - memory.pose[w, i, 0], at[1] - memory.pose[w, i, 1]
     w_x, w_y = at_most(speed * at[2] + g.pull * to_x, speed * at[3] + g.pull * to_y, g.speed)
     ahead = -(others.x * to_x + others.y * to_y) / max(math.hypot(to_x, to_y), 1e-6)
     share = min(max(1.0 - (ahead - g.ahead) / max(g.stop - g.ahead, 1e-6), _BACK), 1.0)
@@ -141,15 +141,15 @@ def _leading(w: int, i: int, others: Others, g: LeaderFollowerGains, kept: Surro
 @compiled
 def _act(
     leads: Float32, worlds: Bool, period: float, g: LeaderFollowerGains, barrier: Barrier, limits: Limits, gain: float,
-    kept: Surroundings, planes: Float64, action: Float32,
+    memory: Surroundings, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle; ``leads`` has shape (world, vehicle, 1)."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
-            if worlds[w] and kept.begun[w, i] > 0.0:
-                others = remembered(w, i, g, kept)
-                wish = _leading(w, i, others, g, kept) if leads[w, i, 0] > 0.0 else _following(others, g)
-                w_x, w_y = pushed(wish[0], wish[1], w, i, g.push, g.push_range, kept)
-                w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
-                num = planes_of(w, i, period, barrier, kept, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)
+            if worlds[w] and memory.begun[w, i] > 0.0:
+                others = remembered(w, i, g, memory)
+                desired = _leading(w, i, others, g, memory) if leads[w, i, 0] > 0.0 else _following(others, g)
+                w_x, w_y = pushed(desired[0], desired[1], w, i, g.push, g.push_range, memory)
+                w_x, w_y = modulated(w_x, w_y, w, i, barrier, memory)
+                num = planes_of(w, i, period, barrier, memory, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, memory, action)

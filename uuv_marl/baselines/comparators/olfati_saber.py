@@ -63,7 +63,7 @@ class OlfatiSaberGains(NamedTuple):
 class OlfatiSaber(Policy):
     """Olfati-Saber's flocking without alignment: lattice, obstacles and navigation, from positions alone."""
 
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
     tuned_as: ClassVar[str] = "olfati_saber"
 
@@ -170,8 +170,8 @@ def _act(flat: Float32, at: Starts, g: OlfatiSaberGains, limits: Limits, centres
 def _alpha(w: int, i: int, see: Fields, g: OlfatiSaberGains) -> tuple[float, float]:
     """Force [N] from neighbours: the lattice, and alignment where their velocities are told."""
     u, v, f_x, f_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0.0, 0.0
-    for k in range(see.heard.shape[2]):
-        if see.heard[w, i, k] == 0.0:
+    for k in range(see.detected.shape[2]):
+        if see.detected[w, i, k] == 0.0:
             continue
         p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         distance = max(math.hypot(p_x, p_y), 1e-6)

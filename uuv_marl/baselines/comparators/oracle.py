@@ -50,8 +50,8 @@ class OracleGains(NamedTuple):
 class Oracle(Policy):
     """Sees the map of hard_water and follows a shortest way: no contender, the proof that each map can be passed."""
 
-    channels: ClassVar[tuple[str, ...]] = ("way", "link")
-    wishes_force: ClassVar[bool] = True
+    channels: ClassVar[tuple[str, ...]] = ("path", "link")
+    outputs_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OracleGains | None = None) -> None:
@@ -62,24 +62,24 @@ class Oracle(Policy):
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         flat = self.flat(percept)
-        way, walls = percept["way"], percept["way_walls"]
-        length = percept["way_length"] * (percept["way_turn"] if "way_turn" in self.layout.starts else 1.0)
+        path, walls = percept["path"], percept["path_walls"]
+        length = percept["path_length"] * (percept["right_of_way"] if "right_of_way" in self.layout.starts else 1.0)
         planes = np.zeros((walls.shape[2] + self.scenario.sonar.num_sectors, 3))
         action = np.empty((*flat.shape[:2], 2), np.float32)
-        _act(flat, self.at, way, length, walls, self.gains, self.limits, self._gain, planes, action)
+        _act(flat, self.at, path, length, walls, self.gains, self.limits, self._gain, planes, action)
         return action
 
 
 @compiled
 def _act(
-    flat: Float32, at: Starts, way: Float32, length: Float32, walls: Float32, g: OracleGains, limits: Limits,
+    flat: Float32, at: Starts, path: Float32, length: Float32, walls: Float32, g: OracleGains, limits: Limits,
     gain: float, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle; ``planes`` is room for half-planes of velocities."""
     see, most = fields(flat, at), full_speed(limits)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            x, y = float(way[w, i, 0]), float(way[w, i, 1])
+            x, y = float(path[w, i, 0]), float(path[w, i, 1])
             pace = min(g.speed, g.slow * length[w, i, 0]) / max(math.hypot(x, y), 1e-6)
             firm = _keep_off_walls(walls[w, i], most, g, planes)
             p_x, p_y, num = _keep_apart(w, i, see, x, y, most, g, planes, firm)
@@ -111,10 +111,10 @@ def _keep_apart(
         The push away from them [m/s], and how many planes there are then.
     """
     p_x, p_y, ahead = 0.0, 0.0, math.hypot(x, y)
-    for k in range(see.heard.shape[2]):
+    for k in range(see.detected.shape[2]):
         n_x, n_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         away = math.hypot(n_x, n_y)
-        if see.heard[w, i, k] == 0.0 or away == 0.0:
+        if see.detected[w, i, k] == 0.0 or away == 0.0:
             continue
         first = math.hypot(x - n_x, y - n_y) < ahead
         n_x, n_y = n_x / away, n_y / away

@@ -49,7 +49,7 @@ class OrcaInformed(Policy):
         gains: instead of the tuned ones.
     """
 
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = ("link",)
     yaw_damping_nms: ClassVar[float] = 600.0
 
@@ -162,8 +162,8 @@ def _neighbours(w: int, i: int, see: Fields, g: OrcaGains, period: float, planes
     on.
     """
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
-    for k in range(see.heard.shape[2]):
-        if see.heard[w, i, k] == 0.0:
+    for k in range(see.detected.shape[2]):
+        if see.detected[w, i, k] == 0.0:
             continue
         v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
         if see.link_identity[w, i, k] >= 1.0:

@@ -38,10 +38,10 @@ class Actor(Policy):
         self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
-        self.declare_as(card)
+        self.copy_requirements(card)
         self.axes = {"unit": card.network.hidden[-1]}
         super().__init__(scenario, num_worlds)
-        need_same(self, card, any_vehicle)
+        check_same_training(self, card, any_vehicle)
         self._seeing = observation_layout(scenario, "closeness")
         self._network = Network(card.network, card.sizes, checkpoint.tensors, NumpyOps)
 
@@ -95,10 +95,10 @@ def bound(action: Float32, disc: bool) -> None:
 
 def in_disc(policy: Policy) -> bool:
     """Whether what a policy decides is a force, in the unit disc; else thrust and rudder, each up to 1."""
-    return policy.wishes_force or policy.scenario.actuators.kind != "rudder"
+    return policy.outputs_force or policy.scenario.actuators.kind != "rudder"
 
 
-def need_same(policy: Policy, card: Card, any_vehicle: bool) -> None:
+def check_same_training(policy: Policy, card: Card, any_vehicle: bool) -> None:
     """Raise an error for a scenario that differs from the training's.
 
     Args:

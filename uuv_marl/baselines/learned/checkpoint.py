@@ -61,8 +61,8 @@ def vehicle_of(scenario: Scenario) -> dict[str, float | str]:
         if not field.is_required()
     }
     every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
-    kept = {field: value for field, value in every.items() if field not in usual or value != usual[field]}
-    return {field: value for field, value in kept.items() if field not in _NOT_THE_VEHICLE}
+    fields = {field: value for field, value in every.items() if field not in usual or value != usual[field]}
+    return {field: value for field, value in fields.items() if field not in _NOT_THE_VEHICLE}
 
 
 class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -73,11 +73,11 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """What the network is made of."""
     filter: bool = False
     """Whether its actions pass the safety filter."""
-    around: str = ""
+    base_controller: str = ""
     """Name of the law to whose actions its own are added, if any."""
     percept: tuple[Row, ...]
     """Name, size, unit and scale of every row of the observation as ``closeness``, which the network is given."""
-    decides_every_s: pydantic.PositiveFloat
+    decision_period_s: pydantic.PositiveFloat
     """Between decisions, in training as in use [s]."""
     yaw_damping_nms: float
     """Inner loop that it was trained with [N m s]."""
@@ -96,7 +96,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     @property
     def policy_class(self) -> str:
         """What decides beside the network: nothing, the filter, a law."""
-        if self.around:
+        if self.base_controller:
             return "around a law"
         return "end to end + filter" if self.filter else "end to end"
 
@@ -106,7 +106,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
         return float(self.vehicle.get("actuators.max_torque_nm", Policy.full_torque_nm))
 
     @property
-    def wishes_force(self) -> bool:
+    def outputs_force(self) -> bool:
         """Whether its actions are forces: where that vehicle has no rudder."""
         return self.vehicle.get("actuators.kind") != "rudder"
 
@@ -130,7 +130,7 @@ def card_rows(scenario: Scenario) -> tuple[Row, ...]:
 def card_of(scenario: Scenario, **more: Any) -> Card:
     """The card of a network that was trained on a scenario; ``more`` are its other fields."""
     return Card(
-        percept=card_rows(scenario), decides_every_s=scenario.timing.decision_period_s,
+        percept=card_rows(scenario), decision_period_s=scenario.timing.decision_period_s,
         yaw_damping_nms=scenario.actuators.yaw_damping_nms, channels=scenario.sonar.channels,
         vehicle=vehicle_of(scenario), **more,
     )  # fmt: skip
@@ -170,13 +170,13 @@ def load_checkpoint(path: UserPath) -> Checkpoint:
         tensors: dict[str, NDArray[Any]] = safetensors.numpy.load(data)
         header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
         card = Card.model_validate_json(header.get("__metadata__", {}).get(_CARD, "null"))
-        made = Checkpoint(card, tensors, hashlib.sha256(data).hexdigest()[:16])
-        _check(made)
+        checkpoint = Checkpoint(card, tensors, hashlib.sha256(data).hexdigest()[:16])
+        _check(checkpoint)
     except (ValueError, KeyError, safetensors.SafetensorError) as error:
         raise PolicyError(
             f"{file} holds no policy of uuv_marl ({_reason(error)}); give a folder that uuv-marl train wrote"
         ) from None
-    return made
+    return checkpoint
 
 
 def _reason(error: Exception) -> str:
@@ -188,9 +188,9 @@ def _reason(error: Exception) -> str:
     return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
-def _check(made: Checkpoint) -> None:
+def _check(checkpoint: Checkpoint) -> None:
     """Raises ValueError that names what can't be run."""
-    card, tensors = made.card, made.tensors
+    card, tensors = checkpoint.card, checkpoint.tensors
     for name, shape in shapes(card.network, card.sizes).items():
         array = tensors[name]
         if array.dtype != np.float32 or array.shape != shape:

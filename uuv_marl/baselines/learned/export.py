@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import with_policy_requirements, make
 from uuv_marl.baselines.learned.actor import Actor, in_disc
 from uuv_marl.baselines.learned.layers import Network
 from uuv_marl.baselines.policy import PolicyError
@@ -45,22 +45,22 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
         ResultsError: the file can't be written.
     """
     path = user_path(path)
-    made = make(policy, granted(policy, scenario))
-    if not isinstance(made, Actor):
+    actor = make(policy, with_policy_requirements(policy, scenario))
+    if not isinstance(actor, Actor):
         raise PolicyError(
             f"policy {policy!r} can't be exported: ONNX holds networks end to end, not laws, filters, or networks "
             "around a law. Export a checkpoint of a training without filter and law; run this "
             "policy with uuv_marl.baselines.make"
         )
     graph = Graph()
-    network = Network(made.checkpoint.card.network, made.checkpoint.card.sizes, made.checkpoint.tensors, graph)
+    network = Network(actor.checkpoint.card.network, actor.checkpoint.card.sizes, actor.checkpoint.tensors, graph)
     z, state = network.features(Value(graph, "observation")), None
-    if network.made.memory:
+    if network.architecture.memory:
         state = graph("Identity", network.step(network.gates(z), Value(graph, "state")), name="next_state")
     clipped = graph("Clip", network.output(z, state), np.float32(-1.0), np.float32(1.0))
-    longest = graph("ReduceL2", clipped, np.array([-1])) if in_disc(made) else np.float32(1.0)
+    longest = graph("ReduceL2", clipped, np.array([-1])) if in_disc(actor) else np.float32(1.0)
     graph("Div", clipped, graph("Max", longest, np.float32(1.0)), name="action")
-    model = _model(made, graph)
+    model = _model(actor, graph)
     onnx.checker.check_model(model, full_check=True)  # pyright: ignore[reportUnknownMemberType] - of a path
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -79,7 +79,7 @@ def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
         units_of = checkpoint.card.network.hidden[-1]
         takes.append(_tensor("state", units_of, "What was remembered; zeros at an episode's start."))
         gives.append(_tensor("next_state", units_of, "What is remembered."))
-    damping, period = policy.scenario.actuators.yaw_damping_nms, checkpoint.card.decides_every_s
+    damping, period = policy.scenario.actuators.yaw_damping_nms, checkpoint.card.decision_period_s
     opset = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(
         helper.make_graph(graph.nodes, "policy", takes, gives, graph.constants),
@@ -90,13 +90,13 @@ def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
         f"beside an inner loop with a yaw damping of {damping:g} N m s.",
     )
     limits = json.dumps(policy.limits._asdict())
-    said = {"limits": limits, "card": checkpoint.card.model_dump_json(), "checkpoint": checkpoint.digest}
-    helper.set_model_props(model, said)
+    metadata = {"limits": limits, "card": checkpoint.card.model_dump_json(), "checkpoint": checkpoint.digest}
+    helper.set_model_props(model, metadata)
     return model
 
 
-def _tensor(name: str, size: int, told: str) -> onnx.ValueInfoProto:
-    return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["vehicle", size], told)
+def _tensor(name: str, size: int, description: str) -> onnx.ValueInfoProto:
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["vehicle", size], description)
 
 
 class Graph:

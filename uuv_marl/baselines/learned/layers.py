@@ -50,26 +50,26 @@ def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
     return sectors, np.concatenate(rest)
 
 
-def shapes(made: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...]]:
+def shapes(architecture: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...]]:
     """Shape of each tensor of a network for such observations, by name; weights are (in, out)."""
-    width, found = sum(size for _, size in sizes), dict[str, tuple[int, ...]]()
-    if made.kind == "sectors":
+    width, tensor_shapes = sum(size for _, size in sizes), dict[str, tuple[int, ...]]()
+    if architecture.kind == "sectors":
         sectors, rest = columns(sizes)
         width = len(rest) + ENCODED * len(sectors)
         for kind, entries in sectors.items():
             num, size = entries.shape
-            found |= {f"{kind}.weight": (size, ENCODED), f"{kind}.place": (num, ENCODED)}
-    elif made.kind == "moments":
+            tensor_shapes |= {f"{kind}.weight": (size, ENCODED), f"{kind}.place": (num, ENCODED)}
+    elif architecture.kind == "moments":
         width += 2 * _POWERS * len(columns(sizes)[0])
-    if made.memory:
-        units = made.hidden[-1]
-        found |= {"gru.weight": (width, 3 * units), "gru.bias": (3 * units,)}
-        found |= {"gru.state_weight": (units, 3 * units), "gru.state_bias": (3 * units,)}
+    if architecture.memory:
+        units = architecture.hidden[-1]
+        tensor_shapes |= {"gru.weight": (width, 3 * units), "gru.bias": (3 * units,)}
+        tensor_shapes |= {"gru.state_weight": (units, 3 * units), "gru.state_bias": (3 * units,)}
         width += units
-    for k, units in enumerate((*made.hidden, 2)):
-        found |= {f"{k}.weight": (width, units), f"{k}.bias": (units,)}
+    for k, units in enumerate((*architecture.hidden, 2)):
+        tensor_shapes |= {f"{k}.weight": (width, units), f"{k}.bias": (units,)}
         width = units
-    return found
+    return tensor_shapes
 
 
 class Network:
@@ -83,15 +83,15 @@ class Network:
             ``relu``, and ``total`` over the middle axis; see ``NumpyOps``.
     """
 
-    def __init__(self, made: Architecture, sizes: Sizes, tensors: Mapping[str, Any], ops: Any) -> None:
-        self.made, self._tensors, self._ops = made, tensors, ops
+    def __init__(self, architecture: Architecture, sizes: Sizes, tensors: Mapping[str, Any], ops: Any) -> None:
+        self.architecture, self._tensors, self._ops = architecture, tensors, ops
         self._sectors, self._rest = columns(sizes)
 
     def features(self, x: Any) -> Any:
         """What the layers see of observations (row, entry): the same, also with moments, or sub-sectors encoded."""
-        if self.made.kind == "mlp":
+        if self.architecture.kind == "mlp":
             return x
-        if self.made.kind == "moments":
+        if self.architecture.kind == "moments":
             return self._ops.joined([x, *self._moments(x)])
         ops, parts = self._ops, [self._ops.take(x, self._rest)]
         for kind, entries in self._sectors.items():
@@ -107,9 +107,9 @@ class Network:
         ops = self._ops
         for entries in self._sectors.values():
             near = ops.shaped(ops.take(x, entries[:, 0]), (-1, len(entries), 1))
-            way = ops.shaped(ops.take(x, entries[:, 1:3].reshape(-1)), (-1, len(entries), 2))
+            directions = ops.shaped(ops.take(x, entries[:, 1:3].reshape(-1)), (-1, len(entries), 2))
             square = near * near
-            yield from (ops.total(each) for each in (way, near * way, square * way, square * square * way))
+            yield from (ops.total(each) for each in (directions, near * directions, square * directions, square * square * directions))
 
     def gates(self, z: Any) -> Any:
         """What features (row, entry) tell the recurrent layer, shape (row, 3 x unit)."""
@@ -120,13 +120,13 @@ class Network:
         ops = self._ops
         own = ops.dense(state, self._tensors["gru.state_weight"], self._tensors["gru.state_bias"])
         (r, k, n), (own_r, own_k, own_n) = ops.parts(gates), ops.parts(own)
-        kept = ops.sigmoid(k + own_k)
+        weighted_state = ops.sigmoid(k + own_k)
         new = ops.tanh(n + ops.sigmoid(r + own_r) * own_n)
-        return new + kept * (state - new)
+        return new + weighted_state * (state - new)
 
     def output(self, z: Any, state: Any = None) -> Any:
         """The action before its bounds, shape (row, 2), of features and the recurrent layer's state, if any."""
-        x, last = z if state is None else self._ops.joined([z, state]), len(self.made.hidden)
+        x, last = z if state is None else self._ops.joined([z, state]), len(self.architecture.hidden)
         for k in range(last + 1):
             x = self._ops.dense(x, self._tensors[f"{k}.weight"], self._tensors[f"{k}.bias"])
             x = self._ops.tanh(x) if k < last else x

@@ -36,9 +36,9 @@ class Trained:
         return self.checkpoint.card.yaw_damping_nms
 
     @property
-    def decides_every_s(self) -> float:
+    def decision_period_s(self) -> float:
         """Period between decisions in the training [s]."""
-        return self.checkpoint.card.decides_every_s
+        return self.checkpoint.card.decision_period_s
 
     @property
     def full_torque_nm(self) -> float:

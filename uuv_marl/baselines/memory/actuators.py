@@ -33,13 +33,13 @@ _LEAST, _MOST = 0.05, 1.5
 
 
 @compiled
-def identify(w: int, i: int, axis: int, asked: float, off: float, period: float, kept: Surroundings) -> None:
+def identify(w: int, i: int, axis: int, asked: float, off: float, period: float, memory: Surroundings) -> None:
     """Take what one period showed of a component into the estimate.
 
     ``asked`` is the share with the inner loop's, ``off`` by how much more the motion shows, as a share of full thrust
     or torque.
     """
-    at = kept.actuators[w, i, axis]
+    at = memory.actuators[w, i, axis]
     f, g, h = at[ACTED] - at[ACTED_BEFORE], asked - at[ASKED], at[ASKED] - at[ASKED_BEFORE]
     y = off - (at[ACTED] - at[ASKED])
     share = max(1.0 - period / _KEPT_S, 0.0)
@@ -57,12 +57,12 @@ def identify(w: int, i: int, axis: int, asked: float, off: float, period: float,
 
 
 @compiled
-def answer(w: int, i: int, axis: int, kept: Surroundings) -> tuple[float, float, float]:
+def answer(w: int, i: int, axis: int, memory: Surroundings) -> tuple[float, float, float]:
     """What remains of a difference after a period, e; the share of what is asked that comes, s, and that comes at once.
 
     They are 0, 1 and 1 at first.
     """
-    at = kept.actuators[w, i, axis]
+    at = memory.actuators[w, i, axis]
     d_0 = at[SQUARES] + _NOTHING  # L D L' of the sums
     l_1, l_2 = at[SQUARES + 1] / d_0, at[SQUARES + 2] / d_0
     d_1 = at[SQUARES + 3] + _NOTHING - l_1 * at[SQUARES + 1]
@@ -79,15 +79,15 @@ def answer(w: int, i: int, axis: int, kept: Surroundings) -> tuple[float, float,
 
 
 @compiled
-def lead(w: int, i: int, axis: int, wanted: float, share: float, kept: Surroundings) -> float:
+def lead(w: int, i: int, axis: int, wanted: float, share: float, memory: Surroundings) -> float:
     """What to ask of a component so that what is wanted acts at the end of the period: the answer, inverted.
 
     It counts as far as less than all comes at once. Where all does, a slowly changing current looks like a lag.
     ``wanted`` is a share with the inner loop's. Of the change ``share`` is made: 0 asks for what is wanted, 1 for what
     makes up for lag and weakness.
     """
-    at = kept.actuators[w, i, axis]
-    e, s, at_once = answer(w, i, axis, kept)
+    at = memory.actuators[w, i, axis]
+    e, s, at_once = answer(w, i, axis, memory)
     m = (1.0 + 4.0 * math.sqrt(e) + e) / 6.0  # Simpson's rule for the mean of exp(-t / T)
     acts = s * at[ASKED] + (at[ACTED] - s * at[ASKED]) * e / m
     asked = (wanted - e * acts) / max(s * (1.0 - e), 1.0 - _LONGEST)

@@ -70,60 +70,60 @@ def deviation(reach: float) -> float:
 
 
 @compiled
-def holds(a: int, x: float, y: float, sectors: ActiveSectors) -> bool:
+def contains(a: int, x: float, y: float, sectors: ActiveSectors) -> bool:
     """Whether a direction, ahead and to starboard, lies in an active sub-sector."""
     lower, upper = sectors.lower, sectors.upper
     return cross(lower[a, 0], lower[a, 1], x, y) > 0.0 and cross(upper[a, 0], upper[a, 1], x, y) <= 0.0
 
 
 @compiled
-def update_discs(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
+def update_discs(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
     """Take a vehicle's echoes into its discs, and forget those that should have been heard and were not."""
-    unheard = kept.unheard[w, i]
-    for d in range(unheard.shape[0]):
-        unheard[d] += sectors.period_s
+    undetected = memory.undetected[w, i]
+    for d in range(undetected.shape[0]):
+        undetected[d] += sectors.period_s
     for a in range(see.echo.shape[2]):
         if see.echo[w, i, a] > 0.0:
-            d = owner(w, i, a, see, sectors, kept)
+            d = owner(w, i, a, see, sectors, memory)
             if d >= 0:
-                _hear(w, i, d, a, see, sectors, kept)
+                _update_disc(w, i, d, a, see, sectors, memory)
     for _ in range(see.echo.shape[2]):  # what is left belongs to obstacles that are new
-        a = _nearest_unexplained(w, i, see, sectors, kept)
+        a = _nearest_unexplained(w, i, see, sectors, memory)
         if a < 0:
             break
-        d = _free_row(w, i, kept)
-        _begin(w, i, d, a, see, sectors, kept)
+        d = _free_row(w, i, memory)
+        _begin(w, i, d, a, see, sectors, memory)
         for b in range(see.echo.shape[2]):
-            if b != a and see.echo[w, i, b] > 0.0 and owner(w, i, b, see, sectors, kept) == d:
-                _hear(w, i, d, b, see, sectors, kept)
-    _lower_scores(w, i, see, sectors, kept)
-    _merge(w, i, sectors, kept)
+            if b != a and see.echo[w, i, b] > 0.0 and owner(w, i, b, see, sectors, memory) == d:
+                _update_disc(w, i, d, b, see, sectors, memory)
+    _lower_scores(w, i, see, sectors, memory)
+    _merge(w, i, sectors, memory)
 
 
 @compiled
-def _nearest_unexplained(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
+def _nearest_unexplained(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> int:
     """The active sub-sector of the nearest echo that no disc explains, -1 for none. Arguments: ``update_discs``."""
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):
-        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and not _explained(w, i, a, see, sectors, kept):
+        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and not _explained(w, i, a, see, sectors, memory):
             nearest, reach = a, see.echo_range[w, i, a]
     return nearest
 
 
 @compiled
-def _explained(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> bool:
+def _explained(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> bool:
     """Whether an echo belongs to a disc which, now that it is corrected, has the echo on its surface.
 
     Two obstacles of which one point each is heard may be taken for one, until no disc fits both. Arguments as for
     ``owner``.
     """
-    d = owner(w, i, a, see, sectors, kept)
+    d = owner(w, i, a, see, sectors, memory)
     if d < 0 or sectors.centres:
         return d >= 0
     x, y = surface_point(w, i, a, see, sectors)
-    x, y = to_map(x, y, kept.pose[w, i])
-    away = math.hypot(x - kept.disc[w, i, d, 0], y - kept.disc[w, i, d, 1])
-    return abs(away - kept.disc[w, i, d, 2]) <= GATE * deviation(float(see.echo_range[w, i, a])) + 0.5
+    x, y = to_map(x, y, memory.pose[w, i])
+    away = math.hypot(x - memory.disc[w, i, d, 0], y - memory.disc[w, i, d, 1])
+    return abs(away - memory.disc[w, i, d, 2]) <= GATE * deviation(float(see.echo_range[w, i, a])) + 0.5
 
 
 @compiled
@@ -139,28 +139,28 @@ def surface_point(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors) -
     if away < 1e-6:
         return 0.0, 0.0
     e_x, e_y = x / away, y / away
-    if not holds(a, e_x, e_y, sectors):
+    if not contains(a, e_x, e_y, sectors):
         l_x, l_y, u_x, u_y = sectors.lower[a, 0], sectors.lower[a, 1], sectors.upper[a, 0], sectors.upper[a, 1]
         e_x, e_y = (l_x, l_y) if l_x * e_x + l_y * e_y > u_x * e_x + u_y * e_y else (u_x, u_y)
     return reach * e_x, reach * e_y
 
 
 @compiled
-def centre_of(w: int, i: int, a: int, see: Fields, kept: Surroundings) -> tuple[float, float]:
+def centre_of(w: int, i: int, a: int, see: Fields, memory: Surroundings) -> tuple[float, float]:
     """The centre that an echo reports, in the map [m]. Arguments as for ``owner``."""
-    return to_map(float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1]), kept.pose[w, i])
+    return to_map(float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1]), memory.pose[w, i])
 
 
 @compiled
-def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> int:
+def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> int:
     """The disc that an echo belongs to, -1 for none: the one whose surface it misses least."""
     x, y = surface_point(w, i, a, see, sectors)
-    x, y = to_map(x, y, kept.pose[w, i])
+    x, y = to_map(x, y, memory.pose[w, i])
     sd = deviation(float(see.echo_range[w, i, a]))
     best, least = -1, math.inf
-    for d in range(kept.score.shape[2]):
-        if kept.score[w, i, d] > 0.0:
-            disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
+    for d in range(memory.score.shape[2]):
+        if memory.score[w, i, d] > 0.0:
+            disc, p = memory.disc[w, i, d], memory.spread[w, i, d]
             dx, dy = x - disc[0], y - disc[1]
             away = max(math.hypot(dx, dy), 1e-6)
             h_x, h_y = -dx / away, -dy / away
@@ -169,7 +169,7 @@ def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, kept: Sur
             )
             miss = abs(away - disc[2])
             if sectors.centres:
-                c_x, c_y = centre_of(w, i, a, see, kept)
+                c_x, c_y = centre_of(w, i, a, see, memory)
                 miss, variance = math.hypot(c_x - disc[0], c_y - disc[1]), p[0] + p[3] + 2.0 * sd * sd
             if miss <= GATE * math.sqrt(variance) + 0.5 and miss < least:
                 best, least = d, miss
@@ -195,36 +195,36 @@ def correct(disc: Float64, p: Float64, h: tuple[float, float, float], wrong: flo
 
 
 @compiled
-def _correct_centre(w: int, i: int, d: int, a: int, sd: float, see: Fields, kept: Surroundings) -> None:
+def _correct_centre(w: int, i: int, d: int, a: int, sd: float, see: Fields, memory: Surroundings) -> None:
     """Correct a disc by the centre that an echo reports. ``sd``: standard deviation of the centre [m]."""
-    disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
-    x, y = centre_of(w, i, a, see, kept)
+    disc, p = memory.disc[w, i, d], memory.spread[w, i, d]
+    x, y = centre_of(w, i, a, see, memory)
     correct(disc, p, (1.0, 0.0, 0.0), x - disc[0], sd * sd)
     correct(disc, p, (0.0, 1.0, 0.0), y - disc[1], sd * sd)
 
 
 @compiled
-def _hear(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
+def _update_disc(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
     """Correct a disc by one echo. Arguments as for ``owner``; d is the index of the disc."""
-    disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
-    if kept.unheard[w, i, d] > 0.0:  # the first of this decision
-        kept.unheard[w, i, d] = 0.0
-        kept.score[w, i, d] = min(kept.score[w, i, d] + 1.0, sectors.most_score)
+    disc, p = memory.disc[w, i, d], memory.spread[w, i, d]
+    if memory.undetected[w, i, d] > 0.0:  # the first of this decision
+        memory.undetected[w, i, d] = 0.0
+        memory.score[w, i, d] = min(memory.score[w, i, d] + 1.0, sectors.most_score)
         if p[0] + p[3] + p[5] < _MOST_VARIANCE:
             for k in range(6):
                 p[k] *= 1.0 + _FORGETS * sectors.period_s
     x, y = surface_point(w, i, a, see, sectors)
-    x, y = to_map(x, y, kept.pose[w, i])
+    x, y = to_map(x, y, memory.pose[w, i])
     sd = deviation(float(see.echo_range[w, i, a]))
     if sectors.centres:
-        _correct_centre(w, i, d, a, sd, see, kept)
+        _correct_centre(w, i, d, a, sd, see, memory)
     dx, dy = x - disc[0], y - disc[1]
     away = max(math.hypot(dx, dy), 1e-6)
     correct(disc, p, (dx / away, dy / away, 1.0), away - disc[2], sd * sd)
 
 
 @compiled
-def _begin(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
+def _begin(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
     """A new disc behind its nearest echo. Arguments as for ``owner``; d is the index of the disc."""
     x, y = surface_point(w, i, a, see, sectors)
     away = max(math.hypot(x, y), 1e-6)
@@ -233,65 +233,65 @@ def _begin(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, 
     inside = cross(sectors.lower[a, 0], sectors.lower[a, 1], e_x, e_y) > 1e-3
     inside = inside and cross(sectors.upper[a, 0], sectors.upper[a, 1], e_x, e_y) < -1e-3
     across = sd if inside or sectors.centres else SIDE_SD_M
-    c_x, c_y = to_map(x + RADIUS_M * e_x, y + RADIUS_M * e_y, kept.pose[w, i])
-    e_x, e_y = to_map_axes(e_x, e_y, kept.pose[w, i])
-    disc, p = kept.disc[w, i, d], kept.spread[w, i, d]
+    c_x, c_y = to_map(x + RADIUS_M * e_x, y + RADIUS_M * e_y, memory.pose[w, i])
+    e_x, e_y = to_map_axes(e_x, e_y, memory.pose[w, i])
+    disc, p = memory.disc[w, i, d], memory.spread[w, i, d]
     disc[0], disc[1], disc[2] = c_x, c_y, RADIUS_M
     along, side, size = RADIUS_SD_M * RADIUS_SD_M + sd * sd, across * across, RADIUS_SD_M * RADIUS_SD_M
     p[0] = along * e_x * e_x + side * e_y * e_y
     p[1] = (along - side) * e_x * e_y
     p[3] = along * e_y * e_y + side * e_x * e_x
     p[2], p[4], p[5] = size * e_x, size * e_y, size
-    kept.score[w, i, d], kept.unheard[w, i, d] = 1.0, 0.0
+    memory.score[w, i, d], memory.undetected[w, i, d] = 1.0, 0.0
     if sectors.centres:
-        _correct_centre(w, i, d, a, sd, see, kept)
+        _correct_centre(w, i, d, a, sd, see, memory)
 
 
 @compiled
-def _free_row(w: int, i: int, kept: Surroundings) -> int:
+def _free_row(w: int, i: int, memory: Surroundings) -> int:
     """Index for a new disc: a free one, or that of the farthest."""
     farthest, most = 0, -1.0
-    for d in range(kept.score.shape[2]):
-        if kept.score[w, i, d] <= 0.0:
+    for d in range(memory.score.shape[2]):
+        if memory.score[w, i, d] <= 0.0:
             return d
-        away = math.hypot(kept.disc[w, i, d, 0] - kept.pose[w, i, 0], kept.disc[w, i, d, 1] - kept.pose[w, i, 1])
-        if away - kept.disc[w, i, d, 2] > most:
-            farthest, most = d, away - kept.disc[w, i, d, 2]
+        away = math.hypot(memory.disc[w, i, d, 0] - memory.pose[w, i, 0], memory.disc[w, i, d, 1] - memory.pose[w, i, 1])
+        if away - memory.disc[w, i, d, 2] > most:
+            farthest, most = d, away - memory.disc[w, i, d, 2]
     return farthest
 
 
 @compiled
-def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, kept: Surroundings) -> None:
+def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
     """Lower the score of discs that should have been heard and were not. Arguments: ``update_discs``."""
-    for d in range(kept.score.shape[2]):
-        score, unheard = kept.score[w, i, d], kept.unheard[w, i, d]
-        if score <= 0.0 or unheard == 0.0:
+    for d in range(memory.score.shape[2]):
+        score, undetected = memory.score[w, i, d], memory.undetected[w, i, d]
+        if score <= 0.0 or undetected == 0.0:
             continue
         evidence = MOST_SCORE_S * score / sectors.most_score
-        if score < sectors.most_score - 1.0 and unheard > LIFETIME * evidence * evidence:
-            kept.score[w, i, d] = 0.0
+        if score < sectors.most_score - 1.0 and undetected > LIFETIME * evidence * evidence:
+            memory.score[w, i, d] = 0.0
             continue
-        x, y = to_body(kept.disc[w, i, d, 0], kept.disc[w, i, d, 1], kept.pose[w, i])
+        x, y = to_body(memory.disc[w, i, d, 0], memory.disc[w, i, d, 1], memory.pose[w, i])
         away = max(math.hypot(x, y), 1e-6)
-        reach = away - kept.disc[w, i, d, 2]
+        reach = away - memory.disc[w, i, d, 2]
         for a in range(sectors.lower.shape[0]):
-            if holds(a, x, y, sectors) and reach < 0.9 * sectors.range_m[a]:
+            if contains(a, x, y, sectors) and reach < 0.9 * sectors.range_m[a]:
                 if see.echo[w, i, a] == 0.0 or see.echo_range[w, i, a] > reach + 1.0 + 0.1 * away:
-                    kept.score[w, i, d] = score - 1.0
+                    memory.score[w, i, d] = score - 1.0
                 break
 
 
 @compiled
-def _merge(w: int, i: int, sectors: ActiveSectors, kept: Surroundings) -> None:
+def _merge(w: int, i: int, sectors: ActiveSectors, memory: Surroundings) -> None:
     """Forget what overlaps a disc that is heard now and was heard less: half as often, or with its centre inside.
 
     Surfaces alone don't tell which of two that are heard now is wrong: both stay. Arguments as for ``update_discs``.
     """
-    disc, score = kept.disc[w, i], kept.score[w, i]
+    disc, score = memory.disc[w, i], memory.score[w, i]
     for d in range(score.shape[0]):
         for e in range(score.shape[0]):
-            heard = kept.unheard[w, i, d] == 0.0 and not sectors.centres
-            if d != e and not heard and 0.0 < score[d] <= score[e] and kept.unheard[w, i, e] == 0.0:
+            detected_now = memory.undetected[w, i, d] == 0.0 and not sectors.centres
+            if d != e and not detected_now and 0.0 < score[d] <= score[e] and memory.undetected[w, i, e] == 0.0:
                 apart = math.hypot(disc[d, 0] - disc[e, 0], disc[d, 1] - disc[e, 1])
                 weak = score[d] <= 0.5 * score[e] and apart < disc[d, 2] + disc[e, 2]
                 if weak or apart < max(disc[d, 2], disc[e, 2]):

@@ -17,7 +17,7 @@ MANOEUVRES = 0.005
 """Mean error over range that neighbours' manoeuvres make; the rest is the sonar's [1]. Assumed."""
 LEAST_ERROR = 0.0002
 """The sonar's is never taken for smaller than this [1]."""
-KEPT_S = 1.0
+MEMORY_S = 1.0
 """A neighbour that is heard no more is kept for so long where nothing else is said [s]."""
 _FRESH_S = 1.0
 """Neighbours that were heard longer ago do not count in the mean age of readings [s]: they may have gone."""
@@ -45,70 +45,70 @@ def alpha_beta(period: float, deviation: float) -> tuple[float, float]:
 
 
 @compiled
-def noise_of(w: int, i: int, kept: Surroundings) -> float:
+def noise_of(w: int, i: int, memory: Surroundings) -> float:
     """The sonar's mean error of places over range, as a vehicle sees it [1]; 0 where manoeuvres explain all."""
-    return max(kept.error[w, i] - MANOEUVRES, 0.0)
+    return max(memory.error[w, i] - MANOEUVRES, 0.0)
 
 
 @compiled
-def age_of(w: int, i: int, kept: Surroundings) -> float:
+def age_of(w: int, i: int, memory: Surroundings) -> float:
     """Mean time since the latest new reading of each neighbour heard of late [s], 0 where there is none."""
     total, num = 0.0, 0
-    for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] > 0.0 and kept.since[w, i, k] <= _FRESH_S:
-            total, num = total + kept.since[w, i, k], num + 1
+    for k in range(memory.known.shape[2]):
+        if memory.known[w, i, k] > 0.0 and memory.since[w, i, k] <= _FRESH_S:
+            total, num = total + memory.since[w, i, k], num + 1
     return total / max(num, 1)
 
 
 @compiled
-def middle(w: int, i: int, kept: Surroundings) -> tuple[float, float, int]:
+def middle(w: int, i: int, memory: Surroundings) -> tuple[float, float, int]:
     """The mean place of the known neighbours from the vehicle [m], those far away drawn in, and how many they are.
 
     A vehicle in the middle of a swarm has neighbours all round; one at the edge has them on one side, and so can tell
     where the swarm is.
     """
-    x, y, num, pose = 0.0, 0.0, 0, kept.pose[w, i]
-    for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] > 0.0:
-            d_x, d_y = kept.place[w, i, k, 0] - pose[0], kept.place[w, i, k, 1] - pose[1]
-            near = _FAR_M / max(_FAR_M, kept.away[w, i, k])
+    x, y, num, pose = 0.0, 0.0, 0, memory.pose[w, i]
+    for k in range(memory.known.shape[2]):
+        if memory.known[w, i, k] > 0.0:
+            d_x, d_y = memory.place[w, i, k, 0] - pose[0], memory.place[w, i, k, 1] - pose[1]
+            near = _FAR_M / max(_FAR_M, memory.away[w, i, k])
             x, y, num = x + near * d_x, y + near * d_y, num + 1
     return x / max(num, 1), y / max(num, 1), num
 
 
 @compiled
-def update_neighbours(w: int, i: int, see: Fields, period: float, kept_s: float, kept: Surroundings) -> None:
+def update_neighbours(w: int, i: int, see: Fields, period: float, memory_s: float, memory: Surroundings) -> None:
     """Take the neighbours that a vehicle hears into those it knows."""
-    known, since, place, velocity = kept.known[w, i], kept.since[w, i], kept.place[w, i], kept.velocity[w, i]
+    known, since, place, velocity = memory.known[w, i], memory.since[w, i], memory.place[w, i], memory.velocity[w, i]
     for k in range(known.shape[0]):
         if known[k] > 0.0:
             since[k] += period
             place[k, 0] += period * velocity[k, 0]
             place[k, 1] += period * velocity[k, 1]
             known[k] = -known[k]  # not heard yet
-    for s in range(see.heard.shape[2]):
-        if see.heard[w, i, s] > 0.0:
+    for s in range(see.detected.shape[2]):
+        if see.detected[w, i, s] > 0.0:
             p_x, p_y = float(see.neighbour[w, i, s, 0]), float(see.neighbour[w, i, s, 1])
-            x, y = to_map(p_x, p_y, kept.pose[w, i])
+            x, y = to_map(p_x, p_y, memory.pose[w, i])
             reach = math.hypot(p_x, p_y)
-            k = _match(x, y, reach, w, i, kept)
+            k = _match(x, y, reach, w, i, memory)
             if k >= 0:
-                _follow(w, i, k, x, y, reach, kept)
-            elif not _is_heard(x, y, w, i, kept):
-                _meet(w, i, x, y, kept)
+                _follow(w, i, k, x, y, reach, memory)
+            elif not _is_detected(x, y, w, i, memory):
+                _meet(w, i, x, y, memory)
     for k in range(known.shape[0]):
         if known[k] < 0.0:
-            known[k] = 0.0 if since[k] > kept_s else -known[k]
+            known[k] = 0.0 if since[k] > memory_s else -known[k]
 
 
 @compiled
-def _match(x: float, y: float, reach: float, w: int, i: int, kept: Surroundings) -> int:
+def _match(x: float, y: float, reach: float, w: int, i: int, memory: Surroundings) -> int:
     """Index of the known neighbour that is expected nearest to where one is heard, -1 for none within the gate.
 
     x and y are where one is heard, in the map [m], ``reach`` is its range [m].
     """
     gate = GATE_M + GATE_SHARE * reach
-    best, least, known, place = -1, gate * gate, kept.known[w, i], kept.place[w, i]
+    best, least, known, place = -1, gate * gate, memory.known[w, i], memory.place[w, i]
     for k in range(known.shape[0]):
         dx, dy = x - place[k, 0], y - place[k, 1]
         squared = dx * dx + dy * dy
@@ -118,49 +118,49 @@ def _match(x: float, y: float, reach: float, w: int, i: int, kept: Surroundings)
 
 
 @compiled
-def _is_heard(x: float, y: float, w: int, i: int, kept: Surroundings) -> bool:
+def _is_detected(x: float, y: float, w: int, i: int, memory: Surroundings) -> bool:
     """Whether another sub-sector, which overlaps, has heard the same at this decision. Arguments as for ``_match``."""
-    for k in range(kept.known.shape[2]):
-        dx, dy = x - kept.reading[w, i, k, 0], y - kept.reading[w, i, k, 1]
-        if dx * dx + dy * dy < _SAME_M * _SAME_M and kept.known[w, i, k] > 0.0:
+    for k in range(memory.known.shape[2]):
+        dx, dy = x - memory.reading[w, i, k, 0], y - memory.reading[w, i, k, 1]
+        if dx * dx + dy * dy < _SAME_M * _SAME_M and memory.known[w, i, k] > 0.0:
             return True
     return False
 
 
 @compiled
-def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, kept: Surroundings) -> None:
+def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, memory: Surroundings) -> None:
     """Correct a known neighbour by a reading. x, y and ``reach`` as for ``_match``."""
-    place, velocity, last = kept.place[w, i, k], kept.velocity[w, i, k], kept.reading[w, i, k]
-    kept.known[w, i, k] = 1.0 - kept.known[w, i, k]
-    since = kept.since[w, i, k]
+    place, velocity, last = memory.place[w, i, k], memory.velocity[w, i, k], memory.reading[w, i, k]
+    memory.known[w, i, k] = 1.0 - memory.known[w, i, k]
+    since = memory.since[w, i, k]
     if math.hypot(x - last[0], y - last[1]) < _SAME_M and since < _STALE_S:
         return
     dx, dy = x - place[0], y - place[1]
     error = math.hypot(dx, dy) / max(reach, 1.0)
-    kept.error[w, i] += _LEARNS * (error - kept.error[w, i])
-    alpha, beta = alpha_beta(since, max(noise_of(w, i, kept), LEAST_ERROR) * max(reach, 1.0))
+    memory.error[w, i] += _LEARNS * (error - memory.error[w, i])
+    alpha, beta = alpha_beta(since, max(noise_of(w, i, memory), LEAST_ERROR) * max(reach, 1.0))
     place[0], place[1] = place[0] + alpha * dx, place[1] + alpha * dy
     velocity[0], velocity[1] = velocity[0] + beta * dx / since, velocity[1] + beta * dy / since
     last[0], last[1] = x, y
-    kept.since[w, i, k] = 0.0
+    memory.since[w, i, k] = 0.0
 
 
 @compiled
-def _meet(w: int, i: int, x: float, y: float, kept: Surroundings) -> None:
+def _meet(w: int, i: int, x: float, y: float, memory: Surroundings) -> None:
     """Know a new neighbour, believed to move as l(t) does; where there is no room, that heard the longest ago goes.
 
     x and y as for ``_match``.
     """
     best, most = 0, -1.0
-    for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] == 0.0:
+    for k in range(memory.known.shape[2]):
+        if memory.known[w, i, k] == 0.0:
             best = k
             break
-        if kept.known[w, i, k] < 0.0 and kept.since[w, i, k] > most:
-            best, most = k, kept.since[w, i, k]
-    speed = kept.reference_speed[w, i]
-    kept.place[w, i, best, 0], kept.place[w, i, best, 1] = x, y
-    kept.reading[w, i, best, 0], kept.reading[w, i, best, 1] = x, y
-    kept.velocity[w, i, best, 0] = speed * kept.reference[w, i, 2]
-    kept.velocity[w, i, best, 1] = speed * kept.reference[w, i, 3]
-    kept.known[w, i, best], kept.since[w, i, best] = 1.0, 0.0
+        if memory.known[w, i, k] < 0.0 and memory.since[w, i, k] > most:
+            best, most = k, memory.since[w, i, k]
+    speed = memory.reference_speed[w, i]
+    memory.place[w, i, best, 0], memory.place[w, i, best, 1] = x, y
+    memory.reading[w, i, best, 0], memory.reading[w, i, best, 1] = x, y
+    memory.velocity[w, i, best, 0] = speed * memory.reference[w, i, 2]
+    memory.velocity[w, i, best, 1] = speed * memory.reference[w, i, 3]
+    memory.known[w, i, best], memory.since[w, i, best] = 1.0, 0.0

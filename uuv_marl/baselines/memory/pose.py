@@ -29,11 +29,11 @@ _TURN_TOLERANCE = 0.001
 """Compass and dead reckoning may differ by this on a leg, beside what the yaw rate's error makes of it [rad]."""
 
 
-class Reckoning(NamedTuple):
+class DeadReckoning(NamedTuple):
     """What a vehicle knows of its own motion between two decisions."""
 
     plant: Plant
-    holds: int
+    control_steps: int
     """Control holds of a decision."""
     steps: int
     """Integration steps of a hold."""
@@ -47,13 +47,13 @@ class Reckoning(NamedTuple):
     """Yaw rate that torque gives so, or a rudder at l(t)'s speed [rad/s]."""
 
     @staticmethod
-    def of(scenario: Scenario) -> "Reckoning":
+    def of(scenario: Scenario) -> "DeadReckoning":
         """That of a scenario's vehicle, undisturbed."""
         timing, still, going = scenario.timing, np.zeros(3), np.zeros(3)
         if scenario.actuators.kind == "rudder":  # which does nothing at rest
             going[0] = scenario.trajectory.speed_mps
-        own = Reckoning(
-            plant(scenario), timing.holds_per_decision, timing.steps_per_hold, timing.integration_step_s,
+        own = DeadReckoning(
+            plant(scenario), timing.control_steps_per_decision, timing.integration_steps_per_control_step, timing.integration_step_s,
             timing.decision_period_s, 1.0, 1.0,
         )  # fmt: skip
         surge = reckoned(still, np.array([_TENTH, 0.0]), own)[3] / _TENTH
@@ -61,13 +61,13 @@ class Reckoning(NamedTuple):
 
 
 @compiled
-def reckoned(motion: Float64, action: Float64 | Float32, own: Reckoning) -> State6:
+def reckoned(motion: Float64, action: Float64 | Float32, own: DeadReckoning) -> State6:
     """The state after one decision [m, rad, m/s, rad/s], from the origin ahead, in still water.
 
     ``motion``: surge and sway velocity [m/s] and yaw rate [rad/s] at the decision.
     """
     state = (0.0, 0.0, 0.0, motion[0], motion[1], motion[2])
-    for _ in range(own.holds):
+    for _ in range(own.control_steps):
         a_x, a_y = held(action[0], action[1], state[2], own.plant)
         tau = actuators(a_x, a_y, state[5], own.plant)
         for _ in range(own.steps):
@@ -101,7 +101,7 @@ def to_body(x: float, y: float, pose: Float64) -> tuple[float, float]:
 
 
 @compiled
-def begin_map(w: int, i: int, see: Fields, kept: Surroundings) -> None:
+def begin_map(w: int, i: int, see: Fields, memory: Surroundings) -> None:
     """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow."""
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed = math.hypot(v_x, v_y)
@@ -109,30 +109,30 @@ def begin_map(w: int, i: int, see: Fields, kept: Surroundings) -> None:
     if speed > _MOVES_MPS:
         c, s, moving = v_x / speed, -v_y / speed, 1.0
     r_x, r_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
-    kept.pose[w, i, 0], kept.pose[w, i, 1] = -(c * r_x - s * r_y), -(s * r_x + c * r_y)
-    kept.pose[w, i, 2], kept.pose[w, i, 3] = c, s
-    kept.reference[w, i, 0] = kept.reference[w, i, 1] = kept.reference[w, i, 3] = 0.0
-    kept.reference[w, i, 2] = moving
-    kept.begun[w, i] = 1.0
+    memory.pose[w, i, 0], memory.pose[w, i, 1] = -(c * r_x - s * r_y), -(s * r_x + c * r_y)
+    memory.pose[w, i, 2], memory.pose[w, i, 3] = c, s
+    memory.reference[w, i, 0] = memory.reference[w, i, 1] = memory.reference[w, i, 3] = 0.0
+    memory.reference[w, i, 2] = moving
+    memory.begun[w, i] = 1.0
 
 
 @compiled
-def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> None:
+def move(w: int, i: int, see: Fields, own: DeadReckoning, memory: Surroundings) -> None:
     """A later percept: heading and place from l(t) while it stays on its leg, or at rest; else by dead reckoning.
 
     Who does not perceive l(t), whose place and velocity then read zero, always reckons.
     """
-    pose, at, motion = kept.pose[w, i], kept.reference[w, i], kept.motion[w, i]
+    pose, at, motion = memory.pose[w, i], memory.reference[w, i], memory.motion[w, i]
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed, half = math.hypot(v_x, v_y), 0.5 * own.period_s
-    x, y, psi, u, v, r = reckoned(motion, kept.action[w, i], own)
+    x, y, psi, u, v, r = reckoned(motion, memory.action[w, i], own)
     wrong = see.yaw_rate[w, i, 0] - r
     surge_off, yaw_off = (see.velocity[w, i, 0] - u) / own.surge, wrong / own.yaw
-    follow(w, i, 0, kept.action[w, i, 0], surge_off, own.period_s, kept)
-    follow(w, i, 1, kept.action[w, i, 1], yaw_off, own.period_s, kept)
-    torque = kept.action[w, i, 1] - own.plant.yaw_damping / own.plant.max_torque * motion[2]
-    identify(w, i, 0, kept.action[w, i, 0], surge_off, own.period_s, kept)
-    identify(w, i, 1, min(max(torque, -1.0), 1.0), yaw_off, own.period_s, kept)
+    follow(w, i, 0, memory.action[w, i, 0], surge_off, own.period_s, memory)
+    follow(w, i, 1, memory.action[w, i, 1], yaw_off, own.period_s, memory)
+    torque = memory.action[w, i, 1] - own.plant.yaw_damping / own.plant.max_torque * motion[2]
+    identify(w, i, 0, memory.action[w, i, 0], surge_off, own.period_s, memory)
+    identify(w, i, 1, min(max(torque, -1.0), 1.0), yaw_off, own.period_s, memory)
     turn_c, turn_s = cos_sin(psi + half * wrong)
     c, s = to_map_axes(turn_c, turn_s, pose)
     moves, moved = speed > _MOVES_MPS, math.hypot(at[2], at[3]) > 0.0
@@ -164,9 +164,9 @@ def move(w: int, i: int, see: Fields, own: Reckoning, kept: Surroundings) -> Non
 
 
 @compiled
-def keep_motion(w: int, i: int, see: Fields, kept: Surroundings) -> None:
+def keep_motion(w: int, i: int, see: Fields, memory: Surroundings) -> None:
     """Own velocity and l(t)'s speed, for the next percept."""
-    kept.motion[w, i, 0], kept.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
-    kept.motion[w, i, 2] = see.yaw_rate[w, i, 0]
+    memory.motion[w, i, 0], memory.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
+    memory.motion[w, i, 2] = see.yaw_rate[w, i, 0]
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
-    kept.reference_speed[w, i] = math.hypot(v_x, v_y)
+    memory.reference_speed[w, i] = math.hypot(v_x, v_y)

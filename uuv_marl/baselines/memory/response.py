@@ -19,13 +19,13 @@ _NOTHING = 0.01
 
 
 @compiled
-def follow(w: int, i: int, axis: int, asked: float, off: float, period: float, kept: Surroundings) -> None:
+def follow(w: int, i: int, axis: int, asked: float, off: float, period: float, memory: Surroundings) -> None:
     """Take what one period showed of a component into the estimate.
 
     ``asked`` is the action's share; ``off`` by how much the motion was more than the model makes of it, as a share of
     full thrust or torque.
     """
-    at = kept.response[w, i, axis]
+    at = memory.response[w, i, axis]
     due = at[ACTED] - asked
     d_x, d_y = due - at[DUE], off - at[MISSED]
     share = max(1.0 - period / _KEPT_S, 0.0)
@@ -35,7 +35,7 @@ def follow(w: int, i: int, axis: int, asked: float, off: float, period: float, k
 
 
 @compiled
-def remains(w: int, i: int, axis: int, kept: Surroundings) -> float:
+def remains(w: int, i: int, axis: int, memory: Surroundings) -> float:
     """Share of the difference between what acted and what is asked that remains on the mean over a period, 0 to 1."""
-    at = kept.response[w, i, axis]
+    at = memory.response[w, i, axis]
     return min(max(at[PRODUCTS] / (at[SQUARES] + _NOTHING), 0.0), 1.0)

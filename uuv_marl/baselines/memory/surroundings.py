@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from uuv_marl.baselines.memory import discs, neighbours, pose
 from uuv_marl.baselines.memory.discs import ActiveSectors
-from uuv_marl.baselines.memory.pose import Reckoning
+from uuv_marl.baselines.memory.pose import DeadReckoning
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.percept import Starts
 from uuv_marl.scenario import Scenario
@@ -17,7 +17,7 @@ from uuv_marl.types import Bool, Float32
 class OwnModel(NamedTuple):
     """What a vehicle knows of itself before it remembers anything."""
 
-    own: Reckoning
+    own: DeadReckoning
     """How it moves."""
     sectors: ActiveSectors
     """How it hears obstacles."""
@@ -25,7 +25,7 @@ class OwnModel(NamedTuple):
     @staticmethod
     def of(scenario: Scenario) -> "OwnModel":
         """That of a scenario's vehicle."""
-        return OwnModel(Reckoning.of(scenario), ActiveSectors.of(scenario))
+        return OwnModel(DeadReckoning.of(scenario), ActiveSectors.of(scenario))
 
 
 @compiled
@@ -38,36 +38,36 @@ def is_lost_percept(row: Float32) -> bool:
 
 
 @compiled
-def update_memory(flat: Float32, at: Starts, worlds: Bool, model: OwnModel, kept_s: float, kept: Surroundings) -> None:
+def update_memory(flat: Float32, at: Starts, worlds: Bool, model: OwnModel, memory_s: float, memory: Surroundings) -> None:
     """Take what every vehicle perceives into what it remembers. Once for every decision."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
-            kept.counted[w, i, 0] += kept.filtered[w, i, 0]
-            kept.counted[w, i, 1] += kept.filtered[w, i, 1]
-            kept.filtered[w, i, 0] = kept.filtered[w, i, 1] = 0.0
+            memory.counted[w, i, 0] += memory.filtered[w, i, 0]
+            memory.counted[w, i, 1] += memory.filtered[w, i, 1]
+            memory.filtered[w, i, 0] = memory.filtered[w, i, 1] = 0.0
             if is_lost_percept(flat[w, i]):
-                kept.begun[w, i] = 0.0
+                memory.begun[w, i] = 0.0
                 continue
-            if kept.begun[w, i] == 0.0:
-                pose.begin_map(w, i, see, kept)
+            if memory.begun[w, i] == 0.0:
+                pose.begin_map(w, i, see, memory)
             else:
-                pose.move(w, i, see, model.own, kept)
-            pose.keep_motion(w, i, see, kept)
-            discs.update_discs(w, i, see, model.sectors, kept)
-            neighbours.update_neighbours(w, i, see, model.own.period_s, kept_s, kept)
-            _keep_distances(w, i, kept)
+                pose.move(w, i, see, model.own, memory)
+            pose.keep_motion(w, i, see, memory)
+            discs.update_discs(w, i, see, model.sectors, memory)
+            neighbours.update_neighbours(w, i, see, model.own.period_s, memory_s, memory)
+            _keep_distances(w, i, memory)
 
 
 @compiled
-def _keep_distances(w: int, i: int, kept: Surroundings) -> None:
+def _keep_distances(w: int, i: int, memory: Surroundings) -> None:
     """How far a vehicle is from what it remembers, once for all that decides by it."""
-    x, y = kept.pose[w, i, 0], kept.pose[w, i, 1]
-    for d in range(kept.score.shape[2]):
-        there = kept.score[w, i, d] > 0.0
-        disc = kept.disc[w, i, d]
-        kept.disc_away[w, i, d] = math.hypot(disc[0] - x, disc[1] - y) if there else math.inf
-    for k in range(kept.known.shape[2]):
-        there = kept.known[w, i, k] > 0.0
-        place = kept.place[w, i, k]
-        kept.away[w, i, k] = math.hypot(place[0] - x, place[1] - y) if there else math.inf
+    x, y = memory.pose[w, i, 0], memory.pose[w, i, 1]
+    for d in range(memory.score.shape[2]):
+        in_use = memory.score[w, i, d] > 0.0
+        disc = memory.disc[w, i, d]
+        memory.disc_away[w, i, d] = math.hypot(disc[0] - x, disc[1] - y) if in_use else math.inf
+    for k in range(memory.known.shape[2]):
+        in_use = memory.known[w, i, k] > 0.0
+        place = memory.place[w, i, k]
+        memory.away[w, i, k] = math.hypot(place[0] - x, place[1] - y) if in_use else math.inf

@@ -40,7 +40,7 @@ class Surroundings(NamedTuple):
         "world vehicle 12",
         "Decisions at which each was heard less those at which it was not though it should have been; 0 for none.",
     ]
-    unheard: Annotated[Float64, "world vehicle 12", "Time since each was heard [s]."]
+    undetected: Annotated[Float64, "world vehicle 12", "Time since each was heard [s]."]
     disc_away: Annotated[
         Float64, "world vehicle 12", "Distance of each one's centre from the vehicle [m], infinite for none."
     ]
@@ -59,6 +59,6 @@ def with_surroundings(name: str, table: type[Any]) -> type[Any]:
     ``name`` is that of the new table in the other's module.
     """
     hints = {**get_type_hints(Surroundings, include_extras=True), **get_type_hints(table, include_extras=True)}
-    made: Any = namedtuple(name, hints, module=table.__module__)  # pyright: ignore[reportUntypedNamedTuple]
-    made.__annotations__ = hints
-    return made
+    table_class: Any = namedtuple(name, hints, module=table.__module__)  # pyright: ignore[reportUntypedNamedTuple]
+    table_class.__annotations__ = hints
+    return table_class

@@ -50,7 +50,7 @@ class BioInspired(Policy):
             obstacle where their positions agree (centres) or follow without a gap (surfaces); its nearest echo counts.
     """
 
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -85,8 +85,8 @@ class BioInspiredPlus(BioInspired):
     yaw_damping_nms: ClassVar[float] = 600.0
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: BioInspiredGains | None = None) -> None:
-        found = gains or BioInspiredGains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)
-        super().__init__(scenario, num_worlds, gains=found)
+        tuned_gains = gains or BioInspiredGains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)
+        super().__init__(scenario, num_worlds, gains=tuned_gains)
 
 
 @compiled
@@ -144,8 +144,8 @@ def _act(
             drag = g.feed_forward * surge_resistance(math.hypot(v_x, v_y), limits)
             f_x = g.zeta_l * see.reference[w, i, 0] + drag * v_x
             f_y = g.zeta_l * see.reference[w, i, 1] + drag * v_y
-            for k in range(see.heard.shape[2]):
-                if see.heard[w, i, k] > 0.0:
+            for k in range(see.detected.shape[2]):
+                if see.detected[w, i, k] > 0.0:
                     d_x, d_y, c = neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
                     f_x, f_y = f_x + d_x, f_y + d_y
                     clamps[w] += c

@@ -78,7 +78,7 @@ class Sdc(Policy):
     acts on its own percept. The informed vehicle is the one whose slot is nearest to the lattice's centre.
     """
 
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = SdcMemory
     channels: ClassVar[tuple[str, ...]] = ("compass", "link")
     identity: ClassVar[bool | str] = True
@@ -179,12 +179,12 @@ def _force(
     c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])
     # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.
     follows = False
-    for k in range(see.heard.shape[2]):
+    for k in range(see.detected.shape[2]):
         j = _index(see.link_identity[w, i, k], depth.shape[0])
-        follows = follows or (see.heard[w, i, k] > 0.0 and j >= 0 and depth[j] < depth[i])
+        follows = follows or (see.detected[w, i, k] > 0.0 and j >= 0 and depth[j] < depth[i])
     z_x, z_y, w_x, w_y, near_x, near_y, num = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
-    for k in range(see.heard.shape[2]):
-        if see.heard[w, i, k] == 0.0:
+    for k in range(see.detected.shape[2]):
+        if see.detected[w, i, k] == 0.0:
             continue
         p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         distance = max(math.hypot(p_x, p_y), 0.1)

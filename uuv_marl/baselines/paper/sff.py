@@ -70,7 +70,7 @@ class SffMemory(NamedTuple):
 class Sff(Policy):
     """Self-organised fission and fusion, with neighbours' velocity over the link, without the reference's velocity."""
 
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = SffMemory
     channels: ClassVar[tuple[str, ...]] = ("link",)
 
@@ -125,22 +125,22 @@ def _compare(w: int, i: int, see: Fields, period: float, memory: SffMemory) -> N
 
     ``memory`` is brought up to date.
     """
-    who, where, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
+    identities, positions, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
     r = float(see.yaw_rate[w, i, 0])
     c, s = math.cos(r * period), math.sin(r * period)
-    for k in range(see.heard.shape[2]):
-        old = _recall(see.link_identity[w, i, k], who)
+    for k in range(see.detected.shape[2]):
+        old = _recall(see.link_identity[w, i, k], identities)
         memory.known[w, i, k] = old >= 0
         if old >= 0:
             p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
             v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
-            memory.rate[w, i, k, 0] = (p_x - c * where[old, 0] - s * where[old, 1]) / period
-            memory.rate[w, i, k, 1] = (p_y - c * where[old, 1] + s * where[old, 0]) / period
+            memory.rate[w, i, k, 0] = (p_x - c * positions[old, 0] - s * positions[old, 1]) / period
+            memory.rate[w, i, k, 1] = (p_y - c * positions[old, 1] + s * positions[old, 0]) / period
             memory.turn[w, i, k, 0] = v_x - c * moved[old, 0] - s * moved[old, 1]
             memory.turn[w, i, k, 1] = v_y - c * moved[old, 1] + s * moved[old, 0]
-    for k in range(see.heard.shape[2]):
-        who[k] = see.link_identity[w, i, k]
-        where[k, 0], where[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
+    for k in range(see.detected.shape[2]):
+        identities[k] = see.link_identity[w, i, k]
+        positions[k, 0], positions[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
         moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
 
 
@@ -163,8 +163,8 @@ def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: Sff
     f_x, f_y = pull * l_x + g.drag * own_drag(u, limits), pull * l_y
     mean_x, mean_y, num = 0.0, 0.0, 0
     change, leader_x, leader_y = -1.0, 0.0, 0.0
-    for k in range(see.heard.shape[2]):
-        if see.heard[w, i, k] == 0.0:
+    for k in range(see.detected.shape[2]):
+        if see.detected[w, i, k] == 0.0:
             continue
         p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
         v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])

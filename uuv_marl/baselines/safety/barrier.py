@@ -60,16 +60,16 @@ GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
 def with_numbers(values: Mapping[str, float], gains: G, barrier: Barrier) -> tuple[G, Barrier]:
     """A law's gains, a NamedTuple, and its filter, with the numbers by name that belong to the one or the other."""
     both: tuple[Any, Any] = gains, barrier
-    made = [each._replace(**{name: value for name, value in values.items() if name in each._fields}) for each in both]
-    return made[0], made[1]
+    updated = [each._replace(**{name: value for name, value in values.items() if name in each._fields}) for each in both]
+    return updated[0], updated[1]
 
 
 @compiled
-def margin(w: int, i: int, d: int, barrier: Barrier, kept: Surroundings) -> float:
+def margin(w: int, i: int, d: int, barrier: Barrier, memory: Surroundings) -> float:
     """Distance to keep from the surface of a remembered obstacle [m]: less where the gap to the next is narrow."""
-    disc, least = kept.disc[w, i], barrier.obstacle_m
-    for e in range(kept.score.shape[2]):
-        if e != d and kept.score[w, i, e] >= CONFIRMED:
+    disc, least = memory.disc[w, i], barrier.obstacle_m
+    for e in range(memory.score.shape[2]):
+        if e != d and memory.score[w, i, e] >= CONFIRMED:
             x, y, radii = disc[e, 0] - disc[d, 0], disc[e, 1] - disc[d, 1], disc[e, 2] + disc[d, 2]
             if barrier.gap_share * (max(abs(x), abs(y)) - radii) > least + 1e-6:
                 continue  # too far apart to count, which needs no root
@@ -80,44 +80,44 @@ def margin(w: int, i: int, d: int, barrier: Barrier, kept: Surroundings) -> floa
 
 
 @compiled
-def planes_of(w: int, i: int, period: float, barrier: Barrier, kept: Surroundings, planes: Float64) -> int:
+def planes_of(w: int, i: int, period: float, barrier: Barrier, memory: Surroundings, planes: Float64) -> int:
     """Half-planes of velocity in the vehicle's map, n . v <= b, for what it remembers.
 
     Returns:
         How many there are.
     """
-    pose, num = kept.pose[w, i], 0
+    pose, num = memory.pose[w, i], 0
     x, y = pose[0], pose[1]
     rate = min(barrier.obstacle_rate, MOST_CLOSED / period)
-    for d in range(kept.score.shape[2]):
-        if kept.score[w, i, d] < CONFIRMED:
+    for d in range(memory.score.shape[2]):
+        if memory.score[w, i, d] < CONFIRMED:
             continue
-        away = max(kept.disc_away[w, i, d], 1e-6)
-        left = away - kept.disc[w, i, d, 2]
+        away = max(memory.disc_away[w, i, d], 1e-6)
+        left = away - memory.disc[w, i, d, 2]
         if left < barrier.horizon_m:
-            n_x, n_y = kept.disc[w, i, d, 0] - x, kept.disc[w, i, d, 1] - y
+            n_x, n_y = memory.disc[w, i, d, 0] - x, memory.disc[w, i, d, 1] - y
             planes[num, 0], planes[num, 1] = n_x / away, n_y / away
-            planes[num, 2] = rate * (left - margin(w, i, d, barrier, kept))
+            planes[num, 2] = rate * (left - margin(w, i, d, barrier, memory))
             num += 1
-    return neighbour_planes(w, i, num, period, barrier, kept, planes)
+    return neighbour_planes(w, i, num, period, barrier, memory, planes)
 
 
 @compiled
 def neighbour_planes(
-    w: int, i: int, num: int, period: float, barrier: Barrier, kept: Surroundings, planes: Float64
+    w: int, i: int, num: int, period: float, barrier: Barrier, memory: Surroundings, planes: Float64
 ) -> int:
     """Add the half-planes of neighbours to the first ``num``, and say how many there are then. See ``planes_of``."""
-    x, y = kept.pose[w, i, 0], kept.pose[w, i, 1]
-    v_x, v_y = to_map_axes(kept.motion[w, i, 0], kept.motion[w, i, 1], kept.pose[w, i])
+    x, y = memory.pose[w, i, 0], memory.pose[w, i, 1]
+    v_x, v_y = to_map_axes(memory.motion[w, i, 0], memory.motion[w, i, 1], memory.pose[w, i])
     rate = min(barrier.neighbour_rate, MOST_CLOSED / period)
-    for k in range(kept.known.shape[2]):
-        away = max(kept.away[w, i, k], 1e-6)
+    for k in range(memory.known.shape[2]):
+        away = max(memory.away[w, i, k], 1e-6)
         if away < barrier.horizon_m:
-            n_x, n_y = (kept.place[w, i, k, 0] - x) / away, (kept.place[w, i, k, 1] - y) / away
+            n_x, n_y = (memory.place[w, i, k, 0] - x) / away, (memory.place[w, i, k, 1] - y) / away
             own = n_x * v_x + n_y * v_y
-            closing = own - n_x * kept.velocity[w, i, k, 0] - n_y * kept.velocity[w, i, k, 1]
+            closing = own - n_x * memory.velocity[w, i, k, 0] - n_y * memory.velocity[w, i, k, 1]
             planes[num, 0], planes[num, 1] = n_x, n_y
-            left = away - barrier.neighbour_m - barrier.noise_margin * noise_of(w, i, kept) * away
+            left = away - barrier.neighbour_m - barrier.noise_margin * noise_of(w, i, memory) * away
             planes[num, 2] = own + barrier.share * (rate * left - closing)
             num += 1
     return num
@@ -135,7 +135,7 @@ def keeps(v_x: float, v_y: float, planes: Float64, num: int) -> bool:
 @compiled
 def steer_safely(
     w: int, i: int, w_x: float, w_y: float, num: int, planes: Float64, gain: float, limits: Limits,
-    kept: Surroundings, action: Float32,
+    memory: Surroundings, action: Float32,
 ) -> None:  # fmt: skip
     """The action that takes a vehicle to the velocity that keeps to half-planes and is nearest to a wished one.
 
@@ -143,8 +143,8 @@ def steer_safely(
     """
     safe_x, safe_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, full_speed(limits))
     if broken > 0.0 or not keeps(w_x, w_y, planes, num):
-        kept.filtered[w, i, 0] = 1.0
+        memory.filtered[w, i, 0] = 1.0
     if broken > 0.0:
-        kept.filtered[w, i, 1] = 1.0
-    w_x, w_y = to_body_axes(safe_x, safe_y, kept.pose[w, i])
-    steer(w_x, w_y, kept.motion[w, i, 0], kept.motion[w, i, 1], gain, limits, action[w, i])
+        memory.filtered[w, i, 1] = 1.0
+    w_x, w_y = to_body_axes(safe_x, safe_y, memory.pose[w, i])
+    steer(w_x, w_y, memory.motion[w, i, 0], memory.motion[w, i, 1], gain, limits, action[w, i])

@@ -13,11 +13,11 @@ from typing import Any
 from numpy.typing import NDArray
 
 from uuv_marl.baselines.memory import Surroundings
-from uuv_marl.baselines.memory.pose import Reckoning, reckoned, to_map_axes
+from uuv_marl.baselines.memory.pose import DeadReckoning, reckoned, to_map_axes
 from uuv_marl.baselines.policy import Limits, Policy, part_of, parts_of
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier, keeps, planes_of, steer_safely
-from uuv_marl.baselines.safety.remembering import Filtered
-from uuv_marl.baselines.steering import wished_velocity
+from uuv_marl.baselines.safety.filtered import Filtered
+from uuv_marl.baselines.steering import steady_velocity
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike
@@ -37,7 +37,7 @@ class Guarded(Filtered):
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: Policy, barrier: Barrier = GUARD) -> None:
         self.inner = inner
         self.name = f"guarded:{inner.name}"
-        self.declare_as(inner)
+        self.copy_requirements(inner)
         super().__init__(scenario, num_worlds, barrier)
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
@@ -48,7 +48,7 @@ class Guarded(Filtered):
     def decide(self, percept: Percept) -> Float32:
         """The policy's actions of shape (world, vehicle, 2), changed where they are not safe."""
         self.inner.active = self.active
-        self.inner.hear(percept)
+        self.inner.update_memory(percept)
         action = self.inner.decide(percept)
         guard_all(
             self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes,
@@ -57,10 +57,10 @@ class Guarded(Filtered):
         self.clamps[...] = self.inner.clamps
         return action
 
-    def taken(self, action: Float32) -> None:
+    def record_action(self, action: Float32) -> None:
         """The policy inside is told too."""
-        super().taken(action)
-        self.inner.taken(action)
+        super().record_action(action)
+        self.inner.record_action(action)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """That of the policy inside, too."""
@@ -73,27 +73,27 @@ class Guarded(Filtered):
 
 
 @compiled
-def coming_velocity(w: int, i: int, action: Float32, own: Reckoning, kept: Surroundings) -> tuple[float, float]:
+def coming_velocity(w: int, i: int, action: Float32, own: DeadReckoning, memory: Surroundings) -> tuple[float, float]:
     """The velocity in the vehicle's map [m/s] that an action leads to at the next decision, in still water."""
-    _, _, psi, u, v, _ = reckoned(kept.motion[w, i], action, own)
+    _, _, psi, u, v, _ = reckoned(memory.motion[w, i], action, own)
     c, s = cos_sin(psi)
-    return to_map_axes(c * u - s * v, s * u + c * v, kept.pose[w, i])
+    return to_map_axes(c * u - s * v, s * u + c * v, memory.pose[w, i])
 
 
 @compiled
 def guard_all(
-    worlds: Bool, own: Reckoning, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, planes: Float64,
+    worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, planes: Float64,
     action: Float32,
 ) -> None:  # fmt: skip
     """Replace actions that are not safe. ``action`` is changed, and whether the filter acts is written."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
-            if not worlds[w] or kept.begun[w, i] == 0.0:
+            if not worlds[w] or memory.begun[w, i] == 0.0:
                 continue
-            num = planes_of(w, i, own.period_s, barrier, kept, planes)
-            v_x, v_y = coming_velocity(w, i, action[w, i], own, kept)
+            num = planes_of(w, i, own.period_s, barrier, memory, planes)
+            v_x, v_y = coming_velocity(w, i, action[w, i], own, memory)
             if not keeps(v_x, v_y, planes, num):
-                a_x, a_y = wished_velocity(action[w, i, 0], action[w, i, 1], limits)
-                w_x, w_y = to_map_axes(a_x, a_y, kept.pose[w, i])
-                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, kept, action)
-                kept.filtered[w, i, 0] = 1.0
+                a_x, a_y = steady_velocity(action[w, i, 0], action[w, i, 1], limits)
+                w_x, w_y = to_map_axes(a_x, a_y, memory.pose[w, i])
+                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, memory, action)
+                memory.filtered[w, i, 0] = 1.0

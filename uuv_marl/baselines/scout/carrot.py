@@ -13,7 +13,7 @@ import numpy as np
 from uuv_marl.baselines.policy import tuned
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.scout.gains import ScoutGains
-from uuv_marl.baselines.scout.law import Scout
+from uuv_marl.baselines.scout.controller import Scout
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Bool, Float32
@@ -41,18 +41,18 @@ class Carrot(Scout):
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Remember a percept whose reference is the carrot."""
-        super().remember(self.led(percept), worlds)
+        super().remember(self.with_carrot(percept), worlds)
 
-    def led(self, percept: Percept) -> Percept:
+    def with_carrot(self, percept: Percept) -> Percept:
         """The percept with the carrot in the place of a goal at rest."""
-        led, (to, left) = dataclasses.replace(percept, flat=percept.flat.copy()), self._way(percept)
+        with_carrot, (to, left) = dataclasses.replace(percept, flat=percept.flat.copy()), self._goal_and_distance(percept)
         far = (left > self.ahead_m) & (percept["reference_velocity"] == 0.0).all(axis=-1)
         to += np.float32(self.right_m) * _unit(np.stack([-to[..., 1], to[..., 0]], axis=-1))
         along = _unit(to)[far]
-        led["reference"][far], led["reference_velocity"][far] = self.ahead_m * along, self.speed * along
-        return led
+        with_carrot["reference"][far], with_carrot["reference_velocity"][far] = self.ahead_m * along, self.speed * along
+        return with_carrot
 
-    def _way(self, percept: Percept) -> tuple[Float32, Float32]:
+    def _goal_and_distance(self, percept: Percept) -> tuple[Float32, Float32]:
         """A vector to lead along [m], shape (world, vehicle, 2), and how far it is to the goal."""
         goal = percept["reference"].copy()
         return goal, np.hypot(goal[..., 0], goal[..., 1])
@@ -66,25 +66,25 @@ class CarrotInformed(Carrot):
         speed: of the carrot [m/s]: that of l(t) in the paper, as nothing has to be found out.
     """
 
-    channels: ClassVar[tuple[str, ...]] = ("way",)
+    channels: ClassVar[tuple[str, ...]] = ("path",)
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, waits: bool = False, speed: float = 4.0,
         right_m: float = 0.0, preset: str = "gap",
     ) -> None:  # fmt: skip
         super().__init__(scenario, num_worlds, speed=speed, right_m=right_m, preset=preset)
-        self.waits = waits and "way_turn" in self.layout.starts
+        self.waits = waits and "right_of_way" in self.layout.starts
 
-    def led(self, percept: Percept) -> Percept:
+    def with_carrot(self, percept: Percept) -> Percept:
         """Likewise; who waits has a reference at rest where it is."""
-        led = super().led(percept)
+        with_carrot = super().with_carrot(percept)
         if self.waits:
-            stays = percept["way_turn"][..., 0] == 0.0
-            led["reference"][stays] = led["reference_velocity"][stays] = 0.0
-        return led
+            stays = percept["right_of_way"][..., 0] == 0.0
+            with_carrot["reference"][stays] = with_carrot["reference_velocity"][stays] = 0.0
+        return with_carrot
 
-    def _way(self, percept: Percept) -> tuple[Float32, Float32]:
-        return percept["way"].copy(), percept["way_length"][..., 0]
+    def _goal_and_distance(self, percept: Percept) -> tuple[Float32, Float32]:
+        return percept["path"].copy(), percept["path_length"][..., 0]
 
 
 def _unit(vectors: Float32) -> Float32:

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from uuv_marl.baselines.memory.neighbours import KEPT_S
+from uuv_marl.baselines.memory.neighbours import MEMORY_S
 from uuv_marl.baselines.policy import tuned
 from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 
@@ -27,15 +27,15 @@ class ScoutGains(NamedTuple):
     """How far behind a moving l(t) to go [m]: a swarm coasts on for about 2 m where l(t) stops."""
     steering: float = 1.0
     """Factor of the force that follows the wished velocity [1]. Less is calmer, and bears actuators that lag."""
-    kept_s: float = KEPT_S
+    memory_s: float = MEMORY_S
     """For how long a neighbour is remembered that is heard no more [s]."""
     lead: float = 0.0
     """Share of its actuators' lag and weakness that a vehicle makes up for, as it sees them (``memory.actuators``) [1].
     Not with a rudder, whose angle is chosen later."""
-    pull_in_doubt: float = 0.0
+    pull_if_uncertain: float = 0.0
     """While l(t) moves, added to the logarithm of the pull of a vehicle that doubts in full (``memory.doubt``); less in
     proportion [1]."""
-    push_in_doubt: float = 0.0
+    push_if_uncertain: float = 0.0
     """The same for its push [1]: who knows less where the others are keeps farther from them."""
 
 
@@ -48,9 +48,9 @@ class Preset(NamedTuple):
 
 
 _PLUS = ScoutGains(
-    pull=0.04, push_range=15.0, pull_at_rest=10.0, push_at_rest=6.0, together=0.04, behind_m=1.0, kept_s=2.0
+    pull=0.04, push_range=15.0, pull_at_rest=10.0, push_at_rest=6.0, together=0.04, behind_m=1.0, memory_s=2.0
 )  # fmt: skip
-_LEAD = _PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0, kept_s=3.0, lead=1.0)
+_LEAD = _PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0, memory_s=3.0, lead=1.0)
 DEFAULT_PRESET = "base"
 PRESETS = {
     "base": Preset(ScoutGains()),
@@ -58,7 +58,7 @@ PRESETS = {
     "lead": Preset(_LEAD),  # makes up for actuators that lag, as far as a vehicle sees it, and is softer at rest
     # Keeps farther from others where it doubts, and from obstacles: with 13.5 m the smallest distance of ``lead`` was
     # 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
-    "wary": Preset(_LEAD._replace(pull_in_doubt=-0.7, push_in_doubt=1.1), Barrier(obstacle_m=13.7)),
+    "wary": Preset(_LEAD._replace(pull_if_uncertain=-0.7, push_if_uncertain=1.1), Barrier(obstacle_m=13.7)),
     "closed": Preset(*with_numbers(tuned("scout"), ScoutGains(), Barrier())),  # for water with walls
     "gap": Preset(*with_numbers(tuned("carrot"), ScoutGains(), Barrier())),  # for gaps through which others come
 }

@@ -16,8 +16,8 @@ from uuv_marl.baselines.memory.pose import to_map, to_map_axes
 from uuv_marl.baselines.memory.table import with_surroundings
 from uuv_marl.baselines.policy import Limits, PolicyError, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
-from uuv_marl.baselines.safety.remembering import Filtered
-from uuv_marl.baselines.scout.law import pushed
+from uuv_marl.baselines.safety.filtered import Filtered
+from uuv_marl.baselines.scout.controller import pushed
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -48,17 +48,17 @@ class SeekerGains(NamedTuple):
     """Factor of the force that follows the wished velocity [1]."""
 
 
-class Sighted(NamedTuple):
+class TrackedTarget(NamedTuple):
     """The target that a vehicle follows, in its map, and how it searches."""
 
     target: Annotated[Float64, "world vehicle 4", "Place [m] and velocity [m/s] of its target."]
-    heard_s: Annotated[Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."]
+    track_timeout_s: Annotated[Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."]
     search: Annotated[
         Float64, "world vehicle 2", "Direction of its search in the box, or in lanes that of x, and the lane."
     ]
 
 
-SeekerMemory = with_surroundings("SeekerMemory", Sighted)
+SeekerMemory = with_surroundings("SeekerMemory", TrackedTarget)
 _ALPHA, _BETA = 0.8, 0.5
 """Gains by which an echo corrects a target's place and velocity [1]. Assumed."""
 _GATE_M, _GATE_MPS = 8.0, 4.0
@@ -88,9 +88,9 @@ class NearestTarget(Filtered):
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
         barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
-        found, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
+        tuned_gains, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
         super().__init__(scenario, num_worlds, barrier or safe)
-        self.gains = gains or found
+        self.gains = gains or tuned_gains
         if "box" not in self.layout.starts:
             raise PolicyError(
                 f"nearest_target searches a box, of which task {scenario.task.name!r} tells nothing; run it on "
@@ -99,86 +99,86 @@ class NearestTarget(Filtered):
         self._half_m = 0.5 * scenario.task_numbers.side_m
         self._lanes = scenario.swarm.num_vehicles if lanes else 0
         split = len(Surroundings._fields)
-        self._kept, self._track = Surroundings(*self.memory[:split]), Sighted(*self.memory[split:])
+        self._surroundings, self._track = Surroundings(*self.memory[:split]), TrackedTarget(*self.memory[split:])
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Remember the targets, and a percept without them, since they are nothing to go round."""
         seen, period = dataclasses.replace(percept, flat=percept.flat.copy()), self.model.own.period_s
         for name in ("echo", "echo_range", "echo_position"):
             seen[name][:] = 0.0
-        update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.kept_s, self._kept)
+        update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.memory_s, self._surroundings)
         stay_behind(
             self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
-            SeekerGains(*map(float, self.gains)), self._kept, self._track,
+            SeekerGains(*map(float, self.gains)), self._surroundings, self._track,
         )  # fmt: skip
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        action, period = np.zeros((*self._track.heard_s.shape, 2), np.float32), self.model.own.period_s
+        action, period = np.zeros((*self._track.track_timeout_s.shape, 2), np.float32), self.model.own.period_s
         seek(
             self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self._half_m, self._lanes,
-            SeekerGains(*map(float, self.gains)), self.barrier, self.limits, self.gain, self._kept, self._track,
+            SeekerGains(*map(float, self.gains)), self.barrier, self.limits, self.gain, self._surroundings, self._track,
             self.planes, action,
         )  # fmt: skip
         return action
 
 
 @compiled
-def claimed(w: int, i: int, x: float, y: float, claim_m: float, kept: Surroundings) -> bool:
+def claimed(w: int, i: int, x: float, y: float, claim_m: float, memory: Surroundings) -> bool:
     """Whether another vehicle is nearer to a target at (x, y) in the map, and near enough."""
-    least = min(math.hypot(kept.pose[w, i, 0] - x, kept.pose[w, i, 1] - y), claim_m)
-    for k in range(kept.known.shape[2]):
-        if kept.known[w, i, k] > 0.0 and math.hypot(kept.place[w, i, k, 0] - x, kept.place[w, i, k, 1] - y) < least:
+    least = min(math.hypot(memory.pose[w, i, 0] - x, memory.pose[w, i, 1] - y), claim_m)
+    for k in range(memory.known.shape[2]):
+        if memory.known[w, i, k] > 0.0 and math.hypot(memory.place[w, i, k, 0] - x, memory.place[w, i, k, 1] - y) < least:
             return True
     return False
 
 
 @compiled
-def _heard(
-    w: int, i: int, gate: float, see: Fields, g: SeekerGains, kept: Surroundings, track: Sighted
+def _detected_target(
+    w: int, i: int, gate: float, see: Fields, g: SeekerGains, memory: Surroundings, track: TrackedTarget
 ) -> tuple[float, float, bool]:
     """Place in the map of the target heard that a vehicle follows, or is to follow now [m], and whether there is one.
 
     ``gate``: how far it may be from where it is expected [m]; infinite where nothing is followed.
     """
-    pose, (x, y, found), best = kept.pose[w, i], (0.0, 0.0, False), gate
+    pose, (x, y, is_detected), best = memory.pose[w, i], (0.0, 0.0, False), gate
     from_x, from_y = (pose[0], pose[1]) if gate == math.inf else (track.target[w, i, 0], track.target[w, i, 1])
     for a in range(see.echo.shape[2]):
         if see.echo[w, i, a] > 0.0:
             p_x, p_y = to_map(see.echo_position[w, i, a, 0], see.echo_position[w, i, a, 1], pose)
             far = math.hypot(p_x - from_x, p_y - from_y)
-            if far < best and not claimed(w, i, p_x, p_y, g.claim_m, kept):
-                best, x, y, found = far, p_x, p_y, True
-    return x, y, found
+            if far < best and not claimed(w, i, p_x, p_y, g.claim_m, memory):
+                best, x, y, is_detected = far, p_x, p_y, True
+    return x, y, is_detected
 
 
 @compiled
 def stay_behind(
     flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
-    kept: Surroundings, track: Sighted,
+    memory: Surroundings, track: TrackedTarget,
 ) -> None:  # fmt: skip
     """Take the echoes, all of which are targets', into what vehicles follow; and turn searches back."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
-            if kept.begun[w, i] == 0.0:
+            if memory.begun[w, i] == 0.0:
                 continue
             goal = track.target[w, i]
             goal[0], goal[1] = goal[0] + period * goal[2], goal[1] + period * goal[3]
-            track.heard_s[w, i] -= period
-            since, follows = g.lost_s - track.heard_s[w, i], track.heard_s[w, i] > 0.0
+            track.track_timeout_s[w, i] -= period
+            since, follows = g.lost_s - track.track_timeout_s[w, i], track.track_timeout_s[w, i] > 0.0
             gate = _GATE_M + _GATE_MPS * since if follows else math.inf
-            x, y, found = _heard(w, i, gate, see, g, kept, track)
-            if found and follows:
+            x, y, is_detected = _detected_target(w, i, gate, see, g, memory, track)
+            if is_detected and follows:
                 d_x, d_y = x - goal[0], y - goal[1]
                 goal[0], goal[1] = goal[0] + _ALPHA * d_x, goal[1] + _ALPHA * d_y
                 goal[2], goal[3] = goal[2] + _BETA * d_x / since, goal[3] + _BETA * d_y / since
-            elif found:
+            elif is_detected:
                 goal[0], goal[1], goal[2], goal[3] = x, y, 0.0, 0.0
-            if found:
-                track.heard_s[w, i] = g.lost_s
-            elif follows and claimed(w, i, goal[0], goal[1], g.claim_m, kept):
-                track.heard_s[w, i] = 0.0
+            if is_detected:
+                track.track_timeout_s[w, i] = g.lost_s
+            elif follows and claimed(w, i, goal[0], goal[1], g.claim_m, memory):
+                track.track_timeout_s[w, i] = 0.0
             _turn_back(w, i, half_m - g.edge_m, lanes, see, box, track)
 
 
@@ -191,25 +191,25 @@ def place_in_box(w: int, i: int, see: Fields, box: Float32) -> tuple[float, floa
 
 
 @compiled
-def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float32, track: Sighted) -> None:
+def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float32, track: TrackedTarget) -> None:
     """Begin a search, along the bow or the lane; ``most`` from the middle [m] mirror it, or take another lane."""
-    way = track.search[w, i]
-    if way[0] == 0.0 and way[1] == 0.0:
-        way[0], way[1] = float(box[w, i, 0]), float(box[w, i, 1])
+    search = track.search[w, i]
+    if search[0] == 0.0 and search[1] == 0.0:
+        search[0], search[1] = float(box[w, i, 0]), float(box[w, i, 1])
         if lanes:
-            way[0], way[1] = (1.0 if i % 2 == 0 else -1.0), i + 0.5
+            search[0], search[1] = (1.0 if i % 2 == 0 else -1.0), i + 0.5
     place = place_in_box(w, i, see, box)
     for k in range(1 if lanes else 2):
-        if abs(place[k]) > most and place[k] * way[k] > 0.0:
-            way[k] = -way[k]
+        if abs(place[k]) > most and place[k] * search[k] > 0.0:
+            search[k] = -search[k]
             if lanes:
-                way[1] = (way[1] + 1.0) % lanes
+                search[1] = (search[1] + 1.0) % lanes
 
 
 @compiled
 def _searching(
-    w: int, i: int, half_m: float, lanes: int, see: Fields, box: Float32, speed: float, kept: Surroundings,
-    track: Sighted,
+    w: int, i: int, half_m: float, lanes: int, see: Fields, box: Float32, speed: float, memory: Surroundings,
+    track: TrackedTarget,
 ) -> tuple[float, float]:  # fmt: skip
     """The velocity that a search wishes, in the map [m/s]."""
     x, y = track.search[w, i, 0], track.search[w, i, 1]
@@ -218,16 +218,16 @@ def _searching(
         far = math.hypot(_AHEAD_M, off)
         x, y = x * _AHEAD_M / far, off / far
     c, s = float(box[w, i, 0]), float(box[w, i, 1])
-    return to_map_axes(speed * (c * x + s * y), speed * (c * y - s * x), kept.pose[w, i])
+    return to_map_axes(speed * (c * x + s * y), speed * (c * y - s * x), memory.pose[w, i])
 
 
 @compiled
-def _keeping(w: int, i: int, g: SeekerGains, kept: Surroundings, track: Sighted) -> tuple[float, float]:
+def _keeping(w: int, i: int, g: SeekerGains, memory: Surroundings, track: TrackedTarget) -> tuple[float, float]:
     """The velocity that keeps a vehicle behind its target, or leads to one that isn't heard, in the map [m/s]."""
-    goal, pose = track.target[w, i], kept.pose[w, i]
+    goal, pose = track.target[w, i], memory.pose[w, i]
     x, y, v_x, v_y = goal[0] - pose[0], goal[1] - pose[1], goal[2], goal[3]
     b_x, b_y = (v_x, v_y) if math.hypot(v_x, v_y) > _GOES_MPS else (x, y)
-    stay = g.stay_m if track.heard_s[w, i] > g.lost_s - _SILENT_S else 0.0
+    stay = g.stay_m if track.track_timeout_s[w, i] > g.lost_s - _SILENT_S else 0.0
     stay /= max(math.hypot(b_x, b_y), 1e-6)
     return v_x + g.rate * (x - stay * b_x), v_y + g.rate * (y - stay * b_y)
 
@@ -235,17 +235,17 @@ def _keeping(w: int, i: int, g: SeekerGains, kept: Surroundings, track: Sighted)
 @compiled
 def seek(
     flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
-    barrier: Barrier, limits: Limits, gain: float, kept: Surroundings, track: Sighted, planes: Float64, action: Float32,
+    barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, track: TrackedTarget, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            if worlds[w] and kept.begun[w, i] > 0.0:
-                if track.heard_s[w, i] > 0.0:
-                    w_x, w_y = _keeping(w, i, g, kept, track)
+            if worlds[w] and memory.begun[w, i] > 0.0:
+                if track.track_timeout_s[w, i] > 0.0:
+                    w_x, w_y = _keeping(w, i, g, memory, track)
                 else:
-                    w_x, w_y = _searching(w, i, half_m, lanes, see, box, g.speed, kept, track)
-                w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, kept)
-                num = planes_of(w, i, period, barrier, kept, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, kept, action)
+                    w_x, w_y = _searching(w, i, half_m, lanes, see, box, g.speed, memory, track)
+                w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, memory)
+                num = planes_of(w, i, period, barrier, memory, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, memory, action)

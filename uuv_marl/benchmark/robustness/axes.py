@@ -47,25 +47,25 @@ class Axis(NamedTuple):
         return not self.channels or not self.channels.isdisjoint(policy_class(policy).channels)
 
 
-def _axis(name: str, told: dict[str, Any]) -> Axis:
-    levels = tuple(told.get("levels", range(1, 6)))
-    severity = told.get("severity") or [math.nan] * (1 + len(levels))
-    fields: dict[str, list[Any]] = told["set"]
+def _axis(name: str, data: dict[str, Any]) -> Axis:
+    levels = tuple(data.get("levels", range(1, 6)))
+    severity = data.get("severity") or [math.nan] * (1 + len(levels))
+    fields: dict[str, list[Any]] = data["set"]
     return Axis(
-        name, told["title"], told["group"], told["unit"], told["source"], levels, tuple(map(float, severity)),
-        labels=tuple(told.get("labels") or (f"{value:g}" for value in severity)),
-        channels=frozenset(told.get("channels", ())),
+        name, data["title"], data["group"], data["unit"], data["source"], levels, tuple(map(float, severity)),
+        labels=tuple(data.get("labels") or (f"{value:g}" for value in severity)),
+        channels=frozenset(data.get("channels", ())),
         changes=tuple(
-            told.get("fixed", {}) | {field: values[k] for field, values in fields.items()} for k in range(len(levels))
+            data.get("fixed", {}) | {field: values[k] for field, values in fields.items()} for k in range(len(levels))
         ),
-        of_speed=frozenset(told.get("of_speed", ())),
+        of_speed=frozenset(data.get("of_speed", ())),
     )  # fmt: skip
 
 
-_TOLD = tomllib.loads((resources.files("uuv_marl.benchmark.robustness") / "axes.toml").read_text(encoding="utf-8"))
-BASE: dict[str, Any] = _TOLD["base"]
+_DATA = tomllib.loads((resources.files("uuv_marl.benchmark.robustness") / "axes.toml").read_text(encoding="utf-8"))
+BASE: dict[str, Any] = _DATA["base"]
 """Fields of every scenario of the suite, at level 0 too."""
-AXES = {name: _axis(name, told) for name, told in _TOLD["axes"].items()}
+AXES = {name: _axis(name, data) for name, data in _DATA["axes"].items()}
 """All axes by name, in the order of the report."""
 
 

@@ -51,10 +51,10 @@ def _draw_line(ax: Axes, axis: Axis, own: Any, intervals: bool, **style: Any) ->
     if axis.name not in own or CALM not in own:
         return
     cells = own[[CALM, axis.name]].dropna(axis="columns", how="all")
-    found = {level: cells[name, level].dropna().to_numpy() for name, level in cells}
-    if len(found) > 1:
-        levels = list(found)
+    levels_shown = {level: cells[name, level].dropna().to_numpy() for name, level in cells}
+    if len(levels_shown) > 1:
+        levels = list(levels_shown)
         if intervals:
-            _, lows, highs = zip(*map(scored, found.values()), strict=True)
+            _, lows, highs = zip(*map(scored, levels_shown.values()), strict=True)
             ax.fill_between(levels, lows, highs, color=style["color"], alpha=0.15, lw=0)
-        ax.plot(levels, [values.mean() for values in found.values()], **style)
+        ax.plot(levels, [values.mean() for values in levels_shown.values()], **style)

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing
-from uuv_marl.baselines import granted, make
-from uuv_marl.benchmark.frame import need_pandas
+from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.benchmark.frame import import_pandas
 from uuv_marl.benchmark.robustness.axes import AXES, CALM, overrides
 from uuv_marl.benchmark.suite import Case, Report, Suite
 from uuv_marl.scenario import ScenarioError, load_scenario
@@ -76,7 +76,7 @@ def _places(plan: Plan) -> Iterator[tuple[str, int]]:
         yield from ((axis, level) for level in plan.levels if level in AXES[axis].levels)
 
 
-def run(folder: Path, plan: Plan, report: Report, *, anew: bool = False) -> Path:
+def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> Path:
     """Run what is missing of a plan, and write all its episodes to ``EPISODES``, a row each; the file.
 
     The folder holds a benchmark's results of each scenario, axis and level, in ``cells``. The rest is as for
@@ -103,9 +103,9 @@ def run(folder: Path, plan: Plan, report: Report, *, anew: bool = False) -> Path
             raise ScenarioError(f"axis {axis} has the levels {levels}, and none of them is to be run; give --level")
     planned = cells(plan)
     for cell in planned:
-        make(cell.case.policy, granted(cell.case.policy, cell.case.load()))  # refused now, not after hours
+        make(cell.case.policy, with_policy_requirements(cell.case.policy, cell.case.load()))  # refused now, not after hours
     suite = Suite(folder / "cells", traces=False)
-    suite.run([cell.case for cell in planned], report, anew=anew)
+    suite.run([cell.case for cell in planned], report, restart=restart)
     path = folder / EPISODES
     write_episodes(path, (row for cell in planned for row in _rows(suite, cell)))
     return path
@@ -121,11 +121,11 @@ def _rows(suite: Suite, cell: Cell) -> Iterator[dict[str, Any]]:
 
 def write_episodes(path: Path, rows: Iterator[dict[str, Any]]) -> None:
     """Rows of scenario, axis, level, policy, seed and metrics as CSV, six significant digits, NaN as nothing."""
-    pandas = need_pandas("uuv-marl robustness")
+    pandas = import_pandas("uuv-marl robustness")
     with replacing(path) as partial:
         pandas.DataFrame.from_records(list(rows)).to_csv(partial, index=False, float_format=f"%{DIGITS}")
 
 
 def read_episodes(path: Path) -> Any:
     """What ``write_episodes`` wrote, as a pandas data frame."""
-    return need_pandas("uuv-marl robustness").read_csv(path, dtype={"axis": str, "policy": str, "scenario": str})
+    return import_pandas("uuv-marl robustness").read_csv(path, dtype={"axis": str, "policy": str, "scenario": str})

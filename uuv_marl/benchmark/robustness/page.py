@@ -48,8 +48,8 @@ def _picture(scenario: str) -> str:
 
 def _calm(scenarios: list[str]) -> str:
     """What is on at level 0."""
-    found = [conditions(load_scenario(name, overrides=BASE)) for name in scenarios if name in scenario_names()]
-    return "; ".join(dict.fromkeys(found)) or f"{IDEAL}, unless the scenario says otherwise"
+    phrases = [conditions(load_scenario(name, overrides=BASE)) for name in scenarios if name in scenario_names()]
+    return "; ".join(dict.fromkeys(phrases)) or f"{IDEAL}, unless the scenario says otherwise"
 
 
 def _main(table: Any) -> Any:

@@ -145,8 +145,8 @@ def _group(table: Any, group: str) -> Float64 | None:
     if group == EVERY:
         usual = dict.fromkeys(axis.group for axis in AXES.values() if not axis.channels)
         parts = [_group(table, name) for name in usual if name != "X"]
-        found = [part for part in parts if part is not None]
-        return np.mean(np.stack(found), axis=0) if found else None
+        parts_scored = [part for part in parts if part is not None]
+        return np.mean(np.stack(parts_scored), axis=0) if parts_scored else None
     axes = [name for name, axis in AXES.items() if axis.group == group and name in table]
     whole = [table[name].dropna(axis="columns", how="all").to_numpy() for name in axes]
     means = [values.mean(axis=1) for values in whole if values.size]

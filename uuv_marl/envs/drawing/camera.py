@@ -47,7 +47,7 @@ class Camera(NamedTuple):
 def aim(kind: str, scenes: Sequence[Scene], size: tuple[int, int]) -> Camera:
     """One of ``CAMERAS`` for a picture of this size [px]; where several scenes are shown, the same for all."""
     if kind == "map":
-        return _around(np.concatenate([_course(scene) for scene in scenes]), size)
+        return _around(np.concatenate([_map_bounds(scene) for scene in scenes]), size)
     return _around(np.concatenate([_swarm(scene) for scene in scenes]), size, _LEAST_M)
 
 
@@ -71,14 +71,14 @@ def _around(points: Float, size: tuple[int, int], least_m: float = 1.0) -> Camer
 
 def _swarm(scene: Scene) -> Float:
     living = scene.position[scene.alive]
-    references = scene.references[list(scene.groups.ways)]
+    references = scene.references[list(scene.groups.paths)]
     centres = [*references, np.median(living, axis=0) if len(living) else references[0]]
     away = np.min([np.hypot(*(living - centre).T) for centre in centres], axis=0)
     shown = living[away < _STRAY * scene.scenario.constraints.s_l_m]
     return np.concatenate([shown, references])
 
 
-def _course(scene: Scene) -> Float:
+def _map_bounds(scene: Scene) -> Float:
     """Trajectory and obstacles, with room for the swarm that starts behind and swings around them."""
     start, n = scene.scenario.start, scene.scenario.swarm.num_vehicles
     length, width = start.sides(n)
@@ -86,7 +86,7 @@ def _course(scene: Scene) -> Float:
     ahead = ahead / np.hypot(*ahead)
     behind, aside = -length * ahead, (start.gap_m / 2.0 + width) * np.array([-ahead[1], ahead[0]])
     corners = scene.waypoints[0] + np.array([behind + aside, behind - aside, aside, -aside])
-    room = 0.3 * start.spacing_m * math.sqrt(n)
+    margin = 0.3 * start.spacing_m * math.sqrt(n)
     discs, radius = scene.obstacles[:, :2], scene.obstacles[:, 2:]
-    ways = np.concatenate([way + side for _, way in scene.groups.ways.values() for side in (-room, room)])
-    return np.concatenate([corners, ways, discs - radius, discs + radius])
+    edges = np.concatenate([path + side for _, path in scene.groups.paths.values() for side in (-margin, margin)])
+    return np.concatenate([corners, edges, discs - radius, discs + radius])

@@ -49,15 +49,15 @@ class Frame:
         wide, high = self._cell
         for k, panel in enumerate(panels):
             row, column = divmod(k, self._columns)
-            x, y, room = column * wide, self._above + row * high, wide
+            x, y, panel_width = column * wide, self._above + row * high, wide
             self._surface.blit(self._painter.paint(panel.scene, views[panel.clock]), (x, y + self._header))
             if camera == "follow":
-                room -= self._header
+                panel_width -= self._header
                 glimpse = self._glimpse.glimpse(
                     panel.scene, aim("map", [panel.scene], self._glimpse.size), views[panel.clock]
                 )
-                self._surface.blit(glimpse, (x + room, y + _PAD // 2))
-            self._head(panel, (x + _PAD, y), room - _PAD)
+                self._surface.blit(glimpse, (x + panel_width, y + _PAD // 2))
+            self._head(panel, (x + _PAD, y), panel_width - _PAD)
         if self._below:
             area = pygame.Rect(0, self.size[1] - self._below, self.size[0], self._below)
             draw_legend(self._surface, area, panels[0].scene, self._text)
@@ -78,18 +78,18 @@ class Frame:
         self._glimpse = Painter((self._header - _PAD, self._header - _PAD))
         self._painter = Painter((self._cell[0] - (2 if self._columns > 1 else 0), high - self._header), grid=self._grid)
 
-    def _head(self, panel: Panel, at: tuple[int, int], room: int) -> None:
+    def _head(self, panel: Panel, at: tuple[int, int], width: int) -> None:
         """The title, and the numbers in two rows."""
         x, y = at
-        title = ink.fitting(panel.title, room, self._title, bold=True)
+        title = ink.fitting(panel.title, width, self._title, bold=True)
         ink.write(self._surface, title, (x, y + 4 * self._unit), self._title, bold=True)
-        roomy = room > 480 * self._unit
+        roomy = width > 480 * self._unit
         if roomy:
             after = x + ink.text(title, self._title, bold=True).get_width() + self._text
             ink.write(self._surface, panel.scene.scenario.title, (after, y + 8 * self._unit), self._text, ink.QUIET)
         for k, (label, short, value, colour) in enumerate(_numbers(panel.scene)):
             row, column = divmod(k, 3)
-            left, top = x + column * min(room // 3, 190 * self._unit), y + (28 + 32 * row) * self._unit
+            left, top = x + column * min(width // 3, 190 * self._unit), y + (28 + 32 * row) * self._unit
             ink.write(self._surface, label if roomy else short, (left, top), round(11 * self._unit), ink.QUIET)
             high = round((13 if roomy else 12) * self._unit)
             ink.write(self._surface, value, (left, top + 12 * self._unit), high, colour, bold=True)
@@ -103,7 +103,7 @@ def pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
 
 def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
     """Label, short label, value and colour of what a header tells."""
-    limits, contact = scene.scenario.constraints, scene.scenario.contact.hull_radius_m
+    limits, contact = scene.scenario.constraints, scene.scenario.collision.hull_radius_m
 
     def distance(value: float, least: float, touching: float) -> tuple[str, ink.Colour]:
         colour = ink.ORANGE if value < touching else ink.AMBER if value < least else ink.TEXT
@@ -119,7 +119,7 @@ def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
         ("vehicles", "vehicles", f"{alive}" if alive == n else f"{alive} of {n}", ink.TEXT),
         ("collisions", "collisions", f"{scene.collisions}", ink.ORANGE if scene.collisions else ink.TEXT),
         (f"swarm's centre to {scene.place}", f"to {scene.place}", _metres(scene.centre_error_m), ink.TEXT),
-    ][: 6 if scene.leads else 5]
+    ][: 6 if scene.followed_paths else 5]
 
 
 def _metres(value: float) -> str:

@@ -58,10 +58,10 @@ def text(words: str, height: int, colour: Colour = TEXT, bold: bool = False) -> 
     return _font(height, bold).render(words, True, colour)
 
 
-def fitting(words: str, room: float, height: int, *, bold: bool = False) -> str:
+def fitting(words: str, width: float, height: int, *, bold: bool = False) -> str:
     """These words, or where there is less room [px] an ellipsis and their end, as of a long path."""
     parts = [words, *(f"…{words[k:]}" for k in range(1, len(words)))]
-    return next((part for part in parts if text(part, height, bold=bold).get_width() <= room), "…")
+    return next((part for part in parts if text(part, height, bold=bold).get_width() <= width), "…")
 
 
 def write(

@@ -24,32 +24,32 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
     limits = scene.scenario.constraints
     teams, all_know = np.unique(scene.groups.team).tolist(), scene.groups.informed.all()
     alone = "vehicle" if all_know else "perceives l(t)"
-    found = [(f"group {k + 1}" if len(teams) > 1 else alone, _dart(ink.TEAMS[k])) for k in teams]
+    signs = [(f"group {k + 1}" if len(teams) > 1 else alone, _dart(ink.TEAMS[k])) for k in teams]
     if not all_know:
-        found.append(("does not perceive l(t)", lambda *on: (_dart(ink.BLUE)(*on), _dart(ink.WHITE, 7.5)(*on))))
+        signs.append(("does not perceive l(t)", lambda *on: (_dart(ink.BLUE)(*on), _dart(ink.WHITE, 7.5)(*on))))
     task = scene.scenario.task_class
-    found.append((task.place, _target if scene.leads else _goal))
+    signs.append((task.reference_label, _target if scene.followed_paths else _goal))
     if len(scene.marks):
-        found.append((task.marked or "of the task", _mark))
+        signs.append((task.mark_label or "of the task", _mark))
     if scene.trail.size:
-        found.append((f"last {TRAIL_S:g} s", _trail))
+        signs.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
     if scene.obstacles.size:
-        found.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))
+        signs.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))
         near += "" if limits.s_o_m == limits.s_u_m else f", obstacle {limits.s_o_m:g} m"
-    found += [(near, _dart(ink.AMBER)), ("collision", _hit)]
+    signs += [(near, _dart(ink.AMBER)), ("collision", _hit)]
     if scene.scenario.loses_vehicles:
-        found.append(("lost", _lost))
+        signs.append(("lost", _lost))
     if scene.water is not None:
-        found.append((f"current, {shown_speed(scene.scenario):g} m/s", _current))
-    return found
+        signs.append((f"current, {shown_speed(scene.scenario):g} m/s", _current))
+    return signs
 
 
 def _sonar(scene: Scene) -> list[tuple[str, Sign]]:
     if scene.sonar is None:
         return []
-    found = [("active sonar", _patch(ink.ACTIVE)), ("passive sonar", _patch(ink.PASSIVE)), ("hears", _heard)]
-    return [*found, ("echo", _echo)] if scene.obstacles.size else found
+    signs = [("active sonar", _patch(ink.ACTIVE)), ("passive sonar", _patch(ink.PASSIVE)), ("hears", _detection_sign)]
+    return [*signs, ("echo", _echo)] if scene.obstacles.size else signs
 
 
 def legend_rows(width: int, scene: Scene, height: int) -> int:
@@ -143,7 +143,7 @@ def _current(fine: pygame.Surface, unit: float) -> None:
     arrow(fine, np.array([2.0, 8.0]) * unit, np.array([ARROW, 0.0]) * unit, unit)
 
 
-def _heard(fine: pygame.Surface, unit: float) -> None:
+def _detection_sign(fine: pygame.Surface, unit: float) -> None:
     pygame.draw.line(fine, ink.PINK, (2.0 * unit, 8.0 * unit), (22.0 * unit, 8.0 * unit), round(unit))
 
 

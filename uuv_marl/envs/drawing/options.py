@@ -36,12 +36,12 @@ def look(options: RenderOptions | None, num_vehicles: int, sonar_of: int | None 
     Raises:
         ValueError: one can't be used; the message names it, its value and what it may be.
     """
-    given: Any = {} if options is None else options
-    if not isinstance(given, Mapping):
-        raise ValueError(f"render_options must be a dictionary such as {{'camera': 'map'}}, got {given!r}")
-    if unknown := [name for name in given if name not in Look._fields]:
+    options_given: Any = {} if options is None else options
+    if not isinstance(options_given, Mapping):
+        raise ValueError(f"render_options must be a dictionary such as {{'camera': 'map'}}, got {options_given!r}")
+    if unknown := [name for name in options_given if name not in Look._fields]:
         raise ValueError(f"render_options has no {unknown[0]!r}; it has {', '.join(Look._fields)}")
-    chosen, (low, high) = Look(**{"sonar_of": sonar_of, **given}), _SIDE_PX
+    chosen, (low, high) = Look(**{"sonar_of": sonar_of, **options_given}), _SIDE_PX
     if not _is_size(chosen.size):
         raise ValueError(
             f"render_options['size'] must be (width, height), whole numbers of pixels from {low} to {high}, "

@@ -12,7 +12,7 @@ from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, nice
 from uuv_marl.envs.drawing.current import paint_current
 from uuv_marl.envs.drawing.scene import Float, Scene
-from uuv_marl.envs.drawing.sonar import paint_arrays, paint_heard
+from uuv_marl.envs.drawing.sonar import paint_arrays, paint_detections
 from uuv_marl.extras import extra
 
 with extra("render", "rendering"):
@@ -47,10 +47,10 @@ class Painter:
         if self._lines:
             self._grid(view, cell)
         paint_current(self._fine, scene, view, cell, self._unit)
-        self._course(scene, view)
+        self._draw_paths(scene, view)
         self._trails(scene, view)
         if scene.sonar:
-            paint_heard(self._fine, scene, scene.sonar, view, self._unit)
+            paint_detections(self._fine, scene, scene.sonar, view, self._unit)
         self._vehicles(scene, view)
         self._hits(scene, view)
         self._references(scene, view)
@@ -64,13 +64,13 @@ class Painter:
         view = camera.magnified(FINE)
         self._fine.fill(ink.WATER)
         self._discs(scene, view)
-        for team, way, _ in scene.leads:
-            pygame.draw.lines(self._fine, ink.TEAMS.get(team, ink.TRACK), False, view.pixels(way).tolist(), FINE)
+        for team, path, _ in scene.followed_paths:
+            pygame.draw.lines(self._fine, ink.TEAMS.get(team, ink.TRACK), False, view.pixels(path).tolist(), FINE)
         for i in np.flatnonzero(scene.alive):
             at, colour = view.pixels(scene.position[i]).tolist(), ink.TEAMS[scene.groups.team[i]]
             pygame.draw.circle(self._fine, colour, at, FINE)
         self._goals(scene, view, 5.0 * FINE)
-        for team, _, at in scene.leads:
+        for team, _, at in scene.followed_paths:
             pygame.draw.circle(self._fine, ink.TEAMS.get(team, ink.GREEN), view.pixels(at).tolist(), 2.5 * FINE)
         high, low = view.pixels(seen.centre + seen.reach), view.pixels(seen.centre - seen.reach)
         rectangle = pygame.Rect(low[0], high[1], high[0] - low[0], low[1] - high[1])
@@ -87,13 +87,13 @@ class Painter:
             for at in view.pixels(np.repeat(lines[:, None], 2, axis=1))[:, 1 - axis] // FINE * FINE:
                 self._fine.fill(ink.GRID, (0, at, width, FINE) if axis == 0 else (at, 0, FINE, height))
 
-    def _course(self, scene: Scene, view: Camera) -> None:
+    def _draw_paths(self, scene: Scene, view: Camera) -> None:
         """Obstacles, each group's trajectory with its direction and start, goals."""
         self._discs(scene, view)
         unit = self._unit
         spacing = nice(_CHEVRON_PX * unit / view.scale) * view.scale
-        for team, way, _ in scene.leads:
-            points, colour, passed = view.pixels(way), ink.TEAMS.get(team, ink.TRACK), 0.0
+        for team, path, _ in scene.followed_paths:
+            points, colour, passed = view.pixels(path), ink.TEAMS.get(team, ink.TRACK), 0.0
             pygame.draw.lines(self._fine, colour, False, points.tolist(), round(1.8 * unit))
             for start, end in pairwise(points):
                 length = math.hypot(*(end - start))
@@ -118,8 +118,8 @@ class Painter:
             pygame.draw.circle(self._fine, ink.AMBER, middle, float(radius) * view.scale, FINE)
 
     def _goals(self, scene: Scene, view: Camera, size: float) -> None:
-        for team, way in scene.groups.ways.values():
-            star(self._fine, view.pixels(way[-1]), size if len(way) > 1 else size / 2.0, ink.TEAMS.get(team, ink.AMBER))
+        for team, path in scene.groups.paths.values():
+            star(self._fine, view.pixels(path[-1]), size if len(path) > 1 else size / 2.0, ink.TEAMS.get(team, ink.AMBER))
 
     def _trails(self, scene: Scene, view: Camera) -> None:
         places = view.pixels(np.concatenate([scene.trail, scene.position[None]])[:, scene.alive])
@@ -159,7 +159,7 @@ class Painter:
 
     def _references(self, scene: Scene, view: Camera) -> None:
         unit = self._unit
-        for team, _, reference in scene.leads:
+        for team, _, reference in scene.followed_paths:
             at = view.pixels(reference).tolist()
             for colour, wider in ((ink.WHITE, 1.2), (ink.TEAMS.get(team, ink.GREEN), 0.0)):
                 pygame.draw.circle(self._fine, colour, at, (12.0 + wider) * unit, round((2.6 + 2.0 * wider) * unit))
@@ -178,8 +178,8 @@ class Painter:
     def _words(self, scene: Scene, camera: Camera, cell: float) -> None:
         unit = self._unit / FINE
         height = round(12 * unit)
-        for team, way, reference in scene.leads:
-            for words, point in (("start", way[0]), ("goal", way[-1])):
+        for team, path, reference in scene.followed_paths:
+            for words, point in (("start", path[0]), ("goal", path[-1])):
                 x, y = camera.pixels(point).tolist()
                 left = x - ink.text(words, height, bold=True).get_width() / 2
                 ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)

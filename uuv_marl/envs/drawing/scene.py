@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.sea.current import FlowField
+from uuv_marl.sim.disturbances.current import FlowField
 from uuv_marl.tasks.groups import Groups, groups_of
 from uuv_marl.types import Bool
 
@@ -72,12 +72,12 @@ class Scene(NamedTuple):
     @property
     def place(self) -> str:
         """What a reference is called, such as ``l(t)``."""
-        return self.scenario.task_class.place.partition(",")[0]
+        return self.scenario.task_class.reference_label.partition(",")[0]
 
     @property
-    def leads(self) -> list[tuple[int | None, Float, Float]]:
+    def followed_paths(self) -> list[tuple[int | None, Float, Float]]:
         """Team, corners and l(t) of each group, but for goals at rest of several groups."""
-        return [(team, way, self.references[g]) for g, (team, way) in self.groups.ways.items() if len(way) > 1]
+        return [(team, path, self.references[g]) for g, (team, path) in self.groups.paths.items() if len(path) > 1]
 
 
 class SceneHistory:
@@ -100,7 +100,7 @@ class SceneHistory:
             self._hits[w].clear()
             for sample in self._trail:
                 sample[w] = np.nan
-        for w, i in np.argwhere((facts.contacts > 0) & (facts.time_s > self._time_s)[:, None]):
+        for w, i in np.argwhere((facts.vehicle_collisions > 0) & (facts.time_s > self._time_s)[:, None]):
             self._hits[w].append((*swarm.state.eta[w, i, :2], facts.time_s[w]))
         if self._steps % self._every == 0:
             self._trail.append(swarm.state.eta[:, :, :2].astype(np.float32))
@@ -110,13 +110,13 @@ class SceneHistory:
     def scene(self, batch: BatchedEnv, world: int, sonar_of: int | None) -> Scene:
         """A world as it stands, with the sonar of one vehicle where it lives."""
         swarm, w = batch.swarm, world
-        course, state, facts, constraints = swarm.course, swarm.state, swarm.facts, swarm.scenario.constraints
+        world_map, state, facts, constraints = swarm.world_map, swarm.state, swarm.facts, swarm.scenario.constraints
         alive, position = state.alive[w].copy(), state.eta[w, :, :2].copy()
         arrival_s = float(facts.arrival_s[w, 0])
         return Scene(
             scenario=swarm.scenario,
-            waypoints=course.waypoints[w, 0, : course.last[w, 0] + 1].copy(),
-            obstacles=course.obstacles[w, : course.num_obstacles[w]].copy(),
+            waypoints=world_map.waypoints[w, 0, : world_map.last[w, 0] + 1].copy(),
+            obstacles=world_map.obstacles[w, : world_map.num_obstacles[w]].copy(),
             groups=groups_of(swarm, w),
             marks=batch.task.marks(w),
             time_s=float(facts.time_s[w]),
@@ -129,7 +129,7 @@ class SceneHistory:
                 -1, *position.shape
             ),
             hits=np.array(self._hits[w]).reshape(-1, 3),
-            arrival_s=arrival_s if np.isfinite(arrival_s) and batch.task.leads else None,
+            arrival_s=arrival_s if np.isfinite(arrival_s) and batch.task.has_goal else None,
             collisions=int(batch.collisions[w]),
             min_spacing_m=float(facts.min_spacing[w]),
             clearance_m=float(facts.obstacle_clearance[w].min()),
@@ -141,5 +141,5 @@ class SceneHistory:
 
 def _sonar(batch: BatchedEnv, world: int, vehicle: int) -> SonarView:
     percept, at = batch.swarm.percept, (world, vehicle)
-    neighbour = percept["neighbour"][at][percept["heard"][at] > 0]
+    neighbour = percept["neighbour"][at][percept["detected"][at] > 0]
     return SonarView(vehicle, neighbour, percept["echo_range"][at].copy())

@@ -28,7 +28,7 @@ def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: 
             pygame.draw.line(surface, ink.EDGE, middle, edge)
 
 
-def paint_heard(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera, line_px: float) -> None:
+def paint_detections(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera, line_px: float) -> None:
     """Lines to the vehicles that are heard, and echoes as arcs across their sub-sectors."""
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     ahead, aside = unit(heading), unit(heading + math.pi / 2)

@@ -22,14 +22,14 @@ class Harbour(MapKind):
 
     def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Piers along both banks, and the mole between two of them."""
-        radius, made = between(rng, self.radius_m), list[Float64]()
+        radius, piers = between(rng, self.radius_m), list[Float64]()
         for bank in (1.0, -1.0):
             x = water.near + rng.uniform(0.0, _FIRST_M)
             while x < water.far:
                 tip = bank * max(water.half - between(rng, self.pier_m), _FREE_M)
-                made.append(wall((x, bank * (water.half + INTO_BANK_M)), (x, tip), radius))
+                piers.append(wall((x, bank * (water.half + INTO_BANK_M)), (x, tip), radius))
                 x += between(rng, self.basin_m) + 2.0 * radius
         x, half = between(rng, (water.near, water.far)), between(rng, self.mole_m) / 2.0
         middle = side(rng) * between(rng, (0.0, _OFF)) * half
-        made.append(wall((x, middle - half), (x, middle + half), radius))
-        return joined(*made)
+        piers.append(wall((x, middle - half), (x, middle + half), radius))
+        return joined(*piers)

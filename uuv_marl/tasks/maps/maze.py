@@ -21,12 +21,12 @@ class Maze(MapKind):
     def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Bars that begin at either bank; the next one more often at the other."""
         radius, bank, x = between(rng, self.radius_m), side(rng), water.near
-        made: list[Float64] = []
+        rows: list[Float64] = []
         for _ in range(int(rng.integers(2, 4))):
             if x > water.far:
                 break
             end = -bank * (water.half - between(rng, self.open_m) - radius)
             tip = water.ahead(x + between(rng, (-_ASLANT_M, _ASLANT_M)))
-            made.append(wall((x, bank * (water.half + INTO_BANK_M)), (tip, end), radius))
+            rows.append(wall((x, bank * (water.half + INTO_BANK_M)), (tip, end), radius))
             bank, x = bank if rng.random() < _SAME_BANK else -bank, x + between(rng, self.apart_m)
-        return joined(*made)
+        return joined(*rows)

@@ -24,12 +24,12 @@ class Piles(MapKind):
         columns = int(water.half // apart)
         aslant = between(rng, (-_ASLANT, _ASLANT))
         joins = rng.random((rows, 2 * columns + 2)) < self.braced
-        made: list[Float64] = []
+        piles: list[Float64] = []
         for row in range(rows):
             places = [
                 (water.ahead(water.near + row * apart + aslant * k * apart), k * apart)
                 for k in range(-columns, columns + 1)
             ]
-            made.append(np.array([(*place, radius) for place in places]))
-            made += [wall(a, b, radius) for a, b, join in zip(places, places[1:], joins[row], strict=False) if join]
-        return joined(*made)
+            piles.append(np.array([(*place, radius) for place in places]))
+            piles += [wall(a, b, radius) for a, b, join in zip(places, places[1:], joins[row], strict=False) if join]
+        return joined(*piles)

@@ -31,11 +31,11 @@ class Pocket(MapKind):
         back = mouth * rng.uniform(_BACK, 1.0)
         front = water.ahead(x - depth)
         corners = [(front, off - mouth), (x, off - back), (x, off + back), (front, off + mouth)]
-        made = [wall(a, b, radius) for a, b in pairwise(corners)]
+        sides = [wall(a, b, radius) for a, b in pairwise(corners)]
         if rng.random() < self.closed:
             which = side(rng)
-            made.append(wall(
+            sides.append(wall(
                 corners[3] if which > 0 else corners[0],
                 (between(rng, (front, x)), which * (water.half + INTO_BANK_M)), radius,
             ))  # fmt: skip
-        return joined(*made)
+        return joined(*sides)

@@ -79,9 +79,9 @@ def side(rng: np.random.Generator) -> float:
 def wall(start: tuple[float, float], end: tuple[float, float], radius: float) -> Float64:
     """A row of discs from one point to another, both their centres, shape (disc, 3)."""
     a, b = np.array(start), np.array(end)
-    way = b - a
-    num = max(1, int(np.ceil(np.sqrt(way[0] * way[0] + way[1] * way[1]) / (STEP * radius))))
-    places = a + way * (np.arange(num + 1)[:, None] / num)
+    offset = b - a
+    num = max(1, int(np.ceil(np.sqrt(offset[0] * offset[0] + offset[1] * offset[1]) / (STEP * radius))))
+    places = a + offset * (np.arange(num + 1)[:, None] / num)
     return np.concatenate([places, np.full((num + 1, 1), radius)], axis=1)
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.doubt import doubt
+from uuv_marl.baselines.memory.uncertainty import uncertainty
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of, steer_safely
-from uuv_marl.baselines.safety.remembering import Filtered
+from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS, ScoutGains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -49,9 +49,9 @@ class Scout(Filtered):
         self._growth = growth(scenario.swarm.num_vehicles)
 
     @property
-    def kept_s(self) -> float:
+    def memory_s(self) -> float:
         """For how long a neighbour is remembered that is heard no more [s]."""
-        return float(self.gains.kept_s)
+        return float(self.gains.memory_s)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
         """Actions of shape (world, vehicle, 2)."""
@@ -64,27 +64,27 @@ class Scout(Filtered):
 
     def _grown(self) -> ScoutGains:
         """The gains for as many vehicles as the swarm has, all float: else compiled code would be made anew."""
-        by, g = ScoutGains(*map(float, self.gains)), self._growth
-        return by._replace(
-            pull=by.pull / g, pull_at_rest=by.pull_at_rest * math.sqrt(g), push_at_rest=by.push_at_rest * g,
-            together=by.together / g**3,
+        gains, g = ScoutGains(*map(float, self.gains)), self._growth
+        return gains._replace(
+            pull=gains.pull / g, pull_at_rest=gains.pull_at_rest * math.sqrt(g), push_at_rest=gains.push_at_rest * g,
+            together=gains.together / g**3,
         )  # fmt: skip
 
 
 @compiled
 def wary(g: ScoutGains, share: float) -> ScoutGains:
     """Gains of a vehicle that doubts: pull and push, changed. ``share``: how much it doubts, 0 to 1."""
-    pull, push = math.exp(share * g.pull_in_doubt), math.exp(share * g.push_in_doubt)
+    pull, push = math.exp(share * g.pull_if_uncertain), math.exp(share * g.push_if_uncertain)
     return ScoutGains(
         g.pull * pull, g.push * push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m, g.steering,
-        g.kept_s, g.lead, g.pull_in_doubt, g.push_in_doubt,
+        g.memory_s, g.lead, g.pull_if_uncertain, g.push_if_uncertain,
     )  # fmt: skip
 
 
 @compiled
-def wished(w: int, i: int, g: ScoutGains, kept: Surroundings) -> tuple[float, float]:
+def desired_velocity(w: int, i: int, g: ScoutGains, memory: Surroundings) -> tuple[float, float]:
     """The velocity that a vehicle wishes where there are no obstacles, in its map [m/s]."""
-    pose, reference, speed = kept.pose[w, i], kept.reference[w, i], kept.reference_speed[w, i]
+    pose, reference, speed = memory.pose[w, i], memory.reference[w, i], memory.reference_speed[w, i]
     pull, push, together = g.pull, g.push, g.together
     if reference[2] == 0.0 and reference[3] == 0.0:
         pull, push, together = pull * g.pull_at_rest, push * g.push_at_rest, 0.0
@@ -92,42 +92,42 @@ def wished(w: int, i: int, g: ScoutGains, kept: Surroundings) -> tuple[float, fl
     to_y = reference[1] - g.behind_m * reference[3] - pose[1]
     w_x, w_y = speed * reference[2] + pull * to_x, speed * reference[3] + pull * to_y
     if together > 0.0:
-        m_x, m_y, _ = middle(w, i, kept)
+        m_x, m_y, _ = middle(w, i, memory)
         w_x, w_y = w_x + together * (to_x - m_x), w_y + together * (to_y - m_y)
-    return pushed(w_x, w_y, w, i, push, g.push_range, kept)
+    return pushed(w_x, w_y, w, i, push, g.push_range, memory)
 
 
 @compiled
 def pushed(
-    w_x: float, w_y: float, w: int, i: int, push: float, push_range: float, kept: Surroundings
+    w_x: float, w_y: float, w: int, i: int, push: float, push_range: float, memory: Surroundings
 ) -> tuple[float, float]:
     """A wished velocity [m/s] with pushes away from near neighbours, as ``ScoutGains`` has them."""
-    for k in range(kept.known.shape[2]):
-        away = max(kept.away[w, i, k], 1e-6)
+    for k in range(memory.known.shape[2]):
+        away = max(memory.away[w, i, k], 1e-6)
         if away < push_range:
-            d_x, d_y = kept.pose[w, i, 0] - kept.place[w, i, k, 0], kept.pose[w, i, 1] - kept.place[w, i, k, 1]
+            d_x, d_y = memory.pose[w, i, 0] - memory.place[w, i, k, 0], memory.pose[w, i, 1] - memory.place[w, i, k, 1]
             share = push * (1.0 / away - 1.0 / push_range)
             w_x, w_y = w_x + share * d_x, w_y + share * d_y
     return w_x, w_y
 
 
 @compiled
-def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Surroundings) -> tuple[float, float]:
+def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, memory: Surroundings) -> tuple[float, float]:
     """A wished velocity [m/s] bent round the obstacles ahead, as an ideal fluid flows round cylinders.
 
     The modulation of Khansari-Zadeh and Billard, A dynamical system approach to realtime obstacle avoidance, Autonomous
     Robots 32 (2012), for discs: with (R / r)^2, R the radius and the margin, r the distance of the centre, the velocity
     towards a disc shrinks by that share, and that past it grows. Each disc bends what the one before has left.
     """
-    for d in range(kept.score.shape[2]):
-        if kept.score[w, i, d] < CONFIRMED:
+    for d in range(memory.score.shape[2]):
+        if memory.score[w, i, d] < CONFIRMED:
             continue
-        n_x, n_y = kept.pose[w, i, 0] - kept.disc[w, i, d, 0], kept.pose[w, i, 1] - kept.disc[w, i, d, 1]
-        away = max(kept.disc_away[w, i, d], 1e-6)
+        n_x, n_y = memory.pose[w, i, 0] - memory.disc[w, i, d, 0], memory.pose[w, i, 1] - memory.disc[w, i, d, 1]
+        away = max(memory.disc_away[w, i, d], 1e-6)
         n_x, n_y = n_x / away, n_y / away
         outwards, past = n_x * w_x + n_y * w_y, n_x * w_y - n_y * w_x
         if outwards < 0.0:
-            near = (kept.disc[w, i, d, 2] + margin(w, i, d, barrier, kept)) / away
+            near = (memory.disc[w, i, d, 2] + margin(w, i, d, barrier, memory)) / away
             near = min(near * near, 1.0)
             outwards, past = (1.0 - near) * outwards, (1.0 + near) * past
             w_x, w_y = n_x * outwards - n_y * past, n_y * outwards + n_x * past
@@ -135,32 +135,32 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, kept: Su
 
 
 @compiled
-def _lead(w: int, i: int, share: float, limits: Limits, kept: Surroundings, action: Float32) -> None:
+def _lead(w: int, i: int, share: float, limits: Limits, memory: Surroundings, action: Float32) -> None:
     """Change an action so that it acts in spite of actuators that lag or are weak.
 
     ``share``: of lag and weakness that is made up for.
     """
-    damping = limits.yaw_damping * kept.motion[w, i, 2]
-    torque = lead(w, i, 1, min(max(action[w, i, 1] - damping, -1.0), 1.0), share, kept) + damping
-    thrust = lead(w, i, 0, float(action[w, i, 0]), share, kept)
+    damping = limits.yaw_damping * memory.motion[w, i, 2]
+    torque = lead(w, i, 1, min(max(action[w, i, 1] - damping, -1.0), 1.0), share, memory) + damping
+    thrust = lead(w, i, 0, float(action[w, i, 0]), share, memory)
     a_x, a_y = project(thrust, min(max(torque, -1.0), 1.0))
     action[w, i, 0], action[w, i, 1] = a_x, a_y
 
 
 @compiled
 def decide_all(
-    worlds: Bool, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, gain: float, kept: Surroundings,
+    worlds: Bool, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
     planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """The law for every vehicle."""
-    doubts = g.pull_in_doubt != 0.0 or g.push_in_doubt != 0.0
+    adapts = g.pull_if_uncertain != 0.0 or g.push_if_uncertain != 0.0
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
-            if worlds[w] and kept.begun[w, i] > 0.0:
-                own = wary(g, doubt(w, i, kept)) if doubts and kept.reference_speed[w, i] > 0.0 else g
-                w_x, w_y = wished(w, i, own, kept)
-                w_x, w_y = modulated(w_x, w_y, w, i, barrier, kept)
-                num = planes_of(w, i, period, barrier, kept, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, kept, action)
+            if worlds[w] and memory.begun[w, i] > 0.0:
+                own = wary(g, uncertainty(w, i, memory)) if adapts and memory.reference_speed[w, i] > 0.0 else g
+                w_x, w_y = desired_velocity(w, i, own, memory)
+                w_x, w_y = modulated(w_x, w_y, w, i, barrier, memory)
+                num = planes_of(w, i, period, barrier, memory, planes)
+                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, memory, action)
                 if g.lead > 0.0 and limits.helm == 0.0:
-                    _lead(w, i, g.lead, limits, kept, action)
+                    _lead(w, i, g.lead, limits, memory, action)

@@ -13,7 +13,7 @@ from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.exponential import exp
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.random import uniform, uniforms
-from uuv_marl.sim.sea.purposes import MISMATCH, ONSET, VICTIM
+from uuv_marl.sim.disturbances.purposes import MISMATCH, ONSET, VICTIM
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
@@ -78,7 +78,7 @@ def actuation(scenario: Scenario) -> Actuation:
     )
 
 
-def draw_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hull: Hull) -> None:
+def sample_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hull: Hull) -> None:
     """The vehicles of world w's new episode, whose faults begin within ``duration_s``; ``hull`` is written."""
     hull.tau[w] = 0.0
     mismatch, nominal = scenario.mismatch, plant(scenario)
@@ -109,11 +109,11 @@ def victims(key: np.uint64, fault: int, scenario: Scenario) -> list[int]:
 
 def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario: Scenario) -> tuple[int, int]:
     """Control holds from which and up to which a fault acts on a vehicle; an onset is drawn within ``duration_s``."""
-    given = scenario.faults[fault]
+    settings = scenario.faults[fault]
     drawn = duration_s * uniform(key, ONSET, 0, vehicle, fault)
-    hold, onset = scenario.timing.control_hold_s, drawn if given.onset_s is None else given.onset_s
-    first = math.ceil(onset / hold - 1e-9)
-    return first, _NEVER if given.duration_s is None else first + math.ceil(given.duration_s / hold - 1e-9)
+    control_step_s, onset = scenario.timing.control_step_s, drawn if settings.onset_s is None else settings.onset_s
+    first = math.ceil(onset / control_step_s - 1e-9)
+    return first, _NEVER if settings.duration_s is None else first + math.ceil(settings.duration_s / control_step_s - 1e-9)
 
 
 def hit(tick: Int64, hull: Hull) -> Bool:
@@ -147,7 +147,7 @@ def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> N
 
 
 @compiled_inline
-def followed(asked: float, given: float, half: float, whole: float) -> tuple[float, float, float]:
+def followed(commanded: float, initial: float, half: float, whole: float) -> tuple[float, float, float]:
     """A lagging force at the start, in the middle and at the end of a step: asked + (given - asked) e^(-t / lag).
 
     Args:
@@ -157,8 +157,8 @@ def followed(asked: float, given: float, half: float, whole: float) -> tuple[flo
         whole: e^(-t / lag) after a step; 0 without a lag.
     """
     if whole == 0.0:
-        return asked, asked, asked
-    return given, asked + (given - asked) * half, asked + (given - asked) * whole
+        return commanded, commanded, commanded
+    return initial, commanded + (initial - commanded) * half, commanded + (initial - commanded) * whole
 
 
 @compiled_inner

@@ -52,7 +52,7 @@ class Traffic(Section):
 
     speed_mps: Speed
     """Their speed, the same for all; 0: they stand still."""
-    way_m: Radius
+    amplitude_m: Radius
     """How far they go to either side of their places."""
     share: Probability
     """Share of the obstacles that move, rounded up. A larger share moves the same obstacles and more."""

@@ -9,13 +9,13 @@ from scipy.stats import kstest, norm
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.scenario import hears_ideally
-from uuv_marl.sim.sea.noise import is_silent
-from uuv_marl.sim.sea.schedule import Reading, due, hold_of, latest
+from uuv_marl.scenario import sonar_is_ideal
+from uuv_marl.sim.disturbances.noise import is_silent
+from uuv_marl.sim.disturbances.schedule import Reading, due, control_step_of, latest
 from uuv_marl.sim.swarm import Swarm
 
 CHANNELS = {"sonar.channels": ["compass", "link", "age", "ranged"]}
-SONAR = ("heard", "neighbour", "echo", "echo_range", "echo_position", "link_identity")
+SONAR = ("detected", "neighbour", "echo", "echo_range", "echo_position", "link_identity")
 LATE = {"latency.processing_s": 0.3}
 CARRIED = {"latency.processing_s": 0.5, "latency.compensated": True}
 PINGS = {"latency.active_period_s": 0.25, "latency.passive_period_s": 0.7}
@@ -39,7 +39,7 @@ def near_obstacles(swarm):
     """Vehicles on a grid around the first obstacle, at every heading."""
     n = swarm.num_vehicles
     for w in range(swarm.num_worlds):
-        rng, (x, y, radius) = np.random.default_rng(w), swarm.course.obstacles[w, 0]
+        rng, (x, y, radius) = np.random.default_rng(w), swarm.world_map.obstacles[w, 0]
         angle, away = rng.uniform(-math.pi, math.pi, n), radius + rng.uniform(20.0, 90.0, n)
         swarm.state.eta[w] = np.stack(
             [x + away * np.cos(angle), y + away * np.sin(angle), angle + rng.normal(0, 3, n)], 1
@@ -53,7 +53,7 @@ def swim(overrides, decisions=40, seed=3, num_vehicles=12, scenario="single_obst
     """A run whose actions are the same whatever disturbs it; what is known and true at every decision."""
     swarm = Swarm(load_scenario(scenario, num_vehicles=num_vehicles, overrides=CHANNELS | overrides))
     swarm.reset(seed)
-    if swarm.course.num_obstacles[0]:
+    if swarm.world_map.num_obstacles[0]:
         near_obstacles(swarm)
     rng, frames = np.random.default_rng(7), []
     for _ in range(decisions + 1):
@@ -67,7 +67,7 @@ def frame(swarm):
     percept = swarm.percept
     known = {name: percept[name][0].copy() for name in percept.names}
     return known | {
-        "who": swarm.heard[0].copy(),
+        "who": swarm.detected_index[0].copy(),
         "eta": swarm.state.eta[0].copy(),
         "l": swarm.facts.reference[0, 0].copy(),
     }
@@ -101,7 +101,7 @@ def test_readings_that_are_neither_late_nor_wrong_move_no_bit():
     """A line that carries the truth: a period of one control hold, and silence that never comes."""
     _, calm = swim({})
     for overrides in ({"noise.silence_probability": 1e-300}, {"latency.passive_period_s": HOLD}):
-        assert not hears_ideally(load_scenario("starter", overrides=overrides))
+        assert not sonar_is_ideal(load_scenario("starter", overrides=overrides))
         for ours, theirs in zip(swim(overrides)[1], calm, strict=True):
             same(ours, theirs, names=ours)
 
@@ -113,7 +113,7 @@ def test_readings_that_are_neither_late_nor_wrong_move_no_bit():
 def test_the_readings_taken_are_those_that_a_decision_sees(every, delay, holds):
     seen = {latest(decision - delay, every) for decision in range(0, 600, holds)} - {-1}
     taken = {due(hold, every, delay, holds) for hold in range(600)} - {-1}
-    assert {m for m in seen if hold_of(m, every) < 500} == {m for m in taken if hold_of(m, every) < 500}
+    assert {m for m in seen if control_step_of(m, every) < 500} == {m for m in taken if control_step_of(m, every) < 500}
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_a_late_reading_is_the_past_and_knows_its_age(overrides):
             every = max(period / HOLD, 1.0)
             readings = [hold for hold in (math.floor(m * every + 0.5) for m in range(t + 2)) if hold <= t - delay]
             np.testing.assert_allclose(known["age"][:, sectors], HOLD * (t - max(readings, default=0)), rtol=1e-6)
-            for names, where in ((("heard", "neighbour", "link_identity", "who"), sectors), (SONAR[2:5], active)):
+            for names, where in ((("detected", "neighbour", "link_identity", "who"), sectors), (SONAR[2:5], active)):
                 if readings:
                     same(known, ideal[max(readings)], names, np.s_[:, where])
                     heard += int((known[names[0]][:, where] > 0).sum())
@@ -144,7 +144,7 @@ def test_a_carried_echo_is_where_the_obstacle_is(reports):
     """Obstacles stand still, and own motion is known, so that only rounding is left."""
     swarm, frames = swim(CARRIED | {"sonar.echo_reports": reports})
     _, ideal = swim({"sonar.echo_reports": reports})
-    x, y, _ = swarm.course.obstacles[0, 0]
+    x, y, _ = swarm.world_map.obstacles[0, 0]
     for t in range(5, len(frames)):
         now, then, seen = frames[t], ideal[t - 5], frames[t]["echo"] > 0
         np.testing.assert_array_equal(now["echo"], then["echo"])
@@ -168,7 +168,7 @@ def test_a_carried_neighbour_is_where_it_was():
     _, frames = swim(CARRIED)
     for t in range(5, len(frames)):
         now, then = frames[t], frames[t - 5]
-        i, k = np.nonzero(now["heard"])
+        i, k = np.nonzero(now["detected"])
         j = now["who"][i, k]
         expected = in_body(now, then["eta"][None, :, 0], then["eta"][None, :, 1])[i, j]
         np.testing.assert_allclose(now["neighbour"][i, k], expected, atol=1e-4)
@@ -178,7 +178,7 @@ def test_sound_shows_vehicles_where_they_were():
     """R / c before, between control holds on the line between them, and before the reset where they stood."""
     _, frames = swim(TRAVEL)
     for t, now in enumerate(frames):
-        i, k = np.nonzero(now["heard"])
+        i, k = np.nonzero(now["detected"])
         j = now["who"][i, k]
         ago = np.hypot(*(now["eta"][i, :2] - now["eta"][j, :2]).T) / (100.0 * HOLD)
         whole = ago.astype(int)
@@ -192,7 +192,7 @@ def test_sound_shows_vehicles_where_they_were():
         expected = np.stack([np.cos(psi) * dx + np.sin(psi) * dy, np.cos(psi) * dy - np.sin(psi) * dx], 1)
         np.testing.assert_allclose(now["neighbour"][i, k], expected, atol=1e-3)
     _, ideal = swim({})
-    same(frames[-1], ideal[-1], ("heard", "echo", "echo_range", "echo_position", "who"))
+    same(frames[-1], ideal[-1], ("detected", "echo", "echo_range", "echo_position", "who"))
     assert np.abs(frames[-1]["neighbour"] - ideal[-1]["neighbour"]).max() > 0.5
 
 
@@ -206,7 +206,7 @@ def polar(points):
 
 def pairs(overrides, field, flag):
     """Positions as heard and as they are, where both are heard, of vehicles that come to rest; some 10^5."""
-    decisions = 300 if flag == "heard" else 1700
+    decisions = 300 if flag == "detected" else 1700
     runs = (swim(change, decisions, num_vehicles=54, idle=True)[1] for change in (overrides, {}))
     both = [(a[field], b[field], (a[flag] > 0) & (b[flag] > 0)) for a, b in zip(*runs, strict=True)]
     return tuple(np.concatenate([pair[part][pair[2]] for pair in both]) for part in range(2))
@@ -220,12 +220,12 @@ def is_normal(values, num):
     assert kstest(values, "norm").pvalue > 1e-6
 
 
-@pytest.mark.parametrize(("field", "flag", "num"), [("neighbour", "heard", 100_000), ("echo_position", "echo", 90_000)])
+@pytest.mark.parametrize(("field", "flag", "num"), [("neighbour", "detected", 100_000), ("echo_position", "echo", 90_000)])
 def test_bearings_and_ranges_are_off_as_stated(field, flag, num):
     heard, true = pairs(BLUR, field, flag)
     (away, bearing), (r, psi) = polar(heard), polar(true)
     turn = np.remainder(bearing - psi + math.pi, 2.0 * math.pi) - math.pi
-    reach = r if flag == "heard" else pairs(BLUR, "echo_range", "echo")[1].astype(float)
+    reach = r if flag == "detected" else pairs(BLUR, "echo_range", "echo")[1].astype(float)
     far = reach > 20.0  # where no range falls below 0
     is_normal(turn[far] / math.radians(5.0), num)
     is_normal(((away - r) / (0.5 + 0.05 * reach))[far], num)
@@ -240,16 +240,16 @@ def test_an_echo_s_position_moves_as_far_as_its_range():
 def test_a_passive_range_has_a_factor_that_lasts():
     swarm, wrong = swim(FACTOR)
     _, true = swim({})
-    factor = swarm._sea.ears.factor[0]
+    factor = swarm._disturbances.sensor_errors.factor[0]
     for ours, theirs in zip(wrong, true, strict=True):
-        same(ours, theirs, ("heard", "echo", "echo_range", "echo_position", "who"))
+        same(ours, theirs, ("detected", "echo", "echo_range", "echo_position", "who"))
         for array, sectors, _ in arrays_of(swarm):
             scale = factor[:, None, None] if array.kind == "passive" else 1.0
             expected = scale * theirs["neighbour"][:, sectors]
             np.testing.assert_allclose(ours["neighbour"][:, sectors], expected, rtol=1e-5)
     drawn = Swarm(load_scenario("single_obstacle", overrides=FACTOR), 200)
     drawn.reset(0)
-    is_normal(np.log(drawn._sea.ears.factor.ravel()) / 0.3, 10_000)
+    is_normal(np.log(drawn._disturbances.sensor_errors.factor.ravel()) / 0.3, 10_000)
 
 
 def test_bearings_alone():
@@ -257,7 +257,7 @@ def test_bearings_alone():
     _, ideal = swim({})
     for ours, theirs in zip(frames, ideal, strict=True):
         for array, sectors, _ in arrays_of(swarm):
-            passive, heard = array.kind == "passive", ours["heard"][:, sectors] > 0
+            passive, heard = array.kind == "passive", ours["detected"][:, sectors] > 0
             np.testing.assert_array_equal(ours["ranged"][:, sectors], 0.0 if passive else 1.0)
             (away, bearing), (r, psi) = (polar(f["neighbour"][:, sectors][heard]) for f in (ours, theirs))
             np.testing.assert_allclose(bearing, psi, atol=1e-6)
@@ -271,7 +271,7 @@ def test_detection_falls_with_range_as_stated():
     counted = 0
     for array, sectors, active in arrays_of(swarm):
         spreading, half = (40.0, 40.0) if array.kind == "active" else (20.0, 60.0)
-        for flag, where in (("heard", sectors), ("echo", active)):
+        for flag, where in (("detected", sectors), ("echo", active)):
             present = np.concatenate([f[flag][:, where] > 0 for f in there])
             r = np.concatenate(
                 [f["echo_range"][:, where] if flag == "echo" else polar(f["neighbour"][:, where])[0] for f in there]
@@ -292,7 +292,7 @@ def test_silence_begins_as_often_and_lasts_as_long_as_stated(probability, length
     overrides = {"noise.silence_probability": probability, "noise.silence_readings": length}
     swarm = Swarm(load_scenario("starter", num_vehicles=1, overrides=overrides))
     swarm.reset(0)
-    sea, num, silent_at = swarm._sea, 100_000, getattr(is_silent, "py_func", is_silent)
+    sea, num, silent_at = swarm._disturbances, 100_000, getattr(is_silent, "py_func", is_silent)
     silent = np.array([silent_at(Reading(0, 1, m, m, 0), 0, sea.keys[0], sea.noise, sea.ears) for m in range(num)])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], silent, [0]])))
     assert ((edges[1::2] - edges[::2])[:-1] % length == 0).all()
@@ -308,8 +308,8 @@ def test_a_silent_array_hears_nothing_and_others_hear_all():
     for ours, theirs in zip(frames, ideal, strict=True):
         for _, sectors, active in arrays_of(swarm):
             for i in range(12):
-                mine = np.concatenate([ours["heard"][i, sectors], ours["echo"][i, active]])
-                full = np.concatenate([theirs["heard"][i, sectors], theirs["echo"][i, active]])
+                mine = np.concatenate([ours["detected"][i, sectors], ours["echo"][i, active]])
+                full = np.concatenate([theirs["detected"][i, sectors], theirs["echo"][i, active]])
                 assert not mine.any() or (mine == full).all()
                 quiet += [not mine.any()] if full.any() else []
     # p L / (p L + 1 - p); the readings of a burst are no draws of their own
@@ -327,7 +327,7 @@ def test_false_echoes_have_their_rate_and_fill_their_sub_sectors(probability):
         frames.append(frame(swarm))
     for array, sectors, active in arrays_of(swarm):
         echoes = array.kind == "active"
-        flag, field, where = ("echo", "echo_position", active) if echoes else ("heard", "neighbour", sectors)
+        flag, field, where = ("echo", "echo_position", active) if echoes else ("detected", "neighbour", sectors)
         found = np.concatenate([f[flag][:, where] for f in frames]) > 0
         spread = math.sqrt(probability * (1.0 - probability) * found.size)
         assert abs(found.sum() - probability * found.size) < SIGMAS * spread
@@ -339,7 +339,7 @@ def test_false_echoes_have_their_rate_and_fill_their_sub_sectors(probability):
         assert kstest(share[found], "uniform").pvalue > 1e-6
         if echoes:
             np.testing.assert_allclose(np.concatenate([f["echo_range"] for f in frames])[found], away[found], rtol=1e-5)
-            assert not any(f["heard"][:, sectors].any() for f in frames)
+            assert not any(f["detected"][:, sectors].any() for f in frames)
     assert all((f["who"] == -1).all() and not f["link_identity"].any() for f in frames)
 
 
@@ -349,14 +349,14 @@ def test_a_false_echo_is_heard_only_where_nothing_is_nearer():
     phantoms = 0
     for false, true in zip(ours, theirs, strict=True):
         for flag, reach in (
-            ("heard", polar(true["neighbour"])[0] - polar(false["neighbour"])[0]),
+            ("detected", polar(true["neighbour"])[0] - polar(false["neighbour"])[0]),
             ("echo", true["echo_range"] - false["echo_range"]),
         ):
             there, changed = true[flag] > 0, reach != 0.0
             assert (false[flag][there] > 0).all()
             assert (reach[there] >= 0.0).all()
             phantoms += (there & changed).sum()
-        stays = (true["heard"] > 0) & (false["who"] >= 0)
+        stays = (true["detected"] > 0) & (false["who"] >= 0)
         np.testing.assert_array_equal(false["neighbour"][stays], true["neighbour"][stays])
     assert phantoms > 20
 
@@ -364,15 +364,15 @@ def test_a_false_echo_is_heard_only_where_nothing_is_nearer():
 def test_a_dead_array_hears_nothing_while_it_is_dead():
     swarm, frames = swim(DEAD | FALSE)
     _, others = swim(FALSE)
-    hit = {i for i in range(12) if swarm._sea.hull.broken[0, i, 0, 0] < 2**62}
+    hit = {i for i in range(12) if swarm._disturbances.hull.broken[0, i, 0, 0] < 2**62}
     assert len(hit) == 6
     for t, (ours, theirs) in enumerate(zip(frames, others, strict=True)):
         for i in range(12):
             dead = i in hit and 10 <= t < 20
-            same(ours, theirs, ("heard", "neighbour", "who"), np.s_[i, 7:])
+            same(ours, theirs, ("detected", "neighbour", "who"), np.s_[i, 7:])
             if dead:
                 assert not any(ours[name][i].any() for name in SONAR[2:5])
-                assert not ours["heard"][i, :7].any()
+                assert not ours["detected"][i, :7].any()
             else:
                 same(ours, theirs, where=np.s_[i])
 
@@ -385,7 +385,7 @@ def test_a_dead_array_hears_nothing_while_it_is_dead():
 )
 def test_one_disturbance_moves_no_draw_of_bearings_and_ranges(other):
     alone, among = (swim(BLUR | FACTOR | change)[1] for change in ({}, other))
-    for flag, field in (("heard", "neighbour"), ("echo", "echo_position")):
+    for flag, field in (("detected", "neighbour"), ("echo", "echo_position")):
         both = [((a[flag] > 0) & (b[flag] > 0), a[field], b[field]) for a, b in zip(alone, among, strict=True)]
         assert sum(mask.sum() for mask, *_ in both) > 20
         for mask, ours, theirs in both:
@@ -396,7 +396,7 @@ def test_one_disturbance_moves_no_draw_of_bearings_and_ranges(other):
 @pytest.mark.parametrize("other", [BLUR | FACTOR | DRIFT | COMPASS, BEARINGS])
 def test_one_disturbance_moves_no_draw_of_what_is_missed(own, other):
     for ours, theirs in zip(swim(own)[1], swim(own | other)[1], strict=True):
-        same(ours, theirs, ("heard", "echo", "who"))
+        same(ours, theirs, ("detected", "echo", "who"))
 
 
 # --- Navigation ---
@@ -437,7 +437,7 @@ def test_a_compass_is_off_by_the_same_angle_all_the_time():
     np.testing.assert_allclose(angles, np.broadcast_to(angles[0], np.shape(angles)), atol=1e-6)
     drawn = Swarm(load_scenario("single_obstacle", overrides=COMPASS), 200)
     drawn.reset(0)
-    is_normal(np.arctan2(*np.moveaxis(drawn._sea.track.bias, -1, 0)[::-1]).ravel() / math.radians(10.0), 10_000)
+    is_normal(np.arctan2(*np.moveaxis(drawn._disturbances.navigation_errors.bias, -1, 0)[::-1]).ravel() / math.radians(10.0), 10_000)
 
 
 def test_drift_carries_late_readings_along():
@@ -445,7 +445,7 @@ def test_drift_carries_late_readings_along():
     _, frames = swim(CARRIED | DRIFT, 60)
     _, true = swim(CARRIED, 60)
     for t in range(5, 61):
-        i, k = np.nonzero(frames[t]["heard"])
+        i, k = np.nonzero(frames[t]["detected"])
         c, s = np.cos(frames[t]["eta"][i, 2]), np.sin(frames[t]["eta"][i, 2])
         north, east = (drift_of(frames[t]) - drift_of(frames[t - 5]))[i].T
         off = frames[t]["neighbour"].astype(float)[i, k] - true[t]["neighbour"][i, k]

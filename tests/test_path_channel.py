@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import PolicyError, granted, make
+from uuv_marl.baselines import PolicyError, with_policy_requirements, make
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
@@ -16,7 +16,7 @@ FIRST = 10_000
 
 def told(kinds=tuple(KINDS), vehicles=10, **changes):
     base = load_scenario("hard_water", num_vehicles=vehicles, overrides={"task.kinds": list(kinds), **changes})
-    return granted("oracle", base)
+    return with_policy_requirements("oracle", base)
 
 
 def flown(scenario, worlds, decisions):
@@ -41,16 +41,16 @@ def test_the_oracle_passes_every_kind_of_map_and_touches_nothing(kind, vehicles)
 def test_what_the_channel_tells_is_true(decisions):
     """By a second hand: the point ahead lies on free water, nearer along the way; walls by brute force."""
     swarm, percept = flown(told(), 8, decisions)
-    task, state, hull = swarm.task, swarm.state, swarm.scenario.contact.hull_radius_m
-    np.testing.assert_allclose(percept["way_length"][:, :, 0], task.ways(), rtol=1e-6)
+    task, state, hull = swarm.task, swarm.state, swarm.scenario.collision.hull_radius_m
+    np.testing.assert_allclose(percept["path_length"][:, :, 0], task.path_lengths(), rtol=1e-6)
     for w in range(8):
-        discs, goal = swarm.course.obstacles[w, : swarm.course.num_obstacles[w]], swarm.course.waypoints[w, 0, 1]
+        discs, goal = swarm.world_map.obstacles[w, : swarm.world_map.num_obstacles[w]], swarm.world_map.waypoints[w, 0, 1]
         for i in range(10):
             (c, s), at = swarm.heading[w, i], state.eta[w, i, :2]
             out = np.array([[c, s], [-s, c]])  # from the body frame
-            point = at + percept["way"][w, i] @ out
+            point = at + percept["path"][w, i] @ out
             world = np.array([w])
-            here, there = (task._ways(world, place[None], goal[None])[0] for place in (at, point))
+            here, there = (task._path_lengths(world, place[None], goal[None])[0] for place in (at, point))
             assert (np.hypot(*(discs[:, :2] - point).T) - discs[:, 2]).min() >= hull - 1e-3
             assert 1.0 < np.hypot(*(point - at)) < 20.0
             assert there < here - 1.0
@@ -58,22 +58,22 @@ def test_what_the_channel_tells_is_true(decisions):
             gap = np.hypot(*off.T) - discs[:, 2]
             nearest = np.argsort(gap)[:8]
             surfaces = at + off[nearest] * (gap / (gap + discs[:, 2]))[nearest, None]
-            np.testing.assert_allclose(at + percept["way_walls"][w, i] @ out, surfaces, atol=1e-3)
+            np.testing.assert_allclose(at + percept["path_walls"][w, i] @ out, surfaces, atol=1e-3)
 
 
 def test_without_the_channel_nothing_is_added_and_nothing_changes():
-    plain, swarm = (Swarm(load_scenario(told(), overrides={"sonar.channels": have}), 3) for have in ([], ["way"]))
-    assert plain.task.memory.lead.size == 0
+    plain, swarm = (Swarm(load_scenario(told(), overrides={"sonar.channels": have}), 3) for have in ([], ["path"]))
+    assert plain.task.memory.path_cost.size == 0
     assert plain.told == ()
     assert swarm.layout.table[: len(plain.layout.table)] == plain.layout.table
-    assert [field.name for field in swarm.told] == ["way", "way_length", "way_walls"]
+    assert [field.name for field in swarm.task_fields] == ["path", "path_length", "path_walls"]
     action = np.full((3, 10, 2), 0.5)
     for each in (plain, swarm):
         each.reset(FIRST)
         each.step(action)
     np.testing.assert_array_equal(swarm.percept.flat[:, :, : plain.layout.size], plain.percept.flat)
     with pytest.raises(KeyError, match="percept has no field 'way'"):
-        plain.percept["way"]
+        plain.percept["path"]
 
 
 def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
@@ -82,9 +82,9 @@ def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
         "task 'hard_water' has it"
     )
     with pytest.raises(ScenarioError, match=message):
-        load_scenario("starter", overrides={"sonar.channels": ["way"]})
+        load_scenario("starter", overrides={"sonar.channels": ["path"]})
     with pytest.raises(ScenarioError, match=message):
-        granted("oracle", load_scenario("starter"))
+        with_policy_requirements("oracle", load_scenario("starter"))
     with pytest.raises(ScenarioError, match="can't hold 'wya' with task 'hard_water', whose channels are .*, way$"):
         load_scenario("hard_water", overrides={"sonar.channels": ["wya"]})
     for name in ("starter", "hard_water"):
@@ -106,12 +106,12 @@ def test_geodesic_progress_is_what_the_way_has_shortened_by():
     knowing, dense = (BatchedEnv(plain, 4, reward) for reward in ("geodesic", "dense"))
     for env in (knowing, dense):
         env.reset(FIRST)
-    before, total = knowing.task.ways(), 0.0
+    before, total = knowing.task.path_lengths(), 0.0
     for _ in range(20):
         result, usual = (env.step(np.full((4, 10, 2), 0.6)) for env in (knowing, dense))
         total += result.terms["progress"]
         for term in ("obstacle", "spacing", "effort", "collision", "arrival"):
             np.testing.assert_array_equal(result.terms[term], usual.terms[term])
-    np.testing.assert_allclose(total, (before - knowing.task.ways()) / plain.reward.progress_m, atol=1e-9)
+    np.testing.assert_allclose(total, (before - knowing.task.path_lengths()) / plain.reward.progress_m, atol=1e-9)
     with pytest.raises(ValueError, match="rewards of task 'follow'"):
         BatchedEnv(load_scenario("starter"), 1, "geodesic")

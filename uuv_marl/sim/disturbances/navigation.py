@@ -15,7 +15,7 @@ from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.perception import saturate, toward
 from uuv_marl.sim.random import normal, uniform
-from uuv_marl.sim.sea.purposes import COMPASS, DRIFT
+from uuv_marl.sim.disturbances.purposes import COMPASS, DRIFT
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields
@@ -32,11 +32,11 @@ class NavigationModel(NamedTuple):
 
 
 @described
-class Track(NamedTuple):
+class NavigationErrors(NamedTuple):
     """What each vehicle's navigation gets wrong."""
 
-    astray: Annotated[Float64, "world vehicle 2", "Direction of its drift, a unit vector north and east."]
-    strayed: Annotated[Float64, "world vehicle 2", "Known less true position, north and east [m]."]
+    drift_direction: Annotated[Float64, "world vehicle 2", "Direction of its drift, a unit vector north and east."]
+    position_error: Annotated[Float64, "world vehicle 2", "Known less true position, north and east [m]."]
     bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's error, clockwise."]
 
 
@@ -46,43 +46,43 @@ def navigation(scenario: Scenario) -> NavigationModel:
     return NavigationModel(own.drift_share, math.radians(own.compass_bias_deg))
 
 
-def draw_track(w: int, key: np.uint64, navigation: NavigationModel, track: Track) -> None:
+def sample_navigation_errors(w: int, key: np.uint64, navigation: NavigationModel, navigation_errors: NavigationErrors) -> None:
     """Directions and errors of world w's new episode, from its key."""
-    for i in range(track.strayed.shape[1]):
-        track.astray[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
-        track.bias[w, i] = cos_sin(navigation.compass_bias * normal(key, COMPASS, 0, i, 0))
+    for i in range(navigation_errors.position_error.shape[1]):
+        navigation_errors.drift_direction[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
+        navigation_errors.bias[w, i] = cos_sin(navigation.compass_bias * normal(key, COMPASS, 0, i, 0))
 
 
 @compiled_inner
-def find_oneself(w: int, track: Track) -> None:
+def reset_position_error(w: int, navigation_errors: NavigationErrors) -> None:
     """The vehicles of world w know where they are."""
-    track.strayed[w] = 0.0
+    navigation_errors.position_error[w] = 0.0
 
 
 @compiled_inner
-def go_astray(w: int, state: State, navigation: NavigationModel, track: Track) -> None:
+def drift_position(w: int, state: State, navigation: NavigationModel, navigation_errors: NavigationErrors) -> None:
     """Known positions after one control hold."""
     if navigation.drift_share == 0.0:
         return
     for i in range(state.eta.shape[1]):
         dx, dy = state.eta[w, i, 0] - state.before[w, i, 0], state.eta[w, i, 1] - state.before[w, i, 1]
         off = navigation.drift_share * math.sqrt(dx * dx + dy * dy)
-        track.strayed[w, i, 0] += off * track.astray[w, i, 0]
-        track.strayed[w, i, 1] += off * track.astray[w, i, 1]
+        navigation_errors.position_error[w, i, 0] += off * navigation_errors.drift_direction[w, i, 0]
+        navigation_errors.position_error[w, i, 1] += off * navigation_errors.drift_direction[w, i, 1]
 
 
 @compiled
-def by_compass(w: int, i: int, north: float, east: float, track: Track) -> tuple[float, float]:
+def by_compass(w: int, i: int, north: float, east: float, navigation_errors: NavigationErrors) -> tuple[float, float]:
     """A vector north and east as a vehicle's compass has it: turned clockwise by the compass's error.
 
     The vector may be a heading's cosine and sine.
     """
-    c, s = track.bias[w, i, 0], track.bias[w, i, 1]
+    c, s = navigation_errors.bias[w, i, 0], navigation_errors.bias[w, i, 1]
     return c * north - s * east, c * east + s * north
 
 
 @compiled_inner
-def navigate(w: int, world: World, navigation: NavigationModel, track: Track, see: Fields) -> None:
+def navigate(w: int, world: World, navigation: NavigationModel, navigation_errors: NavigationErrors, see: Fields) -> None:
     """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them."""
     if navigation.drift_share == 0.0 and navigation.compass_bias == 0.0:
         return
@@ -90,11 +90,11 @@ def navigate(w: int, world: World, navigation: NavigationModel, track: Track, se
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:
             continue
-        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], track)
-        if world.course.informed[w, i]:
-            l_t = reference[w, world.course.group[w, i]]
-            dx = l_t[0] - (eta[w, i, 0] + track.strayed[w, i, 0])
-            dy = l_t[1] - (eta[w, i, 1] + track.strayed[w, i, 1])
+        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], navigation_errors)
+        if world.world_map.informed[w, i]:
+            l_t = reference[w, world.world_map.group[w, i]]
+            dx = l_t[0] - (eta[w, i, 0] + navigation_errors.position_error[w, i, 0])
+            dy = l_t[1] - (eta[w, i, 1] + navigation_errors.position_error[w, i, 1])
             v_x, v_y = l_t[2], l_t[3]
             see.reference[w, i, 0], see.reference[w, i, 1] = toward(dx, dy, c, s)
             see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)

@@ -17,11 +17,11 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.random import uniform
-from uuv_marl.sim.sea.current import Flow, over_ground
-from uuv_marl.sim.sea.navigation import Track, by_compass
-from uuv_marl.sim.sea.purposes import MESSAGE
+from uuv_marl.sim.disturbances.current import Flow, over_ground
+from uuv_marl.sim.disturbances.navigation import NavigationErrors, by_compass
+from uuv_marl.sim.disturbances.purposes import MESSAGE
 from uuv_marl.sim.tables import described
-from uuv_marl.sim.views import SeaFields
+from uuv_marl.sim.views import DisturbanceFields
 from uuv_marl.types import Float64
 
 _MAX_AGE_S = 4096.0
@@ -32,67 +32,67 @@ class ModemModel(NamedTuple):
 
     round_s: float
     """Time between two messages of a vehicle."""
-    hold_s: float
+    control_step_s: float
     """A control hold."""
     loss: float
     """Probability that a listener loses a message."""
 
 
 @described
-class Mail(NamedTuple):
+class Messages(NamedTuple):
     """What was sent and what arrived; times are -1 before the first. The axis peer is empty without the channel."""
 
     sent: Annotated[Float64, "world peer 3", "Latest message: velocity over ground, north, east [m/s]; when sent [s]."]
-    mail: Annotated[Float64, "world vehicle peer 3", "Latest message that arrived at a vehicle from each other one."]
+    received: Annotated[Float64, "world vehicle peer 3", "Latest message that arrived at a vehicle from each other one."]
 
 
 def modem(scenario: Scenario) -> ModemModel:
     """The scenario's messages as numbers for the compiled functions."""
     round_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
-    return ModemModel(round_s, scenario.timing.control_hold_s, scenario.modem.loss_probability)
+    return ModemModel(round_s, scenario.timing.control_step_s, scenario.modem.loss_probability)
 
 
-def draw_mail(w: int, mail: Mail) -> None:
+def clear_messages(w: int, messages: Messages) -> None:
     """Nobody has sent anything in world w's new episode."""
-    mail.sent[w], mail.mail[w] = -1.0, -1.0
+    messages.sent[w], messages.received[w] = -1.0, -1.0
 
 
 @compiled
 def rounds(tick: int, slots: float, numbers: ModemModel) -> int:
     """Latest round whose moment, so many shares of a round after its start, has come by this control hold; or -1."""
-    return max(math.floor(tick * numbers.hold_s / numbers.round_s - slots + 1e-9), -1)
+    return max(math.floor(tick * numbers.control_step_s / numbers.round_s - slots + 1e-9), -1)
 
 
 @compiled_inner
-def exchange(w: int, key: np.uint64, world: World, numbers: ModemModel, mail: Mail, flow: Flow, track: Track) -> None:
+def exchange(w: int, key: np.uint64, world: World, numbers: ModemModel, messages: Messages, flow: Flow, navigation_errors: NavigationErrors) -> None:
     """Send and receive what is due at the start of an episode, or the end of a control hold, its number counted."""
-    state, n, tick = world.state, mail.sent.shape[1], world.state.tick[w]
+    state, n, tick = world.state, messages.sent.shape[1], world.state.tick[w]
     for j in range(n):
         if not state.alive[w, j]:
             continue
         if rounds(tick, j / n, numbers) > rounds(tick - 1, j / n, numbers):
             v_x, v_y = over_ground(w, j, state, flow)
-            mail.sent[w, j, 0], mail.sent[w, j, 1] = by_compass(w, j, v_x, v_y, track)
-            mail.sent[w, j, 2] = tick * numbers.hold_s
+            messages.sent[w, j, 0], messages.sent[w, j, 1] = by_compass(w, j, v_x, v_y, navigation_errors)
+            messages.sent[w, j, 2] = tick * numbers.control_step_s
         arrived = rounds(tick, (j + 1) / n, numbers)
-        if arrived > rounds(tick - 1, (j + 1) / n, numbers) and mail.sent[w, j, 2] >= 0.0:
+        if arrived > rounds(tick - 1, (j + 1) / n, numbers) and messages.sent[w, j, 2] >= 0.0:
             for i in range(n):
                 if i != j and uniform(key, MESSAGE, arrived, i, j) >= numbers.loss:
                     for part in range(3):
-                        mail.mail[w, i, j, part] = mail.sent[w, j, part]
+                        messages.received[w, i, j, part] = messages.sent[w, j, part]
 
 
 @compiled_inner
-def know_mail(w: int, world: World, mail: Mail, track: Track, more: SeaFields) -> None:
+def write_messages(w: int, world: World, messages: Messages, navigation_errors: NavigationErrors, more: DisturbanceFields) -> None:
     """Write, for each sub-sector, what the vehicle heard in it last said."""
     heading, now_s = world.senses.heading, world.facts.time_s[w]
     for i in range(world.state.alive.shape[1]):
-        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], track)
+        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], navigation_errors)
         for k in range(more.modem_identity.shape[2]):
-            j = world.senses.heard[w, i, k]
-            if not world.state.alive[w, i] or j < 0 or mail.mail[w, i, j, 2] < 0.0:
+            j = world.senses.detected_index[w, i, k]
+            if not world.state.alive[w, i] or j < 0 or messages.received[w, i, j, 2] < 0.0:
                 continue
-            v_x, v_y, sent_s = mail.mail[w, i, j, 0], mail.mail[w, i, j, 1], mail.mail[w, i, j, 2]
+            v_x, v_y, sent_s = messages.received[w, i, j, 0], messages.received[w, i, j, 1], messages.received[w, i, j, 2]
             more.modem_identity[w, i, k] = j + 1
             more.modem_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
             more.modem_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)

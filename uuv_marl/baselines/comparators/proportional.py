@@ -13,22 +13,22 @@ from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32
 
 
-class PullGains(NamedTuple):
+class ProportionalGains(NamedTuple):
     """Gains of the wished velocity."""
 
     pull: float = 0.05
     """To l(t) [1/s]; as that of ``scout``."""
 
 
-class Pull(Policy):
+class ProportionalTracking(Policy):
     """The velocity of l(t) and a pull to l(t); neighbours and obstacles are ignored. Meant for ``guarded:pull``."""
 
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: PullGains | None = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: ProportionalGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or PullGains()
+        self.gains = gains or ProportionalGains()
         self._gain = velocity_gain(scenario)
 
     def decide(self, percept: Percept) -> Float32:
@@ -40,7 +40,7 @@ class Pull(Policy):
 
 
 @compiled
-def _act(flat: Float32, at: Starts, g: PullGains, limits: Limits, gain: float, action: Float32) -> None:
+def _act(flat: Float32, at: Starts, g: ProportionalGains, limits: Limits, gain: float, action: Float32) -> None:
     """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):

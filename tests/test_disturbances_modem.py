@@ -7,7 +7,7 @@ import pytest
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, granted, make
+from uuv_marl.baselines import Policy, with_policy_requirements, make
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
 from uuv_marl.baselines.learned.layers import shapes
 from uuv_marl.sim.swarm import Swarm
@@ -35,8 +35,8 @@ def test_a_message_is_the_velocity_when_it_was_sent_and_its_age_follows_the_sche
         past[tick] = np.stack([c * u - s * v, s * u + c * v], axis=-1)
         see = swarm.percept
         for i in range(5):
-            for k in np.flatnonzero(see["heard"][0, i]):
-                j = int(swarm.heard[0, i, k])
+            for k in np.flatnonzero(see["detected"][0, i]):
+                j = int(swarm.detected_index[0, i, k])
                 sent = 4 * j + 20 * math.floor((tick - 4 * (j + 1)) / 20)  # slots of 0.4 s, rounds of 2 s
                 if sent < 4 * j:
                     assert see["modem_identity"][0, i, k] == see["modem_age"][0, i, k] == 0
@@ -52,15 +52,15 @@ def test_a_lost_vehicle_says_no_more():
     swarm = list(swum({"faults": [{"kind": "member", "share": 0.2, "onset_s": 3.0}]}))[-1]
     gone = np.flatnonzero(~swarm.state.alive[0])
     assert len(gone) == 1
-    assert (swarm._sea.mail.sent[0, gone, 2] < 3.05).all()
-    assert (np.delete(swarm._sea.mail.sent[0, :, 2], gone) > 7.9).all()
+    assert (swarm._disturbances.messages.sent[0, gone, 2] < 3.05).all()
+    assert (np.delete(swarm._disturbances.messages.sent[0, :, 2], gone) > 7.9).all()
 
 
 def test_messages_are_lost_as_often_as_is_said():
     """1,000 rounds of 5 vehicles: 20,000 messages; the share within 5 deviations."""
     arrived, before = 0, None
     for swarm in swum({"modem.loss_probability": 0.3, "modem.period_s": 0.1}, 500, worlds=2):
-        now = swarm._sea.mail.mail[..., 2].copy()
+        now = swarm._disturbances.messages.mail[..., 2].copy()
         arrived += int((now != before).sum()) if before is not None else 0
         before = now
     total = 500 * 2 * 20
@@ -71,10 +71,10 @@ def test_compasses_turn_what_is_said_and_what_is_read():
     """A velocity over ground is north and east by the sender's compass, ahead and abeam by the listener's."""
     turns = 0
     for swarm in swum({"navigation.compass_bias_deg": 30.0, "modem.period_s": 0.1}, 20):
-        bias = swarm._sea.track.bias[0] @ [1.0, 1.0j]
+        bias = swarm._disturbances.navigation_errors.bias[0] @ [1.0, 1.0j]
         told, true = (swarm.percept[f"{name}_velocity"][0].astype(float) @ [1.0, 1.0j] for name in ("modem", "link"))
         for i, k in np.argwhere(swarm.percept["modem_identity"][0]):
-            j = swarm.heard[0, i, k]
+            j = swarm.detected_index[0, i, k]
             fresh = swarm.percept["modem_age"][0, i, k] == 0.0
             assert abs(told[i, k] - true[i, k] * bias[j] / bias[i]) < 1e-5 or not fresh
             turns += fresh and abs(true[i, k]) > 0.1
@@ -85,8 +85,8 @@ def test_compasses_turn_what_is_said_and_what_is_read():
 def test_comparators_run_on_messages_as_on_the_link(policy):
     """The same law: where messages are as fresh as the link, it does the same."""
     base = {"modem.period_s": 0.1, "obstacles": []}
-    linked = granted(policy, load_scenario(STARTER, overrides=base))
-    messaged = granted(policy, load_scenario(STARTER, overrides={**base, "sonar.channels": ["modem"]}))
+    linked = with_policy_requirements(policy, load_scenario(STARTER, overrides=base))
+    messaged = with_policy_requirements(policy, load_scenario(STARTER, overrides={**base, "sonar.channels": ["modem"]}))
     assert "link" not in messaged.sonar.channels
     assert "modem" in messaged.sonar.channels
     paths = []
@@ -105,13 +105,13 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
 def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
     """Not for one that asks for both, nor for an actor that was trained on the link."""
     sea = load_scenario(STARTER, overrides={"sonar.channels": ["link", "modem"]})
-    assert granted("sff", sea).sonar.channels == ("modem",)
-    assert granted("tests.test_sea_modem:Both", sea).sonar.channels == ("link", "modem")
+    assert with_policy_requirements("sff", sea).sonar.channels == ("modem",)
+    assert with_policy_requirements("tests.test_disturbances_modem:Both", sea).sonar.channels == ("link", "modem")
     linked = load_scenario(STARTER, overrides={"sonar.channels": ["link"]})
     card = card_of(linked)
     zeros = {name: np.zeros(shape) for name, shape in shapes(card.network, card.sizes).items()}
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, zeros)
-    assert granted(str(tmp_path), sea).sonar.channels == ("link",)
+    assert with_policy_requirements(str(tmp_path), sea).sonar.channels == ("link",)
 
 
 class Both(Policy):

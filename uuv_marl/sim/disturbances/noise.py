@@ -12,14 +12,14 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.exponential import exp
 from uuv_marl.sim.random import log, normal, normals, uniform, uniforms
-from uuv_marl.sim.sea.actuation import ARRAY, Actuation, Hull, acts
-from uuv_marl.sim.sea.purposes import BEARING_RANGE, DETECTION, FACTOR, FALSE_ECHO, FALSE_PLACE, SILENCE
-from uuv_marl.sim.sea.readings import NOBODY, OBSTACLE, PHANTOM, PLACE, SHIFT, Hits, Readings, hush
-from uuv_marl.sim.sea.schedule import Listening, Reading
+from uuv_marl.sim.disturbances.actuation import ARRAY, Actuation, Hull, acts
+from uuv_marl.sim.disturbances.purposes import BEARING_RANGE, DETECTION, FACTOR, FALSE_ECHO, FALSE_PLACE, SILENCE
+from uuv_marl.sim.disturbances.readings import NO_DETECTION, OBSTACLE, FALSE_DETECTION, PLACE, SHIFT, Detections, Readings, clear_array
+from uuv_marl.sim.disturbances.schedule import SonarTiming, Reading
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import SeaFields
+from uuv_marl.sim.views import DisturbanceFields
 from uuv_marl.types import Bool, Float64, Int64
 
 _NEVER = 2**40
@@ -60,7 +60,7 @@ class NoiseModel(NamedTuple):
 
 
 @described
-class Ears(NamedTuple):
+class SensorErrors(NamedTuple):
     """Errors that last longer than a reading."""
 
     factor: Annotated[Float64, "world vehicle", "On ranges that its passive arrays take."]
@@ -71,39 +71,39 @@ class Ears(NamedTuple):
 
 def noise(scenario: Scenario) -> NoiseModel:
     """The scenario's errors as numbers for the compiled functions."""
-    given, arrays = scenario.noise, scenario.sonar.arrays
-    half_range = {"active": given.active_r50_m, "passive": given.passive_r50_m}
+    settings, arrays = scenario.noise, scenario.sonar.arrays
+    half_range = {"active": settings.active_r50_m, "passive": settings.passive_r50_m}
     decibels = {"active": 40.0, "passive": 20.0}  # per factor 10 of range: sound spreads there and back, or one way
     return NoiseModel(
-        bearing=math.radians(given.bearing_deg),
-        range_m=given.range_m,
-        range_share=given.range_share,
-        factor_log_sd=given.passive_range_log_sd,
-        passive_ranges=given.passive_ranges,
-        nominal_range=given.nominal_range_m,
+        bearing=math.radians(settings.bearing_deg),
+        range_m=settings.range_m,
+        range_share=settings.range_share,
+        factor_log_sd=settings.passive_range_log_sd,
+        passive_ranges=settings.passive_ranges,
+        nominal_range=settings.nominal_range_m,
         half_range=np.array([half_range[array.kind] for array in arrays]),
-        decades=np.array([given.detection_sd_db * log(10.0) / decibels[array.kind] for array in arrays]),
-        silence=given.silence_probability,
-        silent_readings=given.silence_readings,
-        false_echo=given.false_echo_probability,
+        decades=np.array([settings.detection_sd_db * log(10.0) / decibels[array.kind] for array in arrays]),
+        silence=settings.silence_probability,
+        silent_readings=settings.silence_readings,
+        false_echo=settings.false_echo_probability,
         range=np.array([array.range_m for array in arrays]),
         lower=suite(scenario).lower,
         width=np.array([math.radians(array.aperture_deg / array.sub_sectors) for array in arrays]),
     )
 
 
-def draw_ears(w: int, key: np.uint64, noise: NoiseModel, ears: Ears) -> None:
+def sample_sensor_errors(w: int, key: np.uint64, noise: NoiseModel, sensor_errors: SensorErrors) -> None:
     """Lasting factors of world w's new episode, from its key."""
-    for i in range(ears.factor.shape[1]):
-        ears.factor[w, i] = exp(noise.factor_log_sd * normal(key, FACTOR, 0, i, 0))
+    for i in range(sensor_errors.factor.shape[1]):
+        sensor_errors.factor[w, i] = exp(noise.factor_log_sd * normal(key, FACTOR, 0, i, 0))
 
 
 @compiled_inner
-def begin_ears(w: int, key: np.uint64, noise: NoiseModel, ears: Ears) -> None:
+def schedule_outages(w: int, key: np.uint64, noise: NoiseModel, sensor_errors: SensorErrors) -> None:
     """When the arrays of world w, which begin to read, fall silent first."""
-    for i in range(ears.silent.shape[1]):
-        for a in range(ears.silent.shape[2]):
-            ears.silent[w, i, a] = gap(uniform(key, SILENCE, 0, i, a), noise.silence)
+    for i in range(sensor_errors.silent.shape[1]):
+        for a in range(sensor_errors.silent.shape[2]):
+            sensor_errors.silent[w, i, a] = gap(uniform(key, SILENCE, 0, i, a), noise.silence)
 
 
 @compiled_inline
@@ -117,134 +117,134 @@ def gap(chance: float, probability: float) -> int:
 
 
 @compiled_inner
-def spoil(at: Reading, num: int, key: np.uint64, passive: bool, noise: NoiseModel, ears: Ears, hits: Hits) -> None:
+def add_errors(at: Reading, num: int, key: np.uint64, passive: bool, noise: NoiseModel, sensor_errors: SensorErrors, detections: Detections) -> None:
     """What an array of every vehicle misses, and puts elsewhere. ``hits`` are true before, and have errors after."""
     if noise.half_range[at.a] > 0.0:
-        miss(at, num, key, noise, hits)
+        drop_missed(at, num, key, noise, detections)
     measured = noise.passive_ranges or not passive
     blurred = noise.bearing > 0.0 or noise.range_m > 0.0 or noise.range_share > 0.0
     if blurred or not measured or (passive and noise.factor_log_sd > 0.0):
-        draw_blur(at, num, key, noise, hits)
-        blur(at, num, measured, passive, noise, ears, hits)
+        sample_perturbations(at, num, key, noise, detections)
+        perturb(at, num, measured, passive, noise, sensor_errors, detections)
 
 
 @compiled_inner
-def miss(at: Reading, num: int, key: np.uint64, noise: NoiseModel, hits: Hits) -> None:
+def drop_missed(at: Reading, num: int, key: np.uint64, noise: NoiseModel, detections: Detections) -> None:
     """What is too faint is missed: signal excess 20 log10(r50 / r), or 40 log10 there and back, plus noise <= 0.
 
     Ranges of those missed become negative.
     """
     w, decades, half_range = at.w, noise.decades[at.a], noise.half_range[at.a]
     for q in range(num):
-        excess, _ = normals(key, DETECTION, at.tick, hits.code[w, q] >> SHIFT, hits.code[w, q] & PLACE)
-        hits.first[w, q] = half_range * exp(decades * excess)
+        excess, _ = normals(key, DETECTION, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE)
+        detections.first[w, q] = half_range * exp(decades * excess)
     for q in range(num):
-        if hits.reach[w, q] >= hits.first[w, q]:
-            hits.reach[w, q] = -1.0
+        if detections.reach[w, q] >= detections.first[w, q]:
+            detections.reach[w, q] = -1.0
 
 
 @compiled_inner
-def draw_blur(at: Reading, num: int, key: np.uint64, noise: NoiseModel, hits: Hits) -> None:
+def sample_perturbations(at: Reading, num: int, key: np.uint64, noise: NoiseModel, detections: Detections) -> None:
     """Cosine and sine of every bearing's error, and a standard normal number for its range; arguments as for ``miss``.
 
     The loop holds nothing else, so that it runs on vector registers.
     """
     w, bearing = at.w, noise.bearing
     for q in range(num):
-        side, off = normals(key, BEARING_RANGE, at.tick, hits.code[w, q] >> SHIFT, hits.code[w, q] & PLACE)
-        hits.first[w, q], hits.second[w, q] = cos_sin(bearing * side)
-        hits.third[w, q] = off
+        side, off = normals(key, BEARING_RANGE, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE)
+        detections.first[w, q], detections.second[w, q] = cos_sin(bearing * side)
+        detections.third[w, q] = off
 
 
 @compiled_inner
-def blur(at: Reading, num: int, measured: bool, passive: bool, noise: NoiseModel, ears: Ears, hits: Hits) -> None:
+def perturb(at: Reading, num: int, measured: bool, passive: bool, noise: NoiseModel, sensor_errors: SensorErrors, detections: Detections) -> None:
     """Put hits at a wrong bearing and range; an echo's position moves as far as its range does.
 
     ``measured``: whether the array measures ranges. The hits have draws of ``draw_blur``.
     """
     w = at.w
     for q in range(num):
-        away = hits.reach[w, q]
+        away = detections.reach[w, q]
         if away < 0.0:
             continue
-        factor = ears.factor[w, hits.code[w, q] >> SHIFT] if passive else 1.0
-        heard = max(factor * away + (noise.range_m + noise.range_share * away) * hits.third[w, q], 0.0)
+        factor = sensor_errors.factor[w, detections.code[w, q] >> SHIFT] if passive else 1.0
+        measured_range = max(factor * away + (noise.range_m + noise.range_share * away) * detections.third[w, q], 0.0)
         if not measured:
-            heard = noise.nominal_range
-        x, y, c, s = hits.x[w, q], hits.y[w, q], hits.first[w, q], hits.second[w, q]
+            measured_range = noise.nominal_range
+        x, y, c, s = detections.x[w, q], detections.y[w, q], detections.first[w, q], detections.second[w, q]
         far = math.sqrt(x * x + y * y)
-        share = max(far + (heard - away), 0.0) / far if far > 0.0 else 1.0
-        hits.x[w, q], hits.y[w, q], hits.reach[w, q] = share * (c * x - s * y), share * (s * x + c * y), heard
+        share = max(far + (measured_range - away), 0.0) / far if far > 0.0 else 1.0
+        detections.x[w, q], detections.y[w, q], detections.reach[w, q] = share * (c * x - s * y), share * (s * x + c * y), measured_range
 
 
 @compiled_inner
-def interrupt(
-    at: Reading, key: np.uint64, listening: Listening, noise: NoiseModel, ears: Ears, actuation: Actuation, hull: Hull,
-    hits: Hits, readings: Readings,
+def apply_outages(
+    at: Reading, key: np.uint64, sonar_timing: SonarTiming, noise: NoiseModel, sensor_errors: SensorErrors, actuation: Actuation, hull: Hull,
+    detections: Detections, readings: Readings,
 ) -> None:  # fmt: skip
     """Echoes of nothing; arrays that are silent for a while; dead arrays."""
     if noise.false_echo > 0.0:
-        imagine(at, key, listening, noise, hits, readings)
+        add_false_echoes(at, key, sonar_timing, noise, detections, readings)
     if noise.silence > 0.0:
-        for i in range(ears.silent.shape[1]):
-            if is_silent(at, i, key, noise, ears):
-                hush(at, i, listening, readings)
+        for i in range(sensor_errors.silent.shape[1]):
+            if is_silent(at, i, key, noise, sensor_errors):
+                clear_array(at, i, sonar_timing, readings)
     for f in range(actuation.kind.shape[0]):
         if actuation.kind[f] == ARRAY and actuation.array[f] == at.a:
-            for i in range(ears.silent.shape[1]):
+            for i in range(sensor_errors.silent.shape[1]):
                 if acts(at.w, i, f, at.tick, hull):
-                    hush(at, i, listening, readings)
+                    clear_array(at, i, sonar_timing, readings)
 
 
 @compiled_inner
-def imagine(
-    at: Reading, key: np.uint64, listening: Listening, noise: NoiseModel, hits: Hits, readings: Readings
+def add_false_echoes(
+    at: Reading, key: np.uint64, sonar_timing: SonarTiming, noise: NoiseModel, detections: Detections, readings: Readings
 ) -> None:
     """Echoes of nothing, anywhere in a sub-sector within the array's range, unless something nearer is heard there.
 
     An active array takes one for an obstacle's surface, a passive one for a vehicle.
     """
     w, a, slot = at.w, at.a, at.slot
-    first, end = listening.first[a], listening.first[a + 1]
-    passive = listening.active[a] == listening.active[a + 1]
+    first, end = sonar_timing.first[a], sonar_timing.first[a + 1]
+    passive = sonar_timing.active[a] == sonar_timing.active[a + 1]
     # Where an active array's echoes lie, beyond its own sub-sectors.
-    beyond = 0 if passive else readings.whom.shape[3] - listening.active[-1] + listening.active[a] - first
-    for i in range(readings.whom.shape[2]):
-        hits.code[w, i] = first + gap(uniform(key, FALSE_ECHO, at.tick, i, first), noise.false_echo)
-    for i in range(readings.whom.shape[2]):
-        k = hits.code[w, i]
+    beyond = 0 if passive else readings.detected_index.shape[3] - sonar_timing.active[-1] + sonar_timing.active[a] - first
+    for i in range(readings.detected_index.shape[2]):
+        detections.code[w, i] = first + gap(uniform(key, FALSE_ECHO, at.tick, i, first), noise.false_echo)
+    for i in range(readings.detected_index.shape[2]):
+        k = detections.code[w, i]
         while k < end:  # from one to the next, so that those who hear nothing false cost one draw
             far, side = uniforms(key, FALSE_PLACE, at.tick, i, k)
             away = noise.range[a] * far if noise.passive_ranges or not passive else noise.nominal_range
             place = k + beyond
-            if readings.whom[w, slot, i, place] == NOBODY or np.float32(away) < readings.reach[w, slot, i, place]:
+            if readings.detected_index[w, slot, i, place] == NO_DETECTION or np.float32(away) < readings.reach[w, slot, i, place]:
                 c, s = cos_sin(noise.width[a] * (1.0 - side))
-                readings.whom[w, slot, i, place] = PHANTOM if passive else OBSTACLE
+                readings.detected_index[w, slot, i, place] = FALSE_DETECTION if passive else OBSTACLE
                 readings.reach[w, slot, i, place] = away
-                readings.where[w, slot, i, place, 0] = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
-                readings.where[w, slot, i, place, 1] = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])
+                readings.position[w, slot, i, place, 0] = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
+                readings.position[w, slot, i, place, 1] = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])
             k += 1 + gap(uniform(key, FALSE_ECHO, at.tick, i, k + 1), noise.false_echo)
 
 
 @compiled_inner
-def is_silent(at: Reading, i: int, key: np.uint64, noise: NoiseModel, ears: Ears) -> bool:
+def is_silent(at: Reading, i: int, key: np.uint64, noise: NoiseModel, sensor_errors: SensorErrors) -> bool:
     """Whether an array of vehicle i is silent at a reading; a silence is over before the next can begin.
 
     ``ears`` is written where a silence is over.
     """
-    while at.number - ears.silent[at.w, i, at.a] >= noise.silent_readings:
-        end = ears.silent[at.w, i, at.a] + noise.silent_readings
-        ears.silent[at.w, i, at.a] = end + gap(uniform(key, SILENCE, end, i, at.a), noise.silence)
-    return at.number >= ears.silent[at.w, i, at.a]
+    while at.number - sensor_errors.silent[at.w, i, at.a] >= noise.silent_readings:
+        end = sensor_errors.silent[at.w, i, at.a] + noise.silent_readings
+        sensor_errors.silent[at.w, i, at.a] = end + gap(uniform(key, SILENCE, end, i, at.a), noise.silence)
+    return at.number >= sensor_errors.silent[at.w, i, at.a]
 
 
 @compiled_inner
-def tell_ranged(w: int, alive: Bool, listening: Listening, noise: NoiseModel, more: SeaFields) -> None:
+def write_ranged(w: int, alive: Bool, sonar_timing: SonarTiming, noise: NoiseModel, more: DisturbanceFields) -> None:
     """Write into the percepts of world w which sub-sectors measure ranges."""
     if more.ranged.shape[2] == 0:
         return
-    for a in range(listening.every.shape[0]):
-        passive = listening.active[a] == listening.active[a + 1]
+    for a in range(sonar_timing.every.shape[0]):
+        passive = sonar_timing.active[a] == sonar_timing.active[a + 1]
         for i in range(alive.shape[1]):
-            for k in range(listening.first[a], listening.first[a + 1]):
+            for k in range(sonar_timing.first[a], sonar_timing.first[a + 1]):
                 more.ranged[w, i, k] = 1.0 if alive[w, i] and (noise.passive_ranges or not passive) else 0.0

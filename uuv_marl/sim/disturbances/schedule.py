@@ -9,23 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.scenario import Scenario, hears_ideally
+from uuv_marl.scenario import Scenario, sonar_is_ideal
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float64, Int64
 
 
-class Listening(NamedTuple):
+class SonarTiming(NamedTuple):
     """Numbers of a scenario's arrays and of how late they are. Times in control holds."""
 
     ideal: bool
     """Whether all is heard at once and as it is, so that percepts stay as they are."""
-    hold_s: float
+    control_step_s: float
     """Length of a control hold [s]."""
-    holds: int
+    control_steps: int
     """Control holds of a decision."""
     delay: int
     """Control holds from the reception of a reading until a policy has it."""
-    holds_per_metre: float
+    control_steps_per_metre: float
     """Control holds that sound takes for a metre; 0: none."""
     compensated: bool
     """Whether readings are carried to the present pose."""
@@ -52,51 +52,51 @@ class Reading(NamedTuple):
     """Place at which the reading is kept."""
 
 
-def listening(scenario: Scenario) -> Listening:
+def sonar_timing(scenario: Scenario) -> SonarTiming:
     """The scenario's arrays and delays as numbers for the compiled functions."""
-    latency, arrays, hold_s = scenario.latency, scenario.sonar.arrays, scenario.timing.control_hold_s
+    latency, arrays, control_step_s = scenario.latency, scenario.sonar.arrays, scenario.timing.control_step_s
     period_s = {"active": latency.active_period_s, "passive": latency.passive_period_s}
     sub_sectors = [array.sub_sectors for array in arrays]
     active = [array.sub_sectors if array.kind == "active" else 0 for array in arrays]
-    return Listening(
-        ideal=hears_ideally(scenario),
-        hold_s=hold_s,
-        holds=scenario.timing.holds_per_decision,
-        delay=math.ceil(latency.processing_s / hold_s - 1e-9),
-        holds_per_metre=1.0 / (latency.sound_speed_mps * hold_s) if latency.travel_time else 0.0,
+    return SonarTiming(
+        ideal=sonar_is_ideal(scenario),
+        control_step_s=control_step_s,
+        control_steps=scenario.timing.control_steps_per_decision,
+        delay=math.ceil(latency.processing_s / control_step_s - 1e-9),
+        control_steps_per_metre=1.0 / (latency.sound_speed_mps * control_step_s) if latency.travel_time else 0.0,
         compensated=latency.compensated,
-        every=np.array([max(period_s[array.kind] / hold_s, 1.0) for array in arrays]),
+        every=np.array([max(period_s[array.kind] / control_step_s, 1.0) for array in arrays]),
         first=np.cumsum([0, *sub_sectors]),
         active=np.cumsum([0, *active]),
     )
 
 
 @compiled
-def hold_of(number: int, every: float) -> int:
+def control_step_of(number: int, every: float) -> int:
     """Control hold, from the first reading on, at which an array takes a reading: the nearest to its time."""
     return math.floor(number * every + 0.5)
 
 
 @compiled
-def latest(hold: int, every: float) -> int:
+def latest(control_step: int, every: float) -> int:
     """Number of the latest reading up to a control hold, -1 for none."""
-    if hold < 0:
+    if control_step < 0:
         return -1
-    number = int((hold + 0.5) / every) + 1
-    while hold_of(number, every) > hold:
+    number = int((control_step + 0.5) / every) + 1
+    while control_step_of(number, every) > control_step:
         number -= 1
     return number
 
 
 @compiled
-def due(hold: int, every: float, delay: int, holds: int) -> int:
+def due(control_step: int, every: float, delay: int, control_steps: int) -> int:
     """Number of the reading that an array takes at this control hold; -1 for none, or one that no decision will see.
 
     ``hold``: since the array began; ``every``: holds between readings; ``delay``: until a policy has one; ``holds``: of
     a decision.
     """
-    number = latest(hold, every)
-    if hold_of(number, every) != hold:
+    number = latest(control_step, every)
+    if control_step_of(number, every) != control_step:
         return -1
-    decision = (hold + delay + holds - 1) // holds * holds
+    decision = (control_step + delay + control_steps - 1) // control_steps * control_steps
     return number if latest(decision - delay, every) == number else -1

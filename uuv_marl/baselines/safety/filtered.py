@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from uuv_marl.baselines.memory import OwnModel, Surroundings, update_memory
-from uuv_marl.baselines.memory.neighbours import KEPT_S
+from uuv_marl.baselines.memory.neighbours import MEMORY_S
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.steering import velocity_gain
@@ -34,7 +34,7 @@ class Filtered(Policy):
     """A policy that remembers, and whose velocities are made safe. A subclass defines ``decide``."""
 
     yaw_damping_nms: ClassVar[float] = 600.0
-    wishes_force: ClassVar[bool] = True
+    outputs_force: ClassVar[bool] = True
     Memory: ClassVar[type[Any] | None] = Surroundings
 
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
@@ -61,10 +61,10 @@ class Filtered(Policy):
         return (self.memory.counted + self.memory.filtered)[..., what].sum(axis=1).astype(np.int64)
 
     @property
-    def kept_s(self) -> float:
+    def memory_s(self) -> float:
         """For how long a neighbour is remembered that is heard no more [s]."""
-        return KEPT_S
+        return MEMORY_S
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Update the memory from the percept."""
-        update_memory(self.flat(percept), self.layout.offsets, worlds, self.model, self.kept_s, self.memory)
+        update_memory(self.flat(percept), self.layout.offsets, worlds, self.model, self.memory_s, self.memory)

@@ -13,16 +13,16 @@ from numpy.typing import ArrayLike
 
 from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario.sea import AROUND_M
+from uuv_marl.scenario.disturbance_sections import AROUND_M
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.random import normals, uniform, uniforms
-from uuv_marl.sim.sea.purposes import DIRECTION, EDDY_PLACE, GUST
+from uuv_marl.sim.disturbances.purposes import DIRECTION, EDDY_PLACE, GUST
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import Fields, SeaFields
+from uuv_marl.sim.views import Fields, DisturbanceFields
 from uuv_marl.types import Float64
 
 _PEAK = 0.638172686
@@ -92,14 +92,14 @@ def water(scenario: Scenario) -> WaterModel:
         speed=current.speed_mps,
         direction=math.nan if direction is None else math.radians(direction),
         deviation=current.variation_mps,
-        remains=exp(-scenario.timing.control_hold_s / current.variation_time_s),
+        remains=exp(-scenario.timing.control_step_s / current.variation_time_s),
         circulation=current.eddy_speed_mps * 2.0 * math.pi * current.eddy_core_m / _PEAK,
         core=current.eddy_core_m,
         over_ground=current.velocity == "ground",
     )
 
 
-def draw_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: WaterModel, flow: Flow) -> None:
+def sample_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: WaterModel, flow: Flow) -> None:
     """The current of world w's new episode, along the corners (point, 2) [m] of its course; ``flow`` is written."""
     angle = water.direction
     if math.isnan(angle):
@@ -173,7 +173,7 @@ def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]
 
 
 @compiled_inner
-def know_velocities(w: int, world: World, water: WaterModel, flow: Flow, see: Fields, more: SeaFields) -> None:
+def write_velocities(w: int, world: World, water: WaterModel, flow: Flow, see: Fields, more: DisturbanceFields) -> None:
     """Write each vehicle's own velocity, and by the link its neighbours', as the current makes them."""
     state, heading = world.state, world.senses.heading
     for i in range(state.alive.shape[1]):
@@ -188,7 +188,7 @@ def know_velocities(w: int, world: World, water: WaterModel, flow: Flow, see: Fi
         if water.over_ground and (flow.flow[w, i, 0] != 0.0 or flow.flow[w, i, 1] != 0.0):
             see.velocity[w, i, 0], see.velocity[w, i, 1] = ahead, abeam
         for k in range(see.link_identity.shape[2]):
-            j = world.senses.heard[w, i, k]
+            j = world.senses.detected_index[w, i, k]
             if j >= 0:
                 v_x, v_y = over_ground(w, j, state, flow)
                 see.link_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)

@@ -3,19 +3,19 @@
 import math
 
 from uuv_marl.percept import LENGTH, POSITION, PerceptField
-from uuv_marl.sim.arrays import Course, State
+from uuv_marl.sim.arrays import WorldMap, State
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.tasks.maps.ways import CELL_M, WayGrid
+from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid
 from uuv_marl.types import Float64
 
 NUM_WALLS = 8
 """Walls around that are told: the nearest. Assumed: all that a hull can touch within a second or two."""
 AHEAD_M = 12.0
 """How far ahead the point on the way is [m]. Assumed: as piloted."""
-WAY = (
-    PerceptField("way", (2,), POSITION, "vector to a point ahead on a short way to the goal that keeps off walls"),
-    PerceptField("way_length", (1,), LENGTH, "length of the shortest free way to the goal"),
-    PerceptField("way_walls", (NUM_WALLS, 2), POSITION, "vectors to the surfaces of the nearest obstacles, else 0"),
+PATH_FIELDS = (
+    PerceptField("path", (2,), POSITION, "vector to a point ahead on a short way to the goal that keeps off walls"),
+    PerceptField("path_length", (1,), LENGTH, "length of the shortest free way to the goal"),
+    PerceptField("path_walls", (NUM_WALLS, 2), POSITION, "vectors to the surfaces of the nearest obstacles, else 0"),
 )
 """Rows of the channel ``way``."""
 _TOUCH_M = 1e-3
@@ -59,15 +59,15 @@ def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float6
     ``pose``: north, east [m], shape (at least 2,); c, s: cosine and sine of the heading; ``discs``: north, east and
     radius [m], shape (disc, 3).
     """
-    found, out[:] = 0, 0.0
+    num_found, out[:] = 0, 0.0
     for m in range(discs.shape[0]):
         x, y = discs[m, 0] - pose[0], discs[m, 1] - pose[1]
         away = max(math.hypot(x, y), _TOUCH_M)
         gap = max(away - discs[m, 2], _TOUCH_M)
-        if found == out.shape[0] and gap >= math.hypot(out[found - 1, 0], out[found - 1, 1]):
+        if num_found == out.shape[0] and gap >= math.hypot(out[num_found - 1, 0], out[num_found - 1, 1]):
             continue
-        found = min(found + 1, out.shape[0])
-        k = found - 1
+        num_found = min(num_found + 1, out.shape[0])
+        k = num_found - 1
         while k > 0 and math.hypot(out[k - 1, 0], out[k - 1, 1]) > gap:
             out[k, 0], out[k, 1] = out[k - 1, 0], out[k - 1, 1]
             k -= 1
@@ -75,8 +75,8 @@ def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float6
 
 
 @compiled
-def tell_way(
-    state: State, course: Course, heading: Float64, turn: Float64, lead: Float64, grid: WayGrid, way: Float64,
+def write_path(
+    state: State, world_map: WorldMap, heading: Float64, turn: Float64, lead: Float64, grid: MapGrid, path: Float64,
     walls: Float64,
 ) -> None:  # fmt: skip
     """Fill ``way`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2) with the channel's rows.
@@ -84,23 +84,23 @@ def tell_way(
     ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``lead``: what is left from
     each cell, dear near walls, shape (world, row, column).
     """
-    for w in range(way.shape[0]):
-        turn_c, turn_s, discs = turn[w, 0], turn[w, 1], course.obstacles[w, : course.num_obstacles[w]]
-        for v in range(way.shape[1]):
+    for w in range(path.shape[0]):
+        turn_c, turn_s, discs = turn[w, 0], turn[w, 1], world_map.obstacles[w, : world_map.num_obstacles[w]]
+        for v in range(path.shape[1]):
             pose, c, s = state.eta[w, v], heading[w, v, 0], heading[w, v, 1]
             x, y = turn_c * pose[0] + turn_s * pose[1], turn_c * pose[1] - turn_s * pose[0]
             row, column = round((x - grid.x) / CELL_M), round((y - grid.y) / CELL_M)
             i, j = point_ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
             x, y = grid.x + i * CELL_M - x, grid.y + j * CELL_M - y
             x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
-            way[w, v, 0], way[w, v, 1] = c * x + s * y, c * y - s * x
+            path[w, v, 0], path[w, v, 1] = c * x + s * y, c * y - s * x
             nearest_walls(pose, c, s, discs, walls[w, v])
 
 
 @compiled
-def tell_walls(state: State, course: Course, heading: Float64, walls: Float64) -> None:
+def write_walls(state: State, world_map: WorldMap, heading: Float64, walls: Float64) -> None:
     """Fill ``walls`` alone, where a task knows the way without a grid; the others are as in ``tell_way``."""
     for w in range(walls.shape[0]):
         for v in range(walls.shape[1]):
-            c, s, discs = heading[w, v, 0], heading[w, v, 1], course.obstacles[w, : course.num_obstacles[w]]
+            c, s, discs = heading[w, v, 0], heading[w, v, 1], world_map.obstacles[w, : world_map.num_obstacles[w]]
             nearest_walls(state.eta[w, v], c, s, discs, walls[w, v])

@@ -23,25 +23,25 @@ def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenari
     if actuators.kind == "rudder":
         return 0.0
     alike = declared_nms * (actuators.max_torque_nm / full_torque_nm)
-    return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_hold_s)
+    return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_step_s)
 
 
-def channels_in(scenario: Scenario, declared: Sequence[str]) -> list[str]:
+def resolved_channels(scenario: Scenario, declared: Sequence[str]) -> list[str]:
     """What a hand-made policy gets that declares these channels: ``modem`` for ``link`` where the scenario has it."""
-    told = "modem" if "modem" in scenario.sonar.channels and "modem" not in declared else "link"
-    return [told if channel == "link" else channel for channel in declared]
+    link_channel = "modem" if "modem" in scenario.sonar.channels and "modem" not in declared else "link"
+    return [link_channel if channel == "link" else channel for channel in declared]
 
 
-class Declared(NamedTuple):
+class PolicyRequirements(NamedTuple):
     """What a policy needs, by the names that ``Policy`` has for it."""
 
     channels: Sequence[str]
     yaw_damping_nms: float
     full_torque_nm: float
-    decides_every_s: float | None
+    decision_period_s: float | None
 
 
-def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
+def check_requirements(name: str, policy: Any, scenario: Scenario) -> None:
     """Refuse a scenario that does not grant what a policy declares: channels, an inner loop, a clock.
 
     Args:
@@ -60,7 +60,7 @@ def need_granted(name: str, policy: Any, scenario: Scenario) -> None:
     damping = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
     if not scenario.timing.fixed and not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
         needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
-    period = policy.decides_every_s
+    period = policy.decision_period_s
     if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
         needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
     if needs:

@@ -13,9 +13,9 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import make
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
-from uuv_marl.sim.sea.actuation import followed, victims
-from uuv_marl.sim.sea.current import advance_gust, eddy_flow, flow_at
-from uuv_marl.sim.sea.sea import SEA_CHANNELS, sea_tables
+from uuv_marl.sim.disturbances.actuation import followed, victims
+from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow, flow_at
+from uuv_marl.sim.disturbances.disturbances import DISTURBANCE_CHANNELS, disturbance_tables
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
 
@@ -56,7 +56,7 @@ def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
 # --- Off is as before ---
 
 
-@pytest.mark.parametrize("channel", SEA_CHANNELS)
+@pytest.mark.parametrize("channel", DISTURBANCE_CHANNELS)
 def test_a_sea_in_which_nothing_is_on_moves_no_bit(channel):
     for worlds in (1, 3):
         calm, still = (swim({"sonar.channels": channels}, worlds=worlds) for channels in ([], [channel]))
@@ -72,7 +72,7 @@ def test_one_disturbance_moves_no_draw_of_another(part):
     alone, among = (swim(change, 0, scenario="random_field") for change in (part, EVERYTHING))
     for name in ("eta", "nu", "waypoints", "obstacles", "losses"):
         np.testing.assert_array_equal(alone.snapshot()[name], among.snapshot()[name], name)
-    ours, theirs = alone._sea, among._sea
+    ours, theirs = alone._disturbances, among._disturbances
     pairs = {
         "current.speed_mps": (ours.flow.mean, theirs.flow.mean),
         "current.variation_mps": (ours.flow.gust, theirs.flow.gust),
@@ -95,7 +95,7 @@ def test_a_snapshot_resumes_bit_for_bit():
             each.step(np.full((1, 5, 2), 0.4))
     for name, array in swarm.snapshot().items():
         np.testing.assert_array_equal(array, other.snapshot()[name], name)
-    kept["whom"][:] = 5
+    kept["detected_index"][:] = 5
     with pytest.raises(ValueError, match="whom must lie within -3 and 4"):
         swarm.restore(kept)
 
@@ -125,14 +125,14 @@ def test_a_uniform_current_carries_the_same_motion_along():
 
 def test_a_policy_that_follows_a_drifting_point_swims_as_in_still_water():
     """Closed loop: l(t) drifts with the water, and everybody knows velocities through it."""
-    course = {"trajectory.waypoints_m": [[0.0, 0.0], [160.0, 0.0]], "random_field": None} | OPEN
+    straight_leg = {"trajectory.waypoints_m": [[0.0, 0.0], [160.0, 0.0]], "random_field": None} | OPEN
     drifting = {
         "trajectory.waypoints_m": [[0.0, 0.0], [160.0, 20.0]],
         "trajectory.speed_mps": math.hypot(4.0, 0.5),
         "current.speed_mps": 0.5, "current.direction_deg": 90.0, "current.velocity": "water",
     }  # fmt: skip
     swarms = [
-        Swarm(load_scenario("single_obstacle", num_vehicles=8, overrides=course | more)) for more in ({}, drifting)
+        Swarm(load_scenario("single_obstacle", num_vehicles=8, overrides=straight_leg | more)) for more in ({}, drifting)
     ]
     start = None
     for swarm in swarms:
@@ -161,15 +161,15 @@ def test_a_lost_vehicle_that_is_still_heard_stands_still():
 
 
 @pytest.mark.parametrize("hold_s", [0.1, 0.5, 2.0])
-def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(hold_s):
+def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(control_step_s):
     """20,000 draws: a mean within 5 / sqrt(n) deviations, a variance within 5 sqrt(2 / n)."""
     tau = 3.0
-    overrides = {"current.variation_mps": 0.4, "current.variation_time_s": tau, "timing.control_hold_s": hold_s,
-                 "timing.decision_period_s": hold_s}  # fmt: skip
+    overrides = {"current.variation_mps": 0.4, "current.variation_time_s": tau, "timing.control_step_s": control_step_s,
+                 "timing.decision_period_s": control_step_s}  # fmt: skip
     swarm = Swarm(load_scenario(STARTER, overrides=overrides), num_worlds=1)
     swarm.reset(0)
-    sea = swarm._sea
-    steps = round(6.0 / hold_s)
+    sea = swarm._disturbances
+    steps = round(6.0 / control_step_s)
     first, last = [], []
     for key in np.random.default_rng(0).integers(0, 2**63, 2000).astype(np.uint64):
         for tick in range(0, 5000, 1000):
@@ -200,7 +200,7 @@ def test_an_eddy_has_no_divergence_no_jumps_and_no_flow_at_its_centre(x, y, core
 
 def test_the_fastest_water_of_an_eddy_has_the_speed_that_is_asked_for():
     swarm = swim(EDDIES, 0)
-    water, core = swarm._sea.water, swarm._sea.water.core
+    water, core = swarm._disturbances.water, swarm._disturbances.water.core
     speeds = [math.hypot(*eddy_flow(r, 0.0, water.circulation, core)) for r in np.linspace(0.5 * core, 2 * core, 2001)]
     assert max(speeds) == pytest.approx(1.2, rel=1e-6)
 
@@ -208,13 +208,13 @@ def test_the_fastest_water_of_an_eddy_has_the_speed_that_is_asked_for():
 def test_eddies_turn_by_turns_so_that_their_circulation_sums_to_nothing():
     for name in (STARTER, "random_field", "tracking"):
         swarm = swim(EDDIES, 0, worlds=2, scenario=name)
-        eddies = swarm._sea.flow.eddies
+        eddies = swarm._disturbances.flow.eddies
         assert eddies.shape[1] == swarm.scenario.max_eddies
         for w in range(2):
             there = eddies[w][eddies[w, :, 2] != 0.0]
             assert len(there) > 0
             assert there[:, 2].sum() == 0.0
-            points = swarm.course.waypoints[w, 0]
+            points = swarm.world_map.waypoints[w, 0]
             assert (there[:, :2] >= points.min(0) - 250).all()
             assert (there[:, :2] <= points.max(0) + 250).all()
 
@@ -223,7 +223,7 @@ def test_the_water_at_a_vehicle_is_the_field_there():
     swarm = swim(CURRENT | GUSTS | EDDIES, 25)
     for i in range(5):
         x, y, _ = swarm.state.eta[0, i]
-        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._sea.water.core, swarm._sea.flow)
+        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._disturbances.water.core, swarm._disturbances.flow)
     np.testing.assert_array_equal(swarm.flow_field().at(swarm.state.eta[0, :, :2]), swarm.flow[0])
     assert not Swarm(load_scenario(STARTER)).flow_field().at([[[1.0, 2.0]]]).any()
     with pytest.raises(ValueError, match=r"north and east \[m\], shape \(..., 2\), got shape \(3,\)"):
@@ -261,14 +261,14 @@ def test_a_vehicle_that_differs_swims_as_a_scenario_with_its_numbers():
     swarm = swim(MISMATCH, 0)
     nominal = plant(swarm.scenario)
     for i in range(5):
-        own = Plant(*swarm._sea.hull.plants[0, i])
+        own = Plant(*swarm._disturbances.hull.plants[0, i])
         mass, drag, added = own.m / nominal.m, own.X_u / nominal.X_u, own.X_udot / nominal.X_udot
         assert abs(mass - 1) <= 0.2
         assert abs(drag - 1) <= 0.3
         assert abs(added - 1) <= 0.3
         theirs = plant(swarm.scenario.model_copy(update={"vehicle": swarm.scenario.vehicle.times(mass, added, drag)}))
         np.testing.assert_allclose(own, theirs, rtol=1e-12)
-    assert len({tuple(row) for row in swarm._sea.hull.plants[0]}) == 5
+    assert len({tuple(row) for row in swarm._disturbances.hull.plants[0]}) == 5
 
 
 @given(st.floats(0, 1), st.floats(0, 1), st.integers(0, 2**32))
@@ -285,12 +285,12 @@ def test_a_larger_share_has_the_smaller_one_s_victims(a, b, key):
 def test_faults_act_from_their_onset_for_their_duration():
     swarm = Swarm(load_scenario(STARTER, overrides=FAULTS))
     swarm.reset(0)
-    victim = [set(np.flatnonzero(swarm._sea.hull.broken[0, :, f, 0] < 10**6).tolist()) for f in range(3)]
+    victim = [set(np.flatnonzero(swarm._disturbances.hull.broken[0, :, f, 0] < 10**6).tolist()) for f in range(3)]
     assert [len(each) for each in victim] == [2, 2, 1]
     for hold in range(25):
         action = np.full((1, 5, 2), 0.5)
         swarm.step(action)
-        thrust, torque = np.moveaxis(swarm._sea.hull.tau[0], -1, 0)
+        thrust, torque = np.moveaxis(swarm._disturbances.hull.tau[0], -1, 0)
         for i in np.flatnonzero(swarm.state.alive[0]):
             assert thrust[i] == (750.0 if i in victim[0] and hold >= 10 else 1500.0)
             assert (torque[i] == 0.0) == (i in victim[1] and 5 <= hold < 15)
@@ -300,5 +300,5 @@ def test_faults_act_from_their_onset_for_their_duration():
 def test_no_array_of_a_swarm_hides_another_of_its_name():
     """In snapshots: else half of the water is forgotten."""
     swarm = swim(HEARD, 0)
-    names = [name for table in (*swarm._world, *sea_tables(swarm._sea)) for name in table._fields]
+    names = [name for table in (*swarm._world, *disturbance_tables(swarm._disturbances)) for name in table._fields]
     assert len(set(names)) == len(names)

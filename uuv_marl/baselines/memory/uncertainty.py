@@ -5,7 +5,7 @@ from uuv_marl.baselines.memory.response import remains
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.sim.compiled import compiled
 
-REMAINS = 0.4
+FULL_SHORTFALL = 0.4
 """Where so much remains of what is asked of thrust or torque, a vehicle doubts all [1]. Assumed."""
 NOISE = 0.02
 """So large errors of neighbours' places over their range do the same [1]. Assumed: those of 2 degrees. Exact echoes
@@ -16,8 +16,8 @@ means are below 0.12 s, of neighbours that are heard no more and kept for a whil
 
 
 @compiled
-def doubt(w: int, i: int, kept: Surroundings) -> float:
+def uncertainty(w: int, i: int, memory: Surroundings) -> float:
     """How much a vehicle doubts: from 0, all is as expected, to 1."""
-    old = max(age_of(w, i, kept) - USUAL_AGE_S, 0.0)
-    moves = max(remains(w, i, 0, kept), remains(w, i, 1, kept)) / REMAINS
-    return min(moves + noise_of(w, i, kept) / NOISE + old / OLD_S, 1.0)
+    old = max(age_of(w, i, memory) - USUAL_AGE_S, 0.0)
+    moves = max(remains(w, i, 0, memory), remains(w, i, 1, memory)) / FULL_SHORTFALL
+    return min(moves + noise_of(w, i, memory) / NOISE + old / OLD_S, 1.0)

@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.field import draw_field
+from uuv_marl.sim.field import sample_field
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trajectory import arrival_times
 from uuv_marl.types import Bool, Float64, Int64
 
 
-class Draw(NamedTuple):
+class EpisodeSetup(NamedTuple):
     """One world as it stands at the reset. North and east [m]."""
 
     waypoints: tuple[Float64, ...]
@@ -32,12 +32,12 @@ class Draw(NamedTuple):
     """Time that the task takes at best [s], from which ``time_limit`` makes the limit."""
 
 
-def usual_draw(scenario: Scenario, rng: np.random.Generator) -> Draw:
+def default_setup(scenario: Scenario, rng: np.random.Generator) -> EpisodeSetup:
     """One trajectory for all: the scenario's own, or one through a random field; the start behind its first point."""
-    field = draw_field(scenario, rng)
+    field = sample_field(scenario, rng)
     eta, nu = start_state(scenario, field.waypoints, rng)
     n, times = scenario.swarm.num_vehicles, arrival_times(field.waypoints, scenario.trajectory.speed_mps)
-    return Draw(
+    return EpisodeSetup(
         (field.waypoints,), (times,), field.obstacles, eta, nu,
         group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_), duration_s=float(times[-1]),
     )  # fmt: skip

@@ -18,17 +18,17 @@ from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.perception import saturate
-from uuv_marl.sim.sea.navigation import Track
-from uuv_marl.sim.sea.schedule import Listening, Reading, due, hold_of, latest, listening
+from uuv_marl.sim.disturbances.navigation import NavigationErrors
+from uuv_marl.sim.disturbances.schedule import SonarTiming, Reading, due, control_step_of, latest, sonar_timing
 from uuv_marl.sim.tables import Bounds, described
-from uuv_marl.sim.views import Fields, SeaFields
+from uuv_marl.sim.views import Fields, DisturbanceFields
 from uuv_marl.types import Float32, Float64, Int32, Int64
 
 Move = tuple[float, float, float, float]
 """Cosine and sine of a vehicle's turn, then how far it went, ahead and abeam as it is headed now [m]; (1, 0, 0, 0) for
 none."""
 
-NOBODY, PHANTOM, OBSTACLE = -1, -2, -3
+NO_DETECTION, FALSE_DETECTION, OBSTACLE = -1, -2, -3
 """What is heard where it is no vehicle: nothing, a vehicle that isn't there, an obstacle."""
 
 
@@ -44,20 +44,20 @@ class Readings(NamedTuple):
     pose: Annotated[
         Float64, "world slot vehicle array 4", "Own position as known at reception [m], cosine and sine of the heading."
     ]
-    whom: Annotated[
+    detected_index: Annotated[
         Int32, "world slot vehicle place", "Index of the vehicle heard, or ``NOBODY``, ``PHANTOM``, ``OBSTACLE``.",
         Bounds(OBSTACLE, "vehicle"),
     ]  # fmt: skip
     reach: Annotated[Float32, "world slot vehicle place", "Range at which it is heard [m]."]
-    where: Annotated[Float32, "world slot vehicle place 2", "Its position in the body frame at reception [m]."]
+    position: Annotated[Float32, "world slot vehicle place 2", "Its position in the body frame at reception [m]."]
 
 
 @described
-class Hits(NamedTuple):
+class Detections(NamedTuple):
     """All that an array of all vehicles hears in a reading, one after the other: room to work in."""
 
     code: Annotated[Int64, "world hit", "Index of the listener, shifted left by ``SHIFT``, plus the place."]
-    whom: Annotated[Int64, "world hit", "As in ``Readings``."]
+    detected_index: Annotated[Int64, "world hit", "As in ``Readings``."]
     reach: Annotated[Float64, "world hit", "Range [m], negative for what is missed."]
     x: Annotated[Float64, "world hit", "How far ahead its position is [m]."]
     y: Annotated[Float64, "world hit", "How far to starboard [m]."]
@@ -72,8 +72,8 @@ SHIFT, PLACE = 32, (1 << 32) - 1
 
 def line_sizes(scenario: Scenario) -> dict[str, int]:
     """Lengths of the axes: all readings on their way and the one that stands; the past within earshot."""
-    numbers, arrays = listening(scenario), scenario.sonar.arrays
-    far = max(array.range_m for array in arrays) * numbers.holds_per_metre
+    numbers, arrays = sonar_timing(scenario), scenario.sonar.arrays
+    far = max(array.range_m for array in arrays) * numbers.control_steps_per_metre
     return {
         "array": len(arrays),
         "place": scenario.sonar.num_sectors + scenario.sonar.num_active_sectors,
@@ -85,12 +85,12 @@ def line_sizes(scenario: Scenario) -> dict[str, int]:
 
 
 @compiled_inner
-def any_due(w: int, tick: int, listening: Listening, readings: Readings) -> bool:
+def any_due(w: int, tick: int, sonar_timing: SonarTiming, readings: Readings) -> bool:
     """Whether an array of world w takes a reading at this control hold."""
-    found = False
-    for a in range(0 if listening.ideal else listening.every.shape[0]):
-        found = found or due(tick - readings.began[w], listening.every[a], listening.delay, listening.holds) >= 0
-    return found
+    is_due = False
+    for a in range(0 if sonar_timing.ideal else sonar_timing.every.shape[0]):
+        is_due = is_due or due(tick - readings.began[w], sonar_timing.every[a], sonar_timing.delay, sonar_timing.control_steps) >= 0
+    return is_due
 
 
 # --- From what is true into the line ---
@@ -100,8 +100,8 @@ def any_due(w: int, tick: int, listening: Listening, readings: Readings) -> bool
 def begin_line(w: int, state: State, readings: Readings) -> None:
     """The arrays of world w begin now, the line empty; whoever is there has stood there before."""
     readings.began[w] = state.tick[w]
-    readings.past[w], readings.pose[w], readings.reach[w], readings.where[w] = 0.0, 0.0, 0.0, 0.0
-    readings.whom[w] = NOBODY
+    readings.past[w], readings.pose[w], readings.reach[w], readings.position[w] = 0.0, 0.0, 0.0, 0.0
+    readings.detected_index[w] = NO_DETECTION
     remember(w, state, readings)
 
 
@@ -127,122 +127,122 @@ def was_at(w: int, j: int, tick: int, ago: float, readings: Readings) -> tuple[f
 
 @compiled_inner
 def collect(
-    at: Reading, world: World, see: Fields, listening: Listening, track: Track, readings: Readings, hits: Hits
+    at: Reading, world: World, see: Fields, sonar_timing: SonarTiming, navigation_errors: NavigationErrors, readings: Readings, detections: Detections
 ) -> int:
     """All that an array of every living vehicle hears now, into ``hits``; how many they are.
 
     Poses at reception are written into ``readings``.
     """
     w, a, num = at.w, at.a, 0
-    eta, heading, heard, sectors = world.state.eta, world.senses.heading, world.senses.heard, see.heard.shape[2]
+    eta, heading, detected_index, sectors = world.state.eta, world.senses.heading, world.senses.detected_index, see.detected.shape[2]
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:
             continue
         x, y, c, s = eta[w, i, 0], eta[w, i, 1], heading[w, i, 0], heading[w, i, 1]
-        readings.pose[w, at.slot, i, a, 0] = x + track.strayed[w, i, 0]
-        readings.pose[w, at.slot, i, a, 1] = y + track.strayed[w, i, 1]
+        readings.pose[w, at.slot, i, a, 0] = x + navigation_errors.position_error[w, i, 0]
+        readings.pose[w, at.slot, i, a, 1] = y + navigation_errors.position_error[w, i, 1]
         readings.pose[w, at.slot, i, a, 2], readings.pose[w, at.slot, i, a, 3] = c, s
-        for k in range(listening.first[a], listening.first[a + 1]):
-            j = heard[w, i, k]
+        for k in range(sonar_timing.first[a], sonar_timing.first[a + 1]):
+            j = detected_index[w, i, k]
             if j < 0:
                 continue
             ahead, abeam = np.float64(see.neighbour[w, i, k, 0]), np.float64(see.neighbour[w, i, k, 1])
-            if listening.holds_per_metre > 0.0:
-                ago = math.sqrt(ahead * ahead + abeam * abeam) * listening.holds_per_metre
+            if sonar_timing.control_steps_per_metre > 0.0:
+                ago = math.sqrt(ahead * ahead + abeam * abeam) * sonar_timing.control_steps_per_metre
                 north, east = was_at(w, j, at.tick, ago, readings)
                 ahead, abeam = c * (north - x) + s * (east - y), c * (east - y) - s * (north - x)
-            hits.code[w, num], hits.whom[w, num] = (i << SHIFT) + k, j
-            hits.x[w, num], hits.y[w, num] = ahead, abeam
-            hits.reach[w, num] = math.sqrt(ahead * ahead + abeam * abeam)
+            detections.code[w, num], detections.detected_index[w, num] = (i << SHIFT) + k, j
+            detections.x[w, num], detections.y[w, num] = ahead, abeam
+            detections.reach[w, num] = math.sqrt(ahead * ahead + abeam * abeam)
             num += 1
-        for e in range(listening.active[a], listening.active[a + 1]):
+        for e in range(sonar_timing.active[a], sonar_timing.active[a + 1]):
             if see.echo[w, i, e] > 0.0:
-                hits.code[w, num], hits.whom[w, num] = (i << SHIFT) + sectors + e, OBSTACLE
-                hits.x[w, num], hits.y[w, num] = see.echo_position[w, i, e, 0], see.echo_position[w, i, e, 1]
-                hits.reach[w, num] = see.echo_range[w, i, e]
+                detections.code[w, num], detections.detected_index[w, num] = (i << SHIFT) + sectors + e, OBSTACLE
+                detections.x[w, num], detections.y[w, num] = see.echo_position[w, i, e, 0], see.echo_position[w, i, e, 1]
+                detections.reach[w, num] = see.echo_range[w, i, e]
                 num += 1
     return num
 
 
 @compiled_inner
-def store(at: Reading, num: int, listening: Listening, hits: Hits, readings: Readings) -> None:
+def store(at: Reading, num: int, sonar_timing: SonarTiming, detections: Detections, readings: Readings) -> None:
     """Put the first ``num`` hits that are not missed into the line; in all other places nothing is heard."""
-    for i in range(readings.whom.shape[2]):
-        hush(at, i, listening, readings)
+    for i in range(readings.detected_index.shape[2]):
+        clear_array(at, i, sonar_timing, readings)
     w, slot = at.w, at.slot
     for q in range(num):
-        if hits.reach[w, q] >= 0.0:
-            i, k = hits.code[w, q] >> SHIFT, hits.code[w, q] & PLACE
-            readings.whom[w, slot, i, k], readings.reach[w, slot, i, k] = hits.whom[w, q], hits.reach[w, q]
-            readings.where[w, slot, i, k, 0], readings.where[w, slot, i, k, 1] = hits.x[w, q], hits.y[w, q]
+        if detections.reach[w, q] >= 0.0:
+            i, k = detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
+            readings.detected_index[w, slot, i, k], readings.reach[w, slot, i, k] = detections.detected_index[w, q], detections.reach[w, q]
+            readings.position[w, slot, i, k, 0], readings.position[w, slot, i, k, 1] = detections.x[w, q], detections.y[w, q]
 
 
 @compiled_inner
-def hush(at: Reading, i: int, listening: Listening, readings: Readings) -> None:
+def clear_array(at: Reading, i: int, sonar_timing: SonarTiming, readings: Readings) -> None:
     """An array of vehicle i has heard nothing."""
-    sectors = readings.whom.shape[3] - listening.active[-1]
-    for k in range(listening.first[at.a], listening.first[at.a + 1]):
-        readings.whom[at.w, at.slot, i, k] = NOBODY
-    for e in range(listening.active[at.a], listening.active[at.a + 1]):
-        readings.whom[at.w, at.slot, i, sectors + e] = NOBODY
+    sectors = readings.detected_index.shape[3] - sonar_timing.active[-1]
+    for k in range(sonar_timing.first[at.a], sonar_timing.first[at.a + 1]):
+        readings.detected_index[at.w, at.slot, i, k] = NO_DETECTION
+    for e in range(sonar_timing.active[at.a], sonar_timing.active[at.a + 1]):
+        readings.detected_index[at.w, at.slot, i, sectors + e] = NO_DETECTION
 
 
 # --- From the line into percepts ---
 
 
 @compiled_inner
-def recall(
-    w: int, world: World, listening: Listening, track: Track, readings: Readings, see: Fields, more: SeaFields
+def write_readings(
+    w: int, world: World, sonar_timing: SonarTiming, navigation_errors: NavigationErrors, readings: Readings, see: Fields, more: DisturbanceFields
 ) -> None:
     """Write into the percepts of world w, and into ``heard``, what the readings that stand now say."""
     tick, since = world.state.tick[w], world.state.tick[w] - readings.began[w]
-    for a in range(listening.every.shape[0]):
-        number = latest(since - listening.delay, listening.every[a])
-        taken = readings.began[w] + hold_of(max(number, 0), listening.every[a])  # before the first: since they began
-        at = Reading(w, a, number, taken, number % readings.whom.shape[1])
-        carries = listening.compensated and number >= 0 and taken != tick
+    for a in range(sonar_timing.every.shape[0]):
+        number = latest(since - sonar_timing.delay, sonar_timing.every[a])
+        taken = readings.began[w] + control_step_of(max(number, 0), sonar_timing.every[a])  # before the first: since they began
+        at = Reading(w, a, number, taken, number % readings.detected_index.shape[1])
+        carries = sonar_timing.compensated and number >= 0 and taken != tick
         for i in range(world.state.alive.shape[1]):
             if not world.state.alive[w, i]:
                 continue
-            for k in range(listening.first[a], listening.first[a + 1] if more.age.shape[2] > 0 else 0):
-                more.age[w, i, k] = (tick - taken) * listening.hold_s
-            move = own_move(at, i, world, track, readings) if carries else (1.0, 0.0, 0.0, 0.0)
-            tell_vehicles(at, i, move, listening, readings, world.senses.heard, see)
-            tell_echoes(at, i, move, listening, readings, see)
+            for k in range(sonar_timing.first[a], sonar_timing.first[a + 1] if more.age.shape[2] > 0 else 0):
+                more.age[w, i, k] = (tick - taken) * sonar_timing.control_step_s
+            move = own_move(at, i, world, navigation_errors, readings) if carries else (1.0, 0.0, 0.0, 0.0)
+            write_vehicle_readings(at, i, move, sonar_timing, readings, world.senses.detected_index, see)
+            write_echo_readings(at, i, move, sonar_timing, readings, see)
 
 
 @compiled_inner
-def tell_vehicles(
-    at: Reading, i: int, move: Move, listening: Listening, readings: Readings, heard: Int32, see: Fields
+def write_vehicle_readings(
+    at: Reading, i: int, move: Move, sonar_timing: SonarTiming, readings: Readings, detected_index: Int32, see: Fields
 ) -> None:
     """The vehicles that vehicle i heard in a reading, into its percept; by the link also who they are.
 
     A number of the reading below 0 is silence.
     """
     w, slot, linked = at.w, at.slot, see.link_identity.shape[2] > 0
-    for k in range(listening.first[at.a], listening.first[at.a + 1]):
-        j, x, y = NOBODY, 0.0, 0.0
+    for k in range(sonar_timing.first[at.a], sonar_timing.first[at.a + 1]):
+        j, x, y = NO_DETECTION, 0.0, 0.0
         if at.number >= 0:
-            j = readings.whom[w, slot, i, k]
-        if j != NOBODY:
-            x, y = np.float64(readings.where[w, slot, i, k, 0]), np.float64(readings.where[w, slot, i, k, 1])
+            j = readings.detected_index[w, slot, i, k]
+        if j != NO_DETECTION:
+            x, y = np.float64(readings.position[w, slot, i, k, 0]), np.float64(readings.position[w, slot, i, k, 1])
             x, y = carried(x, y, move)
-        heard[w, i, k] = max(j, NOBODY)
-        see.heard[w, i, k] = 0.0 if j == NOBODY else 1.0
+        detected_index[w, i, k] = max(j, NO_DETECTION)
+        see.detected[w, i, k] = 0.0 if j == NO_DETECTION else 1.0
         see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1] = saturate(x, MAX_RANGE_M), saturate(y, MAX_RANGE_M)
         if linked:  # a velocity is written where the current is known
-            see.link_identity[w, i, k] = max(j, NOBODY) + 1
+            see.link_identity[w, i, k] = max(j, NO_DETECTION) + 1
             see.link_velocity[w, i, k, 0] = see.link_velocity[w, i, k, 1] = 0.0
 
 
 @compiled_inner
-def tell_echoes(at: Reading, i: int, move: Move, listening: Listening, readings: Readings, see: Fields) -> None:
+def write_echo_readings(at: Reading, i: int, move: Move, sonar_timing: SonarTiming, readings: Readings, see: Fields) -> None:
     """The echoes that vehicle i heard in a reading, into its percept. A number of the reading below 0 is silence."""
     w, slot = at.w, at.slot
-    for e in range(listening.active[at.a], listening.active[at.a + 1]):
-        k, reach, x, y = see.heard.shape[2] + e, -1.0, 0.0, 0.0
-        if at.number >= 0 and readings.whom[w, slot, i, k] != NOBODY:
-            x, y = np.float64(readings.where[w, slot, i, k, 0]), np.float64(readings.where[w, slot, i, k, 1])
+    for e in range(sonar_timing.active[at.a], sonar_timing.active[at.a + 1]):
+        k, reach, x, y = see.detected.shape[2] + e, -1.0, 0.0, 0.0
+        if at.number >= 0 and readings.detected_index[w, slot, i, k] != NO_DETECTION:
+            x, y = np.float64(readings.position[w, slot, i, k, 0]), np.float64(readings.position[w, slot, i, k, 1])
             far = math.sqrt(x * x + y * y)
             x, y = carried(x, y, move)
             reach = max(np.float64(readings.reach[w, slot, i, k]) + math.sqrt(x * x + y * y) - far, 0.0)
@@ -253,13 +253,13 @@ def tell_echoes(at: Reading, i: int, move: Move, listening: Listening, readings:
 
 
 @compiled_inner
-def own_move(at: Reading, i: int, world: World, track: Track, readings: Readings) -> Move:
+def own_move(at: Reading, i: int, world: World, navigation_errors: NavigationErrors, readings: Readings) -> Move:
     """How vehicle i turned and went since a reading, as it knows it."""
     eta, heading, pose = world.state.eta, world.senses.heading, readings.pose
     x, y = pose[at.w, at.slot, i, at.a, 0], pose[at.w, at.slot, i, at.a, 1]
     c_then, s_then = pose[at.w, at.slot, i, at.a, 2], pose[at.w, at.slot, i, at.a, 3]
     c, s = heading[at.w, i, 0], heading[at.w, i, 1]
-    dx, dy = eta[at.w, i, 0] + track.strayed[at.w, i, 0] - x, eta[at.w, i, 1] + track.strayed[at.w, i, 1] - y
+    dx, dy = eta[at.w, i, 0] + navigation_errors.position_error[at.w, i, 0] - x, eta[at.w, i, 1] + navigation_errors.position_error[at.w, i, 1] - y
     return c_then * c + s_then * s, s * c_then - c * s_then, c * dx + s * dy, c * dy - s * dx
 
 

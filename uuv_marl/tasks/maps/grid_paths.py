@@ -20,7 +20,7 @@ _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
 """To neighbours; those of a knight make a length at most 2.8 % too long (1 / cos 13.3 deg)."""
 
 
-class WayGrid(NamedTuple):
+class MapGrid(NamedTuple):
     """Cells in the frame of a map (``walls.py``)."""
 
     x: float
@@ -42,7 +42,7 @@ class WayGrid(NamedTuple):
         return int(row[0]), int(column[0])
 
 
-def free_cells(discs: Float64, grid: WayGrid, clearance: float) -> Bool:
+def free_cells(discs: Float64, grid: MapGrid, clearance: float) -> Bool:
     """Cells whose centres keep a clearance [m] from all discs, shape (row, column)."""
     free = np.ones((grid.rows, grid.columns), np.bool_)
     _stamp(discs, grid.x, grid.y, clearance, free)
@@ -68,8 +68,8 @@ def distances(free: Bool, row: int, column: int, price: Float64 | None = None) -
         weights *= 0.5 * (price.ravel()[first] + price.ravel()[second])
     graph = csr_array((weights, second, indptr), shape=(free.size, free.size))
     shortest: Any = dijkstra
-    found: Float64 = shortest(graph, directed=True, indices=row * free.shape[1] + column)
-    return np.where(free, found.reshape(free.shape), np.inf)
+    lengths: Float64 = shortest(graph, directed=True, indices=row * free.shape[1] + column)
+    return np.where(free, lengths.reshape(free.shape), np.inf)
 
 
 @functools.cache
@@ -78,8 +78,8 @@ def _edges(rows: int, columns: int) -> tuple[Int64, Int32, Float64, Int32]:
     row, column = np.divmod(np.arange(rows * columns), columns)
     first, second, length = [], [], []
     for d_r, d_c in (*_STEPS, *((-a, -b) for a, b in _STEPS)):
-        there = (row + d_r >= 0) & (row + d_r < rows) & (column + d_c >= 0) & (column + d_c < columns)
-        at = np.flatnonzero(there)
+        inside = (row + d_r >= 0) & (row + d_r < rows) & (column + d_c >= 0) & (column + d_c < columns)
+        at = np.flatnonzero(inside)
         first.append(at)
         second.append(at + d_r * columns + d_c)
         length.append(np.full(len(at), CELL_M * np.sqrt(d_r * d_r + d_c * d_c)))

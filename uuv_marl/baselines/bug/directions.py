@@ -27,7 +27,7 @@ def rays() -> Float64:
 
 
 @compiled
-def look_round(w: int, i: int, stand: float, kept: Surroundings, walls: Walls, looks: Float64, free: Float64) -> None:
+def look_round(w: int, i: int, stand: float, memory: Surroundings, walls: Walls, looks: Float64, free: Float64) -> None:
     """How far every direction is free, ``stand`` [m] off what is remembered.
 
     Args:
@@ -41,7 +41,7 @@ def look_round(w: int, i: int, stand: float, kept: Surroundings, walls: Walls, l
     """
     free[:] = _FREE_M
     for k in range(int(walls.num[w, i])):
-        x, y = walls.echoes[w, i, k, 0] - kept.pose[w, i, 0], walls.echoes[w, i, k, 1] - kept.pose[w, i, 1]
+        x, y = walls.echoes[w, i, k, 0] - memory.pose[w, i, 0], walls.echoes[w, i, k, 1] - memory.pose[w, i, 1]
         away = math.hypot(x, y)
         wide = min(walls.echoes[w, i, k, 2] + stand, 0.999 * away)
         for j in range(looks.shape[0]):
@@ -92,8 +92,8 @@ def chosen_ray(w: int, i: int, away: float, g: BugGains, walls: Walls, looks: Fl
 
 
 @compiled
-def choose_ways(
-    worlds: Bool, g: BugGains, turns: Float64, looks: Float64, free: Float64, kept: Surroundings, walls: Walls
+def choose_directions(
+    worlds: Bool, g: BugGains, turns: Float64, looks: Float64, free: Float64, memory: Surroundings, walls: Walls
 ) -> None:
     """Choose every vehicle's way.
 
@@ -102,12 +102,12 @@ def choose_ways(
     """
     for w in range(worlds.shape[0]):
         for i in range(walls.num.shape[1] if worlds[w] else 0):
-            x = kept.reference[w, i, 0] - kept.pose[w, i, 0]
-            y = kept.reference[w, i, 1] - kept.pose[w, i, 1]
+            x = memory.reference[w, i, 0] - memory.pose[w, i, 0]
+            y = memory.reference[w, i, 1] - memory.pose[w, i, 1]
             away = max(math.hypot(x, y), 1e-6)
             for j in range(turns.shape[0]):
                 looks[j, 0] = (x * turns[j, 0] - y * turns[j, 1]) / away
                 looks[j, 1] = (y * turns[j, 0] + x * turns[j, 1]) / away
-            look_round(w, i, g.stand_m, kept, walls, looks, free)
+            look_round(w, i, g.stand_m, memory, walls, looks, free)
             j = chosen_ray(w, i, away, g, walls, looks, free)
-            walls.way[w, i, 0], walls.way[w, i, 1] = looks[j, 0], looks[j, 1]
+            walls.direction[w, i, 0], walls.direction[w, i, 1] = looks[j, 0], looks[j, 1]

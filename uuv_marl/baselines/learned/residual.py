@@ -17,7 +17,7 @@ SHARE = 0.5
 """How much of the full force a network may add to a law's action."""
 
 
-class Around(Policy):
+class ResidualPolicy(Policy):
     """A law's actions, to which those of another policy are added.
 
     Args:
@@ -25,42 +25,42 @@ class Around(Policy):
         inner: the other policy, made for the same scenario and worlds.
     """
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, law: Policy, inner: Policy) -> None:
-        self.law, self.inner = law, inner
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, base: Policy, inner: Policy) -> None:
+        self.base, self.inner = base, inner
         self.name = inner.name
-        self.declare_as(law)
+        self.copy_requirements(base)
         super().__init__(scenario, num_worlds)
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
         """Reset both."""
         super().reset(seed, worlds)
-        for each in (self.law, self.inner):
+        for each in (self.base, self.inner):
             each.reset(seed, worlds)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        said: list[Float32] = []
-        for each in (self.law, self.inner):
+        actions: list[Float32] = []
+        for each in (self.base, self.inner):
             each.active = self.active
-            each.hear(percept)
-            said.append(each.decide(percept))
-        action: Float32 = (said[0] + np.float32(SHARE) * said[1]).astype(np.float32)
+            each.update_memory(percept)
+            actions.append(each.decide(percept))
+        action: Float32 = (actions[0] + np.float32(SHARE) * actions[1]).astype(np.float32)
         bound(action.reshape(-1, 2), in_disc(self))
-        self.clamps[...] = self.law.clamps
+        self.clamps[...] = self.base.clamps
         return action
 
-    def taken(self, action: Float32) -> None:
+    def record_action(self, action: Float32) -> None:
         """Both are told."""
-        super().taken(action)
-        for each in (self.law, self.inner):
-            each.taken(action)
+        super().record_action(action)
+        for each in (self.base, self.inner):
+            each.record_action(action)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """Those of both, too."""
-        return super().snapshot() | parts_of(law=self.law, inner=self.inner)
+        return super().snapshot() | parts_of(base=self.base, inner=self.inner)
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Both, too."""
         super().restore(snapshot)
-        self.law.restore(part_of(snapshot, "law"))
+        self.base.restore(part_of(snapshot, "base"))
         self.inner.restore(part_of(snapshot, "inner"))

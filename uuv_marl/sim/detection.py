@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from uuv_marl.sim.arrays import Course
+from uuv_marl.sim.arrays import WorldMap
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.sonar import SonarSuite, cross, diamond
@@ -23,10 +23,10 @@ _REACH_CELLS = 5.0
 
 
 @compiled_inner
-def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> bool:
+def hidden(x: float, y: float, dx: float, dy: float, w: int, world_map: WorldMap) -> bool:
     """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy)."""
-    obstacles, length2 = course.obstacles, dx * dx + dy * dy
-    for k in range(course.num_obstacles[w]):
+    obstacles, length2 = world_map.obstacles, dx * dx + dy * dy
+    for k in range(world_map.num_obstacles[w]):
         o_x, o_y = obstacles[w, k, 0] - x, obstacles[w, k, 1] - y
         share = min(max((o_x * dx + o_y * dy) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
         if math.hypot(o_x - share * dx, o_y - share * dy) < obstacles[w, k, 2]:
@@ -35,7 +35,7 @@ def hidden(x: float, y: float, dx: float, dy: float, w: int, course: Course) -> 
 
 
 @compiled_inline
-def locate(num: int, points: Points, pose: Pose, bins: int, ear: Listener) -> None:
+def locate(num: int, points: Points, pose: Pose, bins: int, listener: Listener) -> None:
     """Where points are for a listener; itself nowhere.
 
     ``bins``: parts of the full circle of directions, a power of two. Squared distances, places ahead and abeam, and
@@ -47,13 +47,13 @@ def locate(num: int, points: Points, pose: Pose, bins: int, ear: Listener) -> No
         dx, dy = xs[q] - x, ys[q] - y
         squared = dx * dx + dy * dy
         b_x, b_y = c * dx + s * dy, c * dy - s * dx
-        ear.squared[q] = squared if squared > 0.0 else math.inf
-        ear.ahead[q], ear.abeam[q] = b_x, b_y
-        ear.bin[q] = np.int32(diamond(b_x, b_y) * per_unit) & last  # astern is 4 and 0; no direction (NaN) is any bin
+        listener.squared[q] = squared if squared > 0.0 else math.inf
+        listener.ahead[q], listener.abeam[q] = b_x, b_y
+        listener.bin[q] = np.int32(diamond(b_x, b_y) * per_unit) & last  # astern is 4 and 0; no direction (NaN) is any bin
 
 
 @compiled_inline
-def choose_sectors(num: int, layer: int, suite: SonarSuite, ear: Listener) -> None:
+def choose_sectors(num: int, layer: int, suite: SonarSuite, listener: Listener) -> None:
     """The sub-sector of a layer for each of those located. Eq. 12-13.
 
     No branch depends on the positions: a wrongly guessed branch costs more than all the arithmetic here. ``layer`` is a
@@ -62,53 +62,53 @@ def choose_sectors(num: int, layer: int, suite: SonarSuite, ear: Listener) -> No
     none, num_edges = suite.lower.shape[0], 0
     for q in range(num):
         # Unsigned, since Numba spends longer on the sign of an index than on looking it up.
-        code = suite.codes[layer, np.uintp(ear.bin[q])]
-        ear.sector[q], ear.some[num_edges] = code, q
+        code = suite.codes[layer, np.uintp(listener.bin[q])]
+        listener.sector[q], listener.some[num_edges] = code, q
         num_edges += int(code > none)
     for t in range(num_edges):
-        q = np.uintp(ear.some[t])
-        edge = np.uintp(ear.sector[q] - none - 1)
-        side = int(cross(suite.edges[edge, 0], suite.edges[edge, 1], ear.ahead[q], ear.abeam[q]) > 0.0)
-        ear.sector[q] = suite.sides[edge, side]
+        q = np.uintp(listener.some[t])
+        edge = np.uintp(listener.sector[q] - none - 1)
+        side = int(cross(suite.edges[edge, 0], suite.edges[edge, 1], listener.ahead[q], listener.abeam[q]) > 0.0)
+        listener.sector[q] = suite.sides[edge, side]
 
 
 @compiled_inline
-def keep_nearest(num: int, vehicles: Int64, ear: Listener) -> None:
+def keep_nearest(num: int, vehicles: Int64, listener: Listener) -> None:
     """Keep the nearest of those located in each sub-sector, the lower index of equals. Eq. 14-15."""
     for q in range(num):
-        k = np.uintp(ear.sector[q])
-        ear.nearest[k] = ear.squared[q] if ear.squared[q] < ear.nearest[k] else ear.nearest[k]
+        k = np.uintp(listener.sector[q])
+        listener.nearest[k] = listener.squared[q] if listener.squared[q] < listener.nearest[k] else listener.nearest[k]
     num_nearest = 0
     for q in range(num):
-        ear.some[num_nearest] = q
-        num_nearest += int(ear.squared[q] <= ear.nearest[np.uintp(ear.sector[q])])
+        listener.some[num_nearest] = q
+        num_nearest += int(listener.squared[q] <= listener.nearest[np.uintp(listener.sector[q])])
     for t in range(num_nearest):
-        q = np.uintp(ear.some[t])
-        k = np.uintp(ear.sector[q])
-        if ear.squared[q] < ear.kept[k] or (ear.squared[q] == ear.kept[k] and vehicles[q] < ear.heard[k]):
-            ear.kept[k], ear.heard[k] = ear.squared[q], vehicles[q]
-            ear.kept_ahead[k], ear.kept_abeam[k] = ear.ahead[q], ear.abeam[q]
+        q = np.uintp(listener.some[t])
+        k = np.uintp(listener.sector[q])
+        if listener.squared[q] < listener.detected_squared[k] or (listener.squared[q] == listener.detected_squared[k] and vehicles[q] < listener.detected_index[k]):
+            listener.detected_squared[k], listener.detected_index[k] = listener.squared[q], vehicles[q]
+            listener.detected_ahead[k], listener.detected_abeam[k] = listener.ahead[q], listener.abeam[q]
 
 
 @compiled_inline
-def listen(num: int, points: Points, pose: Pose, w: int, course: Course, suite: SonarSuite, ear: Listener) -> None:
+def detect_among(num: int, points: Points, pose: Pose, w: int, world_map: WorldMap, suite: SonarSuite, listener: Listener) -> None:
     """A listener hears those of some vehicles that are nearest in a sub-sector, unless an obstacle is between.
 
     Of the points the first ``num`` count. A nearer one replaces whom the ear has heard so far.
     """
-    locate(num, points, pose, suite.codes.shape[1], ear)
+    locate(num, points, pose, suite.codes.shape[1], listener)
     xs, ys, vehicles = points
-    if suite.obstacles_hide and course.num_obstacles[w] > 0:
+    if suite.obstacles_hide and world_map.num_obstacles[w] > 0:
         for q in range(num):
-            if hidden(pose[0], pose[1], xs[q] - pose[0], ys[q] - pose[1], w, course):
-                ear.squared[q] = math.inf
+            if hidden(pose[0], pose[1], xs[q] - pose[0], ys[q] - pose[1], w, world_map):
+                listener.squared[q] = math.inf
     for layer in range(suite.codes.shape[0]):
-        choose_sectors(num, layer, suite, ear)
-        keep_nearest(num, vehicles, ear)
+        choose_sectors(num, layer, suite, listener)
+        keep_nearest(num, vehicles, listener)
 
 
 @compiled_inner
-def gather(box: Box, cells: Cells, grid: Grid, ear: Listener) -> int:
+def gather(box: Box, cells: Cells, grid: Grid, listener: Listener) -> int:
     """Collect the entries of the cells that meet a rectangle of the world; how many."""
     north, south, east, west = box
     left, right = place(west, grid.y_min, grid.side, grid.columns), place(east, grid.y_min, grid.side, grid.columns)
@@ -116,49 +116,49 @@ def gather(box: Box, cells: Cells, grid: Grid, ear: Listener) -> int:
     num = 0
     for row in range(bottom, top + 1):
         for q in range(cells.first[row * grid.columns + left], cells.first[row * grid.columns + right + 1]):
-            ear.x[num], ear.y[num], ear.vehicle[num] = cells.x[q], cells.y[q], cells.vehicle[q]
+            listener.x[num], listener.y[num], listener.vehicle[num] = cells.x[q], cells.y[q], cells.vehicle[q]
             num += 1
     return num
 
 
 @compiled_inline
-def hear_nobody(ear: Listener) -> None:
+def clear_listener(listener: Listener) -> None:
     """Fill the listener with silence."""
-    ear.heard[:] = -1
-    ear.kept_ahead[:] = 0.0
-    ear.kept_abeam[:] = 0.0
+    listener.detected_index[:] = -1
+    listener.detected_ahead[:] = 0.0
+    listener.detected_abeam[:] = 0.0
 
 
 @compiled_inline
-def hear(p: int, w: int, course: Course, suite: SonarSuite, workspace: Workspace, grid: Grid) -> None:
+def detect(p: int, w: int, world_map: WorldMap, suite: SonarSuite, workspace: Workspace, grid: Grid) -> None:
     """Whom one vehicle hears: those around it, then farther out where a sub-sector is empty."""
-    cells, ear, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]
+    cells, listener, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]
     pose = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(sectors + 1):
-        ear.nearest[k] = ear.kept[k] = suite.squared_range[k]
-        ear.kept_ahead[k] = ear.kept_abeam[k] = 0.0
-        ear.heard[k] = -1
+        listener.nearest[k] = listener.detected_squared[k] = suite.squared_range[k]
+        listener.detected_ahead[k] = listener.detected_abeam[k] = 0.0
+        listener.detected_index[k] = -1
     if grid.rows * grid.columns == 1:
-        listen(grid.living, (cells.x, cells.y, cells.vehicle), pose, w, course, suite, ear)
+        detect_among(grid.living, (cells.x, cells.y, cells.vehicle), pose, w, world_map, suite, listener)
         return
     reach = _REACH_CELLS * grid.side
     around = pose[0] + reach, pose[0] - reach, pose[1] + reach, pose[1] - reach
-    listen_within(around, pose, w, course, suite, workspace, grid)
+    detect_within(around, pose, w, world_map, suite, workspace, grid)
     for k in range(sectors):  # farther and farther, until nobody nearer can be missed
         near = reach
-        while near * near <= ear.nearest[k]:
-            listen_within(sector_box(k, near, 1.5 * near, pose, suite), pose, w, course, suite, workspace, grid)
+        while near * near <= listener.nearest[k]:
+            detect_within(sector_box(k, near, 1.5 * near, pose, suite), pose, w, world_map, suite, workspace, grid)
             near *= 1.5
 
 
 @compiled_inner
-def listen_within(
-    box: Box, pose: Pose, w: int, course: Course, suite: SonarSuite, workspace: Workspace, grid: Grid
+def detect_within(
+    box: Box, pose: Pose, w: int, world_map: WorldMap, suite: SonarSuite, workspace: Workspace, grid: Grid
 ) -> None:
     """A listener hears those of a rectangle of the world, as in ``listen``."""
-    ear = workspace.listener
-    num = gather(box, workspace.cells, grid, ear)
-    listen(num, (ear.x, ear.y, ear.vehicle), pose, w, course, suite, ear)
+    listener = workspace.listener
+    num = gather(box, workspace.cells, grid, listener)
+    detect_among(num, (listener.x, listener.y, listener.vehicle), pose, w, world_map, suite, listener)
 
 
 @compiled_inner
@@ -169,10 +169,10 @@ def sector_box(k: int, near: float, far: float, pose: Pose, suite: SonarSuite) -
     # The far edges are lengthened so that their chord clears the arc: by 1 / cos of half the width.
     far *= math.sqrt(2.0 / (1.0 + l_x * u_x + l_y * u_y))
     l_x, l_y, u_x, u_y = c * l_x - s * l_y, s * l_x + c * l_y, c * u_x - s * u_y, s * u_x + c * u_y
-    room = 1e-9 * far  # for rounding
+    margin = 1e-9 * far  # for rounding
     return (
-        x + max(near * l_x, far * l_x, near * u_x, far * u_x) + room,
-        x + min(near * l_x, far * l_x, near * u_x, far * u_x) - room,
-        y + max(near * l_y, far * l_y, near * u_y, far * u_y) + room,
-        y + min(near * l_y, far * l_y, near * u_y, far * u_y) - room,
+        x + max(near * l_x, far * l_x, near * u_x, far * u_x) + margin,
+        x + min(near * l_x, far * l_x, near * u_x, far * u_x) - margin,
+        y + max(near * l_y, far * l_y, near * u_y, far * u_y) + margin,
+        y + min(near * l_y, far * l_y, near * u_y, far * u_y) - margin,
     )
