@@ -234,7 +234,9 @@ def main() -> None:
     results |= {"rounds": arguments.rounds, "seconds": arguments.seconds, "load": round(os.getloadavg()[0], 2)}
     print("| kind | case | agents | worlds | rate [1/s] | ratio to the first case |\n|" + " --- |" * 6)
     for cell in plan(arguments.training):
-        asked = {n: at for n, at in cell.cases.items() if not arguments.only or {n, at[0], cell.kind} & {*arguments.only}}
+        asked = {
+            n: at for n, at in cell.cases.items() if not arguments.only or {n, at[0], cell.kind} & {*arguments.only}
+        }
         records, about = measure(cell._replace(cases=asked), arguments.rounds, arguments.seconds)
         new = {key(record) for record in records}
         results["cases"] = [old for old in results["cases"] if key(old) not in new] + records

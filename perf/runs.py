@@ -17,7 +17,7 @@ import numpy as np
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, with_policy_requirements, make
+from uuv_marl.baselines import POLICIES, make, with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.folder import Record

@@ -47,7 +47,9 @@ def printed(variables: dict[str, str], *arguments: str) -> str:
 def same_runs(other: Path, only: list[str]) -> bool:
     """Print which hashes of the other version differ here; whether none does. What is new here doesn't count."""
     texts = (printed(variables(path), str(HERE / "runs.py"), str(other), *only) for path in (other, ROOT))
-    before, now = ({(kind, name): digest for kind, name, digest in map(json.loads, text.splitlines())} for text in texts)
+    before, now = (
+        {(kind, name): digest for kind, name, digest in map(json.loads, text.splitlines())} for text in texts
+    )
     bad = [key for key, digest in before.items() if now.get(key) != digest or "failed" in digest]
     print("| runs | hashes | that differ |\n| --- | --- | --- |")
     for kind in dict.fromkeys(kind for kind, _ in before):

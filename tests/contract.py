@@ -13,13 +13,13 @@ ARRIVES = {
     "arrival.spread_m": 20000.0,
     "arrival.dwell_s": 0.2,
 }
-LOSES = {"disturbance.loss_times_s": [1.0, 2.0]}
+LOSES = {"losses.times_s": [1.0, 2.0]}
 TIMES_OUT = {"time_limit.factor": 0.02, "time_limit.extra_s": 8.0}
 SINKS = {
     **LOSES,
     "time_limit.extra_s": 40.0,
-    "contact.ends_vehicle": True,
-    "contact.hull_radius_m": 22.0,
+    "collision.ends_vehicle": True,
+    "collision.hull_radius_m": 22.0,
     "start.spacing_m": 45.0,
     "start.gap_m": 45.0,
 }

@@ -2,7 +2,7 @@
 
 ``tests/golden.json`` was made from commit 3eb4921; ``tests/test_golden.py`` computes it anew. The rule: a commit that
 changes golden.json changes nothing else, and its message names the keys and the reason. If what a key pins only gets
-another name, the key stays, and ``LAWS`` or ``NETWORKS`` here give the new name.
+another name, the key stays, and ``CONTROLLERS`` or ``NETWORKS`` here give the new name.
 
 ``SETTING POLICY WHAT`` is the key of a run: hashes of its states, percepts, actions or reward, one for each seed. They
 are the same on any x86-64 processor. A network's are not, because NumPy computes its tanh in another way on an old
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
@@ -35,11 +35,14 @@ REWARD = "sparse"
 
 CONTROLLERS = {name: name for name in (
     "bio_inspired", "bio_inspired,obstacle_term=per_obstacle", "bio_inspired_plus", "scout", "sff", "sdc",
-    "apf", "olfati_saber", "olfati_saber_informed", "orca_informed", "pull", "random", "idle", "guarded:bio_inspired",
-    "guarded:random",
-)} | {f"scout_{preset}": f"scout,preset={preset}" for preset in ("plus", "lead", "wary")}  # fmt: skip
+    "apf", "olfati_saber", "olfati_saber_informed", "orca_informed", "random", "idle",
+)} | {f"scout_{preset}": f"scout,preset={preset}" for preset in ("plus", "lead", "wary")} | {
+    "pull": "proportional_tracking",
+    "guarded:bio_inspired": "bio_inspired,safety_filter=true",
+    "guarded:random": "random,safety_filter=true",
+}  # fmt: skip
 """Hand-made policies: as a key names them, and the name that makes them today."""
-NETWORKS = {name: name for name in ("mappo", "ppo", "guarded:mappo")}
+NETWORKS = {"mappo": "mappo", "ppo": "ppo", "guarded:mappo": "mappo,safety_filter=true"}
 """The same of policies whose actions are compared, not hashed."""
 DRIVER = "bio_inspired"
 """Whose percepts ``NETWORKS`` see."""

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import BaseParallelWrapper
 
 import uuv_marl
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.scenario import load_scenario
 

@@ -16,9 +16,9 @@ from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE, saved
 from uuv_marl import load_scenario, parallel_env, scenario_names
-from uuv_marl.baselines import POLICIES, Policy, PolicyError, with_policy_requirements, make
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, make, with_policy_requirements
+from uuv_marl.baselines.making import uses_identity
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
-from uuv_marl.baselines.registry import uses_identity
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
@@ -76,7 +76,7 @@ def test_the_controller_is_equations_18_to_22(seed):
         np.testing.assert_allclose(action[0, i], written_as_in_the_paper(mine, GAINS, policy.limits), atol=1e-5)
 
 
-@pytest.mark.parametrize("name", [*(name for name in ANYWHERE if name != "random"), "guarded:mappo"])
+@pytest.mark.parametrize("name", [*(name for name in ANYWHERE if name != "random"), "mappo,safety_filter=true"])
 def test_forces_turn_with_the_world(name):
     """Body-frame actions don't change, up to float32, when the world is rotated and moved."""
     scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
@@ -192,7 +192,7 @@ def flown(name, scenario, decisions=6, worlds=2):
     return swarm, policy, percept
 
 
-@pytest.mark.parametrize("name", [*ANYWHERE, "guarded:mappo"])
+@pytest.mark.parametrize("name", [*ANYWHERE, "mappo,safety_filter=true"])
 def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
     swarm, policy, percept = flown(name, STARTER)
     again, kept, water = pickle.loads(pickle.dumps(policy)), policy.snapshot(), swarm.snapshot()
@@ -207,7 +207,7 @@ def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
         policy.restore({**kept, "clamps": np.zeros(5)})
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
+@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "sff,safety_filter=true"])
 def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
     swarm, policy, percept = flown(name, STARTER)
     first = policy.act(percept)
@@ -220,7 +220,7 @@ def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
     policy.act(swarm.percept)
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "guarded:sff"])
+@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "sff,safety_filter=true"])
 def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
     """So that memory does not outlive an autoreset, whichever API did it; the other world keeps its own."""
     swarm, policy, percept = flown(name, STARTER)
@@ -251,7 +251,7 @@ def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
     scenario = with_policy_requirements("scout", load_scenario(STARTER))
     assert make("scout", scenario).gains == make(f"scout,preset={DEFAULT_PRESET}", scenario).gains
     for name, preset in PRESETS.items():
-        policy = make(f"guarded:scout,preset={name},push=3.5", scenario).inner
+        policy = make(f"scout,preset={name},push=3.5,safety_filter=true", scenario).inner
         assert (policy.gains, policy.barrier) == (preset.gains._replace(push=3.5), preset.barrier)
         assert make("scout", scenario, preset=name).gains == preset.gains
 
@@ -273,7 +273,7 @@ class Nothing(Policy):
         ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
         ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, closed, gap, got 'bold'"),
-        ("guarded:bio_insp", "did you mean 'bio_inspired'"),
+        ("bio_insp,safety_filter=true", "did you mean 'bio_inspired'"),
     ],
 )
 def test_a_name_that_means_nothing_is_explained(name, message):
@@ -309,7 +309,7 @@ def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, dampin
     assert np.isfinite(make(name, scenario, **any_vehicle).act(percept)).all()
 
 
-@pytest.mark.parametrize("name", [*POLICIES, "nearest_target,lanes=true", "guarded:sdc"])
+@pytest.mark.parametrize("name", [*POLICIES, "nearest_target,lanes=true", "sdc,safety_filter=true"])
 def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
     """Of any other policy all vehicles act alike that perceive the same; ``random`` draws for each."""
     plain = name.partition(",")[0].removeprefix("mappo_").removesuffix("_2")

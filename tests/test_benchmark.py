@@ -26,7 +26,11 @@ def quick(name="single_obstacle"):
 
 
 def runs_of(scenario, policy, seeds):
-    return {run.seed: run for run in evaluate(with_policy_requirements(policy, scenario), policy, seeds) if isinstance(run, Run)}
+    return {
+        run.seed: run
+        for run in evaluate(with_policy_requirements(policy, scenario), policy, seeds)
+        if isinstance(run, Run)
+    }
 
 
 def test_metrics_are_those_of_the_series(monkeypatch):
@@ -198,7 +202,7 @@ def test_between_walls_tuning_pays_for_who_arrives_untouched_and_for_time():
     scenario = load_scenario("hard_water", num_vehicles=2)
     idle = next(run for run in evaluate(scenario, "idle", MAPS[:1]) if isinstance(run, Run))
     assert tuning_cost(idle, scenario) == pytest.approx(1000.0 + idle.routes.time_s[-1])
-    half = idle._replace(metrics=idle.metrics | {"task": {"untouched_share": 0.5}})
+    half = idle._replace(metrics=idle.metrics | {"task": {"success_share": 0.5}})
     assert tuning_cost(half, scenario) == pytest.approx(500.0 + idle.routes.time_s[-1])
     made = SPACES["scout"].parameters({"push_range": 9.0, "obstacle_m": 3.0})
     assert made == {"gains": ScoutGains(push_range=9.0), "barrier": Barrier(obstacle_m=3.0)}

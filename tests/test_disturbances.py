@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make
-from uuv_marl.sim.exponential import decay_mean, exp
-from uuv_marl.sim.random import normals
 from uuv_marl.sim.disturbances.actuation import followed, victims
 from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.disturbances.disturbances import DISTURBANCE_CHANNELS, disturbance_tables
+from uuv_marl.sim.exponential import decay_mean, exp
+from uuv_marl.sim.random import normals
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
 
@@ -132,7 +132,8 @@ def test_a_policy_that_follows_a_drifting_point_swims_as_in_still_water():
         "current.speed_mps": 0.5, "current.direction_deg": 90.0, "current.velocity": "water",
     }  # fmt: skip
     swarms = [
-        Swarm(load_scenario("single_obstacle", num_vehicles=8, overrides=straight_leg | more)) for more in ({}, drifting)
+        Swarm(load_scenario("single_obstacle", num_vehicles=8, overrides=straight_leg | more))
+        for more in ({}, drifting)
     ]
     start = None
     for swarm in swarms:

@@ -7,7 +7,7 @@ import pytest
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, with_policy_requirements, make
+from uuv_marl.baselines import Policy, make, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
 from uuv_marl.baselines.learned.layers import shapes
 from uuv_marl.sim.swarm import Swarm

@@ -11,7 +11,7 @@ import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.scenario import sonar_is_ideal
 from uuv_marl.sim.disturbances.noise import is_silent
-from uuv_marl.sim.disturbances.schedule import Reading, due, control_step_of, latest
+from uuv_marl.sim.disturbances.schedule import Reading, control_step_of, due, latest
 from uuv_marl.sim.swarm import Swarm
 
 CHANNELS = {"sonar.channels": ["compass", "link", "age", "ranged"]}
@@ -220,7 +220,9 @@ def is_normal(values, num):
     assert kstest(values, "norm").pvalue > 1e-6
 
 
-@pytest.mark.parametrize(("field", "flag", "num"), [("neighbour", "detected", 100_000), ("echo_position", "echo", 90_000)])
+@pytest.mark.parametrize(
+    ("field", "flag", "num"), [("neighbour", "detected", 100_000), ("echo_position", "echo", 90_000)]
+)
 def test_bearings_and_ranges_are_off_as_stated(field, flag, num):
     heard, true = pairs(BLUR, field, flag)
     (away, bearing), (r, psi) = polar(heard), polar(true)
@@ -437,7 +439,10 @@ def test_a_compass_is_off_by_the_same_angle_all_the_time():
     np.testing.assert_allclose(angles, np.broadcast_to(angles[0], np.shape(angles)), atol=1e-6)
     drawn = Swarm(load_scenario("single_obstacle", overrides=COMPASS), 200)
     drawn.reset(0)
-    is_normal(np.arctan2(*np.moveaxis(drawn._disturbances.navigation_errors.bias, -1, 0)[::-1]).ravel() / math.radians(10.0), 10_000)
+    is_normal(
+        np.arctan2(*np.moveaxis(drawn._disturbances.navigation_errors.bias, -1, 0)[::-1]).ravel() / math.radians(10.0),
+        10_000,
+    )
 
 
 def test_drift_carries_late_readings_along():

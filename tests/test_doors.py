@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import uuv_marl
 from tests.nets import ANYWHERE
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, PolicyError, with_policy_requirements, make
+from uuv_marl.baselines import POLICIES, PolicyError, make, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoint
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results, load_trace
@@ -251,7 +251,7 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     trained = POLICIES["mappo"]
     (home / "best").mkdir()
     save_checkpoint("~/best/policy.safetensors", trained.checkpoint.card, trained.checkpoint.tensors)
-    for name in ("~/best", "guarded:~/best", "~/best/policy.safetensors"):
+    for name in ("~/best", "~/best,safety_filter=true", "~/best/policy.safetensors"):
         assert make(name, with_policy_requirements(name, load_scenario("starter")))
     assert load_checkpoint("~/best").card == trained.checkpoint.card
 

@@ -8,7 +8,7 @@ import pytest
 
 import uuv_marl
 from uuv_marl import load_scenario, uuv_swarm_v1
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
 

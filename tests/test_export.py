@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, PolicyError, with_policy_requirements, make
+from uuv_marl.baselines import POLICIES, PolicyError, make, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.baselines.learned.trained import Trained
@@ -43,7 +43,7 @@ def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_p
     assert np.hypot(*action.T).max() <= 1.0 + 1e-6
 
 
-@pytest.mark.parametrize("policy", ["bio_inspired", "scout", "guarded:mappo"])
+@pytest.mark.parametrize("policy", ["bio_inspired", "scout", "mappo,safety_filter=true"])
 def test_what_is_no_network_end_to_end_is_refused_with_the_remedy(policy, tmp_path):
     with pytest.raises(PolicyError, match=rf"'{policy}' can't be exported.*not laws.*run this policy with"):
         write_onnx(policy, load_scenario("tracking"), tmp_path / "policy.onnx")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.state import global_state, state_layout
@@ -127,7 +127,7 @@ def test_there_is_at_the_end_once_the_reference_rests_and_who_touched_something_
     result = batch.step(np.zeros((1, N, 2)))
     assert result.terms["arrival"][0].tolist() == [20.0 * (k != uninformed[2]) for k in range(N)]
     assert not result.over.any()
-    expected = {"untouched_share": 1 - 4 / N, "swarm_success": 0.0, "uninformed_share": 1 - 3 / (N - K)}
+    expected = {"success_share": 1 - 4 / N, "swarm_success": 0.0, "uninformed_share": 1 - 3 / (N - K)}
     assert batch.task.metrics(0) == pytest.approx(expected)
     while not batch.over.all():
         result = batch.step(np.zeros((1, N, 2)))

@@ -22,7 +22,7 @@ def starter():
 
 @pytest.fixture(scope="module")
 def lossy():
-    short = load_scenario("lossy", num_vehicles=8, overrides={"disturbance.loss_times_s": [5.0, 9.0]})
+    short = load_scenario("lossy", num_vehicles=8, overrides={"losses.times_s": [5.0, 9.0]})
     return record(short, "bio_inspired", 0)
 
 

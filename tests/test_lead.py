@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.test_memory import room
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.baselines.memory.actuators import answer, identify, lead
 from uuv_marl.sim.swarm import Swarm
 

@@ -9,7 +9,7 @@ import safetensors.numpy
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, with_policy_requirements, make
+from uuv_marl.baselines import PolicyError, make, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint, vehicle_of
 from uuv_marl.baselines.learned.layers import ENCODED, Architecture, Network, NumpyOps, columns, shapes
 from uuv_marl.baselines.registry import policy_class
@@ -153,7 +153,7 @@ def test_a_memory_can_be_kept_and_is_forgotten_at_a_reset(tmp_path):
 
 @pytest.mark.parametrize(
     ("beside", "told"),
-    [({}, "end to end"), ({"filter": True}, "end to end + filter"), ({"around": "scout"}, "around a law")],
+    [({}, "end to end"), ({"filter": True}, "end to end + filter"), ({"base_controller": "scout"}, "residual")],
 )
 def test_what_decides_beside_a_network_is_told_and_acts(beside, told, tmp_path):
     """A network that says nothing leaves the law, or a filter around a vehicle at rest."""
@@ -161,7 +161,7 @@ def test_what_decides_beside_a_network_is_told_and_acts(beside, told, tmp_path):
     best = saved(tmp_path, scenario, scale=0.0, **beside)
     assert load_checkpoint(best).card.policy_class == told
     policy, swarm = make(best, scenario), Swarm(scenario)
-    law = make(beside.get("around", "guarded:idle" if beside else "idle"), scenario)
+    law = make(beside.get("base_controller", "idle,safety_filter=true" if beside else "idle"), scenario)
     percept = swarm.reset(3)
     for _ in range(30):
         action = policy.act(percept)

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.uncertainty import uncertainty
 from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
-from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.memory.uncertainty import uncertainty
 from uuv_marl.baselines.scout.controller import wary
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
@@ -99,7 +99,7 @@ def velocities(i, swarm, m, places, turn):
 
 
 @pytest.mark.parametrize("period", [0.1, 0.2, 0.5])
-@pytest.mark.parametrize("policy", ["scout", "guarded:bio_inspired"])
+@pytest.mark.parametrize("policy", ["scout", "bio_inspired,safety_filter=true"])
 def test_a_vehicle_knows_where_it_is_through_turns_and_rest(policy, period):
     seen = run({"timing.decision_period_s": period}, policy=policy)
     assert seen.place.max() < 1e-2
@@ -180,8 +180,10 @@ def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
     angles = np.radians(np.arange(100) * 0.5)
     points = np.cumsum(np.column_stack([np.cos(angles), np.sin(angles)]) * (0.02 if speed < 1.0 else 2.0), axis=0)
     overrides = {"trajectory.waypoints_m": points.tolist(), "trajectory.speed_mps": speed, "obstacles": []}
-    scenario = with_policy_requirements("guarded:pull", load_scenario("tracking", num_vehicles=1, overrides=overrides))
-    swarm, policy = Swarm(scenario), make("guarded:pull", scenario)
+    scenario = with_policy_requirements(
+        "proportional_tracking,safety_filter=true", load_scenario("tracking", num_vehicles=1, overrides=overrides)
+    )
+    swarm, policy = Swarm(scenario), make("proportional_tracking,safety_filter=true", scenario)
     percept = swarm.reset(1)
     for k in range(400):
         action = policy.act(percept)
@@ -194,8 +196,10 @@ def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
 
 
 def test_a_fix_that_is_cut_is_none():
-    scenario = with_policy_requirements("guarded:pull", load_scenario("tracking", num_vehicles=1))
-    swarm, policy = Swarm(scenario), make("guarded:pull", scenario)
+    scenario = with_policy_requirements(
+        "proportional_tracking,safety_filter=true", load_scenario("tracking", num_vehicles=1)
+    )
+    swarm, policy = Swarm(scenario), make("proportional_tracking,safety_filter=true", scenario)
     swarm.reset(0)
     swarm.state.eta[0, 0, :2] = (-9000.0, 5000.0)
     percept = swarm.observe()

@@ -25,7 +25,9 @@ def among_piles(period_s, seed, **changes):
     first = swarm.world_map.obstacles[0, rng.integers(num, size=30)]
     swarm.state.eta[0, :, :2] = first[:, :2] + rng.normal(scale=2.0, size=(30, 2)) * first[:, 2:]
     swarm.state.nu[0, :, 0] = rng.choice([0.0, 3.0, 15.0, 40.0], 30)
-    swarm.world_map.obstacle_velocity[0, :num:3] = rng.uniform(-0.3, 0.3, swarm.world_map.obstacle_velocity[0, :num:3].shape)
+    swarm.world_map.obstacle_velocity[0, :num:3] = rng.uniform(
+        -0.3, 0.3, swarm.world_map.obstacle_velocity[0, :num:3].shape
+    )
     swarm.observe()
     return swarm
 

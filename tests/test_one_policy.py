@@ -9,13 +9,13 @@ import uuv_marl
 from tests.players import CYCLES, PLAYERS, compare, suited
 from uuv_marl.baselines import PolicyError, make
 
-LOSES = {"disturbance.loss_times_s": [1.0, 2.0], "timing.decision_period_s": 0.5}
+LOSES = {"losses.times_s": [1.0, 2.0], "timing.decision_period_s": 0.5}
 KINDS = {
     "bio_inspired": ("starter", {}),  # no memory
     "tangent_bug": ("hard_water", {}),  # a map
     "mappo_few_informed": ("few_informed", {}),  # a recurrent network
     "random": ("lossy", LOSES),  # a random generator
-    "guarded:random": ("starter", {}),
+    "random,safety_filter=true": ("starter", {}),
     "leader_follower": ("few_informed", {}),  # observations that others lack
     "oracle": ("hard_water", {}),
 }

@@ -47,7 +47,7 @@ for _ in range(8):
 bits = {name: array.tobytes().hex() for name, array in swarm.snapshot().items()}
 actions = []
 for name in () if scenario.current.flows else ANYWHERE:
-    swarm, policy = Swarm(granted(name, scenario)), make(name, granted(name, scenario))
+    swarm, policy = Swarm(with_policy_requirements(name, scenario)), make(name, with_policy_requirements(name, scenario))
     policy.reset(0)
     actions.append(policy.act(swarm.reset(0)).tolist())
 print(json.dumps([bits, actions]))
@@ -521,5 +521,5 @@ def test_an_episode_s_facts_and_percepts_are_those_of_the_oracle(name):
         check(swarm)
         check_percept(swarm)
         happened |= {name for name in ("detected", "echo") if swarm.percept[name].any()}
-        happened |= {name for name in ("contacts", "lost") if getattr(swarm.facts, name).any()}
-    assert happened == {"detected", "echo", "contacts", *(["lost"] if name == "losses" else [])}
+        happened |= {name for name in ("vehicle_collisions", "lost") if getattr(swarm.facts, name).any()}
+    assert happened == {"detected", "echo", "vehicle_collisions", *(["lost"] if name == "losses" else [])}

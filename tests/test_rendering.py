@@ -8,7 +8,7 @@ import pytest
 
 import uuv_marl
 from tests.golden import STARTER
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim

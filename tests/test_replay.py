@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import uuv_marl.replay.encode
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import Run, evaluate
 from uuv_marl.benchmark.results import Results

@@ -11,7 +11,7 @@ from research.episodes import read_rows
 from research.paper import cases
 from research.paper import reproduce as job
 from research.paper.assumptions import ASSUMPTIONS, READINGS
-from research.paper.ledger import difference, stated_entries, ledger, verdict
+from research.paper.ledger import difference, ledger, stated_entries, verdict
 from research.paper.report import page
 from uuv_marl.benchmark.suite import Suite
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, with_policy_requirements, make
-from uuv_marl.baselines.requirements import inner_loop_nms
+from uuv_marl.baselines import PolicyError, make, with_policy_requirements
 from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
 from uuv_marl.percept import Percept, PerceptLayout

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, PolicyError, with_policy_requirements, make
+from uuv_marl.baselines import Policy, PolicyError, make, with_policy_requirements
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -42,7 +42,7 @@ def placed(overrides, poses, name, **parameters):
 @pytest.mark.parametrize("aside", [0.0, 12.0])
 def test_who_steers_at_an_obstacle_stays_beyond_the_margin(period, echoes, aside):
     overrides = AHEAD | {"timing.decision_period_s": period, "sonar.echo_reports": echoes}
-    swarm, policy, percept = placed(overrides, [(150.0, aside, 0.0)], f"guarded:{HERE}")
+    swarm, policy, percept = placed(overrides, [(150.0, aside, 0.0)], f"{HERE},safety_filter=true")
     nearest = np.inf
     for _ in range(round(60 / period)):
         percept = swarm.step(policy.act(percept))
@@ -52,7 +52,9 @@ def test_who_steers_at_an_obstacle_stays_beyond_the_margin(period, echoes, aside
 
 
 def test_two_that_meet_head_on_stay_beyond_the_margin():
-    swarm, policy, percept = placed({"obstacles": []}, [(0.0, 0.0, 0.0), (120.0, 0.5, np.pi)], f"guarded:{HERE}")
+    swarm, policy, percept = placed(
+        {"obstacles": []}, [(0.0, 0.0, 0.0), (120.0, 0.5, np.pi)], f"{HERE},safety_filter=true"
+    )
     nearest = np.inf
     for _ in range(400):
         percept = swarm.step(policy.act(percept))
@@ -90,7 +92,7 @@ def test_who_backs_into_what_it_no_longer_hears_is_stopped():
 def test_where_nothing_is_near_no_action_changes(name):
     poses = [(0.0, 0.0, 0.3), (200.0, 250.0, -1.0), (-300.0, 100.0, 2.0)]
     swarm, bare, percept = placed({"obstacles": []}, poses, name)
-    guarded = make(f"guarded:{name}", swarm.scenario)
+    guarded = make(f"{name},safety_filter=true", swarm.scenario)
     for _ in range(round(10.0 / swarm.scenario.timing.decision_period_s)):
         action = bare.act(percept)
         np.testing.assert_array_equal(guarded.act(percept), action)
@@ -100,7 +102,7 @@ def test_where_nothing_is_near_no_action_changes(name):
 
 def test_where_no_velocity_is_safe_it_is_counted():
     poses = [(0.0, 0.0, 0.0), (5.0, 0.0, np.pi), (-2.5, 4.3, 0.0), (-2.5, -4.3, 0.0)]
-    swarm, policy, percept = placed({"obstacles": []}, poses, f"guarded:{HERE}")
+    swarm, policy, percept = placed({"obstacles": []}, poses, f"{HERE},safety_filter=true")
     policy.act(percept)
     infeasible, changed = policy.infeasible[0], policy.changed[0]
     assert 0 < infeasible <= changed <= 4
@@ -116,32 +118,34 @@ def test_where_no_velocity_is_safe_it_is_counted():
 def test_policies_that_collide_alone_do_not_inside_the_filter(name):
     """On a crowded field of the tuning seeds; more are in docs/policies.md."""
     collisions = {}
-    for policy in (name, f"guarded:{name}"):
+    for policy in (name, f"{name},safety_filter=true"):
         scenario = with_policy_requirements(policy, load_scenario("random_field"))
         runs = [run for run in evaluate(scenario, policy, [10_007]) if isinstance(run, Run)]
         collisions[policy] = sum(run.metrics["collisions"] for run in runs)
     assert collisions[name] > 0
-    assert collisions[f"guarded:{name}"] == 0
+    assert collisions[f"{name},safety_filter=true"] == 0
 
 
 def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
-    scenario = with_policy_requirements("guarded:bio_inspired", load_scenario("starter"))
-    policy = make("guarded:bio_inspired,zeta_n=0.5", scenario, barrier=Barrier(obstacle_m=9.0))
-    assert policy.name == "guarded:bio_inspired,zeta_n=0.5"
+    scenario = with_policy_requirements("bio_inspired,safety_filter=true", load_scenario("starter"))
+    policy = make("bio_inspired,zeta_n=0.5,safety_filter=true", scenario, barrier=Barrier(obstacle_m=9.0))
+    assert policy.name == "bio_inspired,zeta_n=0.5,safety_filter=true"
     assert policy.inner.gains.zeta_n == 0.5
     assert policy.barrier.obstacle_m == 9.0
     with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"):
-        make("guarded:bio_inspired,barrier=5", scenario)
+        make("bio_inspired,barrier=5,safety_filter=true", scenario)
     with pytest.raises(PolicyError, match="has a prefix too many"):
-        make("guarded:guarded:bio_inspired", scenario)
-    guarded = make("guarded:sff", with_policy_requirements("guarded:sff", scenario))
+        make("bio_inspired,safety_filter=perhaps", scenario)
+    guarded = make("sff,safety_filter=true", with_policy_requirements("sff,safety_filter=true", scenario))
     with pytest.raises(PolicyError, match=r"the snapshot's identity must be"):
         guarded.restore(guarded.snapshot() | {"inner.identity": np.zeros(3)})
 
 
 @pytest.mark.parametrize("echoes", ["centre", "surface"])
 def test_scout_arrives_and_touches_nothing(echoes):
-    scenario = with_policy_requirements("scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes}))
+    scenario = with_policy_requirements(
+        "scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes})
+    )
     runs = [run for run in evaluate(scenario, "scout", [10_007, 10_008]) if isinstance(run, Run)]
     assert all(run.metrics["collisions"] == 0 for run in runs)
     assert all(run.metrics["task_time_s"] is not None for run in runs)

@@ -17,7 +17,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import PolicyError, with_policy_requirements, make
+from uuv_marl.baselines import PolicyError, make, with_policy_requirements
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.train import run
 from uuv_marl.train.sb3 import save_sb3

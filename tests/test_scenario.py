@@ -100,7 +100,7 @@ def test_overrides_reach_every_level():
         ("swarm.num_vehicles=20", ("swarm.num_vehicles", 20)),
         ("sonar.echo_reports=surface", ("sonar.echo_reports", "surface")),
         ('sonar.channels=["link"]', ("sonar.channels", ["link"])),
-        ("contact.ends_vehicle = true", ("contact.ends_vehicle", True)),
+        ("collision.ends_vehicle = true", ("collision.ends_vehicle", True)),
     ],
 )
 def test_overrides_from_the_command_line(text, expected):
@@ -148,13 +148,13 @@ BAD = [
     ({"timing.decision_period_s": 0.15}, "timing.decision_period_s must be a whole multiple"),
     ({"timing.decision_period_s": 1000.0}, "decision_period_s must be at most the shortest time limit = 298.649"),
     ({"timing.decision_period_s": 10.0, "timing.integration_step_s": 0.0001}, "takes 100,000 steps .*at most 10,000"),
-    ({"swarm.num_vehicles": 2, "disturbance.loss_times_s": [1.0, 2.0]}, "at least one must remain"),
+    ({"swarm.num_vehicles": 2, "losses.times_s": [1.0, 2.0]}, "at least one must remain"),
     ({"trajectory.waypoints_m": [[1.0, 1.0], [1.0, 1.0]]}, "must differ from one to the next"),
     ({"sonar.arrays.bow.sub_sectors": 1, "sonar.arrays.bow.aperture_deg": 200.0}, "use at least 2"),
     ({"sonar.channels": ["link", "link"]}, "sonar.channels must name each channel once"),
     ({"vehicle": "literature_18"}, r"vehicle 'literature_18' is unknown; did you mean 'literature_185'\?"),
 ]
-SHORT = {"timing.control_hold_s": 0.001, "timing.integration_step_s": 0.001}
+SHORT = {"timing.control_step_s": 0.001, "timing.integration_step_s": 0.001}
 COURSE = {"trajectory.waypoints_m": [[0.0, 0.0], [1e6, 1e6]]}
 ARRAY, MEMBER = ({"kind": kind, "share": 0.1} for kind in ("array", "member"))
 BAD_SEA = [
@@ -382,9 +382,9 @@ class Listed(Sequence):
         ("sonar.channels", ["compass"], deque(["compass"])),
         ("swarm.num_vehicles", 7, np.int64(7)),
         ("swarm.num_vehicles", 7, np.array(7)),
-        ("contact.ends_vehicle", True, np.bool_(True)),
-        ("contact.ends_vehicle", True, np.array(True)),
-        ("disturbance.loss_times_s", [1.0, 2.5], np.array([1.0, 2.5], np.float32)),
+        ("collision.ends_vehicle", True, np.bool_(True)),
+        ("collision.ends_vehicle", True, np.array(True)),
+        ("losses.times_s", [1.0, 2.5], np.array([1.0, 2.5], np.float32)),
         ("trajectory.speed_mps", 3.5, np.float32(3.5)),
         ("trajectory.speed_mps", 3.5, Decimal("3.5")),
         ("trajectory.speed_mps", 3.5, Fraction(7, 2)),

@@ -6,7 +6,7 @@ import pytest
 
 from research.second import SECOND, runnable
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, with_policy_requirements, make
+from uuv_marl.baselines import POLICIES, make, with_policy_requirements
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.scenario import scenario_names

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, ScenarioError
 from uuv_marl.scenario.vehicle_checks import top_speed

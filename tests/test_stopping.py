@@ -49,7 +49,9 @@ def test_a_hull_that_pushes_on_stands_at_the_wall_and_touches_it_once():
 def test_along_a_wall_a_hull_glides():
     """The impulse has no component along the surface: that velocity stays, but for drag."""
     swarm = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    free = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)), **{"collision.stops": False})
+    free = two(
+        (-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)), **{"collision.stops": False}
+    )
     for _ in range(6):
         swarm.step(NOTHING)
         free.step(NOTHING)

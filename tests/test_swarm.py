@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.sim import engine as engine_module
 from uuv_marl.sim.field import sample_field
 from uuv_marl.sim.swarm import Swarm

@@ -10,10 +10,10 @@ from typing_extensions import TypeAliasType
 from tests.golden import STARTER
 from uuv_marl import load_scenario
 from uuv_marl.sim import entry_points
-from uuv_marl.sim.arrays import WorldMap, Facts, Senses, State
+from uuv_marl.sim.arrays import Facts, Senses, State, WorldMap
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
-from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, workspace_buffers, workspace
+from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, workspace, workspace_buffers
 from uuv_marl.types import Float32
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import SAME_M
 from uuv_marl.sim.swarm import Swarm
@@ -48,7 +48,7 @@ def test_it_comes_round_a_wall_that_stops_a_pull(walls, surface):
     swarm, _, places = fly("tangent_bug", water(walls, surface))
     assert np.hypot(GOAL_M - places[-1, 0], places[-1, 1]) <= 10.0
     assert not swarm.state.collided.any()
-    _, _, pulled = fly("guarded:pull", water(walls, surface))
+    _, _, pulled = fly("proportional_tracking,safety_filter=true", water(walls, surface))
     assert pulled[-1, 0] < 110.0
 
 

@@ -10,7 +10,7 @@ from research.episodes import read_rows
 from research.tasks.page import report
 from research.tasks.studies import STUDIES, set_name
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps import KINDS
@@ -20,7 +20,7 @@ STUDY = STUDIES["hard_water"]
 
 
 def rows(policy, share):
-    told = dict.fromkeys(STUDY.metrics, "1.000") | {"untouched_share": f"{share:.3f}", "swarm_success": "0.000"}
+    told = dict.fromkeys(STUDY.metrics, "1.000") | {"success_share": f"{share:.3f}", "swarm_success": "0.000"}
     return [{"set": name, "policy": policy, "seed": str(seed), **told} for name in STUDY.sets for seed in range(3)]
 
 

@@ -180,7 +180,7 @@ def test_at_a_goal_at_rest_who_touched_something_has_failed():
     result = batch.step(np.zeros((1, 5, 2)))
     assert result.world_terminated[0]
     assert result.terms["arrival"][0].tolist() == 5 * [20.0]
-    assert batch.task.metrics(0) == {"untouched_share": 0.8, "swarm_success": 0.0}
+    assert batch.task.metrics(0) == {"success_share": 0.8, "swarm_success": 0.0}
 
 
 def test_a_task_that_is_named_takes_fields_too():
@@ -223,13 +223,13 @@ def test_a_task_that_says_nothing_of_success_or_takes_a_name_twice_is_refused_by
 def test_a_task_may_say_who_succeeds_without_saying_where(monkeypatch):
     own = {"succeeded": lambda task: task.swarm.state.alive.copy()}
     monkeypatch.setattr(sys.modules[__name__], "Fit", type("Fit", (Task,), own), raising=False)
-    assert load_scenario("starter", overrides={"task": f"{__name__}:Fit"}).task_class.headline == "untouched_share"
+    assert load_scenario("starter", overrides={"task": f"{__name__}:Fit"}).task_class.headline == "success_share"
 
 
 @pytest.mark.parametrize(("own", "more", "message"), [
-    ({"min_spacing_m": 1.0, "untouched_share": 1.0, "swarm_success": 1.0}, {}, "can't give min_spacing_m in metrics: the name"),
-    ({"mine_m": 1.0}, {}, "must give untouched_share, whole in metrics; add to super"),
-    ({"untouched_share": 1.0, "swarm_success": 1.0}, {"headline": "mine_share"}, "must give mine_share in metrics"),
+    ({"min_spacing_m": 1.0, "success_share": 1.0, "swarm_success": 1.0}, {}, "can't give min_spacing_m in metrics: the name"),
+    ({"mine_m": 1.0}, {}, "must give success_share, whole in metrics; add to super"),
+    ({"success_share": 1.0, "swarm_success": 1.0}, {"headline": "mine_share"}, "must give mine_share in metrics"),
 ])  # fmt: skip
 def test_metrics_that_would_be_hidden_or_missed_are_refused_at_the_first_episodes_end(monkeypatch, own, more, message):
     wrong = type("Wrong", (Survive,), {"metrics": lambda task, world: own, **more})
@@ -264,9 +264,9 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
     for name in ("bio_inspired", "bio_inspired_plus", "scout", "idle", "mappo"):
         mine = with_policy_requirements(name, scenario)
         assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
-    own = with_policy_requirements("own_clock:bio_inspired", scenario)
+    own = with_policy_requirements("bio_inspired,own_clock=true", scenario)
     assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
-    (run,) = [event for event in evaluate(own, "own_clock:bio_inspired", [0]) if isinstance(event, Run)]
+    (run,) = [event for event in evaluate(own, "bio_inspired,own_clock=true", [0]) if isinstance(event, Run)]
     assert run.metrics["task_time_s"] is not None
 
 
@@ -283,13 +283,13 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     done = CliRunner().invoke(app, ["benchmark", *how, "--seeds", "2", "--output", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     runs = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]
-    assert all(set(run["metrics"]["task"]) == {"untouched_share", "swarm_success", "spread_m"} for run in runs)
+    assert all(set(run["metrics"]["task"]) == {"success_share", "swarm_success", "spread_m"} for run in runs)
     text = (tmp_path / "out" / "table.md").read_text()
     assert "| spread_m |" in text
     assert "spread_m: mean distance from the centre at the end [m]." in text
     frame = load(tmp_path / "out")
     np.testing.assert_array_equal(frame["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs])
-    assert {*frame.columns} <= {"spread_m", "untouched_share", "swarm_success", *MEASURED}
+    assert {*frame.columns} <= {"spread_m", "success_share", "swarm_success", *MEASURED}
     assert _outcome(runs[0]["metrics"]).startswith("0% untouched and there, ")
     done = CliRunner().invoke(app, ["replay", *how, "--output", str(tmp_path / "replay.html")])
     assert done.exit_code == 0, done.output
@@ -333,7 +333,7 @@ def test_a_task_of_the_follow_kind_is_judged_as_follow_though_it_measures_more()
     from uuv_marl.train.validation import shares_of
 
     metrics = {"task_time_s": 30.0, "collisions": 0}
-    assert shares_of(metrics, "untouched_share") == shares_of(metrics | {"task": {"mine_m": 1.0}}, "untouched_share")
+    assert shares_of(metrics, "success_share") == shares_of(metrics | {"task": {"mine_m": 1.0}}, "success_share")
 
 
 @pytest.mark.needs("torch")

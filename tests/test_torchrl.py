@@ -28,7 +28,7 @@ from tests import contract
 from uuv_marl.envs.torchrl import SwarmEnv
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
-LOSSES = {**SHORT, "disturbance.loss_times_s": [1.0, 2.0]}
+LOSSES = {**SHORT, "losses.times_s": [1.0, 2.0]}
 GROUP_DONE = {"reward": ("uuv", "reward"), "done": ("uuv", "done"), "terminated": ("uuv", "terminated")}
 
 

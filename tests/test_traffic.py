@@ -90,7 +90,9 @@ def test_which_move_and_where_to_is_the_seed_s():
     pairs = [swarm("multi_obstacle", share=0.5, seed=seed).course.swing[0, :, 2:] for seed in (0, 0, 1)]
     np.testing.assert_array_equal(pairs[0], pairs[1])
     assert (pairs[0] != pairs[2]).any()
-    movers = {tuple(swarm("multi_obstacle", share=0.5, seed=seed).course.swing_control_steps[0] > 0) for seed in range(8)}
+    movers = {
+        tuple(swarm("multi_obstacle", share=0.5, seed=seed).course.swing_control_steps[0] > 0) for seed in range(8)
+    }
     assert len(movers) > 2
 
 
@@ -103,7 +105,7 @@ def test_nothing_else_is_drawn_anew(name):
         np.testing.assert_array_equal(getattr(still.course, table), getattr(moving.course, table))
 
 
-@pytest.mark.parametrize("off", [{"speed_mps": 0.0, "way_m": 3.0, "share": 0.5}, {"share": 0.0}])
+@pytest.mark.parametrize("off", [{"speed_mps": 0.0, "amplitude_m": 3.0, "share": 0.5}, {"share": 0.0}])
 def test_off_is_as_if_there_were_no_such_section(off):
     bare, made = Swarm(load_scenario("starter", overrides=FINE)), swarm(**off)
     bare.reset(0)
@@ -224,9 +226,17 @@ def test_interfaces_agree_and_the_global_state_tells_the_velocity():
             {"swarm.num_vehicles": 10},
             "traffic.speed_mps must be 0 for task 'two_swarms', .* got 2; leave",
         ),
-        ("starter", {"way_m": 0.1}, "traffic.amplitude_m must be at least 0.2, .* got 0.1; raise it or lower the speed"),
-        ("random_field", {"way_m": 55.1}, r"traffic.amplitude_m must be at most .* = 55, so .*, got 55.1; lower it"),
-        ("starter", {"way_m": 90.0}, "lies on the trajectory's end; keep 95 m"),
+        (
+            "starter",
+            {"amplitude_m": 0.1},
+            "traffic.amplitude_m must be at least 0.2, .* got 0.1; raise it or lower the speed",
+        ),
+        (
+            "random_field",
+            {"amplitude_m": 55.1},
+            r"traffic.amplitude_m must be at most .* = 55, so .*, got 55.1; lower it",
+        ),
+        ("starter", {"amplitude_m": 90.0}, "lies on the trajectory's end; keep 95 m"),
         ("starter", {"share": 1.5}, "traffic.share must lie within 0 to 1, got 1.5"),
     ],
 )

@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 
 from tests.nets import card_for, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.benchmark.evaluate import Run, evaluate
@@ -155,7 +155,7 @@ def test_a_lesson_is_learned_whatever_pays():
     assert np.sqrt(np.mean((action - x[:, 1::-1] * (1.0, -1.0)) ** 2)) < 0.1
 
 
-@pytest.mark.parametrize(("pull", "near"), [(0.0, (0.5, -0.5, 0, 0)), (30.0, (0, 0, 1.0, -1.0))])
+@pytest.mark.parametrize(("imitation_weight", "near"), [(0.0, (0.5, -0.5, 0, 0)), (30.0, (0, 0, 1.0, -1.0))])
 def test_a_pull_holds_at_the_teacher_against_what_pays(pull, near):
     """Half of what is seen pays, and the teacher swaps it."""
     toy = Toy(lambda observation, action: -np.square(action - observation[:, :2] * (0.5, -0.5)).sum(axis=1))
@@ -334,7 +334,7 @@ NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
         ({"scenario": "few_informed", "reward": "leader"}, (1.0, 300.0)),
         ({"reward": "own_task:mine"}, (0.0, 0.0)),
         ({"overrides": {"task": "own_task:Mine"}}, (0.0, 0.0)),
-        ({"overrides": {"task": "own_task:Mine"}, "also": ["starter"]}, (0.0, 0.0)),
+        ({"overrides": {"task": "own_task:Mine"}, "extra_scenarios": ["starter"]}, (0.0, 0.0)),
         ({"overrides": {"task": NEARER}}, (0.0, 0.0)),
         ({"overrides": {"task": NEARER}, "ppo": {"collision_cost": (2.0, 5.0)}}, (2.0, 5.0)),
         ({"ppo": {"collision_cost": (0.0, 0.0)}}, (0.0, 0.0)),
@@ -355,7 +355,7 @@ def test_a_training_begins_with_its_whole_objective(tmp_path, own_task, no_valid
         "Reward dense of task follow on starter\n  tracking: -0.1 · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's",
         "\n  arrival: +20 for every vehicle",
         "d: the vehicle's distance to l(t), D: 500 m, c: 10 m\n",
-        "\nIn addition a contact that begins costs 1 at the start and 300 at the end (ppo.contact_cost); discount 0.99",
+        "\nIn addition a contact that begins costs 1 at the start and 300 at the end (ppo.collision_cost); discount 0.99",
         "For 30% of the budget the network first imitates scout, whatever is paid.",
         "Then 2 times the mean squared distance from what it would do is added to PPO's loss.",
     ):
@@ -401,7 +401,7 @@ RUDDER = {
 
 
 @pytest.mark.parametrize("beside", [
-    {}, {"filter": True}, {"around": "scout"}, RUDDER, {**RUDDER, "around": "scout"}, {**RUDDER, "around": "sff"},
+    {}, {"filter": True}, {"base_controller": "scout"}, RUDDER, {**RUDDER, "base_controller": "scout"}, {**RUDDER, "base_controller": "sff"},
 ], ids=["alone", "filter", "scout", "rudder", "rudder, scout", "rudder, sff"])  # fmt: skip
 def test_rows_act_as_the_policy_will(beside, tmp_path):
     """What comes of a training's actions is what comes of its checkpoint's, filter, law and all bounds included."""
@@ -475,7 +475,7 @@ def test_fewer_and_fewer_worlds_are_the_teachers():
 
 def test_rewards_count_after_the_lesson(tmp_path, no_validation):
     """In a lesson of nine tenths the network is far from who acts, the teacher; then PPO is near itself."""
-    fields = {"scenario": "starter", "sizes": [(4, 2)], "steps": 20 * 64, "lesson": 0.9, "expert": "scout"}
+    fields = {"scenario": "starter", "sizes": [(4, 2)], "steps": 20 * 64, "imitation_share": 0.9, "expert": "scout"}
     records = list(train(tmp_path, Training(ppo=TINY, **fields)))
     assert len(records) == 20
     after = [record.kl for record in records[18:]]
@@ -559,10 +559,10 @@ def rows(folder):
         {},
         {"network": {"kind": "sectors", "hidden": (8,)}},
         {"filter": True},
-        {"around": "random"},
-        {"around": "scout"},
-        {"expert": "scout", "lesson": 0.3},
-        {"expert": "scout", "lesson": 0.3, "pull": 2.0},
+        {"base_controller": "random"},
+        {"base_controller": "scout"},
+        {"expert": "scout", "imitation_share": 0.3},
+        {"expert": "scout", "imitation_share": 0.3, "imitation_weight": 2.0},
     ],
     ids=["gru", "sectors", "filter", "random", "scout", "lesson", "pull"],
 )
@@ -689,7 +689,7 @@ def test_a_folder_says_why_it_can_not_go_on_here_and_what_made_it_so_far(tmp_pat
 def test_a_network_is_around_a_law_that_ships(law, tmp_path):
     with pytest.raises(PolicyError, match=f"around one of the laws bio_inspired, .*, got '{law}'"):
         Training(around=law)
-    card = card_for(load_scenario("starter")).model_copy(update={"around": law})
+    card = card_for(load_scenario("starter")).model_copy(update={"base_controller": law})
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, tensors(card))
     with pytest.raises(PolicyError, match="around one of the laws"):
         make(str(tmp_path), load_scenario("starter"))
@@ -720,12 +720,12 @@ def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
     card = card_for(small().loaded)
     weights = {name: 0.1 * array for name, array in tensors(card).items()}
     save_checkpoint(expert / WEIGHTS_FILE, card, weights)
-    for k, name in enumerate((f"{expert}", f"guarded:{expert}")):
+    for k, name in enumerate((f"{expert}", f"{expert},safety_filter=true")):
         begun(tmp_path / f"{k}", 3, expert=name)
     shutil.copytree(tmp_path / "0", tmp_path / "same")
     assert list(resume(tmp_path / "same"))
     save_checkpoint(expert / WEIGHTS_FILE, card, {name: 2.0 * array for name, array in weights.items()})
-    for k, name in enumerate((f"{expert}", f"guarded:{expert}")):
+    for k, name in enumerate((f"{expert}", f"{expert},safety_filter=true")):
         told = (
             rf"begun with teacher = {name} \(\w+\), and teacher is {name} \(\w+\) now; give {name} as it was, or begin"
         )
@@ -899,20 +899,23 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
         ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp', 'sectors' or 'moments', got 'cnn'"),
         ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
-        ({"around": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
+        ({"base_controller": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         (
-            {"around": "scout", "expert": "scout"},
+            {"base_controller": "scout", "expert": "scout"},
             "teacher 'scout' and around 'scout' are both given; leave one out",
         ),
         (
-            {"pull": 2.0},
+            {"imitation_weight": 2.0},
             "pull = 2 is to a teacher, and none is given; name one, or leave pull out",
         ),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
         ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
         ({"sizes": [[5, -1]]}, "sizes.0.1 should be greater than or equal to 0, got -1"),
-        ({"also": ["lossy"]}, "training can't show that a vehicle is lost"),
-        ({"also": ["few_informed"]}, "also = 'few_informed' has another percept than 'starter', and one network"),
+        ({"extra_scenarios": ["lossy"]}, "training can't show that a vehicle is lost"),
+        (
+            {"extra_scenarios": ["few_informed"]},
+            "also = 'few_informed' has another percept than 'starter', and one network",
+        ),
     ],
 )
 def test_fields_that_cannot_be_trained_with_are_named_with_the_remedy(wrong, told):

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
@@ -129,14 +129,14 @@ def test_success_is_untouched_and_there_and_the_episode_ends_when_all_are_there(
     swarm.state.collided[0, 2] = True
     result = batch.step(np.zeros((1, 20, 2)))
     assert not result.world_terminated[0]
-    assert task.metrics(0)["untouched_share"] == 18 / 20
-    assert task.metrics(0)["whole_ratio"] is None
+    assert task.metrics(0)["success_share"] == 18 / 20
+    assert task.metrics(0)["swarm_time_ratio"] is None
     swarm.state.eta[0, 0, :2] = swarm.world_map.waypoints[0, 0, 1]
     result = batch.step(np.zeros((1, 20, 2)))
     assert result.world_terminated[0]
     measured = task.metrics(0)
-    assert (measured["untouched_share"], measured["swarm_success"]) == (19 / 20, 0.0)
-    assert measured["whole_ratio"] == pytest.approx(1.0 / task.memory.best_s[0].max())  # two decisions of 0.5 s
+    assert (measured["success_share"], measured["swarm_success"]) == (19 / 20, 0.0)
+    assert measured["swarm_time_ratio"] == pytest.approx(1.0 / task.memory.best_s[0].max())  # two decisions of 0.5 s
 
 
 def test_the_straight_way_is_that_through_the_gaps_middle():
@@ -172,7 +172,7 @@ def test_the_oracle_passes(tier):
     while not batch.over.all():
         policy.active[:] = ~batch.over
         batch.step(policy.act(batch.swarm.percept))
-    assert np.mean([batch.task.metrics(w)["untouched_share"] for w in range(4)]) >= 0.95
+    assert np.mean([batch.task.metrics(w)["success_share"] for w in range(4)]) >= 0.95
 
 
 def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from research.dynamics import acceptance
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.benchmark import handling
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, vehicle_names
 from uuv_marl.scenario.turning import turning_radius
@@ -137,7 +137,9 @@ def test_a_minute_of_a_steady_turn_is_scipys(name, source):
 @pytest.mark.parametrize("name", handling.every())
 def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
     changes = SLOW | {"vehicle": name, "trajectory.speed_mps": 0.5}
-    scenario = with_policy_requirements("bio_inspired_plus", load_scenario("single_obstacle", num_vehicles=4, overrides=changes))
+    scenario = with_policy_requirements(
+        "bio_inspired_plus", load_scenario("single_obstacle", num_vehicles=4, overrides=changes)
+    )
     assert scenario.vehicle.name == name
     swarm, policy = Swarm(scenario), make("bio_inspired_plus", scenario)
     percept = swarm.reset(0)

@@ -101,7 +101,7 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
         ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),
         ({"policy": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
         ({"policy": "runs/best"}, "policy 'runs/best' is not part of the package"),
-        ({"policy": "own_clock:evil:Law"}, "policy 'own_clock:evil:Law' is not part of the package"),
+        ({"policy": "evil:Law,own_clock=true"}, "policy 'evil:Law,own_clock=true' is not part of the package"),
     ],
 )
 def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, changes, reason):

@@ -82,7 +82,7 @@ def shares(policy: str) -> list[str]:
     for task, rows in TIERS.items():
         kinds = getattr(load_scenario(task).task_numbers, "kinds", [""])
         sets = [select(rows, policy=policy, set=set_name(task, kind)) for kind in kinds]
-        means = [sum(measured(each, "untouched_share")) / len(each) for each in sets if each]
+        means = [sum(measured(each, "success_share")) / len(each) for each in sets if each]
         found.append(f"{sum(means) / len(means):.2f}".replace("0.", ".") if means else "–")
     return found
 

@@ -1,5 +1,8 @@
 """Errors that a user can mend; every message names what is wrong and what to do."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class ScenarioError(ValueError):
     """A scenario that can't be used; the message says which field, what it is and what to do."""
@@ -42,3 +45,14 @@ MENDABLE = (
     MissingExtraError,
 )  # fmt: skip
 """All of them."""
+
+
+def nearest(name: str, known: Iterable[str], cutoff: float = 0.4) -> str | None:
+    """The known name that is most like an unknown one, None where none is: likeness from ``cutoff`` to 1 (difflib)."""
+    return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=cutoff)), None)
+
+
+def hint(name: str, known: Iterable[str], cutoff: float = 0.4) -> str:
+    """``did you mean 'x'? `` for ``nearest``; empty where there is none."""
+    near = nearest(name, known, cutoff)
+    return f"did you mean {near!r}? " if near else ""

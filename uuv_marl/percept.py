@@ -5,13 +5,13 @@ dividing by them (the observation) and multiplying again loses nothing.
 """
 
 import dataclasses
-import difflib
 import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from uuv_marl.errors import hint
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.types import Bool, Float32, Float64, UInt64
 
@@ -252,9 +252,8 @@ class Percept:
     def __getitem__(self, name: str) -> Float32:
         """A field by name, as a view. Raises KeyError where there is none, or where its channel is not granted."""
         if name not in self.layout.starts:
-            near = difflib.get_close_matches(str(name), self.names, n=1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise KeyError(f"percept has no field {name!r}; {hint}It has {', '.join(self.names)}")
+            near = hint(str(name), self.names, 0.6)
+            raise KeyError(f"percept has no field {name!r}; {near}It has {', '.join(self.names)}")
         start = self.layout.starts[name]
         field = next(field for field in self.layout.table if field.name == name)
         return self.flat[..., start : start + field.size].reshape(*self.flat.shape[:-1], *field.shape)

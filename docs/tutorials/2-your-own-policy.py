@@ -80,7 +80,7 @@ Image("results/starter/figures/starter_routes.png", width=700)
 # filter it touches nothing and arrives as early.
 #
 # To improve the law, use `percept["echo_range"]`, the distance to the surface. After each change of `mine.py` add
-# `--anew` to the command: it runs your policy again and keeps the runs of the others. Your policy can also have [a
+# `--restart` to the command: it runs your policy again and keeps the runs of the others. Your policy can also have [a
 # memory](../policies.md#a-policy-that-remembers).
 #
 # Next: [a task of your own](3-your-own-task.ipynb).
@@ -97,5 +97,5 @@ assert runs.loc["scout", "min_obstacle_distance_m"].min() > 10.0
 runs = uuv_marl.benchmark.load("results/fields").set_index("policy")
 assert (runs.loc["mine:Careful", "collisions"] > 0).all()
 assert runs.loc["mine:Careful", "min_obstacle_distance_m"].min() < 0.0
-assert runs.loc["guarded:mine:Careful", "collisions"].sum() == 0
+assert runs.loc["mine:Careful,safety_filter=true", "collisions"].sum() == 0
 assert runs["task_time_s"].notna().all()

@@ -53,7 +53,9 @@ def main() -> None:
     arguments.output.mkdir(parents=True, exist_ok=True)
     model.save(arguments.output / "model")  # for PPO.load, to train on
     save_sb3(model, arguments.output / "policy.safetensors")
-    print(f"The policy is in {arguments.output}: uuv-marl benchmark --scenario {arguments.scenario} --policy {arguments.output}")
+    print(
+        f"The policy is in {arguments.output}: uuv-marl benchmark --scenario {arguments.scenario} --policy {arguments.output}"
+    )
 
 
 if __name__ == "__main__":

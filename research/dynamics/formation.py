@@ -86,7 +86,11 @@ def stiffness(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains
     p, weight, slope = links(places, neighbour_indices, gains)
     block = weight[..., None, None] * np.eye(2) + slope[..., None, None] * p[..., :, None] * p[..., None, :]
     total = np.zeros((n, n, 2, 2))
-    np.add.at(total, (np.repeat(each, neighbour_indices.shape[1]), np.maximum(neighbour_indices, 0).ravel()), block.reshape(-1, 2, 2))
+    np.add.at(
+        total,
+        (np.repeat(each, neighbour_indices.shape[1]), np.maximum(neighbour_indices, 0).ravel()),
+        block.reshape(-1, 2, 2),
+    )
     total[each, each] -= block.sum(axis=1) + gains.zeta_l * np.eye(2)
     return total.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
 

@@ -158,14 +158,16 @@ def tables(_suite: Suite, report: Share) -> Tables:
     # Two BLAS threads fight over a busy core, and round differently.
     with threadpool_limits(1, user_api="blas"):
         nominal = formations(straight_leg(), BioInspiredGains(), SEEDS)
-        rigid = stiffness(nominal[0].places, nominal[0].heard, BioInspiredGains())
+        rigid = stiffness(nominal[0].places, nominal[0].neighbour_indices, BioInspiredGains())
         spectrum = [
             {"loop": loop_name(control_step_s), "real_per_s": value.real, "imaginary_rad_per_s": value.imag}
             for control_step_s in SHOWN_CONTROL_STEPS_S
             for value in eigenvalues(straight_leg(), rigid, control_step_s)
         ]
         rows: list[dict[str, Any]] = []
-        cases = [(parameter, value) for parameter, values in {"t_r": CONTROL_STEPS_S, **SWEEPS}.items() for value in values]
+        cases = [
+            (parameter, value) for parameter, values in {"t_r": CONTROL_STEPS_S, **SWEEPS}.items() for value in values
+        ]
         for k, (parameter, value) in enumerate(cases):
             rows += _margins(parameter, value, nominal)
             report((k + 1) / len(cases))

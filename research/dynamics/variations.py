@@ -122,8 +122,7 @@ CLOCKS: dict[str, dict[str, object]] = {
 """A control hold and an integration step [s]; the policy decides at every hold."""
 SIZES = {f"{n}": {"swarm.num_vehicles": n} for n in (10, 20, 54, 100, 200)}
 LOST = {
-    f"{n}": {"losses.times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, n)]}
-    for n in (0, 6, 12, 24, 36)
+    f"{n}": {"losses.times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, n)]} for n in (0, 6, 12, 24, 36)
 }
 """So many vehicles lost one by one, between 30 and 105 s: before, at and after the obstacle."""
 PARTS = (

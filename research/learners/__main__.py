@@ -9,7 +9,7 @@ from filelock import FileLock, Timeout
 
 from research import FOLDER
 from research.episodes import Row
-from research.learners.cells import EPISODES, Cell, beside, cells, make, check_protocol, read
+from research.learners.cells import EPISODES, Cell, beside, cells, check_protocol, make, read
 from research.learners.page import write_page
 from research.learners.protocol import LEARNERS, TASKS, TRAININGS
 from research.learners.watch import Report
@@ -46,7 +46,9 @@ def main(
         chosen = cells(task or [], learner or [], trainings)
         with working(f"Finished trainings are in {output}") as bar:
             for k, cell in enumerate(chosen):
-                report = progress_line(bar, f"{k + 1} of {len(chosen)}: {cell.learner.name} {cell.task.name} {cell.seed}")
+                report = progress_line(
+                    bar, f"{k + 1} of {len(chosen)}: {cell.learner.name} {cell.task.name} {cell.seed}"
+                )
                 _make(cell, cell.folder(output), report)
             if task is None and learner is None:
                 _write(chosen, output, progress_line(bar, "laws"))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from research.data import read_text
 from research.episodes import Row, read_rows, write_rows
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, PROTOCOL, TASKS, EvaluationSet, Learner, Task
-from research.learners.watch import TrainingRequest, Report, Trainer
+from research.learners.watch import Report, Trainer, TrainingRequest
 from uuv_marl.atomic import write_text
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE

@@ -56,7 +56,10 @@ def complete(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], lis
 def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     """The page's text, on ``complete`` passes."""
     curves, rows = complete(curves, rows)
-    rows_by_competitor, num_trainings = grouped_rows(rows), len({(row["task"], row["learner"], row["training"]) for row in curves})
+    rows_by_competitor, num_trainings = (
+        grouped_rows(rows),
+        len({(row["task"], row["learner"], row["training"]) for row in curves}),
+    )
     wanted = len(TASKS) * len(LEARNERS) * TRAININGS
     return Template(read_text("learners", "story.md")).substitute(
         first=_first(rows_by_competitor), tiers=_tiers(rows_by_competitor), safety=_safety(rows_by_competitor), pairs=_pairs(rows_by_competitor), apart=_apart(rows_by_competitor),
@@ -76,7 +79,10 @@ def grouped_rows(rows: Iterable[Row]) -> Found:
 
 def scores(rows_by_competitor: Found) -> dict[str, Float64]:
     """The headline of each learner's trainings on unseen seeds, shape (training, task)."""
-    return {competitor: np.concatenate([_values(rows_by_competitor, task, competitor) for task in TASKS], axis=1) for competitor in LEARNERS}
+    return {
+        competitor: np.concatenate([_values(rows_by_competitor, task, competitor) for task in TASKS], axis=1)
+        for competitor in LEARNERS
+    }
 
 
 def ranked(rows_by_competitor: Found) -> dict[str, Float64]:
@@ -87,15 +93,25 @@ def ranked(rows_by_competitor: Found) -> dict[str, Float64]:
 def against_controller(rows_by_competitor: Found) -> dict[str, Float64]:
     """The headline over the best law's, both above what ``random`` has."""
     controller, least = (
-        np.array([_values(rows_by_competitor, task, competitor).mean() for task, competitor in zip(TASKS, names, strict=True)], np.float64)
+        np.array(
+            [
+                _values(rows_by_competitor, task, competitor).mean()
+                for task, competitor in zip(TASKS, names, strict=True)
+            ],
+            np.float64,
+        )
         for names in ([task.policies[0] for task in TASKS.values()], ["random"] * len(TASKS))
     )
-    return {competitor: (every - least) / (controller - least) for competitor, every in scores(rows_by_competitor).items()}
+    return {
+        competitor: (every - least) / (controller - least) for competitor, every in scores(rows_by_competitor).items()
+    }
 
 
 def _values(rows_by_competitor: Found, task: str, competitor: str, name: str = "share", each: str = "") -> Float64:
     """A measure of each training, mean over the episodes of a set, shape (training, 1); on unseen seeds if none."""
-    return np.array([[_mean(sets[each or task], name)] for sets in rows_by_competitor[task, competitor].values()], np.float64)
+    return np.array(
+        [[_mean(sets[each or task], name)] for sets in rows_by_competitor[task, competitor].values()], np.float64
+    )
 
 
 def _mean(rows: Sequence[Row], name: str) -> float:
@@ -120,7 +136,14 @@ def _first(rows_by_competitor: Found) -> str:
     for competitor, own in scores(rows_by_competitor).items():
         whole = [_values(rows_by_competitor, task, competitor, "swarm_success").mean() for task in TASKS]
         cells = [f"{_with_interval(mean(own[:, k : k + 1]))}, {short(float(share))}" for k, share in enumerate(whole)]
-        table.append((competitor, *cells, _with_interval(interquartile_mean(every[competitor])), _with_interval(mean(every[competitor]))))
+        table.append(
+            (
+                competitor,
+                *cells,
+                _with_interval(interquartile_mean(every[competitor])),
+                _with_interval(mean(every[competitor])),
+            )
+        )
     for words in ("the best law", "oracle", "random"):
         named = {name: task.policies[0] if words == "the best law" else words for name, task in TASKS.items()}
         cells = [
@@ -134,7 +157,10 @@ def _first(rows_by_competitor: Found) -> str:
 
 def _everyone(rows_by_competitor: Found, task: str) -> list[str]:
     """Learners, then policies, then those from elsewhere."""
-    return [*LEARNERS, *(competitor for where, competitor in rows_by_competitor if where == task and competitor not in LEARNERS)]
+    return [
+        *LEARNERS,
+        *(competitor for where, competitor in rows_by_competitor if where == task and competitor not in LEARNERS),
+    ]
 
 
 def _called(competitor: str) -> str:
@@ -148,7 +174,10 @@ def _tiers(rows_by_competitor: Found) -> str:
     for task in TASKS.values():
         names = [each.name for each in task.sets]
         rows = [
-            (_called(competitor), *(short(float(_values(rows_by_competitor, task.name, competitor, each=name).mean())) for name in names))
+            (
+                _called(competitor),
+                *(short(float(_values(rows_by_competitor, task.name, competitor, each=name).mean())) for name in names),
+            )
             for competitor in _everyone(rows_by_competitor, task.name)
         ]
         tables.append(markdown_table(("", *names), rows))
@@ -204,7 +233,9 @@ def _compute(curves: Sequence[Row]) -> str:
     for competitor in LEARNERS:
         cells: list[str] = []
         for task in TASKS:
-            last = {row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, competitor)}.values()
+            last = {
+                row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, competitor)
+            }.values()
             steps, minutes = (float(np.mean(measured(last, name))) for name in ("agent_steps", "minutes"))
             cells.append(f"{steps / 1e6:.1f} M, {minutes:.1f} min")
         table.append((competitor, *cells))

@@ -16,7 +16,7 @@ AGENT_STEPS: int = _DATA["agent_steps"]
 MINUTES: float = _DATA["minutes"]
 MEASURES: int = _DATA["measures"]
 TRIED_ON: list[str] = _DATA["tried_on"]
-SEA, SEA_LEVEL = "sea", 1
+SEA, SEA_LEVEL = "disturbed", 1
 """Name of a set in the sea, and the level of the robustness axis ``X`` there."""
 
 
@@ -89,12 +89,16 @@ def _task(table: Mapping[str, Any]) -> Task:
             else:
                 other = {**change}
                 name, scenario = other.pop("name"), other.pop("scenario", task)
-                tiers[tier].append(EvaluationSet(name, scenario, own | other if scenario == task else other, seeds[tier]))
+                tiers[tier].append(
+                    EvaluationSet(name, scenario, own | other if scenario == task else other, seeds[tier])
+                )
     return Task(task, table["num_vehicles"], tuple(table["policies"]), tuple(map(tuple, tiers)))
 
 
 TASKS = {table["name"]: _task(table) for table in _DATA["tasks"]}
 LEARNERS = {
-    name: Learner(name, table["by"], tuple({**table["always"], **each} for each in table["tried"]), table["chosen"])
+    name: Learner(
+        name, table["trainer"], tuple({**table["always"], **each} for each in table["tried"]), table["chosen"]
+    )
     for name, table in _DATA["learners"].items()
 }

@@ -11,7 +11,7 @@ from research import FOLDER
 from research.episodes import Row, read_rows, write_rows
 from research.learners.cells import emptied, trainer_of
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRIED_ON
-from research.learners.watch import TrainingRequest, Report
+from research.learners.watch import Report, TrainingRequest
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 from uuv_marl.errors import ResultsError
 

@@ -9,7 +9,8 @@ from research.data import read_text
 from research.episodes import Row, measured, short
 from research.second import runnable
 from research.tasks.studies import STUDIES, Study, set_name
-from uuv_marl.baselines.registry import is_trained, policy_class, uses_identity
+from uuv_marl.baselines.making import uses_identity
+from uuv_marl.baselines.registry import is_trained, policy_class
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.types import Float64
@@ -23,10 +24,10 @@ _NOT_CONTROLLERS = ("oracle", "carrot_informed", "random", "idle", "research.bli
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
     "found_share": ("found", lambda values, _: short(float(np.mean(values)))),
     "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
-    "untouched_share": ("untouched", lambda values, _: short(float(np.mean(values)))),
+    "success_share": ("untouched", lambda values, _: short(float(np.mean(values)))),
     "collisions": ("collisions", lambda values, n: f"{np.mean(values) / n:.2f}"),
     "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
-    "whole_ratio": ("time of the last", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
+    "swarm_time_ratio": ("time of the last", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
     "min_obstacle_distance_m": ("to obstacles", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
     "min_spacing_m": ("to others", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
 }
@@ -54,7 +55,9 @@ def report(task: str, rows: Sequence[Row]) -> str:
             rows_by_set, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
         final=_final(rows_by_set, study),
-        informed=_shares(rows_by_set, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "untouched_share"),
+        informed=_shares(
+            rows_by_set, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "success_share"
+        ),
     )
 
 
@@ -81,9 +84,13 @@ def _measures(rows_by_set: Found, study: Study, columns: Columns) -> str:
     """The headline and the share of whole swarms in each column, or of the medium tier, and other measures."""
     table: list[tuple[str, ...]] = []
     for policy in _policies(rows_by_set):
-        cells = [rows_by_set.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names]
+        cells = [
+            rows_by_set.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names
+        ]
         if every := [row for rows in cells for row in rows]:
-            shares = [[_mean([rows], name) for name in (study.headline, "swarm_success")] if rows else ["–"] for rows in cells]
+            shares = [
+                [_mean([rows], name) for name in (study.headline, "swarm_success")] if rows else ["–"] for rows in cells
+            ]
             own = [", ".join(two) for two in shares] if columns else shares[0]
             rest = (_MEASURES[name][1](measured(every, name), _size(every[0])) for name in _shown(study))
             table.append((named(policy), *own, *rest))

@@ -12,7 +12,7 @@ from research.blind import BLIND
 from research.verify.rows import NoEpisodesError, Row, rows_of
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
-from uuv_marl.baselines.registry import GUARDED, OWN
+from uuv_marl.baselines.names import parse_name
 from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
 from uuv_marl.benchmark.results import FILE
 from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
@@ -125,7 +125,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
 
 
 def _check_trust(policy: str, allowed: Collection[str]) -> None:
-    plain = policy.removeprefix(BLIND).removeprefix(OWN).removeprefix(GUARDED)
+    plain = parse_name(policy.removeprefix(BLIND)).plain
     if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
         raise PolicyError(f"policy {policy!r} is not part of the package; if you trust it, give --policy {policy}")
 

@@ -19,7 +19,7 @@ from research.second import runnable
 from research.sets import DIGITS
 from research.tasks import studies
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.benchmark.results import FILE, Content, knowledge, read_content
+from uuv_marl.benchmark.results import FILE, Content, policy_info, read_content
 from uuv_marl.benchmark.robustness import job as robustness
 from uuv_marl.benchmark.robustness.axes import AXES, CALM
 from uuv_marl.benchmark.suite import Case
@@ -144,7 +144,9 @@ def _learned(cells: Cells) -> Source:
             raise ResultsError(f"there is no training {cells['training']!r} of a learner {policy!r} in this version")
         cell = learners.Cell(task, LEARNERS[policy], int(cells["training"]))
         if not cell.shipped_weights.exists():
-            raise PolicyError(f"of {cell.shipped_weights.stem} no policy is kept; python -m research.learners trains it again")
+            raise PolicyError(
+                f"of {cell.shipped_weights.stem} no policy is kept; python -m research.learners trains it again"
+            )
         policy = cell.policy(cell.shipped_weights)
     return Source(load_scenario(each.scenario, overrides=each.overrides), policy)
 
@@ -193,6 +195,6 @@ def _benchmarked(content: Content, cells: Cells) -> Source:
         scenario = Scenario.model_validate_json(json.dumps(scenario_data))
     except ValueError as error:
         raise ScenarioError(f"the scenario has the fields of another version ({error})") from None
-    if knowledge(policy)["source"] != content["policies"][policy]["source"]:
+    if policy_info(policy)["source"] != content["policies"][policy]["source"]:
         raise PolicyError(f"the file of {policy!r} has changed since the run")
     return Source(scenario, policy)

@@ -116,7 +116,13 @@ def invented(better=()):
                 if who in LEARNERS:
                     curves += [
                         place
-                        | {"agent_steps": str(k), "minutes": "1.00", "share": "0.1", "whole": "0", "collisions": "2"}
+                        | {
+                            "agent_steps": str(k),
+                            "minutes": "1.00",
+                            "share": "0.1",
+                            "swarm_success": "0",
+                            "collisions": "2",
+                        }
                         for k in (1000, 2000)
                     ]
     return curves, rows
@@ -184,7 +190,7 @@ def test_what_the_page_finds_is_in_the_shipped_rows():
     assert all(early("ISAC") > early(who) + 0.1 for who in LEARNERS if who != "ISAC")
 
     def at_sea(task, who):
-        return float(page._values(found, task, who, each=f"{task}-sea").mean())
+        return float(page._values(found, task, who, each=f"{task}-disturbed").mean())
 
     assert all(at_sea(task, TASKS[task].policies[0]) < 0.1 for task in ("hard_water", "two_swarms", "silent_targets"))
     for task in ("hard_water", "silent_targets"):
@@ -226,7 +232,13 @@ def test_all_learners_have_one_axis():
 
 
 def test_a_step_is_the_nearest_measure_and_after_its_end_a_training_stays_at_its_last():
-    place = {"task": "hard_water", "learner": next(iter(LEARNERS)), "training": "0", "whole": "0", "collisions": "0"}
+    place = {
+        "task": "hard_water",
+        "learner": next(iter(LEARNERS)),
+        "training": "0",
+        "swarm_success": "0",
+        "collisions": "0",
+    }
     ends = {400_000: "0.1", 700_000: "0.2", 1_600_000: "0.3"}
     curve = [{**place, "agent_steps": str(k), "minutes": "1", "share": share} for k, share in ends.items()]
     run = marl_eval(curve, [])["uuv_marl"]["hard_water"][place["learner"]]["seed_0"]

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 import uuv_marl
 from tests.nets import ANYWHERE
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
@@ -103,7 +103,10 @@ def fields(rng, folder):
 def scenarios_that_run(rng, folder):
     """What was accepted must work: a few decisions of an environment and of a policy, finite and within bounds."""
     scenario = changed_scenario(rng, 2)
-    if scenario.swarm.num_vehicles > 60 or scenario.timing.control_steps_per_decision * scenario.timing.integration_steps_per_control_step > 2000:
+    if (
+        scenario.swarm.num_vehicles > 60
+        or scenario.timing.control_steps_per_decision * scenario.timing.integration_steps_per_control_step > 2000
+    ):
         return
     env = uuv_marl.parallel_env(scenario, max_cycles=12)
     observations, _ = env.reset(seed=int(rng.integers(10**6)))

@@ -14,7 +14,7 @@ Arguments of compiled functions have the same names and the same meaning everywh
 ``worlds``                  Those that run, shape (world,).
 ``period``, ``gain``        Time between two decisions [s]; force per velocity error [N s/m].
 ``own``, ``kept``           A vehicle's model of itself; what vehicles remember (``memory.surroundings``), in each one's
-                            map. ``kept_s``: how long it remembers a neighbour that it hears no more [s].
+                            map. ``memory_s``: how long it remembers a neighbour that it hears no more [s].
 ``planes``, ``num``         Half-planes n_x v_x + n_y v_y <= b [m/s], a row each, shape (disc + sector, 3), and how many
                             rows count.
 ``u``, ``v``                Own surge and sway velocity [m/s]; ``w_x`` and ``w_y`` are parts of the wished velocity.
@@ -22,7 +22,8 @@ Arguments of compiled functions have the same names and the same meaning everywh
 """
 
 from uuv_marl.baselines.env_policy import EnvPolicy
+from uuv_marl.baselines.making import make, with_policy_requirements
 from uuv_marl.baselines.policy import Policy, PolicyError
-from uuv_marl.baselines.registry import POLICIES, with_policy_requirements, make
+from uuv_marl.baselines.registry import POLICIES
 
-__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "with_policy_requirements", "make"]
+__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "make", "with_policy_requirements"]

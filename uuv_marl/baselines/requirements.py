@@ -64,8 +64,8 @@ def check_requirements(name: str, policy: Any, scenario: Scenario) -> None:
     if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
         needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
     if needs:
-        own = f", or run it as own_clock:{name}" if scenario.timing.fixed else ""
+        own = f", or run it as {name},own_clock=true" if scenario.timing.fixed else ""
         raise PolicyError(
             f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
-            f"use uuv_marl.baselines.granted(policy, scenario), or override these fields{own}"
+            f"use uuv_marl.baselines.with_policy_requirements(policy, scenario), or override these fields{own}"
         )

@@ -66,7 +66,9 @@ def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Se
 def _where(scenario: Scenario, seeds: str) -> str:
     """What a picture is of; in a second line what disturbs it, if anything does."""
     conditions_line = f"\n{conditions(scenario)}" if disturbances(scenario) else ""
-    return f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles ({scenario.vehicle.name}), {seeds}{conditions_line}"
+    return (
+        f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles ({scenario.vehicle.name}), {seeds}{conditions_line}"
+    )
 
 
 def _grid(num: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
@@ -126,7 +128,7 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
 
 def _outcome(metrics: Mapping[str, Any]) -> str:
     time, collisions, own = metrics["task_time_s"], metrics["collisions"], metrics.get("task")
-    if own is not None and (share := own.get("untouched_share")) is not None:
+    if own is not None and (share := own.get("success_share")) is not None:
         arrived = f"{share:.0%} untouched and there"
     else:
         arrived = "never arrives" if time is None else f"arrives after {time:.0f} s"

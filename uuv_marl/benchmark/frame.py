@@ -19,7 +19,7 @@ def load(path: UserPath) -> Any:
     """The runs of a ``results.json`` as a pandas data frame, a row for each, by scenario, policy and seed.
 
     Columns are ``scenario``, ``policy``, ``seed``, every metric (``constraint_share`` as ``constraint_share_all``,
-    ``constraint_share_s_l`` and so on), those of the task by their names, such as ``untouched_share``, with
+    ``constraint_share_s_l`` and so on), those of the task by their names, such as ``success_share``, with
     ``task_`` before a name that is taken, and ``trace``, the path of the run's time series for ``load_trace``. NaN
     means that there was nothing to measure. No policy is imported.
 

@@ -21,10 +21,11 @@ from typing_extensions import TypedDict
 
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
-from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.learned.trained import Trained
+from uuv_marl.baselines.making import uses_identity
 from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.registry import policy_class, uses_identity
+from uuv_marl.baselines.registry import policy_class
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
@@ -171,7 +172,7 @@ class Results:
         now = policy_info(policy)
         if self.policies.setdefault(policy, now)["source"] != now["source"]:
             raise ResultsError(
-                f"{self._path} holds runs of {policy!r} as it was before its file changed; give --anew to drop "
+                f"{self._path} holds runs of {policy!r} as it was before its file changed; give --restart to drop "
                 "those runs, or another --output; while a training still writes the file, benchmark a copy of it"
             )
 

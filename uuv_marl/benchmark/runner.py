@@ -9,7 +9,8 @@ from rich.table import Table as RichTable
 
 from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.baselines.registry import OWN, is_trained
+from uuv_marl.baselines.names import OWN_CLOCK, with_option
+from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import ResultRow, Results
@@ -36,7 +37,10 @@ DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "ppo")
 def default_policies(scenarios: Sequence[Scenario]) -> list[str]:
     """``DEFAULT_POLICIES``; where scenarios fix the clocks for all, the laws among them at their own clocks, too."""
     fixed = all(scenario.timing.fixed for scenario in scenarios)
-    return [*DEFAULT_POLICIES, *(OWN + name for name in DEFAULT_POLICIES if fixed and not is_trained(name))]
+    return [
+        *DEFAULT_POLICIES,
+        *(with_option(name, OWN_CLOCK) for name in DEFAULT_POLICIES if fixed and not is_trained(name)),
+    ]
 
 
 Report = Callable[[str, str, float], None]

@@ -8,7 +8,8 @@ from rich.markup import escape
 from rich.table import Table as RichTable
 from scipy.stats import bootstrap, trim_mean
 
-from uuv_marl.baselines.registry import OWN, with_requirements
+from uuv_marl.baselines.making import with_requirements
+from uuv_marl.baselines.names import parse_name
 from uuv_marl.benchmark.paper import PAPER, PaperFigure
 from uuv_marl.benchmark.results import PolicyInfo, ResultRow, Results, requirements_of
 from uuv_marl.scenario import Scenario, differences
@@ -152,7 +153,7 @@ def task_rows(results: Results, scenario: str, policies: Sequence[str], seeds: S
     rows: list[tuple[str, ...]] = []
     for cells in table_rows(results, scenario, policies, seeds):
         own = [run.metrics.get("task", {}) for run in results.select(scenario, cells.policy, seeds)]
-        shares = [value for run in own if (value := run.get("untouched_share")) is not None]
+        shares = [value for run in own if (value := run.get("success_share")) is not None]
         task_cells = [
             estimate_text([value for run in own if (value := run.get(name)) is not None], ".3g") for name in columns
         ]
@@ -233,7 +234,7 @@ def _requirements_text(scenario: Scenario, policy: str, known: PolicyInfo) -> st
     if has.timing.decision_period_s != scenario.timing.decision_period_s:
         texts.append(f"a decision every {has.timing.decision_period_s:g} s")
     damping = has.actuators.yaw_damping_nms
-    if damping and (policy.startswith(OWN) or not scenario.timing.fixed):
+    if damping and (parse_name(policy).own_clock or not scenario.timing.fixed):
         texts.append(f"yaw damping {damping:g} N m s")
     return ", ".join(texts) or _NOTHING
 

@@ -120,7 +120,7 @@ def tuning_cost(run: Run, scenario: Scenario) -> float:
     own = metrics.get("task", {})
     if (share := own.get("held_share")) is not None:
         return _FAILURE_COST_S * (1.0 - share)
-    if (share := own.get("untouched_share")) is not None:
+    if (share := own.get("success_share")) is not None:
         return float(run.routes.time_s[-1]) + _FAILURE_COST_S * (1.0 - share)
     time, clearance = metrics["task_time_s"], metrics["min_obstacle_distance_m"]
     if time is None:

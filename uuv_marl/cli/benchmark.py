@@ -60,7 +60,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import POLICIES, with_policy_requirements, make
+        from uuv_marl.baselines import POLICIES, make, with_policy_requirements
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.replay.command import command

@@ -32,7 +32,7 @@ def _width() -> int | None:
 console = Console(width=_width())
 errors = Console(stderr=True)
 Restart = Annotated[
-    bool, typer.Option("--anew", help="Drop the runs of policies whose file has changed since, and run these again.")
+    bool, typer.Option("--restart", help="Drop the runs of policies whose file has changed since, and run these again.")
 ]
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)

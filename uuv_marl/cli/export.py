@@ -36,6 +36,9 @@ def export(
 
         kind = policy_class(policy)
         training = kind.checkpoint.card.training if isinstance(kind, Trained) else {}
-        name, own = scenario or training.get("scenario", "starter"), training.get("overrides", {}) if scenario is None else {}
+        name, own = (
+            scenario or training.get("scenario", "starter"),
+            training.get("overrides", {}) if scenario is None else {},
+        )
         write_onnx(policy, load_scenario(name, overrides=overrides_for(name, own)), output)
         say(f"Model: {output}")

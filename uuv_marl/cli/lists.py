@@ -81,7 +81,7 @@ def _vehicles() -> Table:
 
 def _policies() -> Table:
     from uuv_marl.baselines import POLICIES
-    from uuv_marl.baselines.registry import uses_identity
+    from uuv_marl.baselines.making import uses_identity
 
     table = Table("name", "beyond sonar", "yaw damping [N m s]", "decides every [s]", "what")
     for name, policy_type in POLICIES.items():

@@ -146,7 +146,7 @@ def _simulated(
     name: str, policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str], bar: "Progress"
 ) -> "list[Recording]":
     """An episode of each policy on the same seed; all are refused before the first is simulated."""
-    from uuv_marl.baselines import with_policy_requirements, make
+    from uuv_marl.baselines import make, with_policy_requirements
     from uuv_marl.replay.record import checked, record
     from uuv_marl.scenario import load_scenario
 

@@ -1,6 +1,5 @@
 """The core of every environment API: a swarm, its reward and its endings, as arrays over worlds and vehicles."""
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from uuv_marl.envs.reward import RewardFunction, own_reward
 from uuv_marl.envs.state import global_state, state_layout
+from uuv_marl.errors import hint
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
 from uuv_marl.scenario.overrides import override_of
@@ -254,10 +254,9 @@ def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
         ScenarioError: an argument and the override of its field differ.
     """
     for name in changes.keys() - Changes.__annotations__.keys():
-        usual = {"max_episode_steps": ["max_cycles"]}  # Gymnasium's name
-        near = usual.get(name) or difflib.get_close_matches(name, EnvOptions.__annotations__, n=1)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise TypeError(f"this environment has no argument {name}; {hint}fields of the scenario go into overrides")
+        usual = {"max_episode_steps": "max_cycles"}.get(name, name)  # Gymnasium's name
+        near = hint(usual, EnvOptions.__annotations__, 0.6)
+        raise TypeError(f"this environment has no argument {name!r}; {near}Fields of the scenario go into overrides")
     overrides = changes.get("overrides") or {}
     if not isinstance(cast(object, overrides), Mapping):
         return load_scenario(scenario, overrides=overrides)  # which says what overrides must be

@@ -66,7 +66,9 @@ class SpecMixin:
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         if spec is not None:
-            arguments = {name: getattr(value, "value", value) for name, value in spec.kwargs.items()}  # of an enumeration
+            arguments = {
+                name: getattr(value, "value", value) for name, value in spec.kwargs.items()
+            }  # of an enumeration
             spec = replace(spec, kwargs={name: plain(value) for name, value in arguments.items()})
         self._spec = spec
 

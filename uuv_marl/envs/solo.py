@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.envs.core import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending

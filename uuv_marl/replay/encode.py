@@ -3,7 +3,7 @@
 Arrays become whole numbers, these become differences from what their neighbours in time predict, and deflate packs the
 differences, of which most are zero. Motion is smooth, so an array is coded from coarse to fine: every ``stride``-th
 sample by its second differences, then the samples halfway between by how far they are from a cubic through the four
-around them, until all are there. What decides is exact: series and the course keep all bits of their float32.
+around them, until all are there. What decides is exact: series and the map keep all bits of their float32.
 """
 
 import base64
@@ -79,7 +79,7 @@ def _episode(recording: Recording) -> dict[str, Any]:
         "period_s": scenario.timing.decision_period_s,
         "metrics": recording.metrics,
         "constraints": {"s_l_m": limits.s_l_m, "s_o_m": limits.s_o_m, "s_u_m": limits.s_u_m},
-        "contact_m": scenario.collision.hull_radius_m,
+        "hull_radius_m": scenario.collision.hull_radius_m,
         "arrival": {
             "radius_m": arrival.radius_m,
             "spread_m": arrival.spread_m * growth(scenario.swarm.num_vehicles),
@@ -139,7 +139,9 @@ def _arrays(recording: Recording) -> dict[str, Any]:
     arrays |= {name: _bits(np.asarray(values, np.float32)) for name, values in exact.items()}
     if recording.inspections:
         inspected = list(recording.inspections)
-        arrays["detected_index"] = _whole(np.stack([sonar.detected_index for sonar in recording.inspections.values()], axis=1), 1)
+        arrays["detected_index"] = _whole(
+            np.stack([sonar.detected_index for sonar in recording.inspections.values()], axis=1), 1
+        )
         smooth["inspected_heading"] = unwrapped(recording.heading[:, inspected])
         for name in ("neighbour", "echo_range", "echo_position", "action"):
             smooth[name] = np.stack([getattr(sonar, name) for sonar in recording.inspections.values()], axis=1)

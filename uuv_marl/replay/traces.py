@@ -7,9 +7,9 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from pydantic import ValidationError
 
-from uuv_marl.baselines.registry import with_requirements
+from uuv_marl.baselines.making import with_requirements
 from uuv_marl.benchmark.metrics import Metrics
-from uuv_marl.benchmark.results import FILE, Content, requirements_of, load_trace, read_content, trace_path
+from uuv_marl.benchmark.results import FILE, Content, load_trace, read_content, requirements_of, trace_path
 from uuv_marl.errors import ReplayError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay.command import command
@@ -218,7 +218,9 @@ def _references(swarm: Swarm, time_s: Float32) -> Float32:
     """Where each group's l(t) was, shape (time, group, 2)."""
     world_map, passes = swarm.world_map, swarm.scenario.arrival.criterion == "passage"
     trajectories = list(zip(world_map.waypoints[0], world_map.times[0], world_map.last[0].tolist(), strict=True))
-    return np.array([[reference(t, *trajectory, passes)[:2] for trajectory in trajectories] for t in time_s.tolist()], np.float32)
+    return np.array(
+        [[reference(t, *trajectory, passes)[:2] for trajectory in trajectories] for t in time_s.tolist()], np.float32
+    )
 
 
 def _events(scenario: Scenario, trace: dict[str, Float32], metrics: Metrics) -> list[Event]:

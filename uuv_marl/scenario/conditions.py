@@ -1,7 +1,7 @@
 """A scenario's disturbances in a few words, for headers of tables, pages and pictures."""
 
-from uuv_marl.scenario.scenario import Scenario
 from uuv_marl.scenario.disturbance_sections import Fault
+from uuv_marl.scenario.scenario import Scenario
 
 IDEAL = "still water, no noise, no delay"
 """The conditions of a scenario in which nothing is on."""
@@ -69,7 +69,9 @@ def _noise(scenario: Scenario) -> dict[str, bool]:
 def _rest(scenario: Scenario) -> dict[str, bool]:
     navigation, actuators, mismatch = scenario.navigation, scenario.actuators, scenario.mismatch
     shares = (mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
-    broken = {f"{_fault_phrase(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults}
+    broken = {
+        f"{_fault_phrase(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults
+    }
     every_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
     lost = scenario.modem.loss_probability
     return {

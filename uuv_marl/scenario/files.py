@@ -1,6 +1,5 @@
 """Scenarios from names, TOML files and overrides, with errors that name the field, the value and the remedy."""
 
-import difflib
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +9,7 @@ from typing import Any, cast
 import tomlkit
 from pydantic import ValidationError
 
-from uuv_marl.errors import ScenarioError
+from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario.documents import File, items, merged, read_toml
 from uuv_marl.scenario.fields import NAME
@@ -126,10 +125,9 @@ def _find(name: Any, beside: Path | None = None) -> Path:
         return path
     if text in scenario_names():
         return _FOLDER / f"{text}.toml"
-    near = difflib.get_close_matches(text, scenario_names(), n=1, cutoff=0.4)
-    hint = f"did you mean {near[0]!r}? " if near else ""
     raise ScenarioError(
-        f"scenario {shown(text)} is unknown; {hint}give one of {', '.join(scenario_names())}, or a path ending in .toml"
+        f"scenario {shown(text)} is unknown; {hint(text, scenario_names())}give one of {', '.join(scenario_names())}, "
+        "or a path ending in .toml"
     )
 
 

@@ -1,9 +1,9 @@
 """Messages on what is wrong with a scenario: one line of ours for each of pydantic's errors."""
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, cast, get_args, get_origin
 
+from uuv_marl.errors import nearest
 from uuv_marl.scenario.scenario import Scenario
 
 _SHOWN = 80
@@ -62,7 +62,8 @@ def _nearest(location: Sequence[str | int]) -> str:
 
 def _like(name: str, names: Mapping[str, str]) -> list[str]:
     """What stands beside the name that is most like this one, if there is any."""
-    return [names[like] for like in difflib.get_close_matches(name, names, n=1, cutoff=0.5)]
+    near = nearest(name, names, 0.5)
+    return [names[near]] if near else []
 
 
 def _fields(model: Any, prefix: str = "") -> Iterator[str]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
-from uuv_marl.scenario import fields, hardware, disturbance_sections, sections
+from uuv_marl.scenario import disturbance_sections, fields, hardware, sections
 from uuv_marl.scenario.task import TaskSettings, check_channels, check_task, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
@@ -200,7 +200,10 @@ def _check_times(scenario: Scenario) -> None:
     if field is not None:
         duration = field.legs[0] * field.leg_length_m[0] / scenario.trajectory.speed_mps
     shortest = scenario.time_limit.of(duration)
-    period, steps = timing.decision_period_s, timing.control_steps_per_decision * timing.integration_steps_per_control_step
+    period, steps = (
+        timing.decision_period_s,
+        timing.control_steps_per_decision * timing.integration_steps_per_control_step,
+    )
     if period > shortest:
         raise ValueError(
             f"timing.decision_period_s must be at most the shortest time limit = {shortest:g}, got {period:g}; "

@@ -1,11 +1,10 @@
 """Which task a scenario asks for, and the task's own numbers; ``uuv_marl.tasks`` holds the tasks."""
 
-import difflib
 from typing import Any, cast
 
 from pydantic import ConfigDict, ValidationError
 
-from uuv_marl.errors import ScenarioError
+from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.modules import named_object
 from uuv_marl.scenario.fields import Section
 from uuv_marl.scenario.hardware import CHANNEL_NAMES
@@ -59,10 +58,8 @@ def task_class(name: str) -> Any:
     """
     tasks = shipped_tasks()
     if name not in tasks and ":" not in name:
-        near = difflib.get_close_matches(name, tasks, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]!r}? " if near else ""
         raise ScenarioError(
-            f"task {name!r} is unknown; {hint}There are {', '.join(tasks)}, and module:Class for your own"
+            f"task {name!r} is unknown; {hint(name, tasks)}There are {', '.join(tasks)}, and module:Class for your own"
         )
     try:
         task_type = named_object(tasks.get(name, name))

@@ -1,19 +1,21 @@
 """Vehicles from names and TOML files, and the variants that a file has where sources disagree."""
 
-import difflib
 from pathlib import Path
 from typing import Any, cast
 
 import tomlkit
 
-from uuv_marl.errors import ScenarioError
+from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.paths import user_path
 from uuv_marl.scenario.documents import File, items, merged, read_toml
 from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.messages import short, shown
 
 VEHICLES = Path(__file__).resolve().parent / "vehicles"
-_FIELDS_BY_SECTION = {"vehicle": set(Vehicle.model_fields), "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"}}
+_FIELDS_BY_SECTION = {
+    "vehicle": set(Vehicle.model_fields),
+    "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"},
+}
 _OPTIONAL: dict[str, dict[str, Any]] = {
     section: {name: field.default for name, field in model.model_fields.items() if not field.is_required()}
     for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
@@ -130,10 +132,9 @@ def _find_vehicle(name: str, beside: Path | None = None) -> Path:
     path = (beside or Path()) / user_path(name) if name.endswith(".toml") else VEHICLES / f"{name}.toml"
     if name in vehicle_names() or (name.endswith(".toml") and path.is_file()):
         return path
-    near = difflib.get_close_matches(name, vehicle_names(), n=1, cutoff=0.4)
-    hint = f"did you mean {near[0]!r}? " if near else ""
     raise ScenarioError(
-        f"vehicle {shown(name)} is unknown; {hint}give one of {', '.join(vehicle_names())}, or a path ending in .toml"
+        f"vehicle {shown(name)} is unknown; {hint(name, vehicle_names())}give one of {', '.join(vehicle_names())}, or a "
+        "path ending in .toml"
     )
 
 

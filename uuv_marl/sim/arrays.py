@@ -52,7 +52,9 @@ class Senses(NamedTuple):
     """What was heard at the latest step, and the percept made of it."""
 
     heading: Annotated[Float64, "world vehicle 2", "Cosine and sine of psi."]
-    detected_index: Annotated[Int32, "world vehicle sector", "Index of the vehicle heard, -1 for none.", Bounds(-1, "vehicle")]
+    detected_index: Annotated[
+        Int32, "world vehicle sector", "Index of the vehicle heard, -1 for none.", Bounds(-1, "vehicle")
+    ]
     percept: Annotated[Float32, "world vehicle entry", "Flat percepts in physical units, zero for the lost."]
 
 

@@ -49,7 +49,9 @@ def locate(num: int, points: Points, pose: Pose, bins: int, listener: Listener) 
         b_x, b_y = c * dx + s * dy, c * dy - s * dx
         listener.squared[q] = squared if squared > 0.0 else math.inf
         listener.ahead[q], listener.abeam[q] = b_x, b_y
-        listener.bin[q] = np.int32(diamond(b_x, b_y) * per_unit) & last  # astern is 4 and 0; no direction (NaN) is any bin
+        listener.bin[q] = (
+            np.int32(diamond(b_x, b_y) * per_unit) & last
+        )  # astern is 4 and 0; no direction (NaN) is any bin
 
 
 @compiled_inline
@@ -85,13 +87,17 @@ def keep_nearest(num: int, vehicles: Int64, listener: Listener) -> None:
     for t in range(num_nearest):
         q = np.uintp(listener.some[t])
         k = np.uintp(listener.sector[q])
-        if listener.squared[q] < listener.detected_squared[k] or (listener.squared[q] == listener.detected_squared[k] and vehicles[q] < listener.detected_index[k]):
+        if listener.squared[q] < listener.detected_squared[k] or (
+            listener.squared[q] == listener.detected_squared[k] and vehicles[q] < listener.detected_index[k]
+        ):
             listener.detected_squared[k], listener.detected_index[k] = listener.squared[q], vehicles[q]
             listener.detected_ahead[k], listener.detected_abeam[k] = listener.ahead[q], listener.abeam[q]
 
 
 @compiled_inline
-def detect_among(num: int, points: Points, pose: Pose, w: int, world_map: WorldMap, suite: SonarSuite, listener: Listener) -> None:
+def detect_among(
+    num: int, points: Points, pose: Pose, w: int, world_map: WorldMap, suite: SonarSuite, listener: Listener
+) -> None:
     """A listener hears those of some vehicles that are nearest in a sub-sector, unless an obstacle is between.
 
     Of the points the first ``num`` count. A nearer one replaces whom the ear has heard so far.

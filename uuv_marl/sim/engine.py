@@ -9,9 +9,9 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import max_cells
 from uuv_marl.sim.compiled import entry
+from uuv_marl.sim.disturbances.disturbances import Disturbances
 from uuv_marl.sim.entry_points import observe, step_worlds
 from uuv_marl.sim.model import model
-from uuv_marl.sim.disturbances.disturbances import Disturbances
 from uuv_marl.sim.threads import num_threads, on_threads
 from uuv_marl.sim.workspace import workspace_buffers
 from uuv_marl.types import Bool, Float32
@@ -33,7 +33,9 @@ class Engine:
         n, self._num_worlds = scenario.swarm.num_vehicles, len(world.state.tick)
         self._threads = max(1, min(self._num_worlds, num_threads(), self._num_worlds * n // _LEAST))
         self._head = _HEAD // n
-        buffers = workspace_buffers(self._threads, n, scenario.sonar.num_sectors, max_cells(n), world.world_map.obstacles.shape[1])
+        buffers = workspace_buffers(
+            self._threads, n, scenario.sonar.num_sectors, max_cells(n), world.world_map.obstacles.shape[1]
+        )
         self._numbers = (world, model(scenario), buffers, disturbances)
         self._every = np.ones(self._num_worlds, np.bool_)
 

@@ -5,8 +5,8 @@ Numba compiles ``uuv_marl.sim.world`` once without a sea and once with one, so t
 
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.model import Model
 from uuv_marl.sim.disturbances.disturbances import Disturbances
+from uuv_marl.sim.model import Model
 from uuv_marl.sim.workspace import WorkspaceBuffers, workspace
 from uuv_marl.sim.world import observe_world, step_world
 from uuv_marl.types import Bool, Float32

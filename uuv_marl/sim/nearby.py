@@ -5,10 +5,10 @@ Obstacles are columns, over which loops pass on vector registers. What is passed
 
 import math
 
-from uuv_marl.sim.arrays import WorldMap, World
+from uuv_marl.sim.arrays import World, WorldMap
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.model import Rules
-from uuv_marl.sim.workspace import MOST_NEARBY, Obstacles, ObstacleBuffers, obstacle_columns
+from uuv_marl.sim.workspace import MOST_NEARBY, ObstacleBuffers, Obstacles, obstacle_columns
 
 Edges = tuple[float, float, float, float]
 """Lower and upper edge of a cone of directions, north and east each; all 0 for all directions."""

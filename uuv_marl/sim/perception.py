@@ -100,7 +100,9 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 
 
 @compiled_inner
-def write_echoes(i: int, w: int, num: int, pose: Pose, buffers: ObstacleBuffers, suite: SonarSuite, see: Fields) -> None:
+def write_echoes(
+    i: int, w: int, num: int, pose: Pose, buffers: ObstacleBuffers, suite: SonarSuite, see: Fields
+) -> None:
     """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
 
     Of the obstacles the first ``num`` chosen count. What was written stays where nothing is heard.

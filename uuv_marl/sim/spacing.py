@@ -6,7 +6,7 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import Grid, place
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.nearby import nearest_surface
-from uuv_marl.sim.workspace import Cells, Obstacles, ObstacleBuffers, obstacle_columns
+from uuv_marl.sim.workspace import Cells, ObstacleBuffers, Obstacles, obstacle_columns
 from uuv_marl.types import Float64
 
 NOWHERE = (math.inf, math.inf, 0.0)
@@ -110,7 +110,9 @@ def measure_vehicles(w: int, hull_radius: float, world: World, cells: Cells, gri
 
 
 @compiled_inner
-def measure_obstacles(w: int, hull_radius: float, world: World, buffers: ObstacleBuffers, cells: Cells, grid: Grid) -> int:
+def measure_obstacles(
+    w: int, hull_radius: float, world: World, buffers: ObstacleBuffers, cells: Cells, grid: Grid
+) -> int:
     """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began.
 
     A contact episode begins where a hull meets an obstacle now and did not one control hold ago; either may have moved.

@@ -8,11 +8,11 @@ import math
 
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.disturbances.actuation import own_plant
+from uuv_marl.sim.disturbances.disturbances import Disturbances
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.motion import load_one
 from uuv_marl.sim.nearby import ROUND_M, nearest_surface
-from uuv_marl.sim.disturbances.actuation import own_plant
-from uuv_marl.sim.disturbances.disturbances import Disturbances
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant
 from uuv_marl.sim.workspace import Workspace, obstacle_columns
@@ -22,19 +22,29 @@ SINK_M = 0.001
 
 
 @compiled_inner
-def stop_hulls(w: int, world: World, rules: Rules, plant: Plant, own: Workspace, disturbances: Disturbances | None) -> None:
+def stop_hulls(
+    w: int, world: World, rules: Rules, plant: Plant, own: Workspace, disturbances: Disturbances | None
+) -> None:
     """Hulls of world w that have run into something are put at its surface, and lose their velocity into it.
 
     Of two hulls each gives way by half. States are written, and their columns.
     """
-    state, world_map, touch, obstacles = world.state, world.world_map, 2.0 * rules.hull_radius, obstacle_columns(own.obstacles)
+    state, world_map, touch, obstacles = (
+        world.state,
+        world.world_map,
+        2.0 * rules.hull_radius,
+        obstacle_columns(own.obstacles),
+    )
     for i in range(state.eta.shape[1]):
         if not state.alive[w, i]:
             continue
         clear = min(nearest_surface(i, state.eta[w, i, 0], state.eta[w, i, 1], obstacles)) > rules.hull_radius + ROUND_M
         for k in range(0 if clear else world_map.num_obstacles[w]):
             near = world_map.obstacles[w, k, 2] + rules.hull_radius
-            dx, dy = state.eta[w, i, 0] - world_map.obstacles[w, k, 0], state.eta[w, i, 1] - world_map.obstacles[w, k, 1]
+            dx, dy = (
+                state.eta[w, i, 0] - world_map.obstacles[w, k, 0],
+                state.eta[w, i, 1] - world_map.obstacles[w, k, 1],
+            )
             if dx * dx + dy * dy < near * near:
                 d, n_x, n_y = length_and_direction(dx, dy)
                 displace(w, i, n_x, n_y, max(near - d - SINK_M, 0.0), world)
@@ -72,7 +82,9 @@ def displace(w: int, i: int, n_x: float, n_y: float, distance: float, world: Wor
 
 
 @compiled_inner
-def along(w: int, i: int, n_x: float, n_y: float, world: World, plant: Plant, disturbances: Disturbances | None) -> tuple[float, float]:
+def along(
+    w: int, i: int, n_x: float, n_y: float, world: World, plant: Plant, disturbances: Disturbances | None
+) -> tuple[float, float]:
     """A vehicle's velocity over ground along a direction [m/s], and what an impulse adds to it [1/kg]."""
     c, s = cos_sin(world.state.eta[w, i, 2])
     ahead, abeam = c * n_x + s * n_y, c * n_y - s * n_x

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from uuv_marl.percept import Clock, Percept, PerceptLayout, task_fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
-from uuv_marl.sim.arrays import WorldMap, Facts, Senses, State, World
-from uuv_marl.sim.episode_setup import EpisodeSetup
-from uuv_marl.sim.engine import Engine
-from uuv_marl.sim.model import ARRIVAL_RADII_M
-from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.arrays import Facts, Senses, State, World, WorldMap
 from uuv_marl.sim.disturbances.actuation import hit
 from uuv_marl.sim.disturbances.current import Flow, FlowField, flow_field
-from uuv_marl.sim.disturbances.disturbances import sample_disturbances, make_disturbances, disturbance_tables
+from uuv_marl.sim.disturbances.disturbances import disturbance_tables, make_disturbances, sample_disturbances
+from uuv_marl.sim.engine import Engine
+from uuv_marl.sim.episode_setup import EpisodeSetup
+from uuv_marl.sim.model import ARRIVAL_RADII_M
+from uuv_marl.sim.random import episode_key
 from uuv_marl.sim.spacing import NOWHERE
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
@@ -140,7 +140,11 @@ class Swarm:
     @property
     def faulty(self) -> Bool:
         """Vehicles that a fault of the scenario has hit since the reset, shape (world, vehicle)."""
-        return np.zeros_like(self.state.alive) if self._disturbances is None else hit(self.state.tick, self._disturbances.hull)
+        return (
+            np.zeros_like(self.state.alive)
+            if self._disturbances is None
+            else hit(self.state.tick, self._disturbances.hull)
+        )
 
     @property
     def arrived(self) -> Bool:
@@ -266,7 +270,11 @@ class Swarm:
             "duration_s": self._duration_s,
             "keys": self.keys,
             "seeds": self._seeds,
-            **{k: array for table in (*self._world, *disturbance_tables(self._disturbances)) for k, array in table._asdict().items()},
+            **{
+                k: array
+                for table in (*self._world, *disturbance_tables(self._disturbances))
+                for k, array in table._asdict().items()
+            },
             **{f"task.{name}": array for name, array in self._task_memory.items()},
         }
 

@@ -10,8 +10,8 @@ import numpy as np
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import WorldMap
 from uuv_marl.sim.compiled import compiled_inline
-from uuv_marl.sim.random import uniform
 from uuv_marl.sim.disturbances.purposes import MOVER, MOVER_DIRECTION
+from uuv_marl.sim.random import uniform
 from uuv_marl.sim.trigonometry import cos_sin
 
 _LONG = 2**31
@@ -25,12 +25,17 @@ def sample_traffic(w: int, key: np.uint64, scenario: Scenario, world_map: WorldM
     if not traffic.moves:
         return
     order = sorted(range(m), key=lambda k: uniform(key, MOVER, 0, k, 0))
-    control_steps = min(math.floor(traffic.amplitude_m / (traffic.speed_mps * scenario.timing.control_step_s) + 1e-9), _LONG)
+    control_steps = min(
+        math.floor(traffic.amplitude_m / (traffic.speed_mps * scenario.timing.control_step_s) + 1e-9), _LONG
+    )
     for k in order[: math.ceil(traffic.share * m - 1e-9)]:
         c, s = cos_sin(2.0 * math.pi * uniform(key, MOVER_DIRECTION, 0, k, 0))
         velocity = traffic.speed_mps * c, traffic.speed_mps * s
         world_map.obstacle_velocity[w, k] = velocity
-        world_map.swing[w, k], world_map.swing_control_steps[w, k] = (*world_map.obstacles[w, k, :2], *velocity), control_steps
+        world_map.swing[w, k], world_map.swing_control_steps[w, k] = (
+            (*world_map.obstacles[w, k, :2], *velocity),
+            control_steps,
+        )
 
 
 @compiled_inline

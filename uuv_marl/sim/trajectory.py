@@ -23,7 +23,7 @@ def reference(
         waypoints: corners of the trajectory, north and east [m], shape (point, 2).
         times: when l(t) passes them [s], shape (point,).
         last: index of the last corner; those beyond it are padding.
-        passes: whether it goes on along the last leg beyond the end, where it else rests (``arrival.by``); where it
+        passes: whether it goes on along the last leg beyond the end, where it else rests (``arrival.criterion``); where it
             is at the end from the start it rests.
     """
     if t >= times[last] and (not passes or times[last] == 0.0):

@@ -128,7 +128,9 @@ class WorkspaceBuffers(NamedTuple):
     """Shape (thread, column, nearby)."""
 
 
-def workspace_buffers(threads: int, num_vehicles: int, num_sectors: int, num_cells: int, num_obstacles: int) -> WorkspaceBuffers:
+def workspace_buffers(
+    threads: int, num_vehicles: int, num_sectors: int, num_cells: int, num_obstacles: int
+) -> WorkspaceBuffers:
     """A column for each array of a workspace, and a cache line between one thread's and the next's."""
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
     lengths["obstacle"] = max(num_obstacles, num_vehicles) + 9
@@ -169,7 +171,11 @@ _NOW, _CELLS, _LISTENER, _OBSTACLES = _columns()
 def workspace(buffers: WorkspaceBuffers, t: int) -> Workspace:
     """Thread t's scratch by name."""
     reals, integers, shorts = buffers.reals[t], buffers.integers[t], buffers.shorts[t]
-    sector_reals, sector_integers, cell_integers = buffers.sector_reals[t], buffers.sector_integers[t], buffers.cell_integers[t]
+    sector_reals, sector_integers, cell_integers = (
+        buffers.sector_reals[t],
+        buffers.sector_integers[t],
+        buffers.cell_integers[t],
+    )
     n, c, e = _NOW, _CELLS, _LISTENER
     return Workspace(
         Columns(

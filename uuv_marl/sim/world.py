@@ -6,22 +6,30 @@ depends on its neighbours in the batch.
 
 import math
 
-from uuv_marl.sim.arrays import WorldMap, Facts, World
+from uuv_marl.sim.arrays import Facts, World, WorldMap
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled_inner
-from uuv_marl.sim.detection import detect, clear_listener
+from uuv_marl.sim.detection import clear_listener, detect
+from uuv_marl.sim.disturbances.actuation import is_lost_to_fault
+from uuv_marl.sim.disturbances.disturbances import (
+    Disturbances,
+    advance_disturbances,
+    apply_disturbances,
+    begin_disturbances,
+    integrate_disturbed,
+    reads,
+    take_readings,
+)
 from uuv_marl.sim.model import Model, Rules
 from uuv_marl.sim.motion import apply_actuators, integrate, load_action, load_one, load_state
 from uuv_marl.sim.nearby import load_obstacles, load_places, remember_nearby
 from uuv_marl.sim.perception import write_percept
-from uuv_marl.sim.disturbances.actuation import is_lost_to_fault
-from uuv_marl.sim.disturbances.disturbances import Disturbances, begin_disturbances, advance_disturbances, integrate_disturbed, apply_disturbances, reads, take_readings
 from uuv_marl.sim.spacing import extent, measure_obstacles, measure_vehicles
 from uuv_marl.sim.stopping import stop_hulls
 from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import fields, disturbance_fields
+from uuv_marl.sim.views import disturbance_fields, fields
 from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace
 from uuv_marl.types import Float32, Float64
 
@@ -31,7 +39,9 @@ under water is a hundredth as fast."""
 
 
 @compiled_inner
-def integrate_control_step(w: int, first: bool, world: World, model: Model, now: Columns, disturbances: Disturbances | None) -> None:
+def integrate_control_step(
+    w: int, first: bool, world: World, model: Model, now: Columns, disturbances: Disturbances | None
+) -> None:
     """Actions become forces, forces become motion. Eq. 1-4, 22-24.
 
     ``first`` says whether the decision was made at the start of this hold; later ones keep its force's direction in the
@@ -88,7 +98,9 @@ def move_obstacles(w: int, tick: int, world_map: WorldMap, control_step_s: float
             ahead = triangle(tick, world_map.swing_control_steps[w, k])
             speed = ahead - triangle(tick - 1, world_map.swing_control_steps[w, k])
             for c in range(2):
-                world_map.obstacles[w, k, c] = world_map.swing[w, k, c] + ahead * control_step_s * world_map.swing[w, k, 2 + c]
+                world_map.obstacles[w, k, c] = (
+                    world_map.swing[w, k, c] + ahead * control_step_s * world_map.swing[w, k, 2 + c]
+                )
                 world_map.obstacle_velocity[w, k, c] = speed * world_map.swing[w, k, 2 + c]
         elif world_map.obstacle_velocity[w, k, 0] != 0.0 or world_map.obstacle_velocity[w, k, 1] != 0.0:
             world_map.obstacles[w, k, 0] += world_map.obstacle_velocity[w, k, 0] * control_step_s
@@ -238,11 +250,19 @@ def observe_world(w: int, world: World, model: Model, own: Workspace, disturbanc
     if disturbances is not None:
         begin_disturbances(w, world, disturbances)
         take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
-        apply_disturbances(w, world, disturbances, fields(world.senses.percept, model.at), disturbance_fields(world.senses.percept, model.at))
+        apply_disturbances(
+            w,
+            world,
+            disturbances,
+            fields(world.senses.percept, model.at),
+            disturbance_fields(world.senses.percept, model.at),
+        )
 
 
 @compiled_inner
-def control_step(w: int, first: bool, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None) -> Grid:
+def control_step(
+    w: int, first: bool, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None
+) -> Grid:
     """One control hold of a world and what becomes true by it; where the cells of the living lie afterwards.
 
     ``first`` is that of ``control_hold``.
@@ -266,7 +286,9 @@ def control_step(w: int, first: bool, world: World, model: Model, workspace: Wor
 
 
 @compiled_inner
-def step_world(w: int, action: Float32, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None) -> None:
+def step_world(
+    w: int, action: Float32, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None
+) -> None:
     """One decision period of a world. A world that has diverged stays as it is."""
     facts, control_steps = world.facts, model.rules.control_steps
     if facts.diverged[w] >= 0:
@@ -291,4 +313,10 @@ def step_world(w: int, action: Float32, world: World, model: Model, workspace: W
                 take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
     facts.saturated[w] /= max(num_alive * control_steps, 1)
     if disturbances is not None:
-        apply_disturbances(w, world, disturbances, fields(world.senses.percept, model.at), disturbance_fields(world.senses.percept, model.at))
+        apply_disturbances(
+            w,
+            world,
+            disturbances,
+            fields(world.senses.percept, model.at),
+            disturbance_fields(world.senses.percept, model.at),
+        )

@@ -15,9 +15,9 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
+from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
 from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_path
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
-from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.task import Terms
 from uuv_marl.types import Bool, Float64, Int64
@@ -109,7 +109,9 @@ class HardWaterMemory(NamedTuple):
     best_s: Annotated[Float64, "world vehicle", "Length of its free way at the start over full speed [s]."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
     path_length: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
-    path_cost: Annotated[Float64, "world led column", "Cost of the way on from each cell; no row without channel ``way``."]
+    path_cost: Annotated[
+        Float64, "world led column", "Cost of the way on from each cell; no row without channel ``way``."
+    ]
     kind: Annotated[Float64, "world", "Index of the map's kind in ``KINDS``."]
 
 
@@ -138,7 +140,7 @@ class HardWater(Reach):
         """Room for the discs of a map, and for its cells."""
         grid = scenario.task_numbers.grid()
         cost_rows = grid.rows if "path" in scenario.sonar.channels else 0
-        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "led": cost_rows}
+        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "leader": cost_rows}
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
@@ -252,7 +254,9 @@ class HardWater(Reach):
 
     def remaining_m(self) -> tuple[Float64, Float64]:
         """With the reward ``geodesic``, which knows the map, the free way; else the distance."""
-        return (self.path_lengths(), self._remaining_before_m) if self.reward_name == "geodesic" else super().remaining_m()
+        return (
+            (self.path_lengths(), self._remaining_before_m) if self.reward_name == "geodesic" else super().remaining_m()
+        )
 
     def at_goal(self) -> Bool:
         """Vehicles within ``near_m`` of the goal, along the free way."""

@@ -65,7 +65,9 @@ class SilentTargetsMemory(NamedTuple):
     """What ``silent_targets`` remembers."""
 
     first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle held a target first [s]; 0 before."]
-    remaining_m: Annotated[Float64, "world vehicle", "Distance to the nearest target that no nearer vehicle holds, or 0 [m]."]
+    remaining_m: Annotated[
+        Float64, "world vehicle", "Distance to the nearest target that no nearer vehicle holds, or 0 [m]."
+    ]
     remaining_before_m: Annotated[Float64, "world vehicle", "The same before the step."]
     speed: Annotated[Float64, "world target", "Speed of the target [m/s]."]
     heading: Annotated[Float64, "world target", "Where it goes, clockwise from north [rad]."]
@@ -97,7 +99,9 @@ def walk(
     """
     for w in range(memory.speed.shape[0]):
         for k in range(memory.speed.shape[1] if worlds[w] else 0):
-            while memory.turns[w, k] < memory.turn_at.shape[2] and memory.turn_at[w, k, memory.turns[w, k]] <= time_s[w]:
+            while (
+                memory.turns[w, k] < memory.turn_at.shape[2] and memory.turn_at[w, k, memory.turns[w, k]] <= time_s[w]
+            ):
                 memory.to_turn[w, k] = memory.turn_by[w, k, memory.turns[w, k]]
                 memory.turns[w, k] += 1
             turn = min(max(memory.to_turn[w, k], -rate * period), rate * period)
@@ -106,7 +110,11 @@ def walk(
             c, s = cos_sin(memory.heading[w, k])
             distance = memory.speed[w, k] * period
             if abs(places[w, k, 0] + distance * c) > half:
-                c, memory.heading[w, k], memory.to_turn[w, k] = -c, math.pi - memory.heading[w, k], -memory.to_turn[w, k]
+                c, memory.heading[w, k], memory.to_turn[w, k] = (
+                    -c,
+                    math.pi - memory.heading[w, k],
+                    -memory.to_turn[w, k],
+                )
             if abs(places[w, k, 1] + distance * s) > half:
                 s, memory.heading[w, k], memory.to_turn[w, k] = -s, -memory.heading[w, k], -memory.to_turn[w, k]
             velocity[w, k, 0], velocity[w, k, 1] = memory.speed[w, k] * c, memory.speed[w, k] * s
@@ -241,7 +249,10 @@ class SilentTargets(Reach):
         memory.judged[late] += 1.0
         found = running[:, None] & held
         memory.found_s[found] = np.minimum(memory.found_s, time_s[:, None])[found]
-        memory.remaining_before_m[running], memory.remaining_m[running] = memory.remaining_m[running], self._remaining_m()[running]
+        memory.remaining_before_m[running], memory.remaining_m[running] = (
+            memory.remaining_m[running],
+            self._remaining_m()[running],
+        )
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The heading in the box, and where it is granted the way to one's own target."""

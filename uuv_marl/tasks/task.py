@@ -82,7 +82,7 @@ class Task:
     """Names of the rewards that the task knows; the first is the default."""
     terms: ClassVar[Mapping[str, str]] = {}
     """The terms of the first reward with their formulas, in order."""
-    headline: ClassVar[str] = "untouched_share"
+    headline: ClassVar[str] = "success_share"
     """The metric, a share, by which policies are compared and trainings choose."""
     columns: ClassVar[Mapping[str, str]] = {}
     """The task's own metrics that tables show, with what they are and their unit."""
@@ -111,10 +111,10 @@ class Task:
     @classmethod
     def check(cls) -> None:
         """Raise ScenarioError for a class that can't be a task: it doesn't say who succeeds, or takes a name twice."""
-        if cls.there is Task.there and cls.succeeded is Task.succeeded:
+        if cls.at_goal is Task.at_goal and cls.succeeded is Task.succeeded:
             raise ScenarioError(
-                f"task {cls.__name__} must define there(), the vehicles that are where they should be: it decides who "
-                "succeeds and which policy a training keeps; where all are, return np.ones_like(self.swarm.state.alive)"
+                f"task {cls.__name__} must define at_goal(), the vehicles that are where they should be: it decides which "
+                "succeed, and which policy a training keeps; where all are, return np.ones_like(self.swarm.state.alive)"
             )
         rows = [row.name for table in (cls.observed, *cls.channels.values()) for row in table]
         usual = {row.name for row in percept_table(1, 1)}
@@ -204,11 +204,11 @@ class Task:
     def metrics(self, world: int) -> dict[str, float | None]:
         """Measures of an episode that ends now, numbers by name; VMAS: ``info``.
 
-        A subclass adds its own, by names not in ``uuv_marl.tasks.measures``, to these: ``untouched_share``, the share
+        A subclass adds its own, by names not in ``uuv_marl.tasks.measures``, to these: ``success_share``, the share
         of vehicles that succeeded, and ``whole``, 1 if all did.
         """
         share = float(self.succeeded()[world].mean())
-        return {"untouched_share": share, "swarm_success": float(share == 1.0)}
+        return {"success_share": share, "swarm_success": float(share == 1.0)}
 
     def teams(self, world: int) -> Int64:
         """Number of each vehicle's team, from 0 on, which pictures show in one colour, shape (vehicle,)."""

@@ -112,7 +112,7 @@ class TwoSwarms(Reach):
     }
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles there, of the time until then over the straight way at full speed [1]",
-        "whole_ratio": "the same of the last vehicle, if all came there [1]",
+        "swarm_time_ratio": "the same of the last vehicle, if all came there [1]",
     }
     traffic: ClassVar[bool] = False
     reference_label: ClassVar[str] = "goal of a vehicle"
@@ -205,7 +205,7 @@ class TwoSwarms(Reach):
         ratio = float((took / best)[arrived].mean()) if arrived.any() else None
         return {
             **super().metrics(world), "time_ratio": ratio,
-            "whole_ratio": float(took.max() / best.max()) if arrived.all() else None,
+            "swarm_time_ratio": float(took.max() / best.max()) if arrived.all() else None,
         }  # fmt: skip
 
     def teams(self, world: int) -> Int64:

@@ -25,7 +25,11 @@ def privileged(swarm: Swarm) -> Float32:
     drift = velocity.mean(axis=1) - swarm.mean_reference[:, 2:]
     error = facts.centre - swarm.mean_reference[:, :2]
     size = np.hypot(*error.T)[:, None]
-    path_length, away, arrived_before = swarm.task.path_length_m(), facts.away, swarm.task.arrived_before().astype(np.float64)
+    path_length, away, arrived_before = (
+        swarm.task.path_length_m(),
+        facts.away,
+        swarm.task.arrived_before().astype(np.float64),
+    )
     moves = np.abs(swarm.mean_reference[:, 2:]).max(axis=1) > 0.0
     left = np.where(moves, swarm.duration_s - facts.time_s, 0.0)
     columns = [

@@ -10,8 +10,8 @@ from uuv_marl.benchmark.style import house_style, panels
 from uuv_marl.train.folder import Record
 
 _SHOWN = {
-    "share of validation episodes": {"whole": "swarms whole", "share": "vehicles untouched and there"},
-    "contacts per validation episode": {"contacts": ""},
+    "share of validation episodes": {"swarm_success": "swarms whole", "share": "vehicles untouched and there"},
+    "collisions per validation episode": {"collisions": ""},
     "reward per decision, with noise\nand the cost of contacts": {"reward": ""},
 }
 

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
 from uuv_marl.baselines.learned.trained import Trained
-from uuv_marl.baselines.registry import parse_policy
+from uuv_marl.baselines.registry import policy_class
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError, TrainingError
 from uuv_marl.train.training import Training
 
@@ -96,7 +96,11 @@ class TrainingFolder:
         """The training that the folder holds."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
-            before, self.until, saved_versions = dict(config["scenarios"]), float(config["until"]), dict(config["versions"])
+            before, self.until, saved_versions = (
+                dict(config["scenarios"]),
+                float(config["until"]),
+                dict(config["versions"]),
+            )
             training = Training(**config["training"])
             scenarios_now = _read_by(training)
         except (ScenarioError, PolicyError, TrainingError) as error:
@@ -235,12 +239,12 @@ def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[
 
 
 def _read_by(training: Training) -> dict[str, Any]:
-    """What a training reads besides its description, by name: scenarios, whole, and the digest of a teacher's file."""
-    resume_note: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
-    kind = parse_policy(training.expert).kind if training.expert else None
-    if isinstance(kind, Trained):
-        resume_note[training.expert] = {"teacher": f"{training.expert} ({kind.checkpoint.digest})"}
-    return resume_note
+    """What a training reads beside its description, by name: its scenarios, and the digest of an expert's file."""
+    contents: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
+    policy_type = policy_class(training.expert) if training.expert else None
+    if isinstance(policy_type, Trained):
+        contents[training.expert] = {"expert": f"{training.expert} ({policy_type.checkpoint.digest})"}
+    return contents
 
 
 def versions() -> dict[str, str]:

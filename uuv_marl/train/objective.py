@@ -12,19 +12,21 @@ _WEIGHT = re.compile(r"\bw_(\w+)|\bw\b|\b(progress(?:_far)?_m)\b")
 
 def objective(training: Training) -> str:
     """The whole objective, a reward that several scenarios share once."""
-    told: dict[tuple[str, str], dict[str, None]] = {}
+    scenarios_of: dict[tuple[str, str], dict[str, None]] = {}
     for part in training.parts:
-        told.setdefault(_reward(training.reward, part.scenario), {})[part.name] = None
-    lines = [f"Reward {name} on {', '.join(scenarios)}{terms}" for (name, terms), scenarios in told.items()]
-    by, expert, pull = training.ppo, training.expert, training.pull
-    start, end = by.collision_cost or (0.0, 0.0)
-    cost = f"a contact that begins costs {start:g} at the start and {end:g} at the end (ppo.contact_cost)"
+        scenarios_of.setdefault(_reward(training.reward, part.scenario), {})[part.name] = None
+    lines = [f"Reward {name} on {', '.join(scenarios)}{terms}" for (name, terms), scenarios in scenarios_of.items()]
+    ppo, expert, weight = training.ppo, training.expert, training.imitation_weight
+    start, end = ppo.collision_cost or (0.0, 0.0)
+    cost = f"a contact that begins costs {start:g} at the start and {end:g} at the end (ppo.collision_cost)"
     added = f"In addition {cost}" if start or end else "Nothing is added to the reward"
-    lines.append(f"{added}; discount {by.gamma:g} a decision.")
+    lines.append(f"{added}; discount {ppo.gamma:g} a decision.")
     if expert:
-        lines.append(f"For {training.lesson:.0%} of the budget the network first imitates {expert}, whatever is paid.")
-    if pull:
-        lines.append(f"Then {pull:g} times the mean squared distance from what it would do is added to PPO's loss.")
+        lines.append(
+            f"For {training.imitation_share:.0%} of the budget the network first imitates {expert}, whatever is paid."
+        )
+    if weight:
+        lines.append(f"Then {weight:g} times the mean squared distance from what it would do is added to PPO's loss.")
     return "\n".join(lines)
 
 

@@ -88,7 +88,9 @@ class Learner:
 
     def set_imitation(self, imitating: bool, imitation_weight: float = 0.0) -> None:
         """From now on the actor imitates a teacher, or learns what pays, with a ``pull`` to the teacher."""
-        if self.imitating and not imitating:  # with the old optimiser the first updates went twice as far, by ``Update.kl``
+        if (
+            self.imitating and not imitating
+        ):  # with the old optimiser the first updates went twice as far, by ``Update.kl``
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self.imitating, self.imitation_weight = imitating, imitation_weight
 
@@ -117,7 +119,11 @@ class Learner:
         observation = torch.empty((config.horizon + 1, env.rows, env.size))
         action, mean, expert_action = torch.empty((3, *shape, 2))
         states = torch.empty((config.horizon + 1, env.rows, self.actor.units))
-        reward, mean_reward, ended = np.empty(shape, np.float32), 0.0, np.zeros((config.horizon + 1, env.rows), np.bool_)
+        reward, mean_reward, ended = (
+            np.empty(shape, np.float32),
+            0.0,
+            np.zeros((config.horizon + 1, env.rows), np.bool_),
+        )
         first = self.state
         for t in range(config.horizon):
             observation[t] = torch.from_numpy(env.observation)
@@ -166,7 +172,9 @@ class Learner:
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
         """One gradient step on some rows; the divergence from the policy that sampled, or from the teacher."""
-        x, action, old, expert_action, advantage, returns, continues = (array.index_select(1, rows) for array in batch[:7])
+        x, action, old, expert_action, advantage, returns, continues = (
+            array.index_select(1, rows) for array in batch[:7]
+        )
         new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], continues)
         action, old, advantage = action.reshape(-1, 2), old.reshape(-1, 2), advantage.reshape(-1)
         double = 2.0 * noise * noise

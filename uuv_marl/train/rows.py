@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.learned.actor import bound, in_disc
 from uuv_marl.baselines.learned.checkpoint import Card
+from uuv_marl.baselines.making import compose, make
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
-from uuv_marl.baselines.registry import compose, make
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, TrainingError
 from uuv_marl.percept import Percept
@@ -161,7 +161,9 @@ class Rows:
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
         """What the teacher would do, and what is done where the network does ``action``; shape (row, 2)."""
         pairs = [group.query_expert(action[rows]) for group, rows in zip(self.groups, self._rows, strict=True)]
-        return np.concatenate([expert_action for expert_action, _ in pairs]), np.concatenate([done for _, done in pairs])
+        return np.concatenate([expert_action for expert_action, _ in pairs]), np.concatenate(
+            [done for _, done in pairs]
+        )
 
     def step(self, action: Float32) -> Transition:
         """Act, shape (row, 2)."""

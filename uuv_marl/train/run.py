@@ -145,7 +145,9 @@ class Trainer:
         started, config = time.process_time(), self.training.ppo
         share = before.spent(self.training) / self.training.budget
         imitation_share = self.training.imitation_share if self.training.expert else 0.0
-        self.learner.set_imitation(share < imitation_share, self.training.imitation_weight if share >= imitation_share else 0.0)
+        self.learner.set_imitation(
+            share < imitation_share, self.training.imitation_weight if share >= imitation_share else 0.0
+        )
         if self.learner.imitating:
             self.rows.set_expert_share((_NETWORK_ACTS - share / imitation_share) / (_NETWORK_ACTS - _EXPERT_ACTS))
             noise, rate, share = _IMITATION_NOISE, annealed(_IMITATION_RATE, share / imitation_share), 0.0

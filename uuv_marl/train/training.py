@@ -1,6 +1,5 @@
 """``Training``: all that a training is. Its TOML is a recipe, and ``config.json`` of a run repeats it."""
 
-import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -9,13 +8,13 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, cast
 import pydantic
 
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
+from uuv_marl.baselines.making import check_base_controller
 from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.registry import check_base_controller
+from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.envs.core import Reward, refuse_losses
-from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
+from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError, hint
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import Scenario, load_scenario
@@ -152,9 +151,13 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     def _check(self) -> Self:
         """Fill in what is left out, and refuse what can't be run."""
         if self.expert and self.base_controller:
-            raise TrainingError(f"teacher {self.expert!r} and around {self.base_controller!r} are both given; leave one out")
+            raise TrainingError(
+                f"expert {self.expert!r} and base_controller {self.base_controller!r} are both given; leave one out"
+            )
         if self.imitation_weight and not self.expert:
-            raise TrainingError(f"pull = {self.imitation_weight:g} is to a teacher, and none is given; name one, or leave pull out")
+            raise TrainingError(
+                f"imitation_weight = {self.imitation_weight:g} needs an expert, and none is given; name one, or leave it out"
+            )
         if self.minutes is not None and self.steps is not None:
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
         if self.minutes is None and self.steps is None:
@@ -197,7 +200,10 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
             name: load_scenario(name, overrides=overrides_for(name, self.overrides if name == self.scenario else {}))
             for name in (self.scenario, *self.extra_scenarios)
         }
-        return {name: with_policy_requirements(self.base_controller, each) if self.base_controller else each for name, each in loaded.items()}
+        return {
+            name: with_policy_requirements(self.base_controller, each) if self.base_controller else each
+            for name, each in loaded.items()
+        }
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
@@ -303,7 +309,6 @@ def _explained(error: pydantic.ValidationError) -> Exception:
     field = ".".join([*place, last])
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         names = TABLES.get(".".join(place), ())
-        near = difflib.get_close_matches(last, names, n=1)
-        remedy = f"did you mean {near[0]!r}?" if near else f"the fields here are {', '.join(names)}"
-        return TrainingError(f"{field} is unknown; {remedy}")
+        remedy = hint(last, names, 0.6) or f"the fields here are {', '.join(names)}"
+        return TrainingError(f"{field} is unknown; {remedy.strip()}")
     return TrainingError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}")

@@ -81,11 +81,11 @@ def _end_s(run: Run) -> float:
 def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
     """An episode's headline, and whether the swarm was whole; in ``follow`` whether it came and touched nothing."""
     own = metrics.get("task", {})
-    if "whole" not in own:
+    if "swarm_success" not in own:
         swarm_success = metrics["task_time_s"] is not None and not metrics["collisions"]
         return float(swarm_success), swarm_success
     share = own.get(headline)
-    return (own["untouched_share"] if share is None else share) or 0.0, own["whole"] == 1.0
+    return (own["success_share"] if share is None else share) or 0.0, own["swarm_success"] == 1.0
 
 
 def replay_command(policy: Path, training: Training, worst: Worst) -> str:

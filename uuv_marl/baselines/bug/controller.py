@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from uuv_marl.baselines.bug.directions import RAYS, choose_directions, rays
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import Walls, WallsMemory, update_walls, wall_planes
-from uuv_marl.baselines.bug.directions import RAYS, choose_directions, rays
 from uuv_marl.baselines.memory import Surroundings, update_memory
 from uuv_marl.baselines.policy import Limits, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, neighbour_planes, steer_safely, with_numbers
@@ -70,7 +70,9 @@ def _desired_velocity(w: int, i: int, g: BugGains, memory: Surroundings, walls: 
     """The velocity that a vehicle wishes, in its map [m/s]."""
     pose, goal = memory.pose[w, i], memory.reference[w, i]
     speed = min(g.cruise, g.pull * math.hypot(goal[0] - pose[0], goal[1] - pose[1]))
-    return pushed(speed * walls.direction[w, i, 0], speed * walls.direction[w, i, 1], w, i, g.push, g.push_range, memory)
+    return pushed(
+        speed * walls.direction[w, i, 0], speed * walls.direction[w, i, 1], w, i, g.push, g.push_range, memory
+    )
 
 
 @compiled

@@ -103,7 +103,10 @@ def remembered(w: int, i: int, g: LeaderFollowerGains, memory: Surroundings) -> 
     v_x, v_y, weights, x, y, num = 0.0, 0.0, 1e-9, 0.0, 0.0, 0
     for k in range(memory.known.shape[2]):
         if memory.known[w, i, k] > 0.0:
-            x, y = x + memory.place[w, i, k, 0] - memory.pose[w, i, 0], y + memory.place[w, i, k, 1] - memory.pose[w, i, 1]
+            x, y = (
+                x + memory.place[w, i, k, 0] - memory.pose[w, i, 0],
+                y + memory.place[w, i, k, 1] - memory.pose[w, i, 1],
+            )
             num += 1
             if memory.known[w, i, k] >= g.sightings:
                 weight = math.exp(-memory.away[w, i, k] / g.near)
@@ -128,7 +131,9 @@ def _following(others: NeighbourSummary, g: LeaderFollowerGains) -> tuple[float,
 
 
 @compiled
-def _leading(w: int, i: int, others: NeighbourSummary, g: LeaderFollowerGains, memory: Surroundings) -> tuple[float, float]:
+def _leading(
+    w: int, i: int, others: NeighbourSummary, g: LeaderFollowerGains, memory: Surroundings
+) -> tuple[float, float]:
     """The velocity that a leader wishes [m/s]."""
     at, speed = memory.reference[w, i], memory.reference_speed[w, i]
     to_x, to_y = at[0] - memory.pose[w, i, 0], at[1] - memory.pose[w, i, 1]

@@ -1,4 +1,4 @@
-"""The bare pull to the reference point: ``guarded:pull`` shows the effect of the safety filter alone."""
+"""The bare pull to the reference point: ``pull,safety_filter=true`` shows the effect of the safety filter alone."""
 
 from typing import ClassVar, NamedTuple
 
@@ -21,7 +21,7 @@ class ProportionalGains(NamedTuple):
 
 
 class ProportionalTracking(Policy):
-    """The velocity of l(t) and a pull to l(t); neighbours and obstacles are ignored. Meant for ``guarded:pull``."""
+    """The velocity of l(t) and a pull to l(t); neighbours and obstacles are ignored. Meant for ``pull,safety_filter=true``."""
 
     outputs_force: ClassVar[bool] = True
     yaw_damping_nms: ClassVar[float] = 600.0

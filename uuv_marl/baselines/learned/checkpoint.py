@@ -97,7 +97,7 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     def policy_class(self) -> str:
         """What decides beside the network: nothing, the filter, a law."""
         if self.base_controller:
-            return "around a law"
+            return "residual"
         return "end to end + filter" if self.filter else "end to end"
 
     @property
@@ -118,7 +118,7 @@ class Checkpoint(NamedTuple):
     tensors: Mapping[str, Float32]
     """By name, see ``layers.shapes``."""
     digest: str
-    """First 16 hexadecimal digits of the whole file's SHA-256."""
+    """First 16 hexadecimal digits of the SHA-256 of the tensors, as they stand in the file; the card does not count."""
 
 
 def card_rows(scenario: Scenario) -> tuple[Row, ...]:
@@ -168,9 +168,10 @@ def load_checkpoint(path: UserPath) -> Checkpoint:
         ) from None
     try:
         tensors: dict[str, NDArray[Any]] = safetensors.numpy.load(data)
-        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        start = 8 + int.from_bytes(data[:8], "little")
+        header = json.loads(data[8:start])
         card = Card.model_validate_json(header.get("__metadata__", {}).get(_CARD, "null"))
-        checkpoint = Checkpoint(card, tensors, hashlib.sha256(data).hexdigest()[:16])
+        checkpoint = Checkpoint(card, tensors, hashlib.sha256(data[start:]).hexdigest()[:16])
         _check(checkpoint)
     except (ValueError, KeyError, safetensors.SafetensorError) as error:
         raise PolicyError(

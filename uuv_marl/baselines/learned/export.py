@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines import with_policy_requirements, make
+from uuv_marl.baselines import make, with_policy_requirements
 from uuv_marl.baselines.learned.actor import Actor, in_disc
 from uuv_marl.baselines.learned.layers import Network
 from uuv_marl.baselines.policy import PolicyError

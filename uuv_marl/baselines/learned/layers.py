@@ -109,7 +109,10 @@ class Network:
             near = ops.shaped(ops.take(x, entries[:, 0]), (-1, len(entries), 1))
             directions = ops.shaped(ops.take(x, entries[:, 1:3].reshape(-1)), (-1, len(entries), 2))
             square = near * near
-            yield from (ops.total(each) for each in (directions, near * directions, square * directions, square * square * directions))
+            yield from (
+                ops.total(each)
+                for each in (directions, near * directions, square * directions, square * square * directions)
+            )
 
     def gates(self, z: Any) -> Any:
         """What features (row, entry) tell the recurrent layer, shape (row, 3 x unit)."""

@@ -105,7 +105,11 @@ def _nearest_unexplained(w: int, i: int, see: Fields, sectors: ActiveSectors, me
     """The active sub-sector of the nearest echo that no disc explains, -1 for none. Arguments: ``update_discs``."""
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):
-        if see.echo[w, i, a] > 0.0 and see.echo_range[w, i, a] < reach and not _explained(w, i, a, see, sectors, memory):
+        if (
+            see.echo[w, i, a] > 0.0
+            and see.echo_range[w, i, a] < reach
+            and not _explained(w, i, a, see, sectors, memory)
+        ):
             nearest, reach = a, see.echo_range[w, i, a]
     return nearest
 
@@ -254,7 +258,9 @@ def _free_row(w: int, i: int, memory: Surroundings) -> int:
     for d in range(memory.score.shape[2]):
         if memory.score[w, i, d] <= 0.0:
             return d
-        away = math.hypot(memory.disc[w, i, d, 0] - memory.pose[w, i, 0], memory.disc[w, i, d, 1] - memory.pose[w, i, 1])
+        away = math.hypot(
+            memory.disc[w, i, d, 0] - memory.pose[w, i, 0], memory.disc[w, i, d, 1] - memory.pose[w, i, 1]
+        )
         if away - memory.disc[w, i, d, 2] > most:
             farthest, most = d, away - memory.disc[w, i, d, 2]
     return farthest

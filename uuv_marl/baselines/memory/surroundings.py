@@ -38,7 +38,9 @@ def is_lost_percept(row: Float32) -> bool:
 
 
 @compiled
-def update_memory(flat: Float32, at: Starts, worlds: Bool, model: OwnModel, memory_s: float, memory: Surroundings) -> None:
+def update_memory(
+    flat: Float32, at: Starts, worlds: Bool, model: OwnModel, memory_s: float, memory: Surroundings
+) -> None:
     """Take what every vehicle perceives into what it remembers. Once for every decision."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):

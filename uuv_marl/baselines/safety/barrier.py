@@ -60,7 +60,9 @@ GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
 def with_numbers(values: Mapping[str, float], gains: G, barrier: Barrier) -> tuple[G, Barrier]:
     """A law's gains, a NamedTuple, and its filter, with the numbers by name that belong to the one or the other."""
     both: tuple[Any, Any] = gains, barrier
-    updated = [each._replace(**{name: value for name, value in values.items() if name in each._fields}) for each in both]
+    updated = [
+        each._replace(**{name: value for name, value in values.items() if name in each._fields}) for each in both
+    ]
     return updated[0], updated[1]
 
 

@@ -1,4 +1,4 @@
-"""``guarded:NAME``: the safety filter around any policy.
+"""``NAME,safety_filter=true``: the safety filter around any policy.
 
 The policy decides on an action. If the velocity that follows from the action would bring the vehicle too near to
 something that it remembers, the filter takes a safe velocity instead: the one nearest to the velocity at which the
@@ -36,7 +36,7 @@ class Guarded(Filtered):
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: Policy, barrier: Barrier = GUARD) -> None:
         self.inner = inner
-        self.name = f"guarded:{inner.name}"
+        self.name = f"{inner.name},safety_filter=true"
         self.copy_requirements(inner)
         super().__init__(scenario, num_worlds, barrier)
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from uuv_marl.baselines.policy import tuned
 from uuv_marl.baselines.safety.barrier import Barrier
-from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.baselines.scout.controller import Scout
+from uuv_marl.baselines.scout.gains import ScoutGains
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Bool, Float32
@@ -45,7 +45,10 @@ class Carrot(Scout):
 
     def with_carrot(self, percept: Percept) -> Percept:
         """The percept with the carrot in the place of a goal at rest."""
-        with_carrot, (to, left) = dataclasses.replace(percept, flat=percept.flat.copy()), self._goal_and_distance(percept)
+        with_carrot, (to, left) = (
+            dataclasses.replace(percept, flat=percept.flat.copy()),
+            self._goal_and_distance(percept),
+        )
         far = (left > self.ahead_m) & (percept["reference_velocity"] == 0.0).all(axis=-1)
         to += np.float32(self.right_m) * _unit(np.stack([-to[..., 1], to[..., 0]], axis=-1))
         along = _unit(to)[far]

@@ -11,8 +11,8 @@ import numpy as np
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
-from uuv_marl.baselines.memory.uncertainty import uncertainty
 from uuv_marl.baselines.memory.neighbours import middle
+from uuv_marl.baselines.memory.uncertainty import uncertainty
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered

@@ -52,7 +52,9 @@ class TrackedTarget(NamedTuple):
     """The target that a vehicle follows, in its map, and how it searches."""
 
     target: Annotated[Float64, "world vehicle 4", "Place [m] and velocity [m/s] of its target."]
-    track_timeout_s: Annotated[Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."]
+    track_timeout_s: Annotated[
+        Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."
+    ]
     search: Annotated[
         Float64, "world vehicle 2", "Direction of its search in the box, or in lanes that of x, and the lane."
     ]
@@ -128,7 +130,10 @@ def claimed(w: int, i: int, x: float, y: float, claim_m: float, memory: Surround
     """Whether another vehicle is nearer to a target at (x, y) in the map, and near enough."""
     least = min(math.hypot(memory.pose[w, i, 0] - x, memory.pose[w, i, 1] - y), claim_m)
     for k in range(memory.known.shape[2]):
-        if memory.known[w, i, k] > 0.0 and math.hypot(memory.place[w, i, k, 0] - x, memory.place[w, i, k, 1] - y) < least:
+        if (
+            memory.known[w, i, k] > 0.0
+            and math.hypot(memory.place[w, i, k, 0] - x, memory.place[w, i, k, 1] - y) < least
+        ):
             return True
     return False
 

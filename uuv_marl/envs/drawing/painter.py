@@ -119,7 +119,9 @@ class Painter:
 
     def _goals(self, scene: Scene, view: Camera, size: float) -> None:
         for team, path in scene.groups.paths.values():
-            star(self._fine, view.pixels(path[-1]), size if len(path) > 1 else size / 2.0, ink.TEAMS.get(team, ink.AMBER))
+            star(
+                self._fine, view.pixels(path[-1]), size if len(path) > 1 else size / 2.0, ink.TEAMS.get(team, ink.AMBER)
+            )
 
     def _trails(self, scene: Scene, view: Camera) -> None:
         places = view.pixels(np.concatenate([scene.trail, scene.position[None]])[:, scene.alive])

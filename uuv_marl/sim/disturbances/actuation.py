@@ -10,10 +10,10 @@ import numpy as np
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
+from uuv_marl.sim.disturbances.purposes import MISMATCH, ONSET, VICTIM
 from uuv_marl.sim.exponential import exp
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.random import uniform, uniforms
-from uuv_marl.sim.disturbances.purposes import MISMATCH, ONSET, VICTIM
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
@@ -113,7 +113,9 @@ def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario
     drawn = duration_s * uniform(key, ONSET, 0, vehicle, fault)
     control_step_s, onset = scenario.timing.control_step_s, drawn if settings.onset_s is None else settings.onset_s
     first = math.ceil(onset / control_step_s - 1e-9)
-    return first, _NEVER if settings.duration_s is None else first + math.ceil(settings.duration_s / control_step_s - 1e-9)
+    return first, _NEVER if settings.duration_s is None else first + math.ceil(
+        settings.duration_s / control_step_s - 1e-9
+    )
 
 
 def hit(tick: Int64, hull: Hull) -> Bool:

@@ -10,26 +10,53 @@ import numpy as np
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.conditions import vehicle_disturbances
-from uuv_marl.sim.arrays import WorldMap, State, World
+from uuv_marl.sim.arrays import State, World, WorldMap
 from uuv_marl.sim.compiled import compiled_inner
-from uuv_marl.sim.model import Rules
-from uuv_marl.sim.disturbances.actuation import PLANT, Actuation, Hull, actuation, sample_hulls, integrate_each, weaken
-from uuv_marl.sim.disturbances.current import Flow, WaterModel, advance_gust, sample_flow, write_velocities, read_flow, water
-from uuv_marl.sim.disturbances.modem import Messages, ModemModel, clear_messages, exchange, write_messages, modem
+from uuv_marl.sim.disturbances.actuation import PLANT, Actuation, Hull, actuation, integrate_each, sample_hulls, weaken
+from uuv_marl.sim.disturbances.current import (
+    Flow,
+    WaterModel,
+    advance_gust,
+    read_flow,
+    sample_flow,
+    water,
+    write_velocities,
+)
+from uuv_marl.sim.disturbances.modem import Messages, ModemModel, clear_messages, exchange, modem, write_messages
 from uuv_marl.sim.disturbances.navigation import (
-    NavigationModel,
     NavigationErrors,
-    sample_navigation_errors,
-    reset_position_error,
+    NavigationModel,
     drift_position,
     navigate,
     navigation,
+    reset_position_error,
+    sample_navigation_errors,
 )
-from uuv_marl.sim.disturbances.noise import SensorErrors, NoiseModel, schedule_outages, sample_sensor_errors, apply_outages, noise, add_errors, write_ranged
-from uuv_marl.sim.disturbances.readings import Detections, Readings, any_due, begin_line, collect, line_sizes, write_readings, remember, store
-from uuv_marl.sim.disturbances.schedule import SonarTiming, Reading, due, sonar_timing
+from uuv_marl.sim.disturbances.noise import (
+    NoiseModel,
+    SensorErrors,
+    add_errors,
+    apply_outages,
+    noise,
+    sample_sensor_errors,
+    schedule_outages,
+    write_ranged,
+)
+from uuv_marl.sim.disturbances.readings import (
+    Detections,
+    Readings,
+    any_due,
+    begin_line,
+    collect,
+    line_sizes,
+    remember,
+    store,
+    write_readings,
+)
+from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, due, sonar_timing
+from uuv_marl.sim.model import Rules
 from uuv_marl.sim.tables import allocate
-from uuv_marl.sim.views import Fields, DisturbanceFields
+from uuv_marl.sim.views import DisturbanceFields, Fields
 from uuv_marl.sim.workspace import Columns
 from uuv_marl.types import UInt64
 
@@ -88,7 +115,9 @@ def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]
     )
 
 
-def sample_disturbances(w: int, scenario: Scenario, world_map: WorldMap, duration_s: float, disturbances: Disturbances) -> None:
+def sample_disturbances(
+    w: int, scenario: Scenario, world_map: WorldMap, duration_s: float, disturbances: Disturbances
+) -> None:
     """The sea of world w's new episode, from its key alone."""
     key = np.uint64(disturbances.keys[w])
     corners = [points[: last + 1] for points, last in zip(world_map.waypoints[w], world_map.last[w], strict=True)]
@@ -101,7 +130,18 @@ def sample_disturbances(w: int, scenario: Scenario, world_map: WorldMap, duratio
 
 def disturbance_tables(disturbances: Disturbances | None) -> tuple[Any, ...]:
     """All that changes, for snapshots."""
-    return () if disturbances is None else (disturbances.flow, disturbances.hull, disturbances.readings, disturbances.sensor_errors, disturbances.navigation_errors, disturbances.messages)
+    return (
+        ()
+        if disturbances is None
+        else (
+            disturbances.flow,
+            disturbances.hull,
+            disturbances.readings,
+            disturbances.sensor_errors,
+            disturbances.navigation_errors,
+            disturbances.messages,
+        )
+    )
 
 
 @compiled_inner
@@ -118,7 +158,15 @@ def advance_disturbances(w: int, world: World, disturbances: Disturbances) -> No
     read_flow(w, world.state, disturbances.water, disturbances.flow)
     drift_position(w, world.state, disturbances.navigation, disturbances.navigation_errors)
     remember(w, world.state, disturbances.readings)
-    exchange(w, disturbances.keys[w], world, disturbances.modem, disturbances.messages, disturbances.flow, disturbances.navigation_errors)
+    exchange(
+        w,
+        disturbances.keys[w],
+        world,
+        disturbances.modem,
+        disturbances.messages,
+        disturbances.flow,
+        disturbances.navigation_errors,
+    )
 
 
 @compiled_inner
@@ -128,7 +176,15 @@ def begin_disturbances(w: int, world: World, disturbances: Disturbances) -> None
     reset_position_error(w, disturbances.navigation_errors)
     schedule_outages(w, disturbances.keys[w], disturbances.noise, disturbances.sensor_errors)
     begin_line(w, world.state, disturbances.readings)
-    exchange(w, disturbances.keys[w], world, disturbances.modem, disturbances.messages, disturbances.flow, disturbances.navigation_errors)
+    exchange(
+        w,
+        disturbances.keys[w],
+        world,
+        disturbances.modem,
+        disturbances.messages,
+        disturbances.flow,
+        disturbances.navigation_errors,
+    )
 
 
 @compiled_inner
@@ -145,17 +201,39 @@ def take_readings(w: int, world: World, disturbances: Disturbances, see: Fields)
         number = due(tick - disturbances.readings.began[w], line.every[a], line.delay, line.control_steps)
         if number >= 0:
             at = Reading(w, a, number, tick, number % disturbances.readings.detected_index.shape[1])
-            num = collect(at, world, see, line, disturbances.navigation_errors, disturbances.readings, disturbances.detections)
-            add_errors(at, num, disturbances.keys[w], line.active[a] == line.active[a + 1], disturbances.noise, disturbances.sensor_errors, disturbances.detections)
+            num = collect(
+                at, world, see, line, disturbances.navigation_errors, disturbances.readings, disturbances.detections
+            )
+            add_errors(
+                at,
+                num,
+                disturbances.keys[w],
+                line.active[a] == line.active[a + 1],
+                disturbances.noise,
+                disturbances.sensor_errors,
+                disturbances.detections,
+            )
             store(at, num, line, disturbances.detections, disturbances.readings)
-            apply_outages(at, disturbances.keys[w], line, disturbances.noise, disturbances.sensor_errors, disturbances.actuation, disturbances.hull, disturbances.detections, disturbances.readings)
+            apply_outages(
+                at,
+                disturbances.keys[w],
+                line,
+                disturbances.noise,
+                disturbances.sensor_errors,
+                disturbances.actuation,
+                disturbances.hull,
+                disturbances.detections,
+                disturbances.readings,
+            )
 
 
 @compiled_inner
 def apply_disturbances(w: int, world: World, disturbances: Disturbances, see: Fields, more: DisturbanceFields) -> None:
     """Percepts that hold what is true become what vehicles know. ``heard`` is written, too."""
     if not disturbances.sonar_timing.ideal:
-        write_readings(w, world, disturbances.sonar_timing, disturbances.navigation_errors, disturbances.readings, see, more)
+        write_readings(
+            w, world, disturbances.sonar_timing, disturbances.navigation_errors, disturbances.readings, see, more
+        )
     write_ranged(w, world.state.alive, disturbances.sonar_timing, disturbances.noise, more)
     write_velocities(w, world, disturbances.water, disturbances.flow, see, more)
     write_messages(w, world, disturbances.messages, disturbances.navigation_errors, more)

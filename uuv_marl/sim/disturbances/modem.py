@@ -15,11 +15,11 @@ from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.perception import saturate
-from uuv_marl.sim.random import uniform
 from uuv_marl.sim.disturbances.current import Flow, over_ground
 from uuv_marl.sim.disturbances.navigation import NavigationErrors, by_compass
 from uuv_marl.sim.disturbances.purposes import MESSAGE
+from uuv_marl.sim.perception import saturate
+from uuv_marl.sim.random import uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import DisturbanceFields
 from uuv_marl.types import Float64
@@ -43,7 +43,9 @@ class Messages(NamedTuple):
     """What was sent and what arrived; times are -1 before the first. The axis peer is empty without the channel."""
 
     sent: Annotated[Float64, "world peer 3", "Latest message: velocity over ground, north, east [m/s]; when sent [s]."]
-    received: Annotated[Float64, "world vehicle peer 3", "Latest message that arrived at a vehicle from each other one."]
+    received: Annotated[
+        Float64, "world vehicle peer 3", "Latest message that arrived at a vehicle from each other one."
+    ]
 
 
 def modem(scenario: Scenario) -> ModemModel:
@@ -64,7 +66,15 @@ def rounds(tick: int, slots: float, numbers: ModemModel) -> int:
 
 
 @compiled_inner
-def exchange(w: int, key: np.uint64, world: World, numbers: ModemModel, messages: Messages, flow: Flow, navigation_errors: NavigationErrors) -> None:
+def exchange(
+    w: int,
+    key: np.uint64,
+    world: World,
+    numbers: ModemModel,
+    messages: Messages,
+    flow: Flow,
+    navigation_errors: NavigationErrors,
+) -> None:
     """Send and receive what is due at the start of an episode, or the end of a control hold, its number counted."""
     state, n, tick = world.state, messages.sent.shape[1], world.state.tick[w]
     for j in range(n):
@@ -83,7 +93,9 @@ def exchange(w: int, key: np.uint64, world: World, numbers: ModemModel, messages
 
 
 @compiled_inner
-def write_messages(w: int, world: World, messages: Messages, navigation_errors: NavigationErrors, more: DisturbanceFields) -> None:
+def write_messages(
+    w: int, world: World, messages: Messages, navigation_errors: NavigationErrors, more: DisturbanceFields
+) -> None:
     """Write, for each sub-sector, what the vehicle heard in it last said."""
     heading, now_s = world.senses.heading, world.facts.time_s[w]
     for i in range(world.state.alive.shape[1]):
@@ -92,7 +104,11 @@ def write_messages(w: int, world: World, messages: Messages, navigation_errors: 
             j = world.senses.detected_index[w, i, k]
             if not world.state.alive[w, i] or j < 0 or messages.received[w, i, j, 2] < 0.0:
                 continue
-            v_x, v_y, sent_s = messages.received[w, i, j, 0], messages.received[w, i, j, 1], messages.received[w, i, j, 2]
+            v_x, v_y, sent_s = (
+                messages.received[w, i, j, 0],
+                messages.received[w, i, j, 1],
+                messages.received[w, i, j, 2],
+            )
             more.modem_identity[w, i, k] = j + 1
             more.modem_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
             more.modem_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)

@@ -13,9 +13,9 @@ from uuv_marl.percept import MAX_SPEED
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.disturbances.purposes import COMPASS, DRIFT
 from uuv_marl.sim.perception import saturate, toward
 from uuv_marl.sim.random import normal, uniform
-from uuv_marl.sim.disturbances.purposes import COMPASS, DRIFT
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import Fields
@@ -46,7 +46,9 @@ def navigation(scenario: Scenario) -> NavigationModel:
     return NavigationModel(own.drift_share, math.radians(own.compass_bias_deg))
 
 
-def sample_navigation_errors(w: int, key: np.uint64, navigation: NavigationModel, navigation_errors: NavigationErrors) -> None:
+def sample_navigation_errors(
+    w: int, key: np.uint64, navigation: NavigationModel, navigation_errors: NavigationErrors
+) -> None:
     """Directions and errors of world w's new episode, from its key."""
     for i in range(navigation_errors.position_error.shape[1]):
         navigation_errors.drift_direction[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
@@ -82,7 +84,9 @@ def by_compass(w: int, i: int, north: float, east: float, navigation_errors: Nav
 
 
 @compiled_inner
-def navigate(w: int, world: World, navigation: NavigationModel, navigation_errors: NavigationErrors, see: Fields) -> None:
+def navigate(
+    w: int, world: World, navigation: NavigationModel, navigation_errors: NavigationErrors, see: Fields
+) -> None:
     """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them."""
     if navigation.drift_share == 0.0 and navigation.compass_bias == 0.0:
         return

@@ -10,12 +10,21 @@ import numpy as np
 
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
-from uuv_marl.sim.exponential import exp
-from uuv_marl.sim.random import log, normal, normals, uniform, uniforms
 from uuv_marl.sim.disturbances.actuation import ARRAY, Actuation, Hull, acts
 from uuv_marl.sim.disturbances.purposes import BEARING_RANGE, DETECTION, FACTOR, FALSE_ECHO, FALSE_PLACE, SILENCE
-from uuv_marl.sim.disturbances.readings import NO_DETECTION, OBSTACLE, FALSE_DETECTION, PLACE, SHIFT, Detections, Readings, clear_array
-from uuv_marl.sim.disturbances.schedule import SonarTiming, Reading
+from uuv_marl.sim.disturbances.readings import (
+    FALSE_DETECTION,
+    NO_DETECTION,
+    OBSTACLE,
+    PLACE,
+    SHIFT,
+    Detections,
+    Readings,
+    clear_array,
+)
+from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming
+from uuv_marl.sim.exponential import exp
+from uuv_marl.sim.random import log, normal, normals, uniform, uniforms
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.trigonometry import cos_sin
@@ -117,7 +126,15 @@ def gap(chance: float, probability: float) -> int:
 
 
 @compiled_inner
-def add_errors(at: Reading, num: int, key: np.uint64, passive: bool, noise: NoiseModel, sensor_errors: SensorErrors, detections: Detections) -> None:
+def add_errors(
+    at: Reading,
+    num: int,
+    key: np.uint64,
+    passive: bool,
+    noise: NoiseModel,
+    sensor_errors: SensorErrors,
+    detections: Detections,
+) -> None:
     """What an array of every vehicle misses, and puts elsewhere. ``hits`` are true before, and have errors after."""
     if noise.half_range[at.a] > 0.0:
         drop_missed(at, num, key, noise, detections)
@@ -157,7 +174,15 @@ def sample_perturbations(at: Reading, num: int, key: np.uint64, noise: NoiseMode
 
 
 @compiled_inner
-def perturb(at: Reading, num: int, measured: bool, passive: bool, noise: NoiseModel, sensor_errors: SensorErrors, detections: Detections) -> None:
+def perturb(
+    at: Reading,
+    num: int,
+    measured: bool,
+    passive: bool,
+    noise: NoiseModel,
+    sensor_errors: SensorErrors,
+    detections: Detections,
+) -> None:
     """Put hits at a wrong bearing and range; an echo's position moves as far as its range does.
 
     ``measured``: whether the array measures ranges. The hits have draws of ``draw_blur``.
@@ -174,7 +199,11 @@ def perturb(at: Reading, num: int, measured: bool, passive: bool, noise: NoiseMo
         x, y, c, s = detections.x[w, q], detections.y[w, q], detections.first[w, q], detections.second[w, q]
         far = math.sqrt(x * x + y * y)
         share = max(far + (measured_range - away), 0.0) / far if far > 0.0 else 1.0
-        detections.x[w, q], detections.y[w, q], detections.reach[w, q] = share * (c * x - s * y), share * (s * x + c * y), measured_range
+        detections.x[w, q], detections.y[w, q], detections.reach[w, q] = (
+            share * (c * x - s * y),
+            share * (s * x + c * y),
+            measured_range,
+        )
 
 
 @compiled_inner
@@ -198,7 +227,12 @@ def apply_outages(
 
 @compiled_inner
 def add_false_echoes(
-    at: Reading, key: np.uint64, sonar_timing: SonarTiming, noise: NoiseModel, detections: Detections, readings: Readings
+    at: Reading,
+    key: np.uint64,
+    sonar_timing: SonarTiming,
+    noise: NoiseModel,
+    detections: Detections,
+    readings: Readings,
 ) -> None:
     """Echoes of nothing, anywhere in a sub-sector within the array's range, unless something nearer is heard there.
 
@@ -208,7 +242,9 @@ def add_false_echoes(
     first, end = sonar_timing.first[a], sonar_timing.first[a + 1]
     passive = sonar_timing.active[a] == sonar_timing.active[a + 1]
     # Where an active array's echoes lie, beyond its own sub-sectors.
-    beyond = 0 if passive else readings.detected_index.shape[3] - sonar_timing.active[-1] + sonar_timing.active[a] - first
+    beyond = (
+        0 if passive else readings.detected_index.shape[3] - sonar_timing.active[-1] + sonar_timing.active[a] - first
+    )
     for i in range(readings.detected_index.shape[2]):
         detections.code[w, i] = first + gap(uniform(key, FALSE_ECHO, at.tick, i, first), noise.false_echo)
     for i in range(readings.detected_index.shape[2]):
@@ -217,7 +253,10 @@ def add_false_echoes(
             far, side = uniforms(key, FALSE_PLACE, at.tick, i, k)
             away = noise.range[a] * far if noise.passive_ranges or not passive else noise.nominal_range
             place = k + beyond
-            if readings.detected_index[w, slot, i, place] == NO_DETECTION or np.float32(away) < readings.reach[w, slot, i, place]:
+            if (
+                readings.detected_index[w, slot, i, place] == NO_DETECTION
+                or np.float32(away) < readings.reach[w, slot, i, place]
+            ):
                 c, s = cos_sin(noise.width[a] * (1.0 - side))
                 readings.detected_index[w, slot, i, place] = FALSE_DETECTION if passive else OBSTACLE
                 readings.reach[w, slot, i, place] = away

@@ -17,11 +17,11 @@ import numpy as np
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.disturbances.navigation import NavigationErrors
-from uuv_marl.sim.disturbances.schedule import SonarTiming, Reading, due, control_step_of, latest, sonar_timing
+from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, control_step_of, due, latest, sonar_timing
+from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.tables import Bounds, described
-from uuv_marl.sim.views import Fields, DisturbanceFields
+from uuv_marl.sim.views import DisturbanceFields, Fields
 from uuv_marl.types import Float32, Float64, Int32, Int64
 
 Move = tuple[float, float, float, float]
@@ -89,7 +89,10 @@ def any_due(w: int, tick: int, sonar_timing: SonarTiming, readings: Readings) ->
     """Whether an array of world w takes a reading at this control hold."""
     is_due = False
     for a in range(0 if sonar_timing.ideal else sonar_timing.every.shape[0]):
-        is_due = is_due or due(tick - readings.began[w], sonar_timing.every[a], sonar_timing.delay, sonar_timing.control_steps) >= 0
+        is_due = (
+            is_due
+            or due(tick - readings.began[w], sonar_timing.every[a], sonar_timing.delay, sonar_timing.control_steps) >= 0
+        )
     return is_due
 
 
@@ -127,14 +130,25 @@ def was_at(w: int, j: int, tick: int, ago: float, readings: Readings) -> tuple[f
 
 @compiled_inner
 def collect(
-    at: Reading, world: World, see: Fields, sonar_timing: SonarTiming, navigation_errors: NavigationErrors, readings: Readings, detections: Detections
+    at: Reading,
+    world: World,
+    see: Fields,
+    sonar_timing: SonarTiming,
+    navigation_errors: NavigationErrors,
+    readings: Readings,
+    detections: Detections,
 ) -> int:
     """All that an array of every living vehicle hears now, into ``hits``; how many they are.
 
     Poses at reception are written into ``readings``.
     """
     w, a, num = at.w, at.a, 0
-    eta, heading, detected_index, sectors = world.state.eta, world.senses.heading, world.senses.detected_index, see.detected.shape[2]
+    eta, heading, detected_index, sectors = (
+        world.state.eta,
+        world.senses.heading,
+        world.senses.detected_index,
+        see.detected.shape[2],
+    )
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:
             continue
@@ -158,7 +172,10 @@ def collect(
         for e in range(sonar_timing.active[a], sonar_timing.active[a + 1]):
             if see.echo[w, i, e] > 0.0:
                 detections.code[w, num], detections.detected_index[w, num] = (i << SHIFT) + sectors + e, OBSTACLE
-                detections.x[w, num], detections.y[w, num] = see.echo_position[w, i, e, 0], see.echo_position[w, i, e, 1]
+                detections.x[w, num], detections.y[w, num] = (
+                    see.echo_position[w, i, e, 0],
+                    see.echo_position[w, i, e, 1],
+                )
                 detections.reach[w, num] = see.echo_range[w, i, e]
                 num += 1
     return num
@@ -173,8 +190,14 @@ def store(at: Reading, num: int, sonar_timing: SonarTiming, detections: Detectio
     for q in range(num):
         if detections.reach[w, q] >= 0.0:
             i, k = detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
-            readings.detected_index[w, slot, i, k], readings.reach[w, slot, i, k] = detections.detected_index[w, q], detections.reach[w, q]
-            readings.position[w, slot, i, k, 0], readings.position[w, slot, i, k, 1] = detections.x[w, q], detections.y[w, q]
+            readings.detected_index[w, slot, i, k], readings.reach[w, slot, i, k] = (
+                detections.detected_index[w, q],
+                detections.reach[w, q],
+            )
+            readings.position[w, slot, i, k, 0], readings.position[w, slot, i, k, 1] = (
+                detections.x[w, q],
+                detections.y[w, q],
+            )
 
 
 @compiled_inner
@@ -192,13 +215,21 @@ def clear_array(at: Reading, i: int, sonar_timing: SonarTiming, readings: Readin
 
 @compiled_inner
 def write_readings(
-    w: int, world: World, sonar_timing: SonarTiming, navigation_errors: NavigationErrors, readings: Readings, see: Fields, more: DisturbanceFields
+    w: int,
+    world: World,
+    sonar_timing: SonarTiming,
+    navigation_errors: NavigationErrors,
+    readings: Readings,
+    see: Fields,
+    more: DisturbanceFields,
 ) -> None:
     """Write into the percepts of world w, and into ``heard``, what the readings that stand now say."""
     tick, since = world.state.tick[w], world.state.tick[w] - readings.began[w]
     for a in range(sonar_timing.every.shape[0]):
         number = latest(since - sonar_timing.delay, sonar_timing.every[a])
-        taken = readings.began[w] + control_step_of(max(number, 0), sonar_timing.every[a])  # before the first: since they began
+        taken = readings.began[w] + control_step_of(
+            max(number, 0), sonar_timing.every[a]
+        )  # before the first: since they began
         at = Reading(w, a, number, taken, number % readings.detected_index.shape[1])
         carries = sonar_timing.compensated and number >= 0 and taken != tick
         for i in range(world.state.alive.shape[1]):
@@ -236,7 +267,9 @@ def write_vehicle_readings(
 
 
 @compiled_inner
-def write_echo_readings(at: Reading, i: int, move: Move, sonar_timing: SonarTiming, readings: Readings, see: Fields) -> None:
+def write_echo_readings(
+    at: Reading, i: int, move: Move, sonar_timing: SonarTiming, readings: Readings, see: Fields
+) -> None:
     """The echoes that vehicle i heard in a reading, into its percept. A number of the reading below 0 is silence."""
     w, slot = at.w, at.slot
     for e in range(sonar_timing.active[at.a], sonar_timing.active[at.a + 1]):
@@ -259,7 +292,10 @@ def own_move(at: Reading, i: int, world: World, navigation_errors: NavigationErr
     x, y = pose[at.w, at.slot, i, at.a, 0], pose[at.w, at.slot, i, at.a, 1]
     c_then, s_then = pose[at.w, at.slot, i, at.a, 2], pose[at.w, at.slot, i, at.a, 3]
     c, s = heading[at.w, i, 0], heading[at.w, i, 1]
-    dx, dy = eta[at.w, i, 0] + navigation_errors.position_error[at.w, i, 0] - x, eta[at.w, i, 1] + navigation_errors.position_error[at.w, i, 1] - y
+    dx, dy = (
+        eta[at.w, i, 0] + navigation_errors.position_error[at.w, i, 0] - x,
+        eta[at.w, i, 1] + navigation_errors.position_error[at.w, i, 1] - y,
+    )
     return c_then * c + s_then * s, s * c_then - c * s_then, c * dx + s * dy, c * dy - s * dx
 
 

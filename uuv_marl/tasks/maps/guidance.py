@@ -3,7 +3,7 @@
 import math
 
 from uuv_marl.percept import LENGTH, POSITION, PerceptField
-from uuv_marl.sim.arrays import WorldMap, State
+from uuv_marl.sim.arrays import State, WorldMap
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid
 from uuv_marl.types import Float64

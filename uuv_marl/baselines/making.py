@@ -1,0 +1,171 @@
+"""``make``: a policy with its parameters, its base controller and its safety filter, for a scenario or environment."""
+
+import inspect
+import math
+from collections.abc import Sequence
+from typing import Any, overload
+
+from uuv_marl.baselines.env_policy import EnvPolicy, HasSwarm, environment
+from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
+from uuv_marl.baselines.learned.residual import ResidualPolicy
+from uuv_marl.baselines.learned.trained import Trained
+from uuv_marl.baselines.names import parse_name
+from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.registry import POLICIES, PolicyType, is_trained, policy_class
+from uuv_marl.baselines.requirements import inner_loop_nms, resolved_channels
+from uuv_marl.baselines.safety.barrier import GUARD, Barrier
+from uuv_marl.baselines.safety.guarded import Guarded
+from uuv_marl.errors import ScenarioError, hint
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.overrides import plain
+
+
+def uses_identity(name: str) -> bool:
+    """Whether the policy of that name acts by a vehicle's index, which no vehicle perceives."""
+    policy_type = policy_class(name)
+    if isinstance(policy_type, Trained):
+        base = policy_type.checkpoint.card.base_controller
+        return bool(base) and uses_identity(base)
+    identity = policy_type.identity
+    return bool(_value(parse_name(name).parameters.get(identity, "false"))) if isinstance(identity, str) else identity
+
+
+def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
+    """The scenario with exactly the channels, the yaw damping and the decision period that a policy requires.
+
+    Where the scenario fixes damping and period for all policies (``timing.fixed``), only with the channels, unless the
+    name has ``own_clock=true``. If the scenario has ``modem``, a policy that requires ``link`` gets ``modem`` instead,
+    with two exceptions: one that requires both, and a trained policy, which knows only the channels of its training.
+    """
+    return with_requirements(name, policy_class(name), scenario)
+
+
+def with_requirements(name: str, required: Any, scenario: Scenario) -> Scenario:
+    """``with_policy_requirements`` for a policy of that name, by its requirements (``PolicyRequirements``)."""
+    timing, channels = scenario.timing, required.channels
+    changes: dict[str, object] = {
+        "sonar.channels": list(channels) if is_trained(name) else resolved_channels(scenario, channels)
+    }
+    if parse_name(name).own_clock or not timing.fixed:
+        usual = timing.control_step_s if timing.fixed else timing.decision_period_s
+        loop = inner_loop_nms(required.yaw_damping_nms, required.full_torque_nm, scenario)
+        changes["actuators.yaw_damping_nms"] = loop
+        changes["timing.decision_period_s"] = required.decision_period_s or usual
+        changes["timing.fixed"] = False
+    try:
+        return load_scenario(scenario, overrides=changes)
+    except ScenarioError as error:
+        raise ScenarioError(f"{name} can't run on scenario {scenario.name!r} with what it requires: {error}") from None
+
+
+@overload
+def make(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
+@overload
+def make(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
+def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object) -> Policy | EnvPolicy:
+    """A policy by name.
+
+    Args:
+        name: one of ``POLICIES``, the path of a checkpoint (``runs/starter/best``), or ``module:Class``; parameters and
+            gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``; ``safety_filter=true``
+            puts the policy inside the safety filter.
+        target: a scenario, for a policy that maps ``Percept`` to actions (``Policy``); or one of our environments,
+            wrapped or not, for a policy that maps its observations to its actions (``EnvPolicy``).
+        num_worlds: worlds stepped together; an environment has its own number.
+        parameters: keyword arguments of the policy, such as ``gains``, or single gains by name.
+
+    Raises:
+        PolicyError: the name or a parameter is unknown, or the target lacks what the policy requires
+            (``with_policy_requirements``).
+    """
+    if isinstance(target, Scenario):
+        return _with_filter(name, target, num_worlds, parameters)
+    scenario, swarm, agents = environment(target, name)
+    return EnvPolicy(_with_filter(name, scenario, swarm.num_worlds, parameters), swarm, agents)
+
+
+def _with_filter(name: str, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
+    """The policy with these parameters, inside the safety filter where its name says so."""
+    parsed, policy_type = parse_name(name), policy_class(name)
+    values = {**parsed.parameters, **parameters}
+    barrier = values.pop("barrier", GUARD) if parsed.safety_filter else GUARD
+    if not isinstance(barrier, Barrier):
+        raise PolicyError(
+            f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
+            "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
+        )
+    policy = _without_filter(name, policy_type, scenario, num_worlds, values)
+    return Guarded(scenario, num_worlds, inner=policy, barrier=barrier) if parsed.safety_filter else policy
+
+
+def _without_filter(
+    name: str, policy_type: PolicyType, scenario: Scenario, num_worlds: int, parameters: dict[str, object]
+) -> Policy:
+    """The policy with these parameters: keyword arguments of its type, and single gains."""
+    constructor: Any = policy_type
+    known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
+    if isinstance(parameters.get("gains"), str):
+        raise PolicyError(f"policy {name!r}: gains are written one by one, such as bio_inspired,zeta_n=0.5")
+    values = {key: _value(value) for key, value in parameters.items()}
+    policy: Policy = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
+    if isinstance(policy_type, Trained):
+        policy = compose(policy, policy_type.checkpoint.card)
+    policy.name = name
+    if values:
+        gains: Any = getattr(policy, "gains", None)
+        changed = {key: _gain(name, key, value, gains, known) for key, value in values.items()}
+        policy.gains = gains._replace(**changed)  # pyright: ignore[reportAttributeAccessIssue] - it has gains
+    return policy
+
+
+def check_base_controller(name: str) -> None:
+    """Raise PolicyError unless the name is a shipped controller's: a checkpoint runs what it names."""
+    plain = name.partition(",")[0]
+    if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
+        controllers = ", ".join(known for known, kind in POLICIES.items() if not isinstance(kind, Trained))
+        raise PolicyError(f"base_controller must be one of {controllers}, got {name!r}")
+
+
+def compose(network: Policy, card: Card) -> Policy:
+    """A network with its card's base controller, to whose actions its own are added, and safety filter.
+
+    Args:
+        network: the network's policy, or what takes its place in training.
+        card: of the training.
+
+    Raises:
+        PolicyError: there is no such controller, or the scenario lacks its requirements.
+    """
+    scenario, num_worlds = network.scenario, network.num_worlds
+    if card.base_controller:
+        check_base_controller(card.base_controller)
+        network = ResidualPolicy(
+            scenario, num_worlds, base=make(card.base_controller, scenario, num_worlds), inner=network
+        )
+    return Guarded(scenario, num_worlds, inner=network) if card.filter else network
+
+
+def _gain(name: str, key: str, value: object, gains: Any, known: Sequence[str]) -> object:
+    """A gain's value. Raises PolicyError unless the policy has that gain and the value is a finite number."""
+    fields: tuple[str, ...] = getattr(gains, "_fields", ())
+    if key not in fields:
+        names = [*known, *fields]
+        raise PolicyError(
+            f"policy {name!r} has no parameter {key!r}; {hint(key, names, 0.6)}It has {', '.join(names) or 'none'}"
+        )
+    value = plain(value)
+    if not (isinstance(value, float | int) and math.isfinite(value)):
+        raise PolicyError(f"policy {name!r}: the gain {key} must be a finite number, got {value!r}")
+    return value
+
+
+def _value(written: object) -> object:
+    """What a text stands for: a number, true or false, or itself. Other values stay as they are."""
+    if not isinstance(written, str):
+        return written
+    if written in ("true", "false"):
+        return written == "true"
+    try:
+        return float(written)
+    except ValueError:
+        return written

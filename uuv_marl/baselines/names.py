@@ -1,0 +1,45 @@
+"""What the name of a policy says: ``NAME[,key=value ...]``."""
+
+from typing import NamedTuple
+
+from uuv_marl.errors import PolicyError
+from uuv_marl.paths import user_path
+
+SAFETY_FILTER, OWN_CLOCK = "safety_filter", "own_clock"
+"""Options that every policy takes, each ``true`` or ``false``."""
+
+
+class PolicyName(NamedTuple):
+    """The parts of a policy's name."""
+
+    plain: str
+    """One of ``POLICIES``, the path of a checkpoint, or ``module:Class``."""
+    parameters: dict[str, str]
+    """Values by parameter or gain, as the user wrote them."""
+    safety_filter: bool
+    """Whether the policy acts inside the safety filter."""
+    own_clock: bool
+    """Whether it runs with the decision period and the yaw damping that it requires where the scenario fixes others
+    for all (``timing.fixed``); one that requires no period decides at every control step."""
+
+
+def parse_name(name: str) -> PolicyName:
+    """The parts of a name such as ``bio_inspired,zeta_n=0.5,safety_filter=true``.
+
+    Raises:
+        PolicyError: a part is not ``key=value``, or an option is neither true nor false.
+    """
+    plain, *pairs = [name] if user_path(name).exists() else name.split(",")
+    if (wrong := next((pair for pair in pairs if not all(pair.partition("="))), None)) is not None:
+        raise PolicyError(f"policy {name!r}: {wrong!r} must be key=value, such as bio_inspired,zeta_n=0.5")
+    values = {key.strip(): value.strip() for key, _, value in (pair.partition("=") for pair in pairs)}
+    options = {key: values.pop(key, "false") for key in (SAFETY_FILTER, OWN_CLOCK)}
+    for key, value in options.items():
+        if value not in ("true", "false"):
+            raise PolicyError(f"policy {name!r}: {key} must be true or false, got {value!r}")
+    return PolicyName(plain, values, *(value == "true" for value in options.values()))
+
+
+def with_option(name: str, option: str) -> str:
+    """A policy's name with an option switched on."""
+    return f"{name},{option}=true"
