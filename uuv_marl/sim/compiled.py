@@ -233,6 +233,16 @@ def compiled_inner(function: F) -> F:
     return cast(F, dispatcher)
 
 
+def from_source(name: str, parameters: str, value: str, scope: dict[str, Any]) -> Callable[..., Any]:
+    """A function that returns the value of an expression, to be compiled; ``scope`` holds its module's globals.
+
+    For expressions made from a declaration, since Numba can't loop over the fields of a NamedTuple.
+    """
+    source, made = f"def {name}({parameters}):\n    return {value}\n", dict[str, Any]()
+    exec(compile(source, scope["__file__"], "exec"), scope, made)  # noqa: S102 - the source is the package's own
+    return made[name]
+
+
 def entry(function: F, *arguments: object) -> F:
     """A ``compiled`` function for arguments of these very types, whose types are not looked up at every call.
 

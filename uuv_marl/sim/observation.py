@@ -9,10 +9,10 @@ from uuv_marl.percept import (
     DIRECTION,
     SPEED,
     YAW_RATE,
-    Kind,
     Percept,
     PerceptField,
     PerceptLayout,
+    Quantity,
     Starts,
     percept_table,
 )
@@ -23,9 +23,9 @@ from uuv_marl.types import Float32
 
 Observe = Literal["positions", "closeness"]
 
-CLOSENESS = Kind("1", 1.0, 0.0, 2.0)
-_SIGNED = Kind("1", 1.0, -2.0, 2.0)
-_NEAR = Kind("1", 1.0, 0.0, 4.0)
+CLOSENESS = Quantity("1", 1.0, 0.0, 2.0)
+_SIGNED = Quantity("1", 1.0, -2.0, 2.0)
+_NEAR = Quantity("1", 1.0, 0.0, 4.0)
 _BASE = len(percept_table(0, 0, ()))
 """Rows that every percept has; ``closeness`` stands for these."""
 _BEFORE = 9

@@ -2,7 +2,7 @@
 
 import math
 
-from uuv_marl.percept import MAX_SPEED
+from uuv_marl.percept import MAX_SPEED, Fields
 from uuv_marl.scenario import MAX_RANGE_M
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
@@ -10,7 +10,6 @@ from uuv_marl.sim.detection import Pose
 from uuv_marl.sim.model import Model
 from uuv_marl.sim.nearby import choose
 from uuv_marl.sim.sonar import SonarSuite, cross
-from uuv_marl.sim.views import Fields
 from uuv_marl.sim.workspace import MOST_NEARBY, ObstacleBuffers, Workspace, obstacle_columns
 
 

@@ -317,7 +317,7 @@ class Swarm:
             return
         rows, percept, observing = self.task.observe(worlds), self.percept, worlds[:, None] & self.state.alive
         for field in self.task_fields:
-            percept[field.name][observing] = np.clip(rows[field.name][observing], field.kind.low, field.kind.high)
+            percept[field.name][observing] = np.clip(rows[field.name][observing], field.quantity.low, field.quantity.high)
 
 
 def _sizes(scenario: Scenario, worlds: int, entries: int) -> dict[str, int]:

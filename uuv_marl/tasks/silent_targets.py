@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import DIRECTION, PerceptField, Table
+from uuv_marl.percept import DIRECTION, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Positive, Section, within
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -130,12 +130,12 @@ class SilentTargets(Reach):
 
     Numbers = SilentTargetsNumbers
     Memory: ClassVar[type[Any] | None] = SilentTargetsMemory
-    observed: ClassVar[Table] = (
+    observed: ClassVar[FieldTable] = (
         PerceptField(
             "box", (2,), DIRECTION, "cosine and sine of the heading by compass from the first axis of the targets' box"
         ),
     )
-    channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
     terms: ClassVar[Mapping[str, str]] = {
         **{name: meaning for name, meaning in Reach.terms.items() if name != "arrival"},
         "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no vehicle "

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.errors import RewardError, ScenarioError
-from uuv_marl.percept import CHANNELS, Table, percept_table
+from uuv_marl.percept import CHANNELS, FieldTable, percept_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
 from uuv_marl.sim.episode_setup import EpisodeSetup, default_setup
@@ -74,9 +74,9 @@ class Task:
     Memory: ClassVar[type[Any] | None] = None
     """Table of what the task remembers (``uuv_marl.sim.tables``): a NamedTuple of arrays over world and vehicle. Zero
     is nothing: so a world begins. It is part of the swarm's snapshots."""
-    observed: ClassVar[Table] = ()
+    observed: ClassVar[FieldTable] = ()
     """Rows that the task adds to every percept and observation, see ``uuv_marl.percept.PerceptField``."""
-    channels: ClassVar[Mapping[str, Table]] = {}
+    channels: ClassVar[Mapping[str, FieldTable]] = {}
     """Rows that it adds where ``sonar.channels`` grants them, by the channel's name: what no vehicle could measure."""
     rewards: ClassVar[tuple[str, ...]] = ("dense",)
     """Names of the rewards that the task knows; the first is the default."""

@@ -124,7 +124,7 @@ class Checkpoint(NamedTuple):
 def card_rows(scenario: Scenario) -> tuple[Row, ...]:
     """What a network is given in a scenario, as a card keeps it."""
     table = observation_layout(scenario, "closeness").table
-    return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in table)
+    return tuple((field.name, field.size, field.quantity.unit, field.quantity.scale) for field in table)
 
 
 def card_of(scenario: Scenario, **more: Any) -> Card:

@@ -70,7 +70,7 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
 def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
     """The model with its documentation; its metadata hold the vehicle's limits, and card and digest of the weights."""
     layout, checkpoint = observation_layout(policy.scenario, "closeness"), policy.checkpoint
-    units = [f"{row.kind.scale:g} {row.kind.unit}".removesuffix(" 1") for row in layout.table]
+    units = [f"{row.quantity.scale:g} {row.quantity.unit}".removesuffix(" 1") for row in layout.table]
     fields = ", ".join(f"{row.name} {row.size} [{unit}]" for row, unit in zip(layout.table, units, strict=True))
     sees = f"As closeness, body frame; name, size and unit of each part: {fields}."
     acts = "Surge force and yaw torque [full force, full torque], within the unit disc."

@@ -4,8 +4,8 @@ import math
 
 from uuv_marl.baselines.memory.pose import to_map
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Fields
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields
 
 GATE_M, GATE_SHARE = 2.0, 0.1
 """A reading this near to where a neighbour is expected is taken for it: so many metres, and a share of its range.

@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.percept import MAX_SPEED
+from uuv_marl.percept import MAX_SPEED, DisturbanceFields, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.disturbance_sections import AROUND_M
 from uuv_marl.sim.arrays import State, World
@@ -22,7 +22,6 @@ from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.random import normals, uniform, uniforms
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import DisturbanceFields, Fields
 from uuv_marl.types import Float64
 
 _PEAK = 0.638172686

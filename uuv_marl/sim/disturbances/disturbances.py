@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from uuv_marl.percept import DisturbanceFields, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.conditions import vehicle_disturbances
 from uuv_marl.sim.arrays import State, World, WorldMap
@@ -56,7 +57,6 @@ from uuv_marl.sim.disturbances.readings import (
 from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, due, sonar_timing
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.tables import allocate
-from uuv_marl.sim.views import DisturbanceFields, Fields
 from uuv_marl.sim.workspace import Columns
 from uuv_marl.types import UInt64
 

@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import MAX_SPEED
+from uuv_marl.percept import MAX_SPEED, DisturbanceFields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
@@ -21,7 +21,6 @@ from uuv_marl.sim.disturbances.purposes import MESSAGE
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.random import uniform
 from uuv_marl.sim.tables import described
-from uuv_marl.sim.views import DisturbanceFields
 from uuv_marl.types import Float64
 
 _MAX_AGE_S = 4096.0

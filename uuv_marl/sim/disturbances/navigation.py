@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import MAX_SPEED
+from uuv_marl.percept import MAX_SPEED, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
@@ -18,7 +18,6 @@ from uuv_marl.sim.perception import saturate, toward
 from uuv_marl.sim.random import normal, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float64
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from uuv_marl.percept import DisturbanceFields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.disturbances.actuation import ARRAY, Actuation, Hull, acts
@@ -28,7 +29,6 @@ from uuv_marl.sim.random import log, normal, normals, uniform, uniforms
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import DisturbanceFields
 from uuv_marl.types import Bool, Float64, Int64
 
 _NEVER = 2**40

@@ -14,6 +14,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from uuv_marl.percept import DisturbanceFields, Fields
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
@@ -21,7 +22,6 @@ from uuv_marl.sim.disturbances.navigation import NavigationErrors
 from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, control_step_of, due, latest, sonar_timing
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.tables import Bounds, described
-from uuv_marl.sim.views import DisturbanceFields, Fields
 from uuv_marl.types import Float32, Float64, Int32, Int64
 
 Move = tuple[float, float, float, float]
