@@ -212,7 +212,7 @@ def test_without_a_home_folder_there_is_no_cache_and_a_word(cache, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("pwd.getpwuid", lambda uid: {}[uid])
     assert cache() is None
-    assert "every start compiles anew" in caplog.text
+    assert "every start compiles again" in caplog.text
     assert list(tmp_path.iterdir()) == []
 
 
