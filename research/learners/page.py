@@ -1,4 +1,4 @@
-"""``learners.md``: who learns what, written from curves and episodes alone."""
+"""``learners.md``: the comparison of learning algorithms, written from curves and episodes alone."""
 
 import json
 from collections import Counter
@@ -56,7 +56,10 @@ def complete(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], lis
 def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     """The page's text, on ``complete`` passes."""
     curves, rows = complete(curves, rows)
-    rows_by_competitor, num_trainings = grouped_rows(rows), len({(row["task"], row["learner"], row["training"]) for row in curves})
+    rows_by_competitor, num_trainings = (
+        grouped_rows(rows),
+        len({(row["task"], row["learner"], row["training"]) for row in curves}),
+    )
     wanted = len(TASKS) * len(LEARNERS) * TRAININGS
     return Template(read_text("learners", "story.md")).substitute(
         first=_first(rows_by_competitor), tiers=_tiers(rows_by_competitor), safety=_safety(rows_by_competitor), pairs=_pairs(rows_by_competitor), apart=_apart(rows_by_competitor),
@@ -76,7 +79,10 @@ def grouped_rows(rows: Iterable[Row]) -> Found:
 
 def scores(rows_by_competitor: Found) -> dict[str, Float64]:
     """The headline of each learner's trainings on unseen seeds, shape (training, task)."""
-    return {competitor: np.concatenate([_values(rows_by_competitor, task, competitor) for task in TASKS], axis=1) for competitor in LEARNERS}
+    return {
+        competitor: np.concatenate([_values(rows_by_competitor, task, competitor) for task in TASKS], axis=1)
+        for competitor in LEARNERS
+    }
 
 
 def ranked(rows_by_competitor: Found) -> dict[str, Float64]:
@@ -85,17 +91,27 @@ def ranked(rows_by_competitor: Found) -> dict[str, Float64]:
 
 
 def against_controller(rows_by_competitor: Found) -> dict[str, Float64]:
-    """The headline over the best law's, both above what ``random`` has."""
+    """The headline over the best controller's, both above that of ``random``."""
     controller, least = (
-        np.array([_values(rows_by_competitor, task, competitor).mean() for task, competitor in zip(TASKS, names, strict=True)], np.float64)
+        np.array(
+            [
+                _values(rows_by_competitor, task, competitor).mean()
+                for task, competitor in zip(TASKS, names, strict=True)
+            ],
+            np.float64,
+        )
         for names in ([task.policies[0] for task in TASKS.values()], ["random"] * len(TASKS))
     )
-    return {competitor: (every - least) / (controller - least) for competitor, every in scores(rows_by_competitor).items()}
+    return {
+        competitor: (every - least) / (controller - least) for competitor, every in scores(rows_by_competitor).items()
+    }
 
 
 def _values(rows_by_competitor: Found, task: str, competitor: str, name: str = "share", each: str = "") -> Float64:
     """A measure of each training, mean over the episodes of a set, shape (training, 1); on unseen seeds if none."""
-    return np.array([[_mean(sets[each or task], name)] for sets in rows_by_competitor[task, competitor].values()], np.float64)
+    return np.array(
+        [[_mean(sets[each or task], name)] for sets in rows_by_competitor[task, competitor].values()], np.float64
+    )
 
 
 def _mean(rows: Sequence[Row], name: str) -> float:
@@ -115,14 +131,21 @@ def _over_episodes(rows: Sequence[Row]) -> Estimate:
 
 
 def _first(rows_by_competitor: Found) -> str:
-    """Headline and whole swarms on unseen seeds, a column for each task, then all tasks."""
+    """Headline and swarm success on unseen seeds, a column for each task, then all tasks."""
     every, table = against_controller(rows_by_competitor), list[tuple[str, ...]]()
     for competitor, own in scores(rows_by_competitor).items():
         whole = [_values(rows_by_competitor, task, competitor, "swarm_success").mean() for task in TASKS]
         cells = [f"{_with_interval(mean(own[:, k : k + 1]))}, {short(float(share))}" for k, share in enumerate(whole)]
-        table.append((competitor, *cells, _with_interval(interquartile_mean(every[competitor])), _with_interval(mean(every[competitor]))))
-    for words in ("the best law", "oracle", "random"):
-        named = {name: task.policies[0] if words == "the best law" else words for name, task in TASKS.items()}
+        table.append(
+            (
+                competitor,
+                *cells,
+                _with_interval(interquartile_mean(every[competitor])),
+                _with_interval(mean(every[competitor])),
+            )
+        )
+    for words in ("best controller", "oracle", "random"):
+        named = {name: task.policies[0] if words == "best controller" else words for name, task in TASKS.items()}
         cells = [
             _with_interval(_over_episodes(rows_by_competitor[task, competitor][""][task])) + f", {short(_mean(rows_by_competitor[task, competitor][''][task], 'swarm_success'))}"
             if (task, competitor) in rows_by_competitor else "–"
@@ -134,7 +157,10 @@ def _first(rows_by_competitor: Found) -> str:
 
 def _everyone(rows_by_competitor: Found, task: str) -> list[str]:
     """Learners, then policies, then those from elsewhere."""
-    return [*LEARNERS, *(competitor for where, competitor in rows_by_competitor if where == task and competitor not in LEARNERS)]
+    return [
+        *LEARNERS,
+        *(competitor for where, competitor in rows_by_competitor if where == task and competitor not in LEARNERS),
+    ]
 
 
 def _called(competitor: str) -> str:
@@ -148,7 +174,10 @@ def _tiers(rows_by_competitor: Found) -> str:
     for task in TASKS.values():
         names = [each.name for each in task.sets]
         rows = [
-            (_called(competitor), *(short(float(_values(rows_by_competitor, task.name, competitor, each=name).mean())) for name in names))
+            (
+                _called(competitor),
+                *(short(float(_values(rows_by_competitor, task.name, competitor, each=name).mean())) for name in names),
+            )
             for competitor in _everyone(rows_by_competitor, task.name)
         ]
         tables.append(markdown_table(("", *names), rows))
@@ -156,7 +185,7 @@ def _tiers(rows_by_competitor: Found) -> str:
 
 
 def _safety(rows_by_competitor: Found) -> str:
-    """Contacts, distances and time on unseen seeds."""
+    """Collisions, distances and time on unseen seeds."""
     formats = {"collisions": "{:.3f}", "to_obstacles": "{:.1f} m", "to_others": "{:.1f} m", "time_ratio": "{:.2f}"}
     table: list[tuple[str, ...]] = []
     for task in TASKS:
@@ -167,7 +196,7 @@ def _safety(rows_by_competitor: Found) -> str:
                 for name, spec in formats.items()
             ]  # fmt: skip
             table.append((task, _called(competitor), *cells))
-    return markdown_table(("task", "", *(name.replace("_", " ") for name in formats)), table)
+    return markdown_table(("task", "", "collisions", "obstacle distance", "spacing", "time ratio"), table)
 
 
 def _number(rows_by_competitor: Found, task: str, competitor: str, name: str) -> int:
@@ -184,10 +213,10 @@ def _pairs(rows_by_competitor: Found) -> str:
 
 
 def _apart(rows_by_competitor: Found) -> str:
-    """Pairs that are told apart on each task: the interval holds no one half."""
+    """Pairs that differ significantly on each task: the interval excludes one half."""
     every, table = ranked(rows_by_competitor), list[tuple[str, ...]]()
     if (num := min(map(len, every.values()))) < _ENOUGH:
-        return f"Each learner has {num} of {TRAININGS} trainings so far, too few to tell anyone apart.\n"
+        return f"Each learner has {num} of {TRAININGS} trainings so far, too few for a comparison.\n"
     for k, task in enumerate(TASKS):
         apart: list[str] = []
         for one, other in combinations(LEARNERS, 2):
@@ -195,7 +224,7 @@ def _apart(rows_by_competitor: Found) -> str:
             if estimate.low > 0.5 or estimate.high < 0.5:
                 apart.append(f"{one} over {other}" if estimate.low > 0.5 else f"{other} over {one}")
         table.append((task, str(len(apart)), ", ".join(apart) or "–"))
-    return markdown_table(("task", "pairs", "told apart"), table)
+    return markdown_table(("task", "pairs", "significantly different"), table)
 
 
 def _compute(curves: Sequence[Row]) -> str:
@@ -204,7 +233,9 @@ def _compute(curves: Sequence[Row]) -> str:
     for competitor in LEARNERS:
         cells: list[str] = []
         for task in TASKS:
-            last = {row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, competitor)}.values()
+            last = {
+                row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, competitor)
+            }.values()
             steps, minutes = (float(np.mean(measured(last, name))) for name in ("agent_steps", "minutes"))
             cells.append(f"{steps / 1e6:.1f} M, {minutes:.1f} min")
         table.append((competitor, *cells))
