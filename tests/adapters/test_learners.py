@@ -154,7 +154,7 @@ def test_the_page_shows_the_trainings_that_all_learners_have():
     shown = page.complete(lacking, rows)
     assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
     assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
-    assert "too few to tell anyone apart" in page._apart(page.grouped_rows(shown[1]))
+    assert "too few for a comparison" in page._apart(page.grouped_rows(shown[1]))
 
 
 def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
