@@ -146,7 +146,7 @@ def regathered(trace: Trace) -> float:
 
 
 def sides(trace: Trace) -> float:
-    """Over the obstacles, the most even split; 0 around one that somebody passes through."""
+    """Over the obstacles, the most even split; 0 around one that a vehicle passes through."""
     avoided = trace["obstacle_distance_m"].min(axis=0) > 0.0
     shares = [smaller_side(trace["route_position"], obstacle) for obstacle in trace["obstacles"]]
     return float(np.max(np.where(avoided, shares, 0.0)))
