@@ -214,7 +214,7 @@ class Percept:
     clock: Clock | None = None
     """Time of this percept where it comes from the swarm; None for one made from observations."""
     alive: Bool | None = None
-    """False for lost vehicles, whose rows are zero, shape (world, vehicle); None where it is unknown."""
+    """False for lost vehicles (rows of zeros), shape (world, vehicle); None where it is unknown."""
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ class WorldMap(NamedTuple):
     waypoints: Annotated[Float64, "world group point 2", "Corners of each group's trajectory [m], padded."]
     times: Annotated[Float64, "world group point", "Time at which its l(t) passes them [s].", Bounds(0)]
     last: Annotated[Int64, "world group", "Index of the last corner.", Bounds(1, "point")]
-    group: Annotated[Int64, "world vehicle", "Group of the vehicle, whose l(t) is its reference.", Bounds(0, "group")]
+    group: Annotated[Int64, "world vehicle", "Group of the vehicle, which has the reference l(t).", Bounds(0, "group")]
     informed: Annotated[Bool, "world vehicle", "Whether the vehicle perceives its reference; else it perceives zeros."]
     obstacles: Annotated[Float64, "world obstacle 3", "Centre north, east and radius [m], padded."]
     obstacle_velocity: Annotated[Float64, "world obstacle 2", "Velocity of obstacles [m/s]; 0 in the paper."]
@@ -68,7 +68,7 @@ class Facts(NamedTuple):
     effort: Annotated[Float64, "world vehicle", "Mean squared action, as a share of full force or rudder."]
     saturated: Annotated[Float64, "world", "Share of actions at the actuators' limit."]
     arrival_s: Annotated[Float64, "world radius", "Arrival time of the swarm, by ``Rules.arrival_radii``; NaN before."]
-    diverged: Annotated[Int64, "world", "First vehicle whose integration diverged, or -1.", Bounds(-1, "vehicle")]
+    diverged: Annotated[Int64, "world", "First vehicle with diverged integration, or -1.", Bounds(-1, "vehicle")]
 
 
 class World(NamedTuple):

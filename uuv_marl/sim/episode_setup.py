@@ -25,7 +25,7 @@ class EpisodeSetup(NamedTuple):
     nu: Float64
     """Their velocities: surge, sway [m/s], yaw rate [rad/s], shape (vehicle, 3)."""
     group: Int64
-    """Group of each vehicle, whose l(t) is its reference, shape (vehicle,)."""
+    """Group of each vehicle, which has the reference l(t), shape (vehicle,)."""
     informed: Bool
     """Whether a vehicle perceives its reference, shape (vehicle,)."""
     duration_s: float

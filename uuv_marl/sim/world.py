@@ -70,7 +70,7 @@ def integrate_control_step(
 
 @compiled_inner
 def apply_losses(w: int, world: World, rules: Rules, disturbances: Disturbances | None) -> None:
-    """Lose the vehicles whose scheduled time has come, and those lost to faults."""
+    """Lose the vehicles with a loss scheduled now, and those lost to faults."""
     if disturbances is not None:
         for i in range(world.state.alive.shape[1]):
             if is_lost_to_fault(w, i, world.state.tick[w], disturbances.actuation, disturbances.hull):
