@@ -23,14 +23,14 @@ SINK_M = 0.001
 
 @compiled_inner
 def stop_hulls(
-    w: int, world: World, rules: Rules, plant: Plant, own: Workspace, disturbances: Disturbances | None
+    w: int, world: World, rules: Rules, plant: Plant, workspace: Workspace, disturbances: Disturbances | None
 ) -> None:
     """Move colliding hulls of world w to the surface, each of two by half, and remove their velocity into it.
 
     States and their columns are written.
     """
     state, world_map, touch = world.state, world.world_map, 2.0 * rules.hull_radius
-    obstacles = obstacle_columns(own.obstacles)
+    obstacles = obstacle_columns(workspace.obstacles)
     for i in range(state.eta.shape[1]):
         if not state.alive[w, i]:
             continue
@@ -58,7 +58,7 @@ def stop_hulls(
                 push(w, i, n_x, n_y, impulse, world, plant, disturbances)
                 push(w, j, -n_x, -n_y, impulse, world, plant, disturbances)
     for i in range(state.eta.shape[1]):
-        load_one(w, i, state, own.now)
+        load_one(w, i, state, workspace.now)
 
 
 @compiled

@@ -224,21 +224,21 @@ def clear_facts(w: int, facts: Facts) -> None:
 
 
 @compiled_inner
-def observe_world(w: int, world: World, model: Model, own: Workspace, disturbances: Disturbances | None) -> None:
+def observe_world(w: int, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None) -> None:
     """Compute facts and percepts of a world after a reset; ``state.dwell`` is written, too."""
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.state.collided[w] = False
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
-    load_state(w, world.state, own.now)
-    load_obstacles(w, world.world_map, own.obstacles)
-    grid = sort(w, world.state.alive, model.rules.cell_side, own.now, own.cells)
-    measure_distances(w, world, model, own, grid)
+    load_state(w, world.state, workspace.now)
+    load_obstacles(w, world.world_map, workspace.obstacles)
+    grid = sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
+    measure_distances(w, world, model, workspace, grid)
     check_arrival(w, world, model.rules)
     for i in range(world.facts.away.shape[1]):
         world.facts.away_before[w, i] = world.facts.away[w, i]
-    perceive(w, world, model, own, grid, True)
+    perceive(w, world, model, workspace, grid, True)
     if disturbances is not None:
         begin_disturbances(w, world, disturbances)
         take_readings(w, world, model.at, disturbances)
