@@ -25,7 +25,7 @@ from uuv_marl import baselines
 class Careful(baselines.Policy):
     """Goes to l(t), and away from every vehicle and every obstacle that it hears."""
 
-    yaw_damping_nms = 600.0  # an inner loop that brakes turns
+    requirements = baselines.PolicyRequirements(yaw_damping_nms=600.0)  # an inner loop that brakes turns
 
     def decide(self, percept):
         detected = np.concatenate([percept["detected"], percept["echo"]], axis=-1)[..., None]

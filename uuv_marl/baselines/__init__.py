@@ -25,5 +25,6 @@ from uuv_marl.baselines.env_policy import EnvPolicy
 from uuv_marl.baselines.making import make, with_policy_requirements
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES
+from uuv_marl.baselines.requirements import PolicyRequirements
 
-__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "make", "with_policy_requirements"]
+__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "PolicyRequirements", "make", "with_policy_requirements"]

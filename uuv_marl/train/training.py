@@ -12,7 +12,7 @@ from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.making import check_base_controller
 from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.requirements import inner_loop_nms
+from uuv_marl.baselines.requirements import FULL_TORQUE_NM, inner_loop_nms
 from uuv_marl.envs.core import Reward, refuse_losses
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError, hint
 from uuv_marl.modules import named_object
@@ -253,7 +253,7 @@ def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]
     bare = load_scenario(scenario, overrides={**clock, **own, _LOOP: own.get(_LOOP, 0.0)})
     if bare.timing.fixed:
         return dict(own)
-    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, Policy.full_torque_nm, bare), **own}
+    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, FULL_TORQUE_NM, bare), **own}
 
 
 def recipe_fields(name: str) -> dict[str, Any]:

@@ -8,13 +8,14 @@ keep the vehicle from it (GNRON: goals nonreachable with obstacles nearby). The 
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -45,8 +46,7 @@ class Apf(Policy):
         gains: instead of the tuned ones.
     """
 
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: ApfGains | None = None

@@ -17,6 +17,7 @@ import numpy as np
 from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -63,8 +64,7 @@ class OlfatiSaberGains(NamedTuple):
 class OlfatiSaber(Policy):
     """Olfati-Saber's flocking without alignment: lattice, obstacles and navigation, from positions alone."""
 
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
     tuned_as: ClassVar[str] = "olfati_saber"
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OlfatiSaberGains | None = None) -> None:
@@ -83,7 +83,7 @@ class OlfatiSaber(Policy):
 class OlfatiSaberInformed(OlfatiSaber):
     """``OlfatiSaber`` with alignment: every vehicle also follows its neighbours' velocities."""
 
-    channels: ClassVar[tuple[str, ...]] = ("link",)
+    requirements = OlfatiSaber.requirements._replace(channels=("link",))
     tuned_as: ClassVar[str] = "olfati_saber_informed"
 
 

@@ -6,11 +6,12 @@ point goes first: it is pushed less, and keeps less distance, so that nobody get
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
 from uuv_marl.percept import Percept, Starts
@@ -50,9 +51,7 @@ class OracleGains(NamedTuple):
 class Oracle(Policy):
     """Sees the map of hard_water and follows a shortest way: no contender, the proof that each map can be passed."""
 
-    channels: ClassVar[tuple[str, ...]] = ("path", "link")
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(("path", "link"), yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OracleGains | None = None) -> None:
         super().__init__(scenario, num_worlds)

@@ -7,13 +7,14 @@ obstacles go first.
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
 from uuv_marl.percept import Percept, Starts
@@ -49,9 +50,7 @@ class OrcaInformed(Policy):
         gains: instead of the tuned ones.
     """
 
-    outputs_force: ClassVar[bool] = True
-    channels: ClassVar[tuple[str, ...]] = ("link",)
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(("link",), yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: OrcaGains | None = None

@@ -1,10 +1,11 @@
 """The bare pull to the reference point: ``pull,safety_filter=true`` shows the effect of the safety filter alone."""
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.steering import steer, velocity_gain
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -23,8 +24,7 @@ class ProportionalGains(NamedTuple):
 class ProportionalTracking(Policy):
     """The velocity of l(t) and a pull to l(t); neighbours and obstacles are ignored. Meant for ``pull,safety_filter=true``."""
 
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: ProportionalGains | None = None) -> None:
         super().__init__(scenario, num_worlds)

@@ -38,7 +38,7 @@ class Actor(Policy):
         self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
-        self.copy_requirements(card)
+        self.requirements = card.requirements
         self.axes = {"unit": card.network.hidden[-1]}
         super().__init__(scenario, num_worlds)
         check_same_training(self, card, any_vehicle)
@@ -95,7 +95,7 @@ def bound(action: Float32, disc: bool) -> None:
 
 def in_disc(policy: Policy) -> bool:
     """Whether what a policy decides is a force, in the unit disc; else thrust and rudder, each up to 1."""
-    return policy.outputs_force or policy.scenario.actuators.kind != "rudder"
+    return policy.requirements.outputs_force or policy.scenario.actuators.kind != "rudder"
 
 
 def check_same_training(policy: Policy, card: Card, any_vehicle: bool) -> None:

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
 from uuv_marl.baselines.learned.layers import Architecture, Sizes, shapes
-from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.requirements import FULL_TORQUE_NM, PolicyRequirements
+from uuv_marl.errors import PolicyError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.hardware import Actuators, Vehicle
@@ -95,20 +96,19 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
 
     @property
     def policy_class(self) -> str:
-        """What decides beside the network: nothing, the filter, a law."""
+        """What acts besides the network: nothing, the safety filter, a base controller."""
         if self.base_controller:
             return "residual"
         return "end to end + filter" if self.filter else "end to end"
 
     @property
-    def full_torque_nm(self) -> float:
-        """Full torque of that vehicle [N m]."""
-        return float(self.vehicle.get("actuators.max_torque_nm", Policy.full_torque_nm))
-
-    @property
-    def outputs_force(self) -> bool:
-        """Whether its actions are forces: where that vehicle has no rudder."""
-        return self.vehicle.get("actuators.kind") != "rudder"
+    def requirements(self) -> PolicyRequirements:
+        """Channels, inner loop and decision period of the training; outputs are forces unless it had a rudder."""
+        torque = float(self.vehicle.get("actuators.max_torque_nm", FULL_TORQUE_NM))
+        force = self.vehicle.get("actuators.kind") != "rudder"
+        return PolicyRequirements(
+            self.channels, self.yaw_damping_nms, torque, self.decision_period_s, outputs_force=force
+        )
 
 
 class Checkpoint(NamedTuple):

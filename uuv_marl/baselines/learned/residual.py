@@ -28,7 +28,7 @@ class ResidualPolicy(Policy):
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, base: Policy, inner: Policy) -> None:
         self.base, self.inner = base, inner
         self.name = inner.name
-        self.copy_requirements(base)
+        self.requirements = base.requirements
         super().__init__(scenario, num_worlds)
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:

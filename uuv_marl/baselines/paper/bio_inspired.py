@@ -1,11 +1,12 @@
 """The paper's controller (Eq. 18-22), from positions alone, and the strongest hand-made form of the same law."""
 
 import math
-from typing import ClassVar, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -50,7 +51,7 @@ class BioInspired(Policy):
             obstacle where their positions agree (centres) or follow without a gap (surfaces); its nearest echo counts.
     """
 
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(outputs_force=True)
 
     def __init__(
         self,
@@ -82,7 +83,7 @@ class BioInspiredPlus(BioInspired):
         gains: those that were tuned by default.
     """
 
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: BioInspiredGains | None = None) -> None:
         tuned_gains = gains or BioInspiredGains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)

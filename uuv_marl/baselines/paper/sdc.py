@@ -14,6 +14,7 @@ from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -78,12 +79,9 @@ class Sdc(Policy):
     acts on its own percept. The informed vehicle is the one whose slot is nearest to the lattice's centre.
     """
 
-    outputs_force: ClassVar[bool] = True
+    # Without yaw damping, in the settings tried by hand, the informed vehicle left the others behind: none arrived.
+    requirements = PolicyRequirements(("compass", "link"), yaw_damping_nms=600.0, identity=True, outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SdcMemory
-    channels: ClassVar[tuple[str, ...]] = ("compass", "link")
-    identity: ClassVar[bool | str] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
-    """Without it, in the settings tried by hand, the informed vehicle left the others behind and none arrived."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SdcGains | None = None) -> None:
         super().__init__(scenario, num_worlds)

@@ -12,6 +12,7 @@ import numpy as np
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -70,9 +71,8 @@ class SffMemory(NamedTuple):
 class Sff(Policy):
     """Self-organised fission and fusion, with neighbours' velocity over the link, without the reference's velocity."""
 
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(("link",), outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SffMemory
-    channels: ClassVar[tuple[str, ...]] = ("link",)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SffGains | None = None) -> None:
         super().__init__(scenario, num_worlds)

@@ -7,6 +7,7 @@ import numpy as np
 from uuv_marl.baselines.memory import OwnModel, Surroundings, update_memory
 from uuv_marl.baselines.memory.neighbours import MEMORY_S
 from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
@@ -33,8 +34,7 @@ def turnable(barrier: Barrier, scenario: Scenario) -> Barrier:
 class Filtered(Policy):
     """A policy that remembers, and whose velocities are made safe. A subclass defines ``decide``."""
 
-    yaw_damping_nms: ClassVar[float] = 600.0
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
     Memory: ClassVar[type[Any] | None] = Surroundings
 
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:

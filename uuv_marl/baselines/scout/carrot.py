@@ -6,7 +6,6 @@ rule 14 (who meet head-on pass port to port).
 """
 
 import dataclasses
-from typing import ClassVar
 
 import numpy as np
 
@@ -69,7 +68,7 @@ class CarrotInformed(Carrot):
         speed: of the carrot [m/s]: that of l(t) in the paper, as nothing has to be found out.
     """
 
-    channels: ClassVar[tuple[str, ...]] = ("path",)
+    requirements = Carrot.requirements._replace(channels=("path",))
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, waits: bool = False, speed: float = 4.0,

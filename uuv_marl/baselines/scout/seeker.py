@@ -84,7 +84,7 @@ class NearestTarget(Filtered):
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
-    identity: ClassVar[bool | str] = "lanes"
+    requirements = Filtered.requirements._replace(identity="lanes")
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
