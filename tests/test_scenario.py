@@ -114,7 +114,7 @@ SUMS = {"vehicle.Y_uv": -28.6, "vehicle.Y_ur": 5.22, "vehicle.N_uv": -24.0, "veh
 RUDDER = {"actuators.kind": "rudder", "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0}
 BAD = [
     ({"vehicle.m_kg": float("nan")}, "vehicle.m_kg must lie within 0.001 to 1,000,000, got nan"),
-    ({"vehicle.m_kg": 10**5000}, "vehicle.m_kg must be a number, got int that is too large to show"),
+    ({"vehicle.m_kg": 10**5000}, "vehicle.m_kg must be a number, got int too large to show"),
     ({"swarm.num_vehicles": 2.5}, "swarm.num_vehicles must be a whole number, got 2.5"),
     ({"vehicle.m_kgg": 3.0}, "vehicle.m_kgg is unknown; did you mean 'vehicle.m_kg'"),
     ({"speed": 3.0}, "speed is unknown; did you mean 'trajectory.speed_mps'"),

@@ -30,6 +30,7 @@ from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.messages import explain
 from uuv_marl.types import Float32
 
 FILE = "results.json"
@@ -91,8 +92,7 @@ def read_content(path: Path, remedy: str = "move it away or give another --outpu
     except OSError as error:
         reason = error.strerror or str(error)
     except ValidationError as error:
-        first = error.errors()[0]
-        reason = f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
+        reason = explain(error, None)
     else:
         unknown = {row.scenario for row in content["runs"]} - set(content["scenarios"])
         unknown |= {row.policy for row in content["runs"]} - set(content["policies"])

@@ -73,7 +73,7 @@ def load_scenario(
             assign(data, "swarm.num_vehicles", plain(num_vehicles))
         return Scenario.model_validate(frozen(data))
     except ValidationError as error:
-        raise ScenarioError("\n".join(explain(dict(e), data) for e in error.errors()[:10])) from None
+        raise ScenarioError(explain(error, data, Scenario, most=10)) from None
     except RecursionError:
         raise ScenarioError(
             f"scenario {shown(scenario)} or its overrides are nested too deeply; flatten them"

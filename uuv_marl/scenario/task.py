@@ -8,6 +8,7 @@ from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.modules import named_object
 from uuv_marl.scenario.fields import Section
 from uuv_marl.scenario.hardware import CHANNEL_NAMES
+from uuv_marl.scenario.messages import explain
 
 
 class TaskSettings(Section):
@@ -82,15 +83,4 @@ def task_numbers(task: TaskSettings) -> Any:
     try:
         return numbers.model_validate(task.model_extra or {})
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(map(str, ("task", *first["loc"])))
-        if first["type"] == "extra_forbidden":
-            fields = ", ".join(numbers.model_fields) or "none of its own"
-            raise ScenarioError(f"{field} is unknown; the numbers of task {task.name!r} are {fields}") from None
-        if "ctx" in first and first["type"] == "value_error":
-            reason = str(first["ctx"]["error"])
-            raise ScenarioError(f"{field} {reason}" if first["loc"] else reason) from None
-        if first["type"] == "missing" and len(first["loc"]) == 1:
-            reason = f"a task by name takes it as in {{'name': {task.name!r}, '{first['loc'][-1]}': ...}}"
-            raise ScenarioError(f"{field} is missing; {reason}") from None
-        raise ScenarioError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None
+        raise ScenarioError(explain(error, task.model_extra, numbers, "task.")) from None

@@ -24,6 +24,7 @@ from uuv_marl.errors import PolicyError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.hardware import Actuators, Vehicle
+from uuv_marl.scenario.messages import explain
 from uuv_marl.sim.observation import observation_layout
 from uuv_marl.types import Float32
 
@@ -183,9 +184,7 @@ def load_checkpoint(path: UserPath) -> Checkpoint:
 def _reason(error: Exception) -> str:
     """What is wrong with a checkpoint, in a line."""
     if isinstance(error, pydantic.ValidationError):
-        first = error.errors()[0]
-        field = ".".join(map(str, first["loc"]))
-        return f"its card's {field}: {first['msg']}" if field else "it has no card"
+        return f"its card's {explain(error, None, Card)}" if error.errors()[0]["loc"] else "it has no card"
     return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
