@@ -186,7 +186,10 @@ def _tiers(rows_by_competitor: Found) -> str:
 
 def _safety(rows_by_competitor: Found) -> str:
     """Contacts, distances and time on unseen seeds."""
-    formats = {"collisions": "{:.3f}", "to_obstacles": "{:.1f} m", "to_others": "{:.1f} m", "time_ratio": "{:.2f}"}
+    formats = {
+        "collisions_per_vehicle": "{:.3f}", "min_obstacle_distance_m": "{:.1f} m", "min_spacing_m": "{:.1f} m",
+        "time_ratio": "{:.2f}",
+    }  # fmt: skip
     table: list[tuple[str, ...]] = []
     for task in TASKS:
         for competitor in _everyone(rows_by_competitor, task):
