@@ -197,7 +197,7 @@ class Policy:
         return {name: array.copy() for name, array in self._arrays().items()}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from a snapshot of the same policy. Raises PolicyError if an array is missing or has another shape."""
+        """Continue from a snapshot of the same policy. Raises PolicyError for missing or differently shaped arrays."""
         for name, array in self._arrays().items():
             saved = snapshot.get(name)
             if saved is None or saved.shape != array.shape or saved.dtype != array.dtype:
@@ -243,15 +243,15 @@ def part_of(snapshot: Mapping[str, NDArray[Any]], part: str) -> dict[str, NDArra
 
 @compiled
 def surge_resistance(speed: float, limits: Limits) -> float:
-    """Surge resistance per velocity [N s/m] at a speed [m/s] of at least 0. Eq. 4."""
+    """Surge resistance over velocity [N s/m] at a speed [m/s] of at least 0. Eq. 4."""
     return limits.X_u + limits.X_uu * speed
 
 
 @compiled
 def write_action(f_x: float, f_y: float, limits: Limits, out: Float32) -> None:
-    """Write the action for a desired body-frame force [N]: thrust from f_x (forward), torque from f_y (starboard). Eq. 22.
+    """Write the action for a desired body-frame force [N], f_x forward and f_y to starboard. Eq. 22.
 
-    ``out``, shape (2,), receives shares of full surge force and yaw torque.
+    ``out``, shape (2,), receives shares of full surge force and yaw torque, which acts by the lever arm.
     """
     a_x, a_y = f_x / limits.max_force, f_y * limits.lever_arm / limits.max_torque
     if limits.helm > 0.0:  # thrust does not limit a rudder

@@ -1,4 +1,4 @@
-"""The bare pull to the reference point: ``pull,safety_filter=true`` shows the effect of the safety filter alone."""
+"""Proportional tracking of the reference; ``safety_filter=true`` shows the effect of the safety filter alone."""
 
 from typing import NamedTuple
 
@@ -15,14 +15,13 @@ from uuv_marl.types import Float32
 
 
 class ProportionalGains(NamedTuple):
-    """Gains of the wished velocity."""
+    """Gains of the desired velocity."""
 
-    pull: float = 0.05
-    """To l(t) [1/s]; as that of ``scout``."""
+    pull: float = 0.05  # to l(t) [1/s]; as that of ``scout``
 
 
 class ProportionalTracking(Policy):
-    """The velocity of l(t) and a pull to l(t); neighbours and obstacles are ignored. Meant for ``pull,safety_filter=true``."""
+    """The velocity of l(t) and a pull to l(t), without regard to neighbours and obstacles."""
 
     requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
 
@@ -41,7 +40,6 @@ class ProportionalTracking(Policy):
 
 @compiled
 def _act(flat: Float32, at: Starts, g: ProportionalGains, limits: Limits, gain: float, action: Float32) -> None:
-    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

@@ -1,7 +1,7 @@
-"""What a vehicle keeps of its surroundings, from its own percepts alone, in a map of its own.
+"""Arrays of a vehicle's memory of its surroundings, in a map of its own.
 
-The map's origin is the reference point l(t) when the vehicle first perceived it, and its first axis the direction in
-which l(t) moved then (the bow, if l(t) was at rest).
+The map's origin is the reference point l(t) at its first percept, and its first axis the direction in which l(t) moved
+then (the bow, if l(t) was at rest).
 """
 
 from collections import namedtuple
@@ -54,10 +54,7 @@ class Surroundings(NamedTuple):
 
 
 def with_surroundings(name: str, table: type[Any]) -> type[Any]:
-    """A table of the surroundings' arrays and, after them, of another's: the memory of who keeps more.
-
-    ``name`` is that of the new table in the other's module.
-    """
+    """A table of the arrays of ``Surroundings``, then those of ``table``, with ``name`` in the module of ``table``."""
     hints = {**get_type_hints(Surroundings, include_extras=True), **get_type_hints(table, include_extras=True)}
     table_class: Any = namedtuple(name, hints, module=table.__module__)  # pyright: ignore[reportUntypedNamedTuple]
     table_class.__annotations__ = hints
