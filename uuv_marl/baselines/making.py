@@ -43,7 +43,7 @@ def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
 
 
 def with_requirements(name: str, required: PolicyRequirements, scenario: Scenario) -> Scenario:
-    """``with_policy_requirements`` for a policy whose requirements are known."""
+    """``with_policy_requirements`` for a policy with known requirements."""
     timing, channels = scenario.timing, required.channels
     changes: dict[str, object] = {
         "sonar.channels": list(channels) if is_trained(name) else resolved_channels(scenario, channels)

@@ -1,4 +1,4 @@
-"""Scenarios: everything that fixes a simulation, except the seed.
+"""Scenarios: everything that defines a simulation, except the seed.
 
 ``load_scenario`` makes a ``Scenario`` from a name, a TOML file or another scenario. The ``*.toml`` files hold the
 shipped scenarios, every number with its source.

@@ -27,13 +27,13 @@ SAME_M = 2.0
 class Walls(NamedTuple):
     """Echoes in the vehicle's map, and the side on which it passes an obstacle."""
 
-    echoes: Annotated[Float64, "world vehicle 384 3", "Place in the map, and radius, 0 for a point [m]; a ring."]
-    num: Annotated[Float64, "world vehicle", "How many are remembered."]
-    next: Annotated[Float64, "world vehicle", "Where the next goes that is far from all others."]
-    side: Annotated[Float64, "world vehicle", "1 where it turns to starboard, -1 to port, 0 on the way to the goal."]
-    hit_m: Annotated[Float64, "world vehicle", "Distance of the goal when the way was blocked [m]."]
-    turned: Annotated[Float64, "world vehicle", "How often it turned back since then."]
-    direction: Annotated[Float64, "world vehicle 2", "Unit vector of the way in the map."]
+    echoes: Annotated[Float64, "world vehicle 384 3", "Position in the map, and radius, 0 for a point [m]; a ring."]
+    num: Annotated[Float64, "world vehicle", "Number of echoes."]
+    next: Annotated[Float64, "world vehicle", "Index of the next new echo."]
+    side: Annotated[Float64, "world vehicle", "1 where it passes to starboard, -1 to port, 0 on the line to the goal."]
+    hit_m: Annotated[Float64, "world vehicle", "Distance of the goal when the line to it was blocked [m]."]
+    turned: Annotated[Float64, "world vehicle", "Number of reversals since then."]
+    direction: Annotated[Float64, "world vehicle 2", "Unit vector of its direction in the map."]
 
 
 WallsMemory = with_surroundings("WallsMemory", Walls)

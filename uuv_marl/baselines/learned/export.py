@@ -48,8 +48,8 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
     actor = make(policy, with_policy_requirements(policy, scenario))
     if not isinstance(actor, Actor):
         raise PolicyError(
-            f"policy {policy!r} can't be exported: ONNX holds networks end to end, not laws, filters, or networks "
-            "around a law. Export a checkpoint of a training without filter and law; run this "
+            f"policy {policy!r} can't be exported: ONNX holds networks end to end, not controllers, safety filters or "
+            "residual networks. Export a checkpoint of a training without filter and base controller; run this "
             "policy with uuv_marl.baselines.make"
         )
     graph = Graph()
@@ -77,8 +77,8 @@ def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
     takes, gives = [_tensor("observation", layout.size, sees)], [_tensor("action", 2, acts)]
     if checkpoint.card.network.memory:
         units_of = checkpoint.card.network.hidden[-1]
-        takes.append(_tensor("state", units_of, "What was remembered; zeros at an episode's start."))
-        gives.append(_tensor("next_state", units_of, "What is remembered."))
+        takes.append(_tensor("state", units_of, "State of the recurrent layer; zeros at an episode's start."))
+        gives.append(_tensor("next_state", units_of, "Next state of the recurrent layer."))
     damping, period = policy.scenario.actuators.yaw_damping_nms, checkpoint.card.decision_period_s
     opset = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(

@@ -36,7 +36,7 @@ class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
 
 
 def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
-    """Columns of sub-sectors' entries, shape (sub-sector, entry), for ``heard`` and ``echo``; and all others."""
+    """Columns of sub-sectors' entries, shape (sub-sector, entry), for ``heard`` (vehicles) and ``echo``; and all others."""
     at: dict[str, Int64] = {}
     sectors: dict[str, Int64] = {}
     first = 0
@@ -98,7 +98,7 @@ class Network:
             seen = ops.shaped(ops.take(x, entries.reshape(-1)), (-1, size))
             code = ops.shaped(ops.dense(seen, self._tensors[f"{kind}.weight"]), (-1, num, ENCODED))
             place = self._tensors[f"{kind}.place"]
-            parts.append(ops.total(ops.relu(code + place) - ops.relu(place)))  # 0 where nothing is heard
+            parts.append(ops.total(ops.relu(code + place) - ops.relu(place)))  # 0 where nothing is detected
         return ops.joined(parts)
 
     def _moments(self, x: Any) -> Iterator[Any]:
@@ -187,6 +187,6 @@ def dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
             out[i, k] = bias[k]
         for j in range(x.shape[1]):
             value = x[i, j]
-            if value != 0.0:  # most sub-sectors hear nobody
+            if value != 0.0:  # most sub-sectors are empty
                 for k in range(out.shape[1]):
                     out[i, k] += value * weight[j, k]

@@ -82,7 +82,7 @@ def update_neighbours(w: int, i: int, see: Fields, period: float, memory_s: floa
             since[k] += period
             place[k, 0] += period * velocity[k, 0]
             place[k, 1] += period * velocity[k, 1]
-            known[k] = -known[k]  # not heard yet
+            known[k] = -known[k]  # not detected yet
     for s in range(see.detected.shape[2]):
         if see.detected[w, i, s] > 0.0:
             p_x, p_y = float(see.neighbour[w, i, s, 0]), float(see.neighbour[w, i, s, 1])

@@ -44,11 +44,11 @@ class DeadReckoning(NamedTuple):
     def of(scenario: Scenario) -> "DeadReckoning":
         """Model of a scenario's vehicle, undisturbed."""
         timing, still, going = scenario.timing, np.zeros(3), np.zeros(3)
-        if scenario.actuators.kind == "rudder":  # which does nothing at rest
+        if scenario.actuators.kind == "rudder":  # has no effect at rest
             going[0] = scenario.trajectory.speed_mps
         own = DeadReckoning(
-            plant(scenario), timing.control_steps_per_decision, timing.integration_steps_per_control_step, timing.integration_step_s,
-            timing.decision_period_s, 1.0, 1.0,
+            plant(scenario), timing.control_steps_per_decision, timing.integration_steps_per_control_step,
+            timing.integration_step_s, timing.decision_period_s, 1.0, 1.0,
         )  # fmt: skip
         surge = reckoned(still, np.array([_TENTH, 0.0]), own)[3] / _TENTH
         return own._replace(surge=surge, yaw=reckoned(going, np.array([0.0, _TENTH]), own)[5] / _TENTH)

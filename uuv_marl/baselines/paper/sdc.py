@@ -160,7 +160,7 @@ def _force(
     informed = depth[i] == 0.0
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])
-    # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.
+    # A vehicle without detected predecessors, such as the informed one, coordinates with all its neighbours.
     follows = False
     for k in range(see.detected.shape[2]):
         j = _index(see.link_identity[w, i, k], depth.shape[0])

@@ -47,10 +47,10 @@ class SffGains(NamedTuple):
 class SffMemory(NamedTuple):
     """Detected neighbours and their changes since the previous decision, in the body frame."""
 
-    identity: Annotated[Float32, "world vehicle sector", "Who is heard, 0 for nobody."]
-    position: Annotated[Float64, "world vehicle sector 2", "Where [m]."]
-    velocity: Annotated[Float64, "world vehicle sector 2", "How it moves [m/s]."]
-    known: Annotated[Bool, "world vehicle sector", "Whether it was heard at the decision before."]
+    identity: Annotated[Float32, "world vehicle sector", "Identity of the vehicle detected, 0 for none."]
+    position: Annotated[Float64, "world vehicle sector 2", "Its position [m]."]
+    velocity: Annotated[Float64, "world vehicle sector 2", "Its velocity [m/s]."]
+    known: Annotated[Bool, "world vehicle sector", "Whether it was detected at the previous decision."]
     rate: Annotated[Float64, "world vehicle sector 2", "Change of its position since then, per second [m/s]."]
     turn: Annotated[Float64, "world vehicle sector 2", "Change of its velocity since then [m/s]."]
 

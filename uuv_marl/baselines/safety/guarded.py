@@ -50,10 +50,7 @@ class Guarded(Filtered):
         self.inner.active = self.active
         self.inner.update_memory(percept)
         action = self.inner.decide(percept)
-        guard_all(
-            self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes,
-            action,
-        )  # fmt: skip
+        guard_all(self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes, action)
         self.clamps[...] = self.inner.clamps
         return action
 
@@ -82,8 +79,8 @@ def coming_velocity(w: int, i: int, action: Float32, own: DeadReckoning, memory:
 
 @compiled
 def guard_all(
-    worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, planes: Float64,
-    action: Float32,
+    worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
+    planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """Replace unsafe actions in place; ``memory.filtered`` records where the filter acts."""
     for w in range(action.shape[0]):

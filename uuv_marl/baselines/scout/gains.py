@@ -53,13 +53,13 @@ _LEAD = _PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0, memory_s=3.0, lead=1.
 DEFAULT_PRESET = "base"
 PRESETS = {
     "base": Preset(ScoutGains()),
-    "plus": Preset(_PLUS),  # a swarm that moves as a whole, longer pushes, silent neighbours remembered twice as long
-    "lead": Preset(_LEAD),  # makes up for actuators that lag, as far as a vehicle sees it, and is softer at rest
-    # Keeps farther from others where it doubts, and from obstacles: with 13.5 m the smallest distance of ``lead`` was
-    # 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
+    "plus": Preset(_PLUS),  # a swarm that moves as a whole, longer pushes, twice the memory of undetected neighbours
+    "lead": Preset(_LEAD),  # compensates identified actuator lag, and is softer at rest
+    # Keeps farther from neighbours where uncertain, and from obstacles: with 13.5 m the smallest distance of ``lead``
+    # was 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
     "wary": Preset(_LEAD._replace(pull_if_uncertain=-0.7, push_if_uncertain=1.1), Barrier(obstacle_m=13.7)),
     "closed": Preset(*with_numbers(tuned("scout"), ScoutGains(), Barrier())),  # for water with walls
-    "gap": Preset(*with_numbers(tuned("carrot"), ScoutGains(), Barrier())),  # for gaps through which others come
+    "gap": Preset(*with_numbers(tuned("carrot"), ScoutGains(), Barrier())),  # for gaps with oncoming vehicles
 }
 """Presets by name. ``closed`` and ``gap`` are tuned; the others were found by hand on tuning seeds, ``lead`` and
 ``wary`` on disturbed ones too (docs/policies.md)."""

@@ -42,10 +42,8 @@ class SeekerGains(NamedTuple):
 class TrackedTarget(NamedTuple):
     """The target that a vehicle follows, in its map, and its search."""
 
-    target: Annotated[Float64, "world vehicle 4", "Place [m] and velocity [m/s] of its target."]
-    track_timeout_s: Annotated[
-        Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."
-    ]
+    target: Annotated[Float64, "world vehicle 4", "Position [m] and velocity [m/s] of its target."]
+    track_timeout_s: Annotated[Float64, "world vehicle", "Time left to follow it without detection [s]."]
     search: Annotated[
         Float64, "world vehicle 2", "Direction of its search in the box, or in lanes that of x, and the lane."
     ]
@@ -87,7 +85,7 @@ class NearestTarget(Filtered):
         self.gains = gains or tuned_gains
         if "box" not in self.layout.starts:
             raise PolicyError(
-                f"nearest_target searches a box, of which task {scenario.task.name!r} tells nothing; run it on "
+                f"nearest_target searches a box, which task {scenario.task.name!r} does not have; run it on "
                 "silent_targets"
             )
         self._half_m = 0.5 * scenario.task_numbers.side_m
@@ -232,7 +230,8 @@ def _keeping(w: int, i: int, g: SeekerGains, memory: Surroundings, track: Tracke
 @compiled
 def seek(
     flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
-    barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, track: TrackedTarget, planes: Float64, action: Float32,
+    barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, track: TrackedTarget, planes: Float64,
+    action: Float32,
 ) -> None:  # fmt: skip
     """Write every vehicle's action."""
     see = fields(flat, at)
