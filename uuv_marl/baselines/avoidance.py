@@ -43,9 +43,7 @@ def pass_obstacle(
             nearest, reach = a, float(see.echo_range[w, i, a])
     if nearest < 0:
         return 0.0, 0.0
-    n_x, n_y = float(see.echo_position[w, i, nearest, 0]), float(see.echo_position[w, i, nearest, 1])
-    distance = math.hypot(n_x, n_y)
-    n_x, n_y = (n_x / distance, n_y / distance) if distance > 0.0 else (1.0, 0.0)
+    n_x, n_y, _, _ = obstacle_at(w, i, nearest, see, False)
     g_x, g_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     speed = math.hypot(g_x, g_y)
     g_x, g_y = (g_x / speed, g_y / speed) if speed > 0.1 else (1.0, 0.0)

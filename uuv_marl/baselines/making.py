@@ -125,7 +125,7 @@ def check_base_controller(name: str) -> None:
     """Raise PolicyError unless the name is a shipped controller's, since checkpoints must not run other code."""
     plain = name.partition(",")[0]
     if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
-        controllers = ", ".join(known for known, kind in POLICIES.items() if not isinstance(kind, Trained))
+        controllers = ", ".join(known for known, type_ in POLICIES.items() if not isinstance(type_, Trained))
         raise PolicyError(f"base_controller must be one of {controllers}, got {name!r}")
 
 

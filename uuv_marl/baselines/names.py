@@ -5,8 +5,7 @@ from typing import NamedTuple
 from uuv_marl.errors import PolicyError
 from uuv_marl.paths import user_path
 
-SAFETY_FILTER, OWN_CLOCK = "safety_filter", "own_clock"
-"""Options of every policy, each ``true`` or ``false``."""
+SAFETY_FILTER, OWN_CLOCK = "safety_filter", "own_clock"  # options of every policy, each ``true`` or ``false``
 
 
 class PolicyName(NamedTuple):

@@ -23,8 +23,7 @@ from uuv_marl.baselines.scout.seeker import NearestTarget
 from uuv_marl.errors import hint
 from uuv_marl.modules import named_object
 
-PolicyType = type[Policy] | Trained
-"""Called with a scenario, it returns a policy; ``requirements`` are the policy's."""
+PolicyType = type[Policy] | Trained  # called with a scenario, it returns a policy; ``requirements`` are the policy's
 
 _NETWORKS = {
     "mappo": "Trained by MAPPO on random_field, end to end.",

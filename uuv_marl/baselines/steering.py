@@ -10,8 +10,7 @@ from uuv_marl.types import Float32
 _SHARE = 1.5
 """Largest share of a velocity error that one decision period corrects [1]; above 2 errors would grow. Found by hand: at
 1 and below, swarms keep less distance, since surge follows at once, but sway only as the bow turns."""
-_MOST_RATE = 8.0
-"""Largest share of a velocity error that is corrected in a second [1/s]; found by hand, too."""
+_MOST_RATE = 8.0  # largest share of a velocity error that is corrected in a second [1/s]; found by hand, too
 
 
 def velocity_gain(scenario: Scenario) -> float:

@@ -3,8 +3,7 @@
 from uuv_marl.scenario.disturbance_sections import Fault
 from uuv_marl.scenario.scenario import Scenario
 
-IDEAL = "still water, no noise, no delay"
-"""Conditions of a scenario without disturbances."""
+IDEAL = "still water, no noise, no delay"  # conditions of a scenario without disturbances
 
 
 def conditions(scenario: Scenario) -> str:

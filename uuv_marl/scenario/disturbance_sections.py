@@ -8,8 +8,7 @@ from uuv_marl.scenario.fields import Clock, NonNegative, Radius, Section, Speed,
 Probability = Annotated[float, within(0, 1)]
 Angle = Annotated[float, within(0, 180)]
 Share = Annotated[float, within(0, 0.9)]
-MAX_DELAY_S = 2.0
-"""Longest processing time of a reading."""
+MAX_DELAY_S = 2.0  # longest processing time of a reading
 AROUND_M, _SQUARE_M = 250.0, 500.0
 """Margin around a map's box that holds eddies, and side of the square for their density."""
 

@@ -5,8 +5,7 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-MAX_RANGE_M = 4096.0
-"""Largest position in a percept, so that observations are bounded."""
+MAX_RANGE_M = 4096.0  # largest position in a percept, so that observations are bounded
 
 
 def within(low: float, high: float) -> AfterValidator:

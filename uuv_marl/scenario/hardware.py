@@ -9,29 +9,17 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from uuv_marl.scenario.fields import (
-    Lag,
-    NonNegative,
-    NonPositive,
-    Positive,
-    Radius,
-    Section,
-    Signed,
-    Speed,
-    VehicleName,
-    within,
-)  # fmt: skip
+from uuv_marl.scenario import fields
+from uuv_marl.scenario.fields import Lag, NonNegative, NonPositive, Positive, Radius, Section, Signed, Speed, within
 
-MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0
-"""Widths of sub-sectors that the sonar's table of directions supports."""
-CHANNEL_NAMES = ("compass", "link", "current", "age", "ranged", "modem")
-"""Channels of every task."""
+MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0  # widths of sub-sectors that the sonar's table of directions supports
+CHANNEL_NAMES = ("compass", "link", "current", "age", "ranged", "modem")  # channels of every task
 
 
 class Vehicle(Section):
     """Parameters of Eq. 3-4. Dimensions follow from the force or moment and the velocities they multiply."""
 
-    name: VehicleName
+    name: fields.VehicleName
     """The file in ``vehicles/`` with the numbers, and its variants, unless overridden."""
     m_kg: Positive
     I_z_kgm2: Positive

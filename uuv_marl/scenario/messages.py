@@ -1,6 +1,6 @@
 """Messages for pydantic's validation errors, and values as messages show them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, cast, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -73,16 +73,11 @@ def _nearest(location: Sequence[str | int], fields: Sequence[str], prefix: str) 
     last, table = str(location[-1]), "".join(f"{0 if isinstance(part, int) else part}." for part in location[:-1])
     here = dict.fromkeys(field.removeprefix(table).partition(".")[0] for field in fields if field.startswith(table))
     leaves = {field.rpartition(".")[2]: prefix + field for field in reversed(fields)}
-    location_text = prefix + ".".join(map(str, (*location[:-1], "")))
-    near = [leaves[last]] if last in leaves else _like(last, {name: location_text + name for name in here})
-    near = near or _like(last, leaves)
-    return f"; did you mean {near[0]!r}?" if near else f"; the fields here are {', '.join(here) or 'none'}"
-
-
-def _like(name: str, names: Mapping[str, str]) -> list[str]:
-    """The value of the most similar name, if there is one."""
-    near = nearest(name, names, 0.5)
-    return [names[near]] if near else []
+    nested = {name: prefix + ".".join(map(str, (*location[:-1], name))) for name in here}
+    near = (
+        leaves.get(last) or nested.get(nearest(last, nested, 0.5) or "") or leaves.get(nearest(last, leaves, 0.5) or "")
+    )
+    return f"; did you mean {near!r}?" if near else f"; the fields here are {', '.join(here) or 'none'}"
 
 
 def _fields(model: Any, prefix: str = "") -> Iterator[str]:

@@ -14,14 +14,10 @@ from uuv_marl.scenario import disturbance_sections, fields, hardware, sections
 from uuv_marl.scenario.task import TaskSettings, check_channels, check_task, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
-MAX_READINGS = 64
-"""Largest processing time of a sonar reading [control steps]."""
-MAX_EDDIES = 4_096
-"""Largest number of eddies of a world; every vehicle's water velocity is the sum over all of them."""
-MAX_PAST = 1024
-"""Largest travel time of sound across a sonar's range [control steps]."""
-MAX_STEPS = 10_000
-"""Largest number of integration steps in a decision; compiled code can't be interrupted."""
+MAX_READINGS = 64  # largest processing time of a sonar reading [control steps]
+MAX_EDDIES = 4_096  # largest number of eddies of a world; every vehicle's water velocity is the sum over all of them
+MAX_PAST = 1024  # largest travel time of sound across a sonar's range [control steps]
+MAX_STEPS = 10_000  # largest number of integration steps in a decision; compiled code can't be interrupted
 
 
 class Scenario(fields.Section):

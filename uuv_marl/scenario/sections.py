@@ -9,15 +9,12 @@ from pydantic import Field
 from uuv_marl.scenario.fields import Clock, NonNegative, Positive, Radius, Section, Signed, Speed, within
 from uuv_marl.types import Float64
 
-NOMINAL_VEHICLES = 54
-"""The paper's swarm; areas grow with sqrt(n / 54) above it, which keeps the density."""
+NOMINAL_VEHICLES = 54  # the paper's swarm; areas grow with sqrt(n / 54) above it, which keeps the density
 
-Seconds = TypeVar("Seconds", float, Float64)
-"""A time or an array of times [s]."""
+Seconds = TypeVar("Seconds", float, Float64)  # a time or an array of times [s]
 Legs = Annotated[int, within(1, 8)]
 Discs = Annotated[int, within(0, 64)]
-Point = tuple[float, float]
-"""North and east [m]."""
+Point = tuple[float, float]  # north and east [m]
 
 
 def growth(num_vehicles: int) -> float:

@@ -12,14 +12,10 @@ from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.sections import Timing
 from uuv_marl.types import Float64
 
-RK4_LIMIT = 2.78
-"""Classical Runge-Kutta is stable on the negative real axis up to this product of rate and step."""
-TRIAL_STEPS, RUNS = 600, 128
-"""Integration steps of a trial, a minute at the paper's step, and parallel runs."""
-RUNAWAY = 1e8
-"""Speed [m/s, rad/s] beyond which a trial has diverged, never reached otherwise."""
-SAMPLED_LIMIT = 2.0
-"""A sampled damping loop diverges above this product of rate and control step."""
+RK4_LIMIT = 2.78  # classical Runge-Kutta is stable on the negative real axis up to this product of rate and step
+TRIAL_STEPS, RUNS = 600, 128  # integration steps of a trial, a minute at the paper's step, and parallel runs
+RUNAWAY = 1e8  # speed [m/s, rad/s] beyond which a trial has diverged, never reached otherwise
+SAMPLED_LIMIT = 2.0  # a sampled damping loop diverges above this product of rate and control step
 
 
 def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_mps: float) -> None:

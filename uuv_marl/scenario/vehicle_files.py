@@ -126,8 +126,8 @@ def _find_vehicle(name: str, beside: Path | None = None) -> Path:
     if name in vehicle_names() or (name.endswith(".toml") and path.is_file()):
         return path
     raise ScenarioError(
-        f"vehicle {shown(name)} is unknown; {hint(name, vehicle_names())}give one of {', '.join(vehicle_names())}, or a "
-        "path ending in .toml"
+        f"vehicle {shown(name)} is unknown; {hint(name, vehicle_names())}give one of {', '.join(vehicle_names())}, "
+        "or a path ending in .toml"
     )
 
 

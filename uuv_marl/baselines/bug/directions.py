@@ -15,10 +15,8 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Bool, Float64
 
-RAYS = 120
-"""Number of candidate directions, the first to the goal, then clockwise."""
-_FREE_M = 1e6
-"""Free distance where no echo is known [m]."""
+RAYS = 120  # number of candidate directions, the first to the goal, then clockwise
+_FREE_M = 1e6  # free distance where no echo is known [m]
 
 
 def rays() -> Float64:

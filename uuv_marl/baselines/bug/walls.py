@@ -19,8 +19,7 @@ from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32, Float64
 
-SAME_M = 2.0
-"""An echo this near to a remembered one replaces it [m]. Assumed: less than any disc's radius."""
+SAME_M = 2.0  # an echo this near to a remembered one replaces it [m]. Assumed: less than any disc's radius.
 
 
 @described
@@ -36,8 +35,7 @@ class Walls(NamedTuple):
     direction: Annotated[Float64, "world vehicle 2", "Unit vector of its direction in the map."]
 
 
-WallsMemory = with_surroundings("WallsMemory", Walls)
-"""Memory of ``tangent_bug``: surroundings, then walls."""
+WallsMemory = with_surroundings("WallsMemory", Walls)  # memory of ``tangent_bug``: surroundings, then walls
 
 
 @compiled

@@ -42,8 +42,7 @@ class LeaderFollowerGains(NamedTuple):
     memory_s: float = 3.0  # time for which an undetected neighbour is remembered [s]
 
 
-_BACK = -0.3
-"""Largest speed back of a leader that is too far ahead, as a share of its speed [1]. Assumed."""
+_BACK = -0.3  # largest speed back of a leader that is too far ahead, as a share of its speed [1]. Assumed.
 
 
 class LeaderFollower(Filtered):

@@ -26,12 +26,9 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Float32
 
-EPSILON = 0.1
-"""Parameter of the sigma-norm, as in the source's simulations [1]."""
-_H_ALPHA = 0.2
-"""Share of the reach within which neighbours have full weight, as in the source's simulations [1]."""
-_H_BETA = 0.9
-"""The same share for obstacles [1]."""
+EPSILON = 0.1  # parameter of the sigma-norm, as in the source's simulations [1]
+_H_ALPHA = 0.2  # share of the reach within which neighbours have full weight, as in the source's simulations [1]
+_H_BETA = 0.9  # the same share for obstacles [1]
 
 
 class OlfatiSaberGains(NamedTuple):

@@ -23,8 +23,7 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Float32, Float64
 
-_SHARE = 0.5
-"""Share of a change that a vehicle makes; its neighbour makes the other half. Definition of ORCA^tau_A|B."""
+_SHARE = 0.5  # share of a change that a vehicle makes; its neighbour makes the other half. Definition of ORCA^tau_A|B.
 
 
 class OrcaGains(NamedTuple):

@@ -23,30 +23,20 @@ from uuv_marl.baselines.requirements import FULL_TORQUE_NM, PolicyRequirements
 from uuv_marl.errors import PolicyError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.messages import explain
 from uuv_marl.sim.observation import observation_layout
 from uuv_marl.types import Float32
 
 Row = tuple[str, int, str, float]
 
-WEIGHTS_FILE = "policy.safetensors"
-"""The checkpoint within a folder."""
+WEIGHTS_FILE = "policy.safetensors"  # the checkpoint within a folder
 _SHIPPED = Path(__file__).parents[1] / "weights"
 _CARD = "uuv_marl"
-_MOST_WEIGHT = 1e6
-"""Largest valid weight; larger ones overflow in single precision."""
+_MOST_WEIGHT = 1e6  # largest valid weight; larger ones overflow in single precision
 _NOT_THE_VEHICLE = {
-    "vehicle.name",
-    "vehicle.length_m",
-    "vehicle.cruise_mps",
-    "vehicle.max_mps",
-    "vehicle.source",
-    "actuators.yaw_damping_nms",
-    "actuators.thrust_lag_s",
-    "actuators.yaw_lag_s",
-    "actuators.yaw_authority",
-}
+    "vehicle.name", "vehicle.length_m", "vehicle.cruise_mps", "vehicle.max_mps", "vehicle.source",
+    "actuators.yaw_damping_nms", "actuators.thrust_lag_s", "actuators.yaw_lag_s", "actuators.yaw_authority",
+}  # fmt: skip
 
 
 def vehicle_of(scenario: Scenario) -> dict[str, float | str]:
@@ -55,15 +45,12 @@ def vehicle_of(scenario: Scenario) -> dict[str, float | str]:
     An optional field of a vehicle's file is included only if it differs from its default: checkpoints of hulls without
     lift and rudder do not mention them.
     """
-    sections = {"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()}
-    usual = {
-        f"{section}.{name}": field.default
-        for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
-        for name, field in model.model_fields.items()
-        if not field.is_required()
+    sections = {"vehicle": scenario.vehicle, "actuators": scenario.actuators}
+    fields = {
+        f"{section}.{name}": value
+        for section, model in sections.items()
+        for name, value in model.model_dump(exclude_defaults=True).items()
     }
-    every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
-    fields = {field: value for field, value in every.items() if field not in usual or value != usual[field]}
     return {field: value for field, value in fields.items() if field not in _NOT_THE_VEHICLE}
 
 

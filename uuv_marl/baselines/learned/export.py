@@ -3,6 +3,7 @@
 The nodes are created by the code that NumPy runs, ``layers.Network``.
 """
 
+import functools
 import json
 from collections.abc import Sequence
 from typing import Any
@@ -25,8 +26,7 @@ with extra("onnx", "export to ONNX"):
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
-OPSET = 18
-"""Version of ONNX's operators: the first that has every operator in its present form."""
+OPSET = 18  # version of ONNX's operators: the first that has every operator in its present form
 
 
 def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
@@ -106,6 +106,7 @@ class Graph:
         self.nodes: list[onnx.NodeProto] = []
         self.constants: list[onnx.TensorProto] = []
         self._named = 0
+        self.tanh, self.sigmoid, self.relu = (functools.partial(self, name) for name in ("Tanh", "Sigmoid", "Relu"))
 
     def __call__(self, operator: str, *inputs: Any, name: str = "", **attributes: Any) -> "Value":
         """The output of a new node with an operator's inputs (values, or arrays as constants), name and attributes."""
@@ -135,18 +136,6 @@ class Graph:
         names = [self.fresh("part") for _ in range(3)]
         self.nodes.append(helper.make_node("Split", [x.name], names, self.fresh("Split"), axis=1, num_outputs=3))
         return [Value(self, name) for name in names]
-
-    def tanh(self, x: "Value") -> "Value":
-        """From -1 to 1."""
-        return self("Tanh", x)
-
-    def sigmoid(self, x: "Value") -> "Value":
-        """From 0 to 1."""
-        return self("Sigmoid", x)
-
-    def relu(self, x: "Value") -> "Value":
-        """At least 0."""
-        return self("Relu", x)
 
     def total(self, x: "Value") -> "Value":
         """Sum over the middle axis, which is removed."""

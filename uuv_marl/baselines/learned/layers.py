@@ -9,17 +9,14 @@ import pydantic
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float32, Int64
 
-ENCODED = 32
-"""Features of an encoded sub-sector."""
+ENCODED = 32  # features of an encoded sub-sector
 _HEARD = (
     "closeness", "neighbour_direction", "link_identity", "link_velocity", "age", "ranged", "modem_identity",
     "modem_velocity", "modem_age",
 )  # fmt: skip
 _ECHO = ("echo_closeness", "echo_direction")
-_POWERS = 4
-"""Sums of a kind in ``moments``: directions, whose length is closeness, times its powers 0, 1, 2 and 4."""
-Sizes = Sequence[tuple[str, int]]
-"""Name and number of entries of every row of an observation, in order."""
+_POWERS = 4  # sums of a kind in ``moments``: directions, whose length is closeness, times its powers 0, 1, 2 and 4
+Sizes = Sequence[tuple[str, int]]  # name and number of entries of every row of an observation, in order
 
 
 class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
@@ -36,7 +33,7 @@ class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
 
 
 def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
-    """Columns of sub-sectors' entries, shape (sub-sector, entry), for ``heard`` (vehicles) and ``echo``; and all others."""
+    """Columns of sub-sectors' entries, shape (sub-sector, entry), for ``heard`` and ``echo``; and all others."""
     at: dict[str, Int64] = {}
     sectors: dict[str, Int64] = {}
     first = 0

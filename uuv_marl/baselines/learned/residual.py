@@ -13,8 +13,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike
 from uuv_marl.types import Float32
 
-SHARE = 0.5
-"""Largest part of the full force that a network adds to the base controller's action."""
+SHARE = 0.5  # largest part of the full force that a network adds to the base controller's action
 
 
 class ResidualPolicy(Policy):

@@ -33,5 +33,5 @@ class Trained:
 
     def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Actor:
         """The network for a scenario, without safety filter or base controller. Raises PolicyError as ``Actor``."""
-        kind = Recurrent if self.checkpoint.card.network.memory else Actor
-        return kind(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)
+        network = Recurrent if self.checkpoint.card.network.memory else Actor
+        return network(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)

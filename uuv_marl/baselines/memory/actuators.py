@@ -19,8 +19,7 @@ from uuv_marl.sim.compiled import compiled
 ASKED, ACTED, ASKED_BEFORE, ACTED_BEFORE, SQUARES, PRODUCTS = 0, 1, 2, 3, 4, 10
 """Columns of ``Surroundings.actuators``: g and f of the latest period and of that before, six sums of products of the
 regressors (f_(k-1), g_k, g_(k-1)), and three of the regressors with f_k - g_k."""
-_KEPT_S = 5.0
-"""Time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg."""
+_KEPT_S = 5.0  # time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg.
 _NOTHING = 1e-3
 """Sum of squared changes below which the estimate stays at ideal actuators (3 % of full thrust or torque)."""
 _LONGEST = 0.97
@@ -28,8 +27,7 @@ _LONGEST = 0.97
 _MISSING = 0.3
 """Immediate shortfall at which the correction has full weight [1]. Assumed: in a current 0.97 to 1.05 of a demand acts
 at once, on a tuning field, and 0.63 with a lag of 0.1 s."""
-_LEAST, _MOST = 0.05, 1.5
-"""Bounds of s. Assumed: an effectiveness of 5 % can't be compensated."""
+_LEAST, _MOST = 0.05, 1.5  # bounds of s. Assumed: an effectiveness of 5 % can't be compensated.
 
 
 @compiled

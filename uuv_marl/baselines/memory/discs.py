@@ -21,18 +21,13 @@ RADIUS_M, RADIUS_SD_M = 18.0, 10.0
 """Expected radius of an obstacle with one known point, and its deviation [m]. Assumed: those of random_field."""
 SIDE_SD_M = 8.0
 """Lateral deviation of the centre of an obstacle whose nearest point may lie outside the sonar's arc [m]. Assumed."""
-GATE = 3.0
-"""Largest deviation of an echo from its disc, in standard deviations [1]."""
-CONFIRMED = 3.0
-"""Detections from which a disc counts."""
+GATE = 3.0  # largest deviation of an echo from its disc, in standard deviations [1]
+CONFIRMED = 3.0  # detections from which a disc counts
 MOST_SCORE_S = 3.0
 """Largest score, as time [s]: the time for which a disc then remains undetected until it is removed. Assumed."""
-LIFETIME = 40.0
-"""A disc detected for t seconds in all, less than that, is removed after this times t^2 [1/s]. Assumed."""
-SMALLEST_M, LARGEST_M = 0.5, 60.0
-"""Bounds of a radius [m]."""
-_FORGETS = 0.2
-"""Growth of the covariance of a detected disc [1/s]: about the last 5 s count ..."""
+LIFETIME = 40.0  # a disc detected for t seconds in all, less than that, is removed after this times t^2 [1/s]. Assumed.
+SMALLEST_M, LARGEST_M = 0.5, 60.0  # bounds of a radius [m]
+_FORGETS = 0.2  # growth of the covariance of a detected disc [1/s]: about the last 5 s count ...
 _MOST_VARIANCE = 2.0 * RADIUS_SD_M * RADIUS_SD_M + SIDE_SD_M * SIDE_SD_M
 """... unless it is as large as that of a new one already [m2]."""
 

@@ -13,21 +13,15 @@ ACCELERATION = 2.0
 """Typical acceleration of neighbours [m/s2]. Assumed: a seventh of the default vehicle's at full force."""
 MANOEUVRES = 0.005
 """Mean error over range that neighbours' manoeuvres cause; the rest is attributed to the sonar [1]. Assumed."""
-LEAST_ERROR = 0.0002
-"""Smallest assumed error of the sonar over range [1]."""
-MEMORY_S = 1.0
-"""Default time for which an undetected neighbour is remembered [s]."""
-_FRESH_S = 1.0
-"""Neighbours undetected for longer do not count in the mean age of readings [s]."""
-_SAME_M = 1e-3
-"""A reading that moved less is a repetition, from a sonar that is slower than decisions [m]."""
-_STALE_S = 2.0
-"""A repeated reading counts as new after this time [s]."""
+LEAST_ERROR = 0.0002  # smallest assumed error of the sonar over range [1]
+MEMORY_S = 1.0  # default time for which an undetected neighbour is remembered [s]
+_FRESH_S = 1.0  # neighbours undetected for longer do not count in the mean age of readings [s]
+_SAME_M = 1e-3  # a reading that moved less is a repetition, from a sonar that is slower than decisions [m]
+_STALE_S = 2.0  # a repeated reading counts as new after this time [s]
 _FAR_M = 64.0
 """Neighbours farther away count in the mean position as if they were at this distance. Assumed: about twice the radius
 in which 54 vehicles move."""
-_LEARNS = 0.05
-"""Weight of the newest error in the running mean [1]."""
+_LEARNS = 0.05  # weight of the newest error in the running mean [1]
 
 
 @compiled

@@ -19,12 +19,10 @@ from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, held,
 from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float32, Float64
 
-_MOVES_MPS = 0.005
-"""Speed above which l(t) counts as moving; scenarios allow no speed below 0.01 m/s."""
+_MOVES_MPS = 0.005  # speed above which l(t) counts as moving; scenarios allow no speed below 0.01 m/s
 _TENTH = 0.1
 """Share of full thrust and torque for the model's gains: small, so that the direction hardly changes in a turn."""
-FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)
-"""A longer vector to l(t) is clipped and gives no fix [m]."""
+FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)  # a longer vector to l(t) is clipped and gives no fix [m]
 _TURN_TOLERANCE = 0.001
 """Difference of compass and dead reckoning on a leg, beside the effect of the yaw rate's error [rad]."""
 

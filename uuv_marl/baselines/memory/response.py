@@ -12,8 +12,7 @@ from uuv_marl.sim.compiled import compiled
 
 ACTED, MISSED, DUE, PRODUCTS, SQUARES = range(5)
 """Columns of ``Surroundings.response``: f, y, x, and the running sums of dx dy and dx^2."""
-_KEPT_S = 5.0
-"""Time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg."""
+_KEPT_S = 5.0  # time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg.
 _NOTHING = 0.01
 """Sum of squared changes of an action below which the estimate stays near 0: one of a tenth, a hundred of 1 %."""
 

@@ -19,29 +19,17 @@ class Surroundings(NamedTuple):
     motion: Annotated[Float64, "world vehicle 3", "Own velocity, body frame [m/s], and yaw rate [rad/s]."]
     action: Annotated[Float64, "world vehicle 2", "Own latest action: shares of full thrust and torque."]
     response: Annotated[Float64, "world vehicle 2 5", "Response of thrust and torque: see ``memory.response``."]
-    actuators: Annotated[
-        Float64, "world vehicle 2 13", "Response of thrust and total torque: see ``memory.actuators``."
-    ]
+    actuators: Annotated[Float64, "world vehicle 2 13", "Lag of thrust and total torque: see ``memory.actuators``."]
     reference: Annotated[Float64, "world vehicle 4", "Position of l(t) [m], unit vector of its leg, 0 at rest."]
     reference_speed: Annotated[Float64, "world vehicle", "Speed of l(t) [m/s]."]
-    filtered: Annotated[
-        Float64,
-        "world vehicle 2",
-        "1 if the safety filter changed the latest velocity; if none was safe.",
-    ]
+    filtered: Annotated[Float64, "world vehicle 2", "1 if the filter changed the latest velocity; if none was safe."]
     counted: Annotated[Float64, "world vehicle 2", "Sums of these over earlier decisions."]
     begun: Annotated[Float64, "world vehicle", "1 from the first percept until the vehicle is lost."]
     disc: Annotated[Float64, "world vehicle 12 3", "Obstacles: centre in the map and radius [m]."]
     spread: Annotated[Float64, "world vehicle 12 6", "Their covariance [m2]: xx, xy, xR, yy, yR, RR."]
-    score: Annotated[
-        Float64,
-        "world vehicle 12",
-        "Detections of each less missed ones; 0 for none.",
-    ]
+    score: Annotated[Float64, "world vehicle 12", "Detections of each less missed ones; 0 for none."]
     undetected: Annotated[Float64, "world vehicle 12", "Time since each was detected [s]."]
-    disc_away: Annotated[
-        Float64, "world vehicle 12", "Distance of each one's centre from the vehicle [m], infinite for none."
-    ]
+    disc_away: Annotated[Float64, "world vehicle 12", "Distance of each one's centre [m], infinite for none."]
     place: Annotated[Float64, "world vehicle sector 2", "Neighbours: position in the map [m]."]
     away: Annotated[Float64, "world vehicle sector", "Their distance from the vehicle [m], infinite for none."]
     velocity: Annotated[Float64, "world vehicle sector 2", "Their velocity [m/s]."]

@@ -5,8 +5,7 @@ from uuv_marl.baselines.memory.response import remains
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.sim.compiled import compiled
 
-FULL_SHORTFALL = 0.4
-"""Remaining share of a demand on thrust or torque that means full uncertainty [1]. Assumed."""
+FULL_SHORTFALL = 0.4  # remaining share of a demand on thrust or torque that means full uncertainty [1]. Assumed.
 NOISE = 0.02
 """Position errors of neighbours over range that mean the same [1]. Assumed: those of 2 degrees. Exact echoes cause
 errors only at long decision periods, when neighbours are not where they were predicted."""

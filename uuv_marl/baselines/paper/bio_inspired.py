@@ -14,12 +14,9 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Float32, Int64
 
-FEED_FORWARD = 1.2
-"""Feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference."""
-MAX_EXPONENT = 50.0
-"""Largest exponent length / distance [1]."""
-MIN_DISTANCE_M = 0.5
-"""Smallest distance in the exponent [m]."""
+FEED_FORWARD = 1.2  # feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference
+MAX_EXPONENT = 50.0  # largest exponent length / distance [1]
+MIN_DISTANCE_M = 0.5  # smallest distance in the exponent [m]
 
 
 class BioInspiredGains(NamedTuple):

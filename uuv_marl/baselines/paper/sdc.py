@@ -23,8 +23,7 @@ from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Bool, Float32, Float64, Int64
 
-SLOT_PITCH_M = 12.0
-"""Distance between neighbouring slots."""
+SLOT_PITCH_M = 12.0  # distance between neighbouring slots
 _MAX_XI = 0.99
 _MOST_VEHICLES = 2000
 """Slot assignment takes time cubic in the swarm's size: 1.5 s here, a quarter of an hour for 16,384 vehicles."""

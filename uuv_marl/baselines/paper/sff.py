@@ -20,8 +20,7 @@ from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import Fields, fields
 from uuv_marl.types import Bool, Float32, Float64
 
-HORIZON_S = 1.0
-"""Time ahead for which neighbours are predicted [s]."""
+HORIZON_S = 1.0  # time ahead for which neighbours are predicted [s]
 _MAX_RATE_MPS = 8.0
 
 

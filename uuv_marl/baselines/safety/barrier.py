@@ -42,8 +42,7 @@ class Barrier(NamedTuple):
     horizon_m: float = 60.0  # neighbours and surfaces farther away are ignored [m]
 
 
-MOST_CLOSED = 0.3
-"""Largest share of the remaining distance that is closed in a decision period [1]."""
+MOST_CLOSED = 0.3  # largest share of the remaining distance that is closed in a decision period [1]
 GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
 """The filter of ``safety_filter=true``, with smaller margins than a controller that avoids obstacles early."""
 

@@ -50,15 +50,15 @@ class Filtered(Policy):
     @property
     def changed(self) -> Int64:
         """Velocities that the filter changed since the reset, shape (world,)."""
-        return self._times(0)
+        return self._count(0)
 
     @property
     def infeasible(self) -> Int64:
         """Changed velocities for which no velocity was safe, so that the least unsafe was taken, shape (world,)."""
-        return self._times(1)
+        return self._count(1)
 
-    def _times(self, what: int) -> Int64:
-        return (self.memory.counted + self.memory.filtered)[..., what].sum(axis=1).astype(np.int64)
+    def _count(self, column: int) -> Int64:
+        return (self.memory.counted + self.memory.filtered)[..., column].sum(axis=1).astype(np.int64)
 
     @property
     def memory_s(self) -> float:

@@ -10,8 +10,7 @@ import math
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float64
 
-TOLERANCE = 1e-9
-"""Largest violation of a satisfied half-plane [m/s]. Assumed: far above rounding, below any use."""
+TOLERANCE = 1e-9  # largest violation of a satisfied half-plane [m/s]. Assumed: far above rounding, below any use.
 _PARALLEL = 1e-12
 """Sine of the angle below which two borders are parallel. Assumed: their crossing would be beyond any speed."""
 

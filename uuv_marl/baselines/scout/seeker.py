@@ -44,21 +44,17 @@ class TrackedTarget(NamedTuple):
 
     target: Annotated[Float64, "world vehicle 4", "Position [m] and velocity [m/s] of its target."]
     track_timeout_s: Annotated[Float64, "world vehicle", "Time left to follow it without detection [s]."]
-    search: Annotated[
-        Float64, "world vehicle 2", "Direction of its search in the box, or in lanes that of x, and the lane."
-    ]
+    search: Annotated[Float64, "world vehicle 2", "Direction of its search in the box; in lanes, of x, and the lane."]
 
 
 SeekerMemory = with_surroundings("SeekerMemory", TrackedTarget)
-_ALPHA, _BETA = 0.8, 0.5
-"""Gains by which an echo corrects a target's position and velocity [1]. Assumed."""
+_ALPHA, _BETA = 0.8, 0.5  # gains by which an echo corrects a target's position and velocity [1]. Assumed.
 _GATE_M, _GATE_MPS = 8.0, 4.0
 """Distance from the predicted target within which an echo is its own, and its growth with the time undetected.
 Assumed."""
 _SILENT_S, _GOES_MPS = 1.2, 0.5
 """Time undetected after which a vehicle moves to the target; speed from which it stays behind it. Assumed."""
-_AHEAD_M = 40.0
-"""Distance ahead at which a vehicle returns to its lane [m]. Assumed."""
+_AHEAD_M = 40.0  # distance ahead at which a vehicle returns to its lane [m]. Assumed.
 
 
 class NearestTarget(Filtered):
