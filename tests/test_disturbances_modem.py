@@ -10,6 +10,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, make, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
 from uuv_marl.baselines.learned.layers import shapes
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -117,4 +118,4 @@ def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
 class Both(Policy):
     """Compares messages with true values."""
 
-    channels = ("link", "modem")
+    requirements = PolicyRequirements(("link", "modem"))

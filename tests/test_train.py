@@ -894,9 +894,9 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 should be a finite number, got inf"),
-        ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'noise'?"),
-        ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp', 'sectors' or 'moments', got 'cnn'"),
+        ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 must be a finite number, got inf"),
+        ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'ppo.noise'"),
+        ({"network": {"kind": "cnn"}}, "network.kind must be 'mlp', 'sectors' or 'moments', got 'cnn'"),
         ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
         ({"base_controller": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
@@ -909,8 +909,8 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
             "pull = 2 is to a teacher, and none is given; name one, or leave pull out",
         ),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
-        ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
-        ({"sizes": [[5, -1]]}, "sizes.0.1 should be greater than or equal to 0, got -1"),
+        ({"sizes": [0]}, "sizes.0.0 must be greater than or equal to 1, got 0"),
+        ({"sizes": [[5, -1]]}, "sizes.0.1 must be greater than or equal to 0, got -1"),
         ({"extra_scenarios": ["lossy"]}, "training can't show that a vehicle is lost"),
         (
             {"extra_scenarios": ["few_informed"]},

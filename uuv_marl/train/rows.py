@@ -42,7 +42,7 @@ class ExternalActionPolicy(Policy):
     """Does what it is told: it stands where the network will."""
 
     def __init__(self, scenario: Scenario, num_worlds: int, card: Card) -> None:
-        self.copy_requirements(card)
+        self.requirements = card.requirements
         super().__init__(scenario, num_worlds)
         self.action = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
 
