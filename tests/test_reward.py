@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
+from uuv_marl.baselines import make_policy
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario.task import task_class
 
@@ -38,7 +38,7 @@ REACH = {"task": "reach"}
 
 
 def mean_return(name, scenario, reward, worlds):
-    batch, policy = BatchedEnv(scenario, worlds, reward), make(name, scenario, worlds)
+    batch, policy = BatchedEnv(scenario, worlds, reward), make_policy(name, scenario, worlds)
     batch.reset(0)
     policy.reset(0)
     total = np.zeros(worlds)

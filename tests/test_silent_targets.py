@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, ScenarioError
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -172,7 +172,7 @@ def test_a_run_goes_on_alike_from_a_snapshot():
 
 def shares(name, tier, worlds=4):
     scenario = with_policy_requirements(name, load_scenario(tier))
-    batch, policy = BatchedEnv(scenario, worlds), make(name, scenario, worlds)
+    batch, policy = BatchedEnv(scenario, worlds), make_policy(name, scenario, worlds)
     batch.reset(TUNING)
     policy.reset(TUNING)
     total = np.zeros(worlds)
@@ -194,7 +194,7 @@ def test_the_oracle_holds_all_and_the_guide_beats_the_floors():
 
 def way_of(policy, decisions=300):
     swarm = water(2, "silent_targets_easy")
-    policy, percept = make(policy, swarm.scenario, 2), swarm.reset(TUNING)
+    policy, percept = make_policy(policy, swarm.scenario, 2), swarm.reset(TUNING)
     policy.reset(TUNING)
     for _ in range(decisions):
         percept = swarm.step(policy.act(percept))
@@ -202,14 +202,14 @@ def way_of(policy, decisions=300):
 
 
 def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
-    gains, usual = make("nearest_target", load_scenario("silent_targets_easy")).gains, way_of("nearest_target")
+    gains, usual = make_policy("nearest_target", load_scenario("silent_targets_easy")).gains, way_of("nearest_target")
     for name, value in gains._asdict().items():
         assert not np.array_equal(way_of(f"nearest_target,{name}={0.1 * value}"), usual), name
 
 
 def test_the_search_refuses_what_has_no_box():
     with pytest.raises(PolicyError, match="searches a box, of which task 'follow' tells nothing; run it on silent"):
-        make("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
+        make_policy("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
 
 
 @pytest.mark.parametrize(("changes", "message"), [

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
@@ -167,7 +167,7 @@ def test_one_group_has_its_turn_once_the_other_is_through():
 @pytest.mark.parametrize("tier", TIERS)
 def test_the_oracle_passes(tier):
     scenario = with_policy_requirements("oracle", load_scenario(tier))
-    batch, policy = BatchedEnv(scenario, 4), make("oracle", scenario, 4)
+    batch, policy = BatchedEnv(scenario, 4), make_policy("oracle", scenario, 4)
     batch.reset(TUNING)
     while not batch.over.all():
         policy.active[:] = ~batch.over
@@ -207,7 +207,7 @@ def test_numbers_that_can_not_be_are_refused(changes, message):
 
 def test_a_carrot_is_ahead_at_its_speed_and_to_starboard_and_ends_at_the_goal():
     scenario = load_scenario("two_swarms")
-    swarm, policy = Swarm(scenario), make("carrot,right_m=7,ahead_m=6,speed=3", scenario)
+    swarm, policy = Swarm(scenario), make_policy("carrot,right_m=7,ahead_m=6,speed=3", scenario)
     swarm.reset(TUNING)
     swarm.state.eta[0, 0, :2] = swarm.world_map.waypoints[0, 0, 1] + (3.0, 0.0)
     percept = swarm.observe()

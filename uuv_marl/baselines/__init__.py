@@ -1,4 +1,4 @@
-"""Policies: percepts in, actions out. ``make(name, scenario_or_env)`` gives one; ``POLICIES`` lists them.
+"""Policies: percepts in, actions out. ``make_policy(name, scenario_or_env)`` gives one; ``POLICIES`` lists them.
 
 Arguments of compiled functions have the same names and the same meaning everywhere, beside those of ``uuv_marl.sim``:
 
@@ -22,8 +22,8 @@ Arguments of compiled functions have the same names and the same meaning everywh
 """
 
 from uuv_marl.baselines.env_policy import EnvPolicy
-from uuv_marl.baselines.making import make, with_policy_requirements
+from uuv_marl.baselines.making import make_policy, with_policy_requirements
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES
 
-__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "make", "with_policy_requirements"]
+__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "make_policy", "with_policy_requirements"]

@@ -15,7 +15,7 @@ from uuv_marl.types import Float32, Int64
 
 
 class HasSwarm(Protocol):
-    """The part of an environment that ``make`` needs. A wrapper has it, if its ``unwrapped`` is our environment."""
+    """The part of an environment that ``make_policy`` needs. A wrapper has it, if its ``unwrapped`` is our environment."""
 
     @property
     def unwrapped(self) -> Any:

@@ -1,4 +1,4 @@
-"""``make``: a policy with its parameters, its base controller and its safety filter, for a scenario or environment."""
+"""``make_policy``: a policy with its parameters, base controller and safety filter, for a scenario or environment."""
 
 import inspect
 import math
@@ -59,10 +59,12 @@ def with_requirements(name: str, required: Any, scenario: Scenario) -> Scenario:
 
 
 @overload
-def make(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
+def make_policy(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
 @overload
-def make(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
-def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object) -> Policy | EnvPolicy:
+def make_policy(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
+def make_policy(
+    name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object
+) -> Policy | EnvPolicy:
     """A policy by name.
 
     Args:
@@ -92,7 +94,7 @@ def _with_filter(name: str, scenario: Scenario, num_worlds: int, parameters: dic
     if not isinstance(barrier, Barrier):
         raise PolicyError(
             f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
-            "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
+            "give it to make_policy(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
         )
     policy = _without_filter(name, policy_type, scenario, num_worlds, values)
     return Guarded(scenario, num_worlds, inner=policy, barrier=barrier) if parsed.safety_filter else policy
@@ -140,7 +142,7 @@ def compose(network: Policy, card: Card) -> Policy:
     if card.base_controller:
         check_base_controller(card.base_controller)
         network = ResidualPolicy(
-            scenario, num_worlds, base=make(card.base_controller, scenario, num_worlds), inner=network
+            scenario, num_worlds, base=make_policy(card.base_controller, scenario, num_worlds), inner=network
         )
     return Guarded(scenario, num_worlds, inner=network) if card.filter else network
 

@@ -3,25 +3,20 @@
 import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Literal, NamedTuple, TypedDict, Unpack, cast
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.envs.reward import RewardFunction, own_reward
+from uuv_marl.envs.changes import Changes, Reward, ScenarioLike, changed
+from uuv_marl.envs.reward import own_reward
 from uuv_marl.envs.state import global_state, state_layout
-from uuv_marl.errors import hint
-from uuv_marl.paths import UserPath
-from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
-from uuv_marl.scenario.overrides import override_of
+from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.observation import Observe, observation_layout, observer
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.task import StepReward, Task, checked_reward
 from uuv_marl.types import Bool, Float32, Float64
-
-ScenarioLike = UserPath | Scenario | Mapping[str, object]
-Reward = Literal["dense", "sparse", "team", "geodesic", "leader"] | RewardFunction
 
 
 class StepResult(NamedTuple):
@@ -219,55 +214,6 @@ class BatchedEnv:
         return reward, mean, terms
 
 
-class Changes(TypedDict, total=False):
-    """Arguments of every environment API that change the scenario, explained by ``uuv_marl.parallel_env``."""
-
-    num_vehicles: int | None
-    decision_period: float | None
-    task: str | Mapping[str, object] | None
-    overrides: Mapping[str, object] | None
-
-
-class EnvOptions(Changes, total=False):
-    """Arguments of every environment API beyond the scenario, explained by ``uuv_marl.parallel_env``."""
-
-    max_cycles: int | None
-    reward: Reward
-    observe: Observe
-
-
-_FIELDS = {"num_vehicles": "swarm.num_vehicles", "decision_period": "timing.decision_period_s", "task": "task"}
-"""Fields that arguments stand for."""
-
-
-def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
-    """The scenario, changed by the arguments of an environment.
-
-    Args:
-        scenario: a name, a TOML file or a ``Scenario``.
-        changes: ``num_vehicles`` replaces the scenario's number of vehicles, ``decision_period`` the time between
-            decisions [s], ``task`` what is to be done (``mine:Rendezvous``), and ``overrides`` any field, as in
-            ``{"sonar.echo_reports": "surface"}``.
-
-    Raises:
-        TypeError: there is no such argument.
-        ScenarioError: an argument and the override of its field differ.
-    """
-    for name in changes.keys() - Changes.__annotations__.keys():
-        usual = {"max_episode_steps": "max_cycles"}.get(name, name)  # Gymnasium's name
-        near = hint(usual, EnvOptions.__annotations__, 0.6)
-        raise TypeError(f"this environment has no argument {name!r}; {near}Fields of the scenario go into overrides")
-    overrides = changes.get("overrides") or {}
-    if not isinstance(cast(object, overrides), Mapping):
-        return load_scenario(scenario, overrides=overrides)  # which says what overrides must be
-    for name, field in _FIELDS.items():
-        own, other = changes.get(name), override_of(overrides, field)
-        if own is not None and other is not None and own != other:
-            raise ScenarioError(f"{name} = {own} and the override {field} = {other} differ; leave one out")
-    more = {field: changes[name] for name, field in _FIELDS.items() if changes.get(name) is not None}
-    return load_scenario(scenario, overrides={**overrides, **more})
-
-
 def make_batched_env(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
@@ -277,6 +223,7 @@ def make_batched_env(
     reward: Reward = "dense",
     observe: Observe = "positions",
     keep_terms: bool = True,
+    for_policy: str | None = None,
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes.
@@ -289,6 +236,7 @@ def make_batched_env(
         reward: ``dense``, ``sparse``, ``team``, one of the task's, or a function from the swarm to (world, vehicle).
         observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
         keep_terms: whether steps tell the reward's terms.
+        for_policy: policy whose requirements the scenario gets.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
     """
     (number,) = {*order} - {"scenario"}
@@ -299,7 +247,7 @@ def make_batched_env(
         worlds = whole_number(number, num_worlds, 1)
     except TypeError as error:
         raise TypeError(f"{error}; {remedy}") from None
-    return BatchedEnv(changed(scenario, **changes), worlds, reward, max_cycles, observe, keep_terms)
+    return BatchedEnv(changed(scenario, for_policy, **changes), worlds, reward, max_cycles, observe, keep_terms)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

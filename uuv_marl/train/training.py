@@ -13,7 +13,8 @@ from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.making import check_base_controller
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.requirements import inner_loop_nms
-from uuv_marl.envs.core import Reward, refuse_losses
+from uuv_marl.envs.changes import Reward
+from uuv_marl.envs.core import refuse_losses
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError, hint
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
