@@ -3,7 +3,7 @@ import { readFileSync } from "node:fs";
 import { decodeEpisodes } from "../uuv_marl/replay/decode.js";
 import { flowAt } from "../uuv_marl/replay/page/current.js";
 import { Episode } from "../uuv_marl/replay/page/episode.js";
-import { hearing } from "../uuv_marl/replay/page/sonar.js";
+import { detections } from "../uuv_marl/replay/page/sonar.js";
 import { jumps } from "../uuv_marl/replay/page/timeline.js";
 
 const [page, ...times] = process.argv.slice(2);
@@ -15,10 +15,10 @@ const read = (episode, time) => ({
   ...episode.numbers(time),
   poses: [...episode.poses(time)],
   discs: [...episode.discs(time)],
-  references: episode.ways.map((_, way) => episode.reference(time, way)),
+  references: episode.paths.map((_, path) => episode.reference(time, path)),
   marks: [...episode.marks(time)],
   flow: episode.current && flow(episode, episode.sampleAt(time), episode.poses(time)),
-  hearing: episode.inspected.map((_, rank) => hearing(episode, rank, episode.sampleAt(time))),
+  hearing: episode.inspected.map((_, rank) => detections(episode, rank, episode.sampleAt(time))),
 });
 const numbers = episodes.map((episode) => times.map((time) => read(episode, Number(time))));
 console.log(JSON.stringify({ numbers, jumps: jumps(episodes).map((jump) => jump.time) }));

@@ -276,9 +276,9 @@ def test_solo_takes_actions_that_can_t_be_written_to(monkeypatch):
 
 @pytest.mark.parametrize("make", [partial(uuv_marl.vector_env, 2), SoloEnv])
 def test_an_argument_that_is_not_there_is_named(make):
-    with pytest.raises(TypeError, match="no argument num_vehicle; did you mean num_vehicles"):
+    with pytest.raises(TypeError, match="no argument 'num_vehicle'; did you mean 'num_vehicles'"):
         make("starter", num_vehicle=3)
-    with pytest.raises(TypeError, match="no argument max_episode_steps; did you mean max_cycles"):
+    with pytest.raises(TypeError, match="no argument 'max_episode_steps'; did you mean 'max_cycles'"):
         make("starter", max_episode_steps=3)
     with pytest.raises(ScenarioError, match=r"decision_period = 0.2 and the override timing.decision_period_s = 0.5"):
         make("starter", decision_period=0.2, overrides={"timing": {"decision_period_s": 0.5}})

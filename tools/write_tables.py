@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from decimal import Decimal
 from pathlib import Path
 
 import uuv_marl
@@ -11,7 +10,6 @@ from research.episodes import measured, read_rows, select
 from research.heldout import page as heldout
 from research.tasks.studies import set_name
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
-from uuv_marl.benchmark.runner import DEFAULT_POLICIES
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
@@ -25,12 +23,15 @@ PAGES = (ROOT / "README.md", *(ROOT / "docs" / f"{name}.md" for name in NAMES))
 MARKED = re.compile(r"<!-- (\w+) -->\n(.*?)\n<!-- /\1 -->", re.DOTALL)
 RESULTS = ROOT / "docs" / "results.md"
 TIERS = {task: read_rows(ROOT / "docs" / f"{task}.csv.gz") for task in ("hard_water", "two_swarms")}
-IN_TASKS = {
-    "tangent_bug": "`tangent_bug` with yaw damping",
-    **{name: f"`{name}` with a decision every 0.5 s, yaw damping" for name in ("mappo_hard_water", "mappo_two_swarms")},
-    "oracle": "`oracle`, who sees the map, with way, link, yaw damping",
+README_ROWS = {
+    "bio_inspired": "`bio_inspired`: the paper's controller",
+    "sff": "`sff`: reconstruction, observes link",
+    "sdc": "`sdc`: reconstruction, observes compass, link, identity",
+    "scout": "`scout`: controller with memory and safety filter",
+    "tangent_bug": "`tangent_bug`: controller for walls",
+    "mappo": "`mappo`, `mappo_hard_water`, `mappo_two_swarms`: a network for each column",
 }
-"""What else README's table has."""
+"""Policies in README's table, and what it says of them."""
 HELD = heldout.tables(read_rows(ROOT / "docs" / "heldout.csv.gz"))
 
 
@@ -57,34 +58,25 @@ def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:
 
 
 def benchmark() -> str:
-    """The default policies' rows of ``single_obstacle`` in docs/results.md, shorter, and what all do in tasks."""
+    """README's table: time and collisions from ``single_obstacle`` in docs/results.md, success from the tasks' rows."""
     section = RESULTS.read_text(encoding="utf-8").partition("\n## single_obstacle")[2].partition("\n## ")[0]
+    found = {cells[0]: cells for line in section.splitlines() if len(cells := line.strip("| ").split(" | ")) > 12}
     lines: list[tuple[str, ...]] = []
-    for line in section.splitlines():
-        if line.startswith("| ") and not line.startswith(("| policy", "| ---")):
-            policy, extra, _, time, _, _, obstacle, _, spacing, _, _, collisions, _ = line.strip("| ").split(" | ")
-            if policy not in DEFAULT_POLICIES:
-                continue
-            needs = extra.removesuffix(" 600 N m s").removeprefix("end to end, ")
-            name = f"`{policy}`" + ("" if extra == "–" else f" with {needs}")
-            closest = (
-                f"{Decimal(obstacle):.1f} m, {Decimal(spacing):.1f} m"  # what ends in 5 was rounded before: to even
-            )
-            lines.append((name, f"{time.split()[0]} s", closest, collisions, *shares(policy)))
-    lines += [(requirements, "–", "–", "–", *shares(policy)) for policy, requirements in IN_TASKS.items()]
-    heads = ("one obstacle: time", "to the obstacle, to a vehicle", "collisions", "hard water", "two swarms")
-    return table(("policy, and what it gets beyond sonar", *heads), lines)
+    for policy, words in README_ROWS.items():
+        cells = found.get(policy)
+        first = f"{cells[3].split()[0]} s, {cells[11]}" if cells else "–"
+        walls, gap = (shares(f"{policy}_{task}" if policy == "mappo" else policy, task) for task in TIERS)
+        lines.append((words, first, walls, gap))
+    heads = ("one obstacle: time, collisions", "walls: success", "one gap: success")
+    return table(("policy", *heads), lines)
 
 
-def shares(policy: str) -> list[str]:
-    """Of the vehicles that succeed in the medium tier of each of ``TIERS``, mean over the kinds of maps it draws."""
-    found: list[str] = []
-    for task, rows in TIERS.items():
-        kinds = getattr(load_scenario(task).task_numbers, "kinds", [""])
-        sets = [select(rows, policy=policy, set=set_name(task, kind)) for kind in kinds]
-        means = [sum(measured(each, "success_share")) / len(each) for each in sets if each]
-        found.append(f"{sum(means) / len(means):.2f}".replace("0.", ".") if means else "–")
-    return found
+def shares(policy: str, task: str) -> str:
+    """Share of vehicles that succeed in a task's medium tier, mean over the kinds of maps that it samples."""
+    kinds = getattr(load_scenario(task).task_numbers, "kinds", [""])
+    sets = [select(TIERS[task], policy=policy, set=set_name(task, kind)) for kind in kinds]
+    means = [sum(measured(each, "success_share")) / len(each) for each in sets if each]
+    return f"{sum(means) / len(means):.2f}".replace("0.", ".") if means else "–"
 
 
 def scenarios() -> str:

@@ -60,9 +60,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
         if "for_policy" in changes:
-            raise TypeError(
-                f"SoloEnv has no for_policy: the scenario gets the requirements of others={others!r}; leave it out"
-            )
+            raise TypeError(f"SoloEnv takes no for_policy: the scenario suits others={others!r}; leave it out")
         batch = make_batched_env(
             scenario, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms, for_policy=others,
             **changes,

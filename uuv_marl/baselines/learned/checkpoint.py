@@ -118,7 +118,7 @@ class Checkpoint(NamedTuple):
     tensors: Mapping[str, Float32]
     """By name, see ``layers.shapes``."""
     digest: str
-    """First 16 hexadecimal digits of the SHA-256 of the tensors, as they stand in the file; the card does not count."""
+    """First 16 hexadecimal digits of the SHA-256 of the tensors' bytes in the file, without the card."""
 
 
 def card_rows(scenario: Scenario) -> tuple[Row, ...]:

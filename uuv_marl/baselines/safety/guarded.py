@@ -36,7 +36,7 @@ class Guarded(Filtered):
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: Policy, barrier: Barrier = GUARD) -> None:
         self.inner = inner
-        self.name = f"{inner.name},safety_filter=true"
+        self.name = inner.name
         self.copy_requirements(inner)
         super().__init__(scenario, num_worlds, barrier)
 

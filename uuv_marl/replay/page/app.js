@@ -12,7 +12,7 @@ import { showVehicle } from "./vehicle.js";
 
 const PALETTE = [
   "water", "grid", "track", "obstacle", "keepout", "goal", "trail", "reference", "hit", "near", "lost", "active",
-  "passive", "current", "heard", "echo", "force", "ink", "muted", "line", "panel", "series-0", "series-1", "series-2", "series-3",
+  "passive", "current", "detected", "echo", "force", "ink", "muted", "line", "panel", "series-0", "series-1", "series-2", "series-3",
 ];
 /** How often the numbers are written while the replay plays [ms]. */
 const WRITE_MS = 100;
@@ -86,7 +86,7 @@ class App {
     at("status").textContent = jumpText(jump, this.episodes.length > 1);
   }
 
-  /** Select a vehicle, the same in all episodes, and show the details of one; null for nobody. */
+  /** Select a vehicle, the same in all episodes, and show the details of one; null for none. */
   select(episode, vehicle) {
     const inside = Number.isInteger(vehicle) && vehicle >= 0 && vehicle < this.episodes[episode].vehicles;
     this.selected = inside ? vehicle : null;
@@ -109,7 +109,7 @@ class App {
     at("speed").value = String(speed);
   }
 
-  /** Follow the `swarm`, the selected `vehicle`, or see the whole `course`. */
+  /** Follow the `swarm`, the selected `vehicle`, or see the whole `map`. */
   follow(what) {
     if (what === "vehicle" && this.selected === null) this.selected = this.episodes[0].inspected[0] ?? 0;
     this.camera.look(what);

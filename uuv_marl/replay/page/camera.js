@@ -1,16 +1,16 @@
 /** Where the pictures look: one zoom and one way of following for all episodes, so that they can be compared. */
-export const FOLLOW = ["swarm", "vehicle", "course"];
+export const FOLLOW = ["swarm", "vehicle", "map"];
 
 export class Camera {
   constructor(episodes) {
-    this.course = bounds(episodes);
+    this.extent = bounds(episodes);
     const widest = Math.max(...episodes.map(swarmWidth));
-    const whole = Math.max(this.course.high[0] - this.course.low[0], this.course.high[1] - this.course.low[1]);
+    const whole = Math.max(this.extent.high[0] - this.extent.low[0], this.extent.high[1] - this.extent.low[1]);
     this.width = Math.min(Math.max(1.6 * widest, 40), whole);
     this.look("swarm");
   }
 
-  /** Follow the swarm's centre, the selected vehicle, or nobody: then the whole course is seen. */
+  /** Follow the swarm's centre, the selected vehicle, or nothing: then the whole map is shown. */
   look(follow) {
     this.follow = follow;
     this.zoom = 1;
@@ -19,13 +19,13 @@ export class Camera {
 
   /** How an episode is seen now, on a picture of this size [px]; `poses` as of `Episode.poses`. */
   view(episode, time, poses, selected, width, height) {
-    const { low, high } = this.course;
+    const { low, high } = this.extent;
     const fit = Math.min((height - 50) / (high[0] - low[0]), width / (high[1] - low[1]));
     const close = Math.min(width, height) / (this.follow === "vehicle" ? 0.7 * this.width : this.width);
     let at = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
     if (this.follow === "swarm") at = episode.centre(time, poses);
     if (this.follow === "vehicle") at = [poses[3 * selected], poses[3 * selected + 1]];
-    const scale = this.zoom * (this.follow === "course" ? fit : close);
+    const scale = this.zoom * (this.follow === "map" ? fit : close);
     return new View(at[0] + this.away[0], at[1] + this.away[1], scale, width, height);
   }
 
@@ -58,7 +58,7 @@ export class View {
   }
 }
 
-/** North and east between which all episodes' courses and starts lie, with a margin [m]. */
+/** North and east between which all episodes' maps and starts lie, with a margin [m]. */
 function bounds(episodes) {
   const low = [Infinity, Infinity];
   const high = [-Infinity, -Infinity];
@@ -69,7 +69,7 @@ function bounds(episodes) {
     });
   };
   for (const episode of episodes) {
-    const corners = episode.ways.flatMap((way) => way.corners);
+    const corners = episode.paths.flatMap((path) => path.corners);
     const discs = episode.values("obstacles");
     const start = episode.poses(0);
     for (let k = 0; k < corners.length; k += 2) hold(corners[k], corners[k + 1], 40);

@@ -32,7 +32,7 @@ export function resolvePalette(names) {
 export class Scale {
   constructor(quantity, episodes) {
     Object.assign(this, QUANTITIES[quantity], { quantity, low: 0, high: 1 });
-    if (quantity === "spacing") this.low = 2 * episodes[0].contact_m;
+    if (quantity === "spacing") this.low = 2 * episodes[0].hull_radius_m;
     if (quantity !== "force") {
       this.high = Math.max(...episodes.map((episode) => commonMost(episode.values(quantity))), this.low + 1);
     }

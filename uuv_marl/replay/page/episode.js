@@ -53,7 +53,7 @@ export class Episode {
     return sample > this.lastSeen[vehicle];
   }
 
-  /** North, east [m] and heading [rad] of everybody; the lost stay where they were seen last. */
+  /** North, east [m] and heading [rad] of all vehicles; the lost stay where they were seen last. */
   poses(time) {
     const [sample, next, share] = this.#between(time);
     const position = this.values("position");
@@ -69,11 +69,11 @@ export class Episode {
     return poses;
   }
 
-  /** North and east of a way's l(t) [m]. */
-  reference(time, way = 0) {
+  /** North and east of a path's l(t) [m]. */
+  reference(time, path = 0) {
     const [sample, next, share] = this.#between(time);
     const at = this.values("reference");
-    const [from, to] = [sample, next].map((k) => 2 * (k * this.ways.length + way));
+    const [from, to] = [sample, next].map((k) => 2 * (k * this.paths.length + path));
     return [0, 1].map((axis) => at[from + axis] + share * (at[to + axis] - at[from + axis]));
   }
 
@@ -96,7 +96,7 @@ export class Episode {
     });
   }
 
-  /** Mean north and east [m] of those that are not lost; of all of them where everybody is. */
+  /** Mean north and east [m] of those that are not lost; of all of them where all are lost. */
   centre(time, poses = this.poses(time)) {
     const sample = this.sampleAt(time);
     const all = Array.from({ length: this.vehicles }, (_, i) => i);

@@ -1,4 +1,4 @@
-/** What vehicles are among: grid, course, obstacles, scale bar, and the small map of it all. */
+/** What vehicles are among: grid, paths, obstacles, scale bar, and the inset that shows all of it. */
 import { View } from "./camera.js";
 import { circle, label, star } from "./shapes.js";
 
@@ -28,11 +28,11 @@ function roundStep(number) {
 }
 
 /** Each group's trajectory with start and goal, arrival radius, obstacles with their keep-out ring. */
-export function drawCourse(context, episode, time, view, palette, weight) {
+export function drawMap(context, episode, time, view, palette, weight) {
   const discs = episode.discs(time);
-  const leads = episode.ways.filter(({ corners }) => corners.length > 2);
+  const followed = episode.paths.filter(({ corners }) => corners.length > 2);
   context.lineWidth = 1.5 * weight;
-  for (const { team, corners } of leads) {
+  for (const { team, corners } of followed) {
     context.strokeStyle = palette.teams[team] ?? palette.track;
     context.setLineDash([7 * weight, 6 * weight]);
     context.beginPath();
@@ -68,7 +68,7 @@ export function drawCourse(context, episode, time, view, palette, weight) {
   context.strokeStyle = palette.goal;
   context.stroke();
 
-  for (const { team, corners } of leads) {
+  for (const { team, corners } of followed) {
     context.beginPath();
     circle(context, view.x(corners[1]), view.y(corners[0]), 5 * weight);
     context.fillStyle = palette.water;
@@ -76,13 +76,13 @@ export function drawCourse(context, episode, time, view, palette, weight) {
     context.strokeStyle = palette.teams[team] ?? palette.track;
     context.stroke();
   }
-  for (const { team, corners } of episode.ways) {
-    const [x, y, led] = [view.x(corners.at(-1)), view.y(corners.at(-2)), corners.length > 2];
+  for (const { team, corners } of episode.paths) {
+    const [x, y, isFollowed] = [view.x(corners.at(-1)), view.y(corners.at(-2)), corners.length > 2];
     context.fillStyle = context.strokeStyle = palette.teams[team] ?? palette.goal;
     context.beginPath();
-    if (led && weight === 1) circle(context, x, y, episode.arrival.radius_m * view.scale);
+    if (isFollowed && weight === 1) circle(context, x, y, episode.arrival.radius_m * view.scale);
     context.stroke();
-    star(context, x, y, (led ? 9 : 5) * weight);
+    star(context, x, y, (isFollowed ? 9 : 5) * weight);
   }
 }
 
@@ -110,39 +110,39 @@ export function drawScaleBar(context, view, palette) {
   label(context, "N", x - 4, 40, palette);
 }
 
-/** The whole course in a corner, and the part of it that the picture shows. */
-export function drawMap(context, episode, time, poses, view, look) {
-  const map = look.map;
+/** The whole map in a corner, and the part of it that the picture shows. */
+export function drawInset(context, episode, time, poses, view, look) {
+  const inset = look.inset;
   context.save();
   context.translate(10, 10);
   context.beginPath();
-  context.roundRect(0, 0, map.width, map.height, 6);
+  context.roundRect(0, 0, inset.width, inset.height, 6);
   context.fillStyle = look.palette.panel;
   context.globalAlpha = 0.8;
   context.fill();
   context.globalAlpha = 1;
   context.clip();
-  drawCourse(context, episode, time, map, look.palette, 0.5);
+  drawMap(context, episode, time, inset, look.palette, 0.5);
   const dot = episode.vehicles > 200 ? 1 : 1.8;
   for (let i = 0; i < episode.vehicles; i++) {
     context.fillStyle = episode.hasTeams ? look.palette.teams[episode.team[i]] : look.palette.scale[8];
-    context.fillRect(map.x(poses[3 * i + 1]) - dot / 2, map.y(poses[3 * i]) - dot / 2, dot, dot);
+    context.fillRect(inset.x(poses[3 * i + 1]) - dot / 2, inset.y(poses[3 * i]) - dot / 2, dot, dot);
   }
   const [north, east] = [view.height / 2 / view.scale, view.width / 2 / view.scale];
   context.lineWidth = 1;
   context.strokeStyle = look.palette.ink;
   context.strokeRect(
-    map.x(view.east - east), map.y(view.north + north), 2 * east * map.scale, 2 * north * map.scale,
+    inset.x(view.east - east), inset.y(view.north + north), 2 * east * inset.scale, 2 * north * inset.scale,
   );
   context.restore();
 }
 
-/** The frame of the small map in a picture's corner, or null where the picture has no room or shows it all. */
-export function mapView(course, view) {
-  const [tall, wide] = [course.high[0] - course.low[0], course.high[1] - course.low[1]];
+/** The frame of the inset in a picture's corner, or null where the picture has no room or shows it all. */
+export function insetView(extent, view) {
+  const [tall, wide] = [extent.high[0] - extent.low[0], extent.high[1] - extent.low[1]];
   const most = Math.min(140, 0.22 * view.width, 0.3 * view.height);
   const scale = most / Math.max(tall, wide);
   if (most < 60 || scale > 0.75 * view.scale) return null;
-  const [north, east] = [(course.low[0] + course.high[0]) / 2, (course.low[1] + course.high[1]) / 2];
+  const [north, east] = [(extent.low[0] + extent.high[0]) / 2, (extent.low[1] + extent.high[1]) / 2];
   return new View(north, east, scale, wide * scale, tall * scale);
 }

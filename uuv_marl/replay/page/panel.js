@@ -1,5 +1,5 @@
 /** One episode's part of the page: its name and state, its water, and the numbers of the present time. */
-import { mapView } from "./course.js";
+import { insetView } from "./map.js";
 import { drawScene } from "./scene.js";
 
 const NUMBERS = [
@@ -19,7 +19,7 @@ export function make(tag, properties = {}, ...children) {
 }
 
 export class Panel {
-  /** @param select called with a vehicle, or null for nobody. */
+  /** @param select called with a vehicle, or null for none. */
   constructor(episode, index, select) {
     this.episode = episode;
     this.select = select;
@@ -31,7 +31,7 @@ export class Panel {
     this.hits = make("span", { className: "badge", data: { hits: index } });
     this.chips = episode.inspected.map((vehicle) => {
       const chip = make("button", { className: "chip", type: "button", data: { vehicle } }, `UUV ${vehicle}`);
-      chip.title = "Show what its sonar hears";
+      chip.title = "Show what its sonar detects";
       chip.addEventListener("focus", () => select(vehicle));
       chip.addEventListener("click", () => select(vehicle));
       return chip;
@@ -65,8 +65,8 @@ export class Panel {
     if (!width || !height) return;
     this.poses = this.episode.poses(time);
     this.view = camera.view(this.episode, time, this.poses, look.selected ?? 0, width, height);
-    const map = camera.follow === "course" ? null : mapView(camera.course, this.view);
-    drawScene(this.context, this.episode, time, this.poses, this.view, { ...look, map });
+    const inset = camera.follow === "map" ? null : insetView(camera.extent, this.view);
+    drawScene(this.context, this.episode, time, this.poses, this.view, { ...look, inset });
   }
 
   /** The numbers of a time, and which vehicle is selected. */

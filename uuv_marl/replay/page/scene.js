@@ -1,5 +1,5 @@
-/** The water: course, obstacles, trails, vehicles, and what happens to them. */
-import { drawCourse, drawGrid, drawMap, drawScaleBar } from "./course.js";
+/** The water: paths, obstacles, trails, vehicles, and what happens to them. */
+import { drawGrid, drawInset, drawMap, drawScaleBar } from "./map.js";
 import { drawCurrent, drawCurrentKey } from "./current.js";
 import { circle, cross, dart, label } from "./shapes.js";
 import { drawSonar } from "./sonar.js";
@@ -14,7 +14,7 @@ const TRAIL_PIECES = 6000;
 /**
  * Draw an episode at a time.
  * @param context 2D context whose unit is a CSS pixel.
- * @param look {palette, scale: Scale, trails: boolean, selected: vehicle or null, map: View or null}
+ * @param look {palette, scale: Scale, trails: boolean, selected: vehicle or null, inset: View or null}
  */
 export function drawScene(context, episode, time, poses, view, look) {
   const sample = episode.sampleAt(time);
@@ -23,29 +23,29 @@ export function drawScene(context, episode, time, poses, view, look) {
   context.fillRect(0, 0, view.width, view.height);
   drawGrid(context, view, look.palette);
   if (episode.current) drawCurrent(context, episode, sample, view, look.palette);
-  drawCourse(context, episode, time, view, look.palette, 1);
+  drawMap(context, episode, time, view, look.palette, 1);
   if (look.trails) drawTrails(context, episode, sample, poses, view, look.palette);
   const shown = look.selected !== null && episode.inspected.indexOf(look.selected);
   if (shown >= 0 && shown !== false) drawSonar(context, episode, shown, sample, poses, view, look.palette);
   drawVehicles(context, episode, sample, poses, view, size, look);
   drawMarks(context, episode, poses, view, size, look);
-  episode.ways.forEach(({ team, corners }, way) => {
+  episode.paths.forEach(({ team, corners }, path) => {
     const colour = look.palette.teams[team] ?? look.palette.reference;
-    if (corners.length > 2) drawReference(context, episode.reference(time, way), view, look.palette, colour);
+    if (corners.length > 2) drawReference(context, episode.reference(time, path), view, look.palette, colour);
   });
   drawFlashes(context, episode, time, poses, view, size, look.palette);
   drawScaleBar(context, view, look.palette);
   if (episode.current) drawCurrentKey(context, episode, view, look.palette);
-  if (look.map) drawMap(context, episode, time, poses, view, look);
+  if (look.inset) drawInset(context, episode, time, poses, view, look);
 }
 
 /** Length of a drawn vehicle [px]: as large as can be told apart, and never smaller than it is. */
 function hullSize(episode, view) {
   const apart = episode.metrics.mean_min_spacing_m ?? 10;
-  return Math.max(2 * episode.contact_m * view.scale, Math.min(14, 0.8 * apart * view.scale), 3);
+  return Math.max(2 * episode.hull_radius_m * view.scale, Math.min(14, 0.8 * apart * view.scale), 3);
 }
 
-/** Where everybody came from, paler the longer ago. */
+/** Where all vehicles came from, paler the longer ago. */
 function drawTrails(context, episode, sample, poses, view, palette) {
   const position = episode.values("position");
   const n = episode.vehicles;
@@ -75,7 +75,7 @@ function drawTrails(context, episode, sample, poses, view, palette) {
   context.globalAlpha = 1;
 }
 
-/** Everybody, colour by colour. Small paths one by one are filled faster than one path that spans the picture. */
+/** All vehicles, colour by colour. Small paths one by one are filled faster than one path that spans the picture. */
 function drawVehicles(context, episode, sample, poses, view, size, look) {
   const values = look.scale && episode.values(look.scale.quantity);
   const paths = new Map();

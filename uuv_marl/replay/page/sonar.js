@@ -1,4 +1,4 @@
-/** What one vehicle hears: its arrays and their sub-sectors, the nearest in each, echoes, and the force it asked for. */
+/** What one vehicle detects: arrays and sub-sectors, the nearest in each, echoes, and the force it asked for. */
 
 const QUARTER = Math.PI / 2;
 
@@ -10,15 +10,15 @@ export function subSectors(sonar) {
 }
 
 /**
- * What an inspected vehicle hears at a sample, one entry for each sub-sector:
- * {array, from, to, heard: vehicle or -1, distance [m], echo: range [m], echoAt: [ahead, starboard] [m]}; NaN for none.
+ * What an inspected vehicle detects at a sample, one entry for each sub-sector:
+ * {array, from, to, detected: vehicle or -1, distance [m], echo: range [m], echoAt: [ahead, starboard] [m]}, NaN: none.
  */
-export function hearing(episode, inspected, sample) {
+export function detections(episode, inspected, sample) {
   const at = sample * episode.inspected.length + inspected;
   const sectors = subSectors(episode.sonar);
   const active = sectors.filter((sector) => sector.array.active);
   const row = (name, width) => episode.values(name)?.subarray(at * width, (at + 1) * width) ?? null;
-  const heard = row("heard", sectors.length);
+  const detected = row("detected_index", sectors.length);
   const neighbour = row("neighbour", 2 * sectors.length);
   const ranges = row("echo_range", active.length);
   const echoes = row("echo_position", 2 * active.length);
@@ -26,7 +26,7 @@ export function hearing(episode, inspected, sample) {
     const j = active.indexOf(sector);
     return {
       ...sector,
-      heard: heard[k],
+      detected: detected[k],
       distance: Math.hypot(neighbour[2 * k], neighbour[2 * k + 1]),
       echo: j < 0 ? NaN : ranges[j],
       echoAt: j < 0 ? null : [echoes[2 * j], echoes[2 * j + 1]],
@@ -34,14 +34,14 @@ export function hearing(episode, inspected, sample) {
   });
 }
 
-/** Draw what the inspected vehicle of this rank hears at a sample. */
+/** Draw what the inspected vehicle of this rank detects at a sample. */
 export function drawSonar(context, episode, inspected, sample, poses, view, palette) {
   const vehicle = episode.inspected[inspected];
   if (episode.isLost(vehicle, sample)) return;
   const own = { x: view.x(poses[3 * vehicle + 1]), y: view.y(poses[3 * vehicle]), heading: poses[3 * vehicle + 2] };
-  const sectors = hearing(episode, inspected, sample);
+  const sectors = detections(episode, inspected, sample);
   drawArrays(context, own, sectors, view, palette);
-  drawHeard(context, own, sectors, poses, view, palette);
+  drawDetected(context, own, sectors, poses, view, palette);
   drawEchoes(context, own, sectors, view, palette);
   drawForce(context, own, episode, inspected, sample, palette);
 }
@@ -54,7 +54,7 @@ function fan(context, own, sector, radius) {
   context.closePath();
 }
 
-/** Every sub-sector out to its array's range, and filled as far as the nearest vehicle that it hears. */
+/** Every sub-sector out to its array's range, and filled as far as the nearest vehicle that it detects. */
 function drawArrays(context, own, sectors, view, palette) {
   context.lineWidth = 1;
   for (const sector of sectors) {
@@ -65,7 +65,7 @@ function drawArrays(context, own, sectors, view, palette) {
     context.fill();
     context.globalAlpha = sector.array.active ? 0.3 : 0.15;
     context.stroke();
-    if (sector.heard >= 0) {
+    if (sector.detected >= 0) {
       fan(context, own, sector, sector.distance * view.scale);
       context.globalAlpha = 0.2;
       context.fill();
@@ -74,14 +74,14 @@ function drawArrays(context, own, sectors, view, palette) {
   context.globalAlpha = 1;
 }
 
-function drawHeard(context, own, sectors, poses, view, palette) {
+function drawDetected(context, own, sectors, poses, view, palette) {
   context.beginPath();
-  for (const { heard } of sectors.filter((sector) => sector.heard >= 0)) {
+  for (const { detected } of sectors.filter((sector) => sector.detected >= 0)) {
     context.moveTo(own.x, own.y);
-    context.lineTo(view.x(poses[3 * heard + 1]), view.y(poses[3 * heard]));
+    context.lineTo(view.x(poses[3 * detected + 1]), view.y(poses[3 * detected]));
   }
   context.lineWidth = 1.5;
-  context.strokeStyle = palette.heard;
+  context.strokeStyle = palette.detected;
   context.stroke();
 }
 

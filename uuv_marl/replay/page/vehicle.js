@@ -1,6 +1,6 @@
-/** The selected vehicle: its numbers, and whom it hears in every sub-sector. */
+/** The selected vehicle: its numbers, and which vehicle it detects in every sub-sector. */
 import { make } from "./panel.js";
-import { hearing } from "./sonar.js";
+import { detections } from "./sonar.js";
 
 /** Write it into the page; `choose` is called with the vehicle that the reader types. */
 export function showVehicle(place, episode, vehicle, time, choose) {
@@ -26,7 +26,7 @@ function hint() {
 }
 
 function details(episode, vehicle, sample) {
-  if (episode.isLost(vehicle, sample)) return [make("p", {}, "lost: it is silent, and nobody hears it")];
+  if (episode.isLost(vehicle, sample)) return [make("p", {}, "lost: it is silent, and no vehicle detects it")];
   const at = sample * episode.vehicles + vehicle;
   const value = (name, digits, unit, factor = 1) => {
     const number = episode.values(name)?.[at];
@@ -47,9 +47,9 @@ function details(episode, vehicle, sample) {
   return [list, ...arrays(episode, inspected, sample)];
 }
 
-/** A row of sub-sectors for each array, from port to starboard: whom it hears, how far, and whether it has an echo. */
+/** A row of sub-sectors for each array, from port to starboard: the vehicle that it detects, its distance, an echo. */
 function arrays(episode, inspected, sample) {
-  const sectors = hearing(episode, inspected, sample);
+  const sectors = detections(episode, inspected, sample);
   return episode.sonar.map((array) => {
     const cells = sectors.filter((sector) => sector.array === array).map(sectorCell);
     const row = make("div", { className: "sectors" }, ...cells);
@@ -59,12 +59,12 @@ function arrays(episode, inspected, sample) {
   });
 }
 
-function sectorCell({ heard, distance, echo }) {
-  const cell = make("div", {}, heard >= 0 ? String(heard) : "·");
-  cell.append(make("small", {}, heard >= 0 ? `${distance.toFixed(0)} m` : echo > 0 ? `${echo.toFixed(0)} m` : " "));
-  cell.classList.toggle("heard", heard >= 0);
+function sectorCell({ detected, distance, echo }) {
+  const cell = make("div", {}, detected >= 0 ? String(detected) : "·");
+  cell.append(make("small", {}, detected >= 0 ? `${distance.toFixed(0)} m` : echo > 0 ? `${echo.toFixed(0)} m` : " "));
+  cell.classList.toggle("detected", detected >= 0);
   cell.classList.toggle("echo", echo > 0);
-  cell.title = [heard >= 0 && `hears UUV ${heard} at ${distance.toFixed(1)} m`, echo > 0 && `echo at ${echo.toFixed(1)} m`]
+  cell.title = [detected >= 0 && `detects UUV ${detected} at ${distance.toFixed(1)} m`, echo > 0 && `echo at ${echo.toFixed(1)} m`]
     .filter(Boolean).join("; ");
   return cell;
 }
