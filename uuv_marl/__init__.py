@@ -16,7 +16,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from uuv_marl import baselines, uuv_swarm_v1
     from uuv_marl.baselines import make_policy, with_policy_requirements
-    from uuv_marl.benchmark.evaluate import episodes
+    from uuv_marl.benchmark.evaluate import evaluate
     from uuv_marl.envs.parallel_env import env, parallel_env
     from uuv_marl.envs.vector_env import vector_env
     from uuv_marl.scenario import load_scenario, scenario_names

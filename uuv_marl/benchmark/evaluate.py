@@ -92,7 +92,7 @@ def episodes(
                 yield event
 
 
-def episodes(
+def evaluate(
     policy: str,
     scenario: ScenarioLike = "single_obstacle",
     seeds: Iterable[int] = range(20),
