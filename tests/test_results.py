@@ -78,7 +78,7 @@ def test_a_folder_in_the_place_of_the_file_is_refused(tmp_path):
 def test_results_of_another_task_of_the_user_s_are_refused(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     file = tmp_path / "my_task.py"
-    file.write_text("from uuv_marl.tasks import Task\n\n\nclass Mine(Task):\n    there = Task.came\n")
+    file.write_text("from uuv_marl.tasks import Follow\n\n\nclass Mine(Follow):\n    pass\n")
     scenario = load_scenario("starter", overrides={"task": "my_task:Mine"})
     (run,) = (run for run in episodes(quick(), "idle", [0]) if isinstance(run, Run))
     Results(tmp_path / "out", [scenario]).add("starter", "idle", run)

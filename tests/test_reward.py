@@ -213,7 +213,7 @@ def test_terms_are_those_documented_and_sum_to_the_reward_whose_mean_the_team_ha
         _, rewards, *_, infos = env.step(action)
         assert list(team.step(action)[1].values()) == pytest.approx(len(rewards) * [np.mean(list(rewards.values()))])
         for agent, info in infos.items():
-            assert list(info["reward_terms"]) == list(task_class(task).terms)
+            assert list(info["reward_terms"]) == list(task_class(task).rewards["dense"])
             assert sum(info["reward_terms"].values()) == pytest.approx(rewards[agent], abs=1e-12)
 
 

@@ -179,7 +179,7 @@ def shares(name, tier, worlds=4):
     while not batch.over.all():
         policy.active[:] = ~batch.over
         result = batch.step(policy.act(batch.swarm.percept))
-        assert list(result.terms) == list(SilentTargets.terms)
+        assert list(result.terms) == list(SilentTargets.rewards["dense"])
         total += result.world_reward
     return np.mean([batch.task.metrics(w)["held_share"] for w in range(worlds)]), total.mean()
 

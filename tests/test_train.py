@@ -307,10 +307,16 @@ import numpy as np
 from uuv_marl.tasks import Task
 from uuv_marl.tasks.reach import Reach
 class Mine(Task):
-    terms = {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}
+    rewards = {"dense": {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}}
+    def draw(self, world, rng):
+        return super().draw(world, rng)
+    def at_goal(self):
+        return self.swarm.state.alive
+    def done(self):
+        return ~self.swarm.state.alive.any(axis=1)
     def reward(self, running):
         slow = -np.hypot(*np.moveaxis(self.swarm.velocity, -1, 0))
-        return {"still": 0.5 * slow, "collision": -60.0 * self.swarm.facts.contacts}
+        return {"still": 0.5 * slow, "collision": -60.0 * self.swarm.facts.vehicle_collisions}
 class Nearer(Reach):
     pass
 def mine(swarm):

@@ -4,12 +4,12 @@ import math
 from collections.abc import Mapping
 from typing import Literal, TypedDict, Unpack, cast
 
-from uuv_marl.envs.reward import RewardFunction
 from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.paths import UserPath
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import override_of
 from uuv_marl.sim.observation import Observe
+from uuv_marl.tasks.reward import RewardFunction
 
 ScenarioLike = UserPath | Scenario | Mapping[str, object]
 Reward = Literal["dense", "sparse", "team", "geodesic", "leader"] | RewardFunction

@@ -110,12 +110,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         self._renderer.update()
         with rounding():
             reward = result.reward.astype(np.float32).reshape(-1)
-        return (
-            observation.reshape(self.num_envs, -1),
-            reward,
-            np.repeat(over, self._shape[1]),
-            infos,
-        )
+        return (observation.reshape(self.num_envs, -1), reward, np.repeat(over, self._shape[1]), infos)
 
     def _end(self, world: int, result: StepResult, infos: list[dict[str, Any]]) -> None:
         """Write what SB3 wants to know of an ended world into the infos of its rows."""

@@ -11,7 +11,8 @@ from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.reach import Reach, ReachNumbers
-from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.tasks.reward import Terms
+from uuv_marl.tasks.task import Task
 from uuv_marl.types import Bool
 
 
@@ -22,6 +23,14 @@ class FewInformedNumbers(ReachNumbers):
     """A vehicle is there within this distance of l(t)'s end. Assumed: the paper's ``arrival.spread_m``."""
     informed: Annotated[int, within(1, 16_384)]
     """How many vehicles perceive l(t), drawn for each episode; all where there are fewer."""
+
+
+_TERMS = {
+    **Reach.rewards["dense"],
+    "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
+    "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to l(t), perceived or not, D: "
+    "progress_far_m, c: progress_m",
+}
 
 
 class FewInformed(Reach):
@@ -37,13 +46,7 @@ class FewInformed(Reach):
     observed: ClassVar[Table] = (
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )
-    rewards: ClassVar[tuple[str, ...]] = ("dense", "leader")
-    terms: ClassVar[Mapping[str, str]] = {
-        **Reach.terms,
-        "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
-        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to l(t), perceived or not, D: "
-        "progress_far_m, c: progress_m",
-    }
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": _TERMS, "leader": _TERMS}
     headline: ClassVar[str] = "uninformed_share"
     columns: ClassVar[Mapping[str, str]] = {"uninformed_share": "share of the uninformed vehicles that succeed [1]"}
     reference_policy: ClassVar[str] = "leader_follower"
@@ -66,7 +69,7 @@ class FewInformed(Reach):
         return {"informed": self.swarm.world_map.informed[:, :, None].astype(np.float64)}
 
     def reward(self, running: Bool) -> Terms:
-        """With the reward ``led`` the informed are paid the mean of all, but for their own loss; the others as ever."""
+        """With ``leader``, each informed vehicle gets the mean over all vehicles, but its own loss."""
         terms, informed = super().reward(running), self.swarm.world_map.informed
         if self.reward_name != "leader":
             return terms
@@ -79,7 +82,7 @@ class FewInformed(Reach):
 
     def done(self) -> Bool:
         """No world: the time limit ends the episode, so that passing by is not enough."""
-        return Task.done(self)
+        return np.zeros(self.swarm.num_worlds, np.bool_)
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also the headline; None where all are informed."""

@@ -19,7 +19,7 @@ from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cell
 from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_path
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
 from uuv_marl.tasks.reach import Reach, ReachNumbers
-from uuv_marl.tasks.task import Terms
+from uuv_marl.tasks.reward import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 MOST_DISCS = 320
@@ -124,10 +124,16 @@ class HardWater(Reach):
     Numbers = HardWaterNumbers
     Memory: ClassVar[type[Any] | None] = HardWaterMemory
     channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
-    rewards: ClassVar[tuple[str, ...]] = ("dense", "geodesic")
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        **Reach.rewards,
+        "geodesic": {
+            **Reach.rewards["dense"],
+            "progress": "as in dense; d: length of the collision-free path",
+        },
+    }
     traffic: ClassVar[bool] = False  # a wall whose discs move has gaps, and a gate may close
     columns: ClassVar[Mapping[str, str]] = {
-        "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]",
+        "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]"
     }
 
     def __init__(self, swarm: Swarm) -> None:

@@ -21,7 +21,7 @@ from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_walls
 from uuv_marl.tasks.maps.walls import Range, between
 from uuv_marl.tasks.reach import Reach
-from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.tasks.reward import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 LEAD_S = 2.0
@@ -136,12 +136,12 @@ class SilentTargets(Reach):
         ),
     )
     channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
-    terms: ClassVar[Mapping[str, str]] = {
-        **{name: meaning for name, meaning in Reach.terms.items() if name != "arrival"},
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
+        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
         "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no vehicle "
         "nearer to it holds, 0 if there is none, D: progress_far_m, c: progress_m",
         "held": "+w_arrival · dt/T for each target that is held, to the vehicle nearest to it; T: the time limit",
-    }
+    }}  # fmt: skip
     traffic: ClassVar[bool] = False
     has_goal: ClassVar[bool] = False
     reference_label: ClassVar[str] = "middle of the box"
@@ -291,7 +291,7 @@ class SilentTargets(Reach):
 
     def done(self) -> Bool:
         """No world: the time limit ends the episode."""
-        return Task.done(self)
+        return np.zeros(self.swarm.num_worlds, np.bool_)
 
     def succeeded(self) -> Bool:
         """Vehicles that live and have touched nothing."""

@@ -19,7 +19,7 @@ from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps.guidance import AHEAD_M, NUM_WALLS, PATH_FIELDS, write_walls
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Range, banks, between, joined, wall
 from uuv_marl.tasks.reach import Reach, ReachNumbers
-from uuv_marl.tasks.task import Terms
+from uuv_marl.tasks.reward import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 _BEFORE_M = 5.0
@@ -105,11 +105,11 @@ class TwoSwarms(Reach):
     Numbers = TwoSwarmsNumbers
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
     channels: ClassVar[Mapping[str, Table]] = {"path": (*PATH_FIELDS, _TURN)}
-    terms: ClassVar[Mapping[str, str]] = {
-        **{name: meaning for name, meaning in Reach.terms.items() if name != "arrival"},
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
+        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
         "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "
         "is left until the limit T",
-    }
+    }}  # fmt: skip
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles there, of the time until then over the straight way at full speed [1]",
         "swarm_time_ratio": "the same of the last vehicle, if all came there [1]",

@@ -227,7 +227,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     def reward_for(self, scenario: Scenario) -> Reward:
         """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
-        name = self.reward or scenario.task_class.rewards[0]
+        name = self.reward or next(iter(scenario.task_class.rewards))
         if ":" not in name:
             return cast(Reward, name)
         try:
