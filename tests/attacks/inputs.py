@@ -433,7 +433,7 @@ def prepare(folder):
     assert done.exit_code == 0, done.output
     for name in ANYWHERE:
         scenario = with_policy_requirements(name, load_scenario("single_obstacle"))
-        make(name, scenario).act(Swarm(scenario).reset(0))
+        make_policy(name, scenario).act(Swarm(scenario).reset(0))
     for name in scenario_names():
         env = uuv_marl.parallel_env(load_scenario(name, overrides={"current.speed_mps": 0.1}))  # what the sea does, too
         env.reset(seed=0)
