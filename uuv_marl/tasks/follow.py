@@ -66,7 +66,7 @@ class Follow(Task):
     def _compiled(self, running: Bool, keep_terms: bool = True) -> StepReward:
         swarm = self.swarm
         worlds, n = swarm.num_worlds, swarm.num_vehicles
-        terms = np.zeros((len(self.terms), worlds if keep_terms else 0, n))
+        terms = np.zeros((len(_TERMS) - (self.reward_name == "sparse"), worlds if keep_terms else 0, n))
         reward, limit_s = np.zeros((worlds, n)), swarm.time_limit_s
 
         def fill(begin: int, end: int) -> None:
@@ -78,7 +78,7 @@ class Follow(Task):
         """The weighted terms of the latest step; zero for vehicles lost before."""
         step_reward = self._compiled(running)
         step_reward.fill(0, self.swarm.num_worlds)
-        return dict(zip(self.terms, step_reward.terms, strict=True))
+        return dict(zip(_TERMS, step_reward.terms, strict=False))
 
     def done(self) -> Bool:
         """Worlds whose swarm has arrived, unless ``arrival.ends_episode`` is false."""
