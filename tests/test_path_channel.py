@@ -9,7 +9,7 @@ from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.maps import KINDS
+from uuv_marl.tasks.maps.kinds import KINDS
 
 FIRST = 10_000
 

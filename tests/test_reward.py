@@ -109,7 +109,7 @@ def test_who_moves_and_comes_back_gains_nothing(task, way):
 
 def left(batch):
     """What progress counts [m]."""
-    away = batch.task.remaining_m()[0] if hasattr(batch.task, "left") else batch.swarm.facts.away
+    away = batch.task.remaining_m()[0] if hasattr(batch.task, "remaining_m") else batch.swarm.facts.away
     return np.minimum(away, batch.swarm.scenario.reward.progress_far_m)
 
 

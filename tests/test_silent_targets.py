@@ -11,7 +11,7 @@ from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, ScenarioError
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks import SilentTargets
+from uuv_marl.tasks.silent_targets import SilentTargets
 
 TIERS = ("silent_targets_easy", "silent_targets", "silent_targets_hard")
 TUNING = 10_100
@@ -44,8 +44,8 @@ def test_targets_depend_on_their_seed_alone_and_not_on_what_vehicles_do():
         single.reset(TUNING + w)
         for _ in range(60):
             single.step(0.3 * rng.uniform(-1.0, 1.0, (1, single.num_vehicles, 2)))
-        np.testing.assert_array_equal(single.course.obstacles[0], batch.course.obstacles[w])
-    assert len(np.unique(batch.course.obstacles[:, :, 0])) == 24
+        np.testing.assert_array_equal(single.world_map.obstacles[0], batch.world_map.obstacles[w])
+    assert len(np.unique(batch.world_map.obstacles[:, :, 0])) == 24
 
 
 @pytest.mark.parametrize("tier", TIERS)
@@ -144,14 +144,14 @@ def test_progress_and_pay_count_targets_that_no_nearer_vehicle_holds():
     swarm.world_map.obstacles[0, :2, :2] = (0.0, 0.0), (200.0, 0.0)
     swarm.state.eta[0, 0, :2], swarm.state.eta[0, 1, :2] = (0.0, 10.0), (0.0, 50.0)
     swarm.observe()
-    left = swarm.task._left()[0]
+    left = swarm.task._remaining_m()[0]
     assert left[0] == pytest.approx(10.0)  # its own
     assert left[1] == pytest.approx(np.hypot(200.0, 50.0))
     swarm.state.eta[0, 2, :2] = (200.0, 5.0)
-    assert swarm.task._left()[0, 1] == 0.0  # none is left
+    assert swarm.task._remaining_m()[0, 1] == 0.0  # none is left
     swarm.state.eta[0, 1, :2] = 0.0, -20.0  # a second one at the first target changes nothing for who is nearer
     swarm.state.eta[0, 2, :2] = 300.0, 500.0
-    left, held = swarm.task._left()[0], swarm.task.reward(np.ones(1, np.bool_))["held"][0]
+    left, held = swarm.task._remaining_m()[0], swarm.task.reward(np.ones(1, np.bool_))["held"][0]
     assert left[:2] == pytest.approx([10.0, np.hypot(200.0, 20.0)])
     assert held[0] > 0.0
     assert not held[1:].any()

@@ -13,7 +13,7 @@ from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.maps import KINDS
+from uuv_marl.tasks.maps.kinds import KINDS
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 STUDY = STUDIES["hard_water"]

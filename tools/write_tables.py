@@ -15,7 +15,8 @@ from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
 from uuv_marl.scenario.task import task_class
 from uuv_marl.sim.observation import closeness_table
-from uuv_marl.tasks import TASKS, Follow, Reach
+from uuv_marl.tasks import TASKS, Follow
+from uuv_marl.tasks.reach import Reach
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = ("environment", "results", "scenarios", "tasks", "vehicles")

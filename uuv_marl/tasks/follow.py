@@ -1,11 +1,10 @@
 """``follow``: the paper's task. The swarm follows l(t) around obstacles and comes to rest at its end.
 
-Properties of its rewards, ``dense`` and ``sparse``: an earlier arrival along the same path never lowers the return, since
-costs per second are at most zero, progress sums to the distance at the start, and an arrival is rewarded once. Moving
-away and back gains nothing. A vehicle never gains from its own loss, unless it would have collided many times: it is
-charged the most that the terms could have cost it in the rest of the episode, an arrival and a collision. No term
-depends on the number of vehicles. A weakness: if one vehicle keeps the swarm from arriving, the others gain from its
-loss.
+Properties of both rewards: an earlier arrival along the same path never lowers the return, since costs per second are
+at most zero, progress sums to the distance at the start, and an arrival is rewarded once. Moving away and back gains
+nothing. A vehicle never gains from its own loss, unless it would have collided many times: it is charged the most that
+the terms could have cost it in the rest of the episode, an arrival and a collision. No term depends on the number of
+vehicles. A weakness: if one vehicle keeps the swarm from arriving, the others gain from its loss.
 """
 
 import math
@@ -25,8 +24,6 @@ from uuv_marl.tasks.task import Task
 from uuv_marl.types import Bool, Float64
 
 TRACKING, OBSTACLE, SPACING, EFFORT, COLLISION, LOSS, ARRIVAL, PROGRESS = range(8)
-"""Index of each term; ``sparse`` has no progress."""
-
 _TERMS = {
     "tracking": "-w · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's distance to l(t)",
     "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
@@ -39,6 +36,7 @@ _TERMS = {
     "progress": "dense alone: Phi now - Phi before, with Phi = -min(d, D)/c, and 0 once the swarm has arrived; "
     "d: the vehicle's distance to l(t), D: progress_far_m, c: progress_m",
 }
+"""Each term of ``dense``; ``sparse`` has all but the last."""
 
 
 class Follow(Task):
