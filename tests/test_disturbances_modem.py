@@ -7,7 +7,7 @@ import pytest
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, make, with_policy_requirements
+from uuv_marl.baselines import Policy, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
 from uuv_marl.baselines.learned.layers import shapes
 from uuv_marl.baselines.requirements import PolicyRequirements
@@ -94,7 +94,7 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
     for scenario in (linked, messaged):
         swarm = Swarm(scenario)
         swarm.reset(0)
-        actor = make(policy, scenario)
+        actor = make_policy(policy, scenario)
         actor.reset(0)
         for _ in range(30):
             swarm.step(actor.act(swarm.percept))

@@ -60,7 +60,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import POLICIES, make, with_policy_requirements
+        from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.replay.command import command
@@ -74,7 +74,7 @@ def benchmark(
             raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
         policies = list(dict.fromkeys(policy or runner.default_policies(scenarios)))
         for name, loaded in itertools.product(policies, scenarios):
-            make(name, with_policy_requirements(name, loaded))  # refused now, not after hours of others' runs
+            make_policy(name, with_policy_requirements(name, loaded))  # refused now, not after hours of others' runs
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)

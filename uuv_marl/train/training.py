@@ -12,7 +12,8 @@ from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.making import check_base_controller
 from uuv_marl.baselines.requirements import FULL_TORQUE_NM, inner_loop_nms
-from uuv_marl.envs.core import Reward, refuse_losses
+from uuv_marl.envs.changes import Reward
+from uuv_marl.envs.core import refuse_losses
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
@@ -228,7 +229,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     def reward_for(self, scenario: Scenario) -> Reward:
         """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
-        name = self.reward or scenario.task_class.rewards[0]
+        name = self.reward or next(iter(scenario.task_class.rewards))
         if ":" not in name:
             return cast(Reward, name)
         try:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.actor import Actor, in_disc
 from uuv_marl.baselines.learned.layers import Network
 from uuv_marl.baselines.policy import PolicyError
@@ -45,12 +45,12 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
         ResultsError: the file can't be written.
     """
     path = user_path(path)
-    actor = make(policy, with_policy_requirements(policy, scenario))
+    actor = make_policy(policy, with_policy_requirements(policy, scenario))
     if not isinstance(actor, Actor):
         raise PolicyError(
             f"policy {policy!r} can't be exported: ONNX holds networks end to end, not controllers, safety filters or "
             "residual networks. Export a checkpoint of a training without filter and base controller; run this "
-            "policy with uuv_marl.baselines.make"
+            "policy with uuv_marl.baselines.make_policy"
         )
     graph = Graph()
     network = Network(actor.checkpoint.card.network, actor.checkpoint.card.sizes, actor.checkpoint.tensors, graph)
