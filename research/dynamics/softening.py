@@ -1,4 +1,4 @@
-"""Changes to the paper's law that may let a swarm come to rest: a smooth gate, a dead zone, surge damping."""
+"""Changes to the paper's law that may let a swarm come to rest: smooth neighbours, surge damping."""
 
 import math
 from typing import NamedTuple
@@ -18,10 +18,6 @@ class Softening(NamedTuple):
     """Neighbours within this distance count in full ..."""
     far_m: float = math.inf
     """... and those beyond this not at all, with a smooth step between."""
-    torque_gate_n: float = 0.0
-    """Torque is multiplied by F^2 / (F^2 + this^2), so that it fades where the force F fades [N]."""
-    dead_zone_n: float = 0.0
-    """The force is shortened by this, to 0 where it is smaller [N]."""
     surge_damping: float = 0.0
     """Thrust against surge relative to the reference's velocity [N s/m]."""
 
@@ -60,9 +56,6 @@ class Softened(BioInspired):
         force = g.zeta_l * percept["reference"].astype(np.float64) + (weight[..., None] * neighbour).sum(axis=-2)
         weight = -g.zeta_o * _bounded_exp(g.delta_o, echo) * (percept["echo"] > 0)
         force += (weight[..., None] * echo).sum(axis=-2)
-        length = np.maximum(np.hypot(force[..., 0], force[..., 1]), 1e-9)
-        force *= np.maximum(1.0 - soft.dead_zone_n / length, 0.0)[..., None]
-        force[..., 1] *= length**2 / (length**2 + soft.torque_gate_n**2)
         force[..., 0] -= soft.surge_damping * (percept["velocity"] - percept["reference_velocity"])[..., 0]
         action = force * (1.0 / limits.max_force, limits.lever_arm / limits.max_torque)
         action /= np.maximum(np.hypot(action[..., 0], action[..., 1]), 1.0)[..., None]

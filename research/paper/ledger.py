@@ -170,9 +170,7 @@ def assumption_entries() -> list[Entry]:
     rows = [
         *((one.name, one.taken, one.in_view) for one in ASSUMPTIONS),
         ("the identified parameters, beside these", "research/dynamics/identified", searched),
-        ("the hypothesis post hoc, beside these", "obstacles heard from 190 m, 45 vehicles in 5.1",
-         "5.1 both, 5.2.1, 5.2.2 both, Table 2"),
-    ]  # fmt: skip
+    ]
     return [
         Entry("", "assumption", what, "", "silent", taken, verdict=f"in view: {seen}") for what, taken, seen in rows
     ]
