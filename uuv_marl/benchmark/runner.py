@@ -3,9 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
-
-from rich.table import Table as RichTable
 
 from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import with_policy_requirements
@@ -14,21 +11,8 @@ from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import ResultRow, Results
-from uuv_marl.benchmark.tables import (
-    CAPTION,
-    HEADERS,
-    TableRow,
-    counted,
-    markdown_table,
-    rich_table,
-    table_rows,
-    task_caption,
-    task_headers,
-    task_rows,
-    task_table,
-)
-from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
-from uuv_marl.tasks import Follow
+from uuv_marl.benchmark.tables import Table, markdown_table, scenario_table
+from uuv_marl.scenario import Scenario
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "ppo")
 """The paper's Table 2, the safest hand-made law, and learned policies; all others by name."""
@@ -102,26 +86,6 @@ def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[st
     return max((row for s in scenarios for p in policies for row in results.select(s.name, p, seeds)), key=badness)
 
 
-def title(scenario: Scenario, seeds: Sequence[int]) -> str:
-    """Heading of a scenario's table."""
-    changed = differences(scenario) if scenario.name in scenario_names() else []
-    note = f"; CHANGED: {', '.join(changed)}" if changed else ""
-    return (
-        f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
-        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}, {conditions(scenario)}{note}"
-    )
-
-
-class Table(NamedTuple):
-    """A scenario's table."""
-
-    title: str
-    rows: Sequence[TableRow] | Sequence[tuple[str, ...]]
-    headers: tuple[str, ...] = HEADERS
-    """Those of ``follow``, whose rows are ``TableRow``, or of another task."""
-    caption: str = CAPTION
-
-
 def write_report(
     results: Results, scenarios: Sequence[Scenario], seeds: Sequence[int]
 ) -> tuple[list[Table], list[Path]]:
@@ -136,25 +100,10 @@ def write_report(
     """
     held = [name for name in sorted(results.policies) if any(results.select(s.name, name, seeds) for s in scenarios)]
     policies = [name for name in dict.fromkeys([*DEFAULT_POLICIES, *held]) if name in held]
-    tables = [_table(results, scenario, policies, seeds) for scenario in scenarios]
+    tables = [scenario_table(results, scenario, policies, seeds) for scenario in scenarios]
     path = results.folder / "table.md"
     texts = [f"## {table.title}\n\n{markdown_table(table.headers, table.rows)}" for table in tables]
     captions = dict.fromkeys(table.caption for table in tables)
     write_text(path, "\n".join([*texts, *(f"{caption}\n" for caption in captions)]))
     with writing(results.folder / "figures"):
         return tables, [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]
-
-
-def terminal_table(table: Table, width: int) -> RichTable:
-    """A table for a terminal of a given width in columns."""
-    if table.headers == HEADERS:
-        return rich_table(table.title, [TableRow(*row) for row in table.rows], width)
-    return task_table(table.title, table.headers, table.rows, table.caption, width)
-
-
-def _table(results: Results, scenario: Scenario, policies: Sequence[str], seeds: Sequence[int]) -> Table:
-    name, heading = scenario.name, title(scenario, seeds)
-    if issubclass(scenario.task_class, Follow):
-        return Table(heading, table_rows(results, name, policies, seeds))
-    task = scenario.task_class
-    return Table(heading, task_rows(results, name, policies, seeds), task_headers(task), task_caption(task))

@@ -63,6 +63,7 @@ def benchmark(
         from uuv_marl.baselines import POLICIES, make, with_policy_requirements
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
+        from uuv_marl.benchmark.tables import terminal_table
         from uuv_marl.replay.command import command
         from uuv_marl.scenario import ScenarioError, load_scenario
 
@@ -86,7 +87,7 @@ def benchmark(
             runner.run_missing(results, scenarios, policies, wanted, report)
             tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
-            console.print(runner.terminal_table(table, console.width))
+            console.print(terminal_table(table, console.width))
         say(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
         for path in pictures:
             say(f"  {path}")
