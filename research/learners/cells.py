@@ -110,7 +110,9 @@ def episodes(policy: str, each: EvaluationSet, seeds: range) -> Iterator[Row]:
     yield from sorted(rows, key=lambda row: int(row["seed"]))
 
 
-MEASURES = ("share", "swarm_success", "collisions", "to_obstacles", "to_others", "time_ratio")
+MEASURES = (
+    "share", "swarm_success", "collisions_per_vehicle", "min_obstacle_distance_m", "min_spacing_m", "time_ratio",
+)  # fmt: skip
 
 
 def measures(metrics: Metrics, scenario: Scenario) -> dict[str, str]:

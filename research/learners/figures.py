@@ -16,7 +16,7 @@ from uuv_marl.types import Float64
 
 
 def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
-    """The headline on validation over agent-steps, mean and range of the trainings; the best law as a line."""
+    """The headline on validation over agent-steps, mean and range of the trainings; the best controller as a line."""
     figure, axes = panels(len(TASKS), 3, (3.6, 2.8))
     for ax, (name, task) in zip(axes, TASKS.items(), strict=False):
         for k, learner in enumerate(LEARNERS):
@@ -32,7 +32,7 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
             ax.plot(steps, share.mean(axis=0), color=f"C{k}", label=learner)
             ax.fill_between(steps, share.min(axis=0), share.max(axis=0), color=f"C{k}", alpha=0.15, linewidth=0)
         controller = [row for row in rows if (row["learner"], row["set"]) == (task.policies[0], task.tiers[0][0].name)]
-        ax.axhline(float(np.mean(measured(controller, "share"))), color="0.4", linestyle="--", label="the best law")
+        ax.axhline(float(np.mean(measured(controller, "share"))), color="0.4", linestyle="--", label="best controller")
         ax.set(title=name, xlabel="million agent-steps", ylabel="headline", ylim=(-0.02, 1.02))
     axes[0].legend()
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -41,13 +41,13 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
 
 
 def draw_profiles(scores: Mapping[str, Float64], path: Path) -> Path:
-    """The share of trainings and tasks above a score, 1 being the best law's, for each learner, with 95 % intervals."""
+    """The share of trainings and tasks above a score, 1 being the best controller's, for each learner, with 95 % intervals."""
     levels = np.linspace(0.0, 1.2, 61)
     figure, (ax, *_) = panels(1, 1, (5.0, 3.4))
     for k, (learner, (share, low, high)) in enumerate(profiles(scores, levels).items()):
         ax.plot(levels, share, color=f"C{k}", label=learner)
         ax.fill_between(levels, low, high, color=f"C{k}", alpha=0.15, linewidth=0)
-    ax.set(xlabel="headline, 0: random, 1: the best law", ylabel="share of trainings above it", ylim=(-0.02, 1.02))
+    ax.set(xlabel="headline, 0: random, 1: best controller", ylabel="share of trainings above it", ylim=(-0.02, 1.02))
     ax.legend()
     figure.savefig(path)
     return path

@@ -7,7 +7,7 @@ from research.episodes import Row, measured
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MEASURES, TASKS
 
 ENVIRONMENT = "uuv_marl"
-_METRICS = ("share", "swarm_success", "collisions")
+_METRICS = ("share", "swarm_success", "collisions_per_vehicle")
 _STEPS = [AGENT_STEPS * (k + 1) // MEASURES for k in range(MEASURES)]
 
 

@@ -1,4 +1,4 @@
-"""``learners.md``: who learns what, written from curves and episodes alone."""
+"""``learners.md``: the comparison of learning algorithms, written from curves and episodes alone."""
 
 import json
 from collections import Counter
@@ -91,7 +91,7 @@ def ranked(rows_by_competitor: Found) -> dict[str, Float64]:
 
 
 def against_controller(rows_by_competitor: Found) -> dict[str, Float64]:
-    """The headline over the best law's, both above what ``random`` has."""
+    """The headline over the best controller's, both above that of ``random``."""
     controller, least = (
         np.array(
             [
@@ -131,7 +131,7 @@ def _over_episodes(rows: Sequence[Row]) -> Estimate:
 
 
 def _first(rows_by_competitor: Found) -> str:
-    """Headline and whole swarms on unseen seeds, a column for each task, then all tasks."""
+    """Headline and swarm success on unseen seeds, a column for each task, then all tasks."""
     every, table = against_controller(rows_by_competitor), list[tuple[str, ...]]()
     for competitor, own in scores(rows_by_competitor).items():
         whole = [_values(rows_by_competitor, task, competitor, "swarm_success").mean() for task in TASKS]
@@ -144,8 +144,8 @@ def _first(rows_by_competitor: Found) -> str:
                 _with_interval(mean(every[competitor])),
             )
         )
-    for words in ("the best law", "oracle", "random"):
-        named = {name: task.policies[0] if words == "the best law" else words for name, task in TASKS.items()}
+    for words in ("best controller", "oracle", "random"):
+        named = {name: task.policies[0] if words == "best controller" else words for name, task in TASKS.items()}
         cells = [
             _with_interval(_over_episodes(rows_by_competitor[task, competitor][""][task])) + f", {short(_mean(rows_by_competitor[task, competitor][''][task], 'swarm_success'))}"
             if (task, competitor) in rows_by_competitor else "–"
@@ -185,8 +185,11 @@ def _tiers(rows_by_competitor: Found) -> str:
 
 
 def _safety(rows_by_competitor: Found) -> str:
-    """Contacts, distances and time on unseen seeds."""
-    formats = {"collisions": "{:.3f}", "to_obstacles": "{:.1f} m", "to_others": "{:.1f} m", "time_ratio": "{:.2f}"}
+    """Collisions, distances and time on unseen seeds."""
+    formats = {
+        "collisions_per_vehicle": "{:.3f}", "min_obstacle_distance_m": "{:.1f} m", "min_spacing_m": "{:.1f} m",
+        "time_ratio": "{:.2f}",
+    }  # fmt: skip
     table: list[tuple[str, ...]] = []
     for task in TASKS:
         for competitor in _everyone(rows_by_competitor, task):
@@ -196,7 +199,7 @@ def _safety(rows_by_competitor: Found) -> str:
                 for name, spec in formats.items()
             ]  # fmt: skip
             table.append((task, _called(competitor), *cells))
-    return markdown_table(("task", "", *(name.replace("_", " ") for name in formats)), table)
+    return markdown_table(("task", "", "collisions", "obstacle distance", "spacing", "time ratio"), table)
 
 
 def _number(rows_by_competitor: Found, task: str, competitor: str, name: str) -> int:
@@ -213,10 +216,10 @@ def _pairs(rows_by_competitor: Found) -> str:
 
 
 def _apart(rows_by_competitor: Found) -> str:
-    """Pairs that are told apart on each task: the interval holds no one half."""
+    """Pairs that differ significantly on each task: the interval excludes one half."""
     every, table = ranked(rows_by_competitor), list[tuple[str, ...]]()
     if (num := min(map(len, every.values()))) < _ENOUGH:
-        return f"Each learner has {num} of {TRAININGS} trainings so far, too few to tell anyone apart.\n"
+        return f"Each learner has {num} of {TRAININGS} trainings so far, too few for a comparison.\n"
     for k, task in enumerate(TASKS):
         apart: list[str] = []
         for one, other in combinations(LEARNERS, 2):
@@ -224,7 +227,7 @@ def _apart(rows_by_competitor: Found) -> str:
             if estimate.low > 0.5 or estimate.high < 0.5:
                 apart.append(f"{one} over {other}" if estimate.low > 0.5 else f"{other} over {one}")
         table.append((task, str(len(apart)), ", ".join(apart) or "–"))
-    return markdown_table(("task", "pairs", "told apart"), table)
+    return markdown_table(("task", "pairs", "significantly different"), table)
 
 
 def _compute(curves: Sequence[Row]) -> str:

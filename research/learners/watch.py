@@ -77,5 +77,5 @@ def point(agent_steps: int, minutes: float, share: float, whole: float, contacts
     """A row of a curve; the contacts are those of a vehicle."""
     return {
         "agent_steps": str(agent_steps), "minutes": f"{minutes:.2f}", "share": f"{share:.4f}", "swarm_success": f"{whole:.4f}",
-        "collisions": f"{contacts:.3f}",
+        "collisions_per_vehicle": f"{contacts:.3f}",
     }  # fmt: skip

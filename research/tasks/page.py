@@ -18,20 +18,20 @@ from uuv_marl.types import Float64
 Found = Mapping[tuple[str, str], Sequence[Row]]
 """Rows by policy and set."""
 Columns = Mapping[str, Sequence[str]]
-"""Sets by the head of their column."""
+"""Sets by the header of their column."""
 _RESAMPLES = 2000
 _NOT_CONTROLLERS = ("oracle", "carrot_informed", "random", "idle", "research.blind")
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
     "found_share": ("found", lambda values, _: short(float(np.mean(values)))),
     "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
-    "success_share": ("untouched", lambda values, _: short(float(np.mean(values)))),
+    "success_share": ("vehicle success", lambda values, _: short(float(np.mean(values)))),
     "collisions": ("collisions", lambda values, n: f"{np.mean(values) / n:.2f}"),
     "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
-    "swarm_time_ratio": ("time of the last", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
-    "min_obstacle_distance_m": ("to obstacles", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
-    "min_spacing_m": ("to others", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
+    "swarm_time_ratio": ("swarm time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
+    "min_obstacle_distance_m": ("obstacle distance", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
+    "min_spacing_m": ("spacing", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
 }
-"""Heads and cells of measures, from an episode's values and the number of vehicles."""
+"""Header and cell of each measure, from its values by episode and the number of vehicles."""
 
 
 def report(task: str, rows: Sequence[Row]) -> str:
@@ -62,7 +62,7 @@ def report(task: str, rows: Sequence[Row]) -> str:
 
 
 def _tiers(task: str) -> Columns:
-    """The sets of each scenario: those of the kinds of map that it draws by itself."""
+    """The sets of each scenario: those of the kinds of map in its file."""
     return {
         name: [set_name(name, kind) for kind in getattr(load_scenario(name).task_numbers, "kinds", [""])]
         for name in (f"{task}_easy", task, f"{task}_hard")
@@ -70,7 +70,7 @@ def _tiers(task: str) -> Columns:
 
 
 def _shares(rows_by_set: Found, study: Study, columns: Columns, share: str = "") -> str:
-    """The headline, or another ``share``, with its interval, and whole swarms, for policies that ran on all sets."""
+    """The headline, or another ``share``, with its interval, and swarm success, for policies that ran on all sets."""
     share = share or study.headline
     table = [
         (named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'swarm_success')}" for mine in cells))
@@ -81,7 +81,7 @@ def _shares(rows_by_set: Found, study: Study, columns: Columns, share: str = "")
 
 
 def _measures(rows_by_set: Found, study: Study, columns: Columns) -> str:
-    """The headline and the share of whole swarms in each column, or of the medium tier, and other measures."""
+    """The headline and the swarm success in each column, or of the medium tier, and other measures."""
     table: list[tuple[str, ...]] = []
     for policy in _policies(rows_by_set):
         cells = [
@@ -94,7 +94,7 @@ def _measures(rows_by_set: Found, study: Study, columns: Columns) -> str:
             own = [", ".join(two) for two in shares] if columns else shares[0]
             rest = (_MEASURES[name][1](measured(every, name), _size(every[0])) for name in _shown(study))
             table.append((named(policy), *own, *rest))
-    heads = (*columns,) if columns else (study.headline.replace("_", " "), "swarm_success")
+    heads = (*columns,) if columns else (study.headline.replace("_", " "), "swarm success")
     return markdown_table(("policy", *heads, *(_MEASURES[name][0] for name in _shown(study))), table)
 
 
@@ -104,14 +104,14 @@ def _shown(study: Study) -> list[str]:
 
 
 def _size(row: Row) -> int:
-    """How many vehicles there were."""
+    """Number of vehicles."""
     scenario, _, rest = row["set"].partition("-")
     last = rest.split("-")[-1]
     return int(last) if last.isdigit() else load_scenario(scenario).swarm.num_vehicles
 
 
 def _final(rows_by_set: Found, study: Study) -> str:
-    """The headline and whole swarms on the final seeds, and by how much a network is above the best law there."""
+    """The headline and the swarm success on the final seeds, and a network's gain over the best controller there."""
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
         mine = {policy: rows for (policy, where), rows in rows_by_set.items() if where == name}
@@ -121,7 +121,7 @@ def _final(rows_by_set: Found, study: Study) -> str:
             if not (is_trained(policy) or policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy)
         ]  # fmt: skip
         best = max(controllers, key=lambda controller: shares[controller].mean())
-        heads += [scenario, "above the best law"]
+        heads += [scenario, "gain over the best controller"]
         for policy, rows in mine.items():
             gain = _with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
             score_text = f"{_with_interval([shares[policy]])}, {_mean([rows], 'swarm_success')}"
@@ -130,7 +130,7 @@ def _final(rows_by_set: Found, study: Study) -> str:
 
 
 def named(policy: str) -> str:
-    """A policy with what it gets beyond sonar."""
+    """A policy with its extra observations."""
     beyond = [*policy_class(runnable(policy)).channels, *(["identity"] if uses_identity(runnable(policy)) else [])]
     return f"{policy} with {', '.join(beyond)}" if beyond else policy
 
@@ -146,7 +146,7 @@ def _cells(rows_by_set: Found, policy: str, columns: Columns) -> list[list[Seque
 
 
 def _values(mine: Sequence[Sequence[Row]], name: str) -> list[Float64]:
-    """Of each set, shape (episode,)."""
+    """A metric's values in each set, shape (episode,)."""
     return [np.array(measured(rows, name)) for rows in mine]
 
 

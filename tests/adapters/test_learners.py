@@ -111,7 +111,7 @@ def invented(better=()):
                 place = {"task": task.name, "learner": who, "training": str(training)}
                 share = 0.1 * rng.uniform() + 0.5 * (who in better)
                 for each in task.sets:
-                    values = dict.fromkeys(cells.MEASURES, "1") | {"share": f"{share:.3g}", "time": ""}
+                    values = dict.fromkeys(cells.MEASURES, "1") | {"share": f"{share:.3g}", "time_ratio": ""}
                     rows += [place | {"set": each.name, "seed": str(seed)} | values for seed in (7000, 7001)]
                 if who in LEARNERS:
                     curves += [
@@ -121,7 +121,7 @@ def invented(better=()):
                             "minutes": "1.00",
                             "share": "0.1",
                             "swarm_success": "0",
-                            "collisions": "2",
+                            "collisions_per_vehicle": "2",
                         }
                         for k in (1000, 2000)
                     ]
@@ -154,7 +154,7 @@ def test_the_page_shows_the_trainings_that_all_learners_have():
     shown = page.complete(lacking, rows)
     assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
     assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
-    assert "too few to tell anyone apart" in page._apart(page.grouped_rows(shown[1]))
+    assert "too few for a comparison" in page._apart(page.grouped_rows(shown[1]))
 
 
 def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
@@ -237,7 +237,7 @@ def test_a_step_is_the_nearest_measure_and_after_its_end_a_training_stays_at_its
         "learner": next(iter(LEARNERS)),
         "training": "0",
         "swarm_success": "0",
-        "collisions": "0",
+        "collisions_per_vehicle": "0",
     }
     ends = {400_000: "0.1", 700_000: "0.2", 1_600_000: "0.3"}
     curve = [{**place, "agent_steps": str(k), "minutes": "1", "share": share} for k, share in ends.items()]
@@ -263,7 +263,7 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
     with pytest.raises(ResultsError, match="set hard_water must have the seeds 7000 to 7001 once each, got 1 rows"):
         others.check_complete(rows[1:], few)
     with pytest.raises(ResultsError, match="set hard_water, seed 7000 came again with to_others 9.9, now"):
-        others.check_equal({**rows[0], "to_others": "9.9"}, "scout", few)
+        others.check_equal({**rows[0], "min_spacing_m": "9.9"}, "scout", few)
     with pytest.raises(ResultsError, match="came again with"):
         others.check_equal(rows[0], "random", few)
     with pytest.raises(ResultsError, match="set must be one of hard_water, .*, got 'lake'"):

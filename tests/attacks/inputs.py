@@ -19,8 +19,9 @@ from typer.testing import CliRunner
 
 import uuv_marl
 from tests.nets import ANYWHERE
+from tests.players import CYCLES, PLAYERS, compare, suited
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import POLICIES, make, with_policy_requirements
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
@@ -423,13 +424,36 @@ SOURCE_RESULTS = Path()
 
 
 def prepare(folder):
-    """What the cases start from."""
+    """Make what the cases start from, and compile what they need, so that their time limit is for them alone."""
     global SOURCE_RESULTS  # noqa: PLW0603
     SOURCE_RESULTS = folder / "source"
     done = CliRunner().invoke(
         app, ["benchmark", "--scenario", "starter", "--policy", "idle", "--seeds", "2", "--output", str(SOURCE_RESULTS)]
     )
     assert done.exit_code == 0, done.output
+    for name in ANYWHERE:
+        scenario = with_policy_requirements(name, load_scenario("single_obstacle"))
+        make(name, scenario).act(Swarm(scenario).reset(0))
+    for name in scenario_names():
+        env = uuv_marl.parallel_env(load_scenario(name, overrides={"current.speed_mps": 0.1}))  # what the sea does, too
+        env.reset(seed=0)
+        env.step({agent: [0.0, 0.0] for agent in env.agents})
+
+
+TASKS_OF = {
+    "oracle": "hard_water", "carrot_informed": "hard_water", "nearest_target": "silent_targets",
+    "mappo_silent_targets": "silent_targets", "mappo_few_informed": "few_informed",
+}  # fmt: skip
+
+
+def interfaces(rng, folder):
+    """Every policy, over several episodes, through an interface drawn for it: the actions must be the same bits."""
+    for name in POLICIES:
+        scenario = suited(name, TASKS_OF.get(name, "starter"), **{"swarm.num_vehicles": 5})
+        try:
+            compare(pick(rng, PLAYERS), name, scenario, int(rng.integers(2**40)), CYCLES + 3, rng)
+        except AssertionError as error:
+            raise WrongError(f"{name}: {error}") from None
 
 
 def command_line(rng, folder):
@@ -467,5 +491,6 @@ COUNTS = {
     checkpoints: 400,
     results_folders: 200,
     command_line: 150,
+    interfaces: 28,
 }
 """Kinds of inputs, and how many cases of each the campaign has."""

@@ -140,7 +140,7 @@ def _own(task: Task, world: int) -> dict[str, float | None]:
     """A task's own metrics. Raises ScenarioError where names are taken, or lack what tables and trainings read."""
     own, name = task.metrics(world), type(task).__name__
     needed = set[str]() if isinstance(task, Follow) else {"success_share", "swarm_success", task.headline}
-    if taken := sorted(own.keys() & MEASURED):
+    if taken := sorted(own.keys() & MEASURED - needed):
         raise ScenarioError(f"task {name} can't give {', '.join(taken)} in metrics: the name is taken; choose another")
     if missing := sorted(needed - own.keys()):
         raise ScenarioError(f"task {name} must give {', '.join(missing)} in metrics; add to super().metrics(world)")

@@ -110,7 +110,7 @@ class HardWaterMemory(NamedTuple):
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
     path_length: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
     path_cost: Annotated[
-        Float64, "world led column", "Cost of the way on from each cell; no row without channel ``way``."
+        Float64, "world cost_row column", "Cost of the way on from each cell; no row without channel ``way``."
     ]
     kind: Annotated[Float64, "world", "Index of the map's kind in ``KINDS``."]
 
@@ -140,7 +140,7 @@ class HardWater(Reach):
         """Room for the discs of a map, and for its cells."""
         grid = scenario.task_numbers.grid()
         cost_rows = grid.rows if "path" in scenario.sonar.channels else 0
-        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "leader": cost_rows}
+        return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "cost_row": cost_rows}
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
