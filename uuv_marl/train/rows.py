@@ -85,7 +85,7 @@ class Group:
         return self.env.reset(seeds, worlds)
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
-        """The expert's actions, and those to execute: the expert's in its own worlds, else ``action``; shape (row, 2)."""
+        """The expert's actions, and those to execute, in its own worlds the expert's; shape (row, 2)."""
         expert_action = cast(Policy, self._expert).act(self.env.swarm.percept).reshape(-1, 2).copy()
         return expert_action, np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
 

@@ -176,8 +176,8 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
             card = self._card(scenario)
             if differs := next((f for f in Card.model_fields if getattr(card, f) != getattr(self.card, f)), None):
                 raise TrainingError(
-                    f"extra_scenarios has {name!r} with another {differs} than {self.scenario!r}, and one network needs the "
-                    "same; leave it out, or make them equal in a file of your own"
+                    f"extra_scenarios has {name!r} with another {differs} than {self.scenario!r}, and one network "
+                    "needs the same; leave it out, or make them equal in a file of your own"
                 )
         return self
 
