@@ -47,8 +47,8 @@ class Variant:
         return straight_leg(self.num_vehicles, self.yaw_damping_nms, self.control_step_s, leg_m=4.0)
 
     def policy(self, scenario: Scenario, num_worlds: int) -> Policy:
-        """The law for this scenario: the paper's own code where nothing is softened."""
-        undamped = load_scenario(scenario, overrides={"actuators.yaw_damping_nms": 0.0})  # as the law was made
+        """The controller for this scenario: the shipped one where nothing is softened."""
+        undamped = load_scenario(scenario, overrides={"actuators.yaw_damping_nms": 0.0})
         if self.softening == PAPER:
             return BioInspired(undamped, num_worlds, gains=self.gains)
         return Softened(undamped, num_worlds, gains=self.gains, softening=self.softening)

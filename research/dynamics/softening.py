@@ -1,4 +1,4 @@
-"""Changes to the paper's law that may let a swarm come to rest: smooth neighbours, surge damping."""
+"""Changes to the paper's controller that may let a swarm come to rest: smooth neighbours, surge damping."""
 
 import math
 from typing import NamedTuple
@@ -12,22 +12,22 @@ from uuv_marl.types import Float32, Float64
 
 
 class Softening(NamedTuple):
-    """Changes to the paper's law, each off by default."""
+    """Changes to the paper's controller, each off by default."""
 
     near_m: float = math.inf
-    """Neighbours within this distance count in full ..."""
+    """Distance up to which neighbours count in full [m]."""
     far_m: float = math.inf
-    """... and those beyond this not at all, with a smooth step between."""
+    """Distance from which they do not count [m], with a smooth step between."""
     surge_damping: float = 0.0
     """Thrust against surge relative to the reference's velocity [N s/m]."""
 
 
 PAPER = Softening()
-"""The law as it is."""
+"""The unchanged controller."""
 
 
 class Softened(BioInspired):
-    """The paper's law with a ``Softening``, in NumPy; without one it is ``BioInspired`` with an echo per beam.
+    """The paper's controller with a ``Softening``, in NumPy; without one it equals ``BioInspired``, an echo per beam.
 
     Args:
         scenario: gives the vehicle's limits and the percept's layout.

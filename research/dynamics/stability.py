@@ -1,4 +1,4 @@
-"""Stability of steady tracking: the paper's law (Eq. 18-22), linearised with frozen neighbour sets.
+"""Stability of steady tracking: the paper's controller (Eq. 18-22), linearised with frozen neighbour sets.
 
 A swarm moves along a straight leg at the reference's speed, all bows along the leg. Positions are relative to l(t),
 x ahead and y to starboard; a vehicle's state is (x, y, psi, u, v, r). Formations are sought in ``formation.py``.
@@ -32,14 +32,14 @@ Complex128 = NDArray[np.complex128]
 SEEDS = (0, 1, 2, 3)
 """Starts from which formations are sought."""
 CONTROL_STEPS_S = (0.0, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.15, 0.2)
-"""Control holds t_r swept; 0 is feedback without delay."""
+"""Control steps t_r swept; 0 is feedback without delay."""
 SHOWN_CONTROL_STEPS_S = (0.0, 0.02, 0.05, 0.1)
-"""Control holds whose eigenvalues are tabled."""
+"""Control steps whose eigenvalues are tabled."""
 SWEEP_CONTROL_STEPS_S = (0.0, 0.1)
-"""Control holds at which the yaw damping is swept."""
+"""Control steps at which the yaw damping is swept."""
 DAMPING_NMS = (0.0, 60.0, 120.0, 200.0, 300.0, 400.0, 600.0)
 """Yaw dampings swept."""
-_CONTROL_STEP_COLOURS = {"continuous": BLUE, "t_r = 0.1 s": ORANGE, "control hold on the axis": BLACK}
+_CONTROL_STEP_COLOURS = {"continuous": BLUE, "t_r = 0.1 s": ORANGE, "control step on the axis": BLACK}
 WEAVING_RAD_PER_S = 1.0
 """Modes that turn faster than this are weaving; slower ones rearrange the formation."""
 
@@ -83,7 +83,7 @@ def feedback(scenario: Scenario, rigid: Float64) -> Float64:
 
 
 def loop(scenario: Scenario, rigid: Float64, control_step_s: float) -> Float64:
-    """The closed loop, shape (6 vehicle, 6 vehicle): the state's rate for a hold of 0, else its next sample.
+    """The closed loop, shape (6 vehicle, 6 vehicle): the state's rate for a control step of 0, else its next sample.
 
     Body forces are held for ``hold_s`` exactly (zero-order hold); the simulation's Runge-Kutta step differs from that
     by its fifth-order error.
@@ -125,7 +125,7 @@ def tables(_suite: Suite, report: Share) -> Tables:
         ]
         rows: list[dict[str, Any]] = []
         cases = [("t_r", control_step_s, 0.0, control_step_s) for control_step_s in CONTROL_STEPS_S]
-        cases += [("yaw_damping_nms", c, c, control_step_s) for c in DAMPING_NMS for control_step_s in SWEEP_CONTROL_STEPS_S]
+        cases += [("yaw_damping_nms", c, c, step_s) for c in DAMPING_NMS for step_s in SWEEP_CONTROL_STEPS_S]
         for k, case in enumerate(cases):
             rows += _margins(*case, nominal)
             report((k + 1) / len(cases))
@@ -161,9 +161,9 @@ def draw(computed: Tables) -> Figure:
     axes[0].set(xlim=(-2.0, 1.5), xlabel="growth rate [1/s]", ylabel="angular rate [rad/s]")
     axes[0].set_ylim(0.0)
     axes[0].set_title("eigenvalues of the nominal swarm, first seed")
-    axes[0].legend(title="control hold")
+    axes[0].legend(title="control step")
     for ax, parameter, label in (
-        (axes[1], "t_r", "control hold $t_r$ [s]"),
+        (axes[1], "t_r", "control step $t_r$ [s]"),
         (axes[2], "yaw_damping_nms", "yaw damping [N m s]"),
     ):
         _draw_sweep(ax, computed["margins"], parameter)
