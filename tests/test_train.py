@@ -78,7 +78,7 @@ class Toy:
         self.observation = self._rng.uniform(-1, 1, (self.rows, self.size)).astype(np.float32)
 
     def query_expert(self, action):
-        """The teacher does (x2, -x1), and lets the network act."""
+        """The expert's action is (x2, -x1), and the network acts."""
         return self.observation[:, 1::-1] * np.array([1.0, -1.0], np.float32), action
 
     def step(self, action):
@@ -142,7 +142,7 @@ def test_a_one_step_task_is_solved():
     assert np.sqrt(np.mean((action - x[:, :2] * (0.5, -0.5)) ** 2)) < 0.1
 
 
-def test_a_lesson_is_learned_whatever_pays():
+def test_imitation_ignores_the_reward():
     toy = Toy(lambda observation, action: 10.0 * observation[:, 0] * action[:, 0])
     learner = learner_for(toy, Ppo(horizon=8))
     learner.set_imitation(imitating=True)
@@ -156,8 +156,8 @@ def test_a_lesson_is_learned_whatever_pays():
 
 
 @pytest.mark.parametrize(("imitation_weight", "near"), [(0.0, (0.5, -0.5, 0, 0)), (30.0, (0, 0, 1.0, -1.0))])
-def test_a_pull_holds_at_the_teacher_against_what_pays(imitation_weight, near):
-    """Half of what is seen pays, and the teacher swaps it."""
+def test_an_imitation_weight_keeps_the_policy_near_the_expert_against_the_reward(imitation_weight, near):
+    """Half of the observation is rewarded, and the expert swaps it."""
     toy = Toy(lambda observation, action: -np.square(action - observation[:, :2] * (0.5, -0.5)).sum(axis=1))
     learner = learner_for(toy, Ppo(horizon=8))
     learner.set_imitation(imitating=False, imitation_weight=imitation_weight)
@@ -280,8 +280,8 @@ def test_rows_of_mixed_sizes_end_and_start_anew():
     assert np.abs(came.final - before).max() < np.abs(env.observation - before).max()
 
 
-def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
-    """Nothing else is charged, and each contact that begins by as much."""
+def test_collisions_cost_more_as_a_training_goes_on(tmp_path, no_validation):
+    """Each collision costs as much, and nothing else changes."""
     crowd = Training(scenario="starter", sizes=[(12, 4)], ppo=TINY)
     plain, charged, found = rows_for(crowd), rows_for(crowd), 0
     charged.set_collision_cost(7.0)
@@ -289,13 +289,13 @@ def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
     for _ in range(60):
         action = rng.uniform(-1.0, 1.0, (48, 2)).astype(np.float32)
         less = plain.step(action).reward - charged.step(action).reward
-        contacts = charged.groups[0].env.swarm.facts.vehicle_collisions.ravel()
-        np.testing.assert_allclose(less, 7.0 * contacts, atol=1e-4)
-        found += contacts.sum()
+        collisions = charged.groups[0].env.swarm.facts.vehicle_collisions.ravel()
+        np.testing.assert_allclose(less, 7.0 * collisions, atol=1e-4)
+        found += collisions.sum()
     assert found > 0
     costs = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Rows, "charge", lambda self, cost: costs.append(cost))
+        patch.setattr(Rows, "set_collision_cost", lambda self, cost: costs.append(cost))
         list(train(tmp_path, small(steps=5 * 168)))
     assert costs[0] == 1.0
     assert costs == sorted(costs)
@@ -308,6 +308,7 @@ from uuv_marl.tasks import Task
 from uuv_marl.tasks.reach import Reach
 class Mine(Task):
     terms = {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}
+    at_goal = Task.arrived_before
     def reward(self, running):
         slow = -np.hypot(*np.moveaxis(self.swarm.velocity, -1, 0))
         return {"still": 0.5 * slow, "collision": -60.0 * self.swarm.facts.vehicle_collisions}
@@ -328,7 +329,7 @@ NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
 
 
 @pytest.mark.parametrize(
-    ("told", "cost"),
+    ("fields", "cost"),
     [
         ({}, (1.0, 300.0)),
         ({"scenario": "few_informed", "reward": "leader"}, (1.0, 300.0)),
@@ -340,8 +341,8 @@ NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
         ({"ppo": {"collision_cost": (0.0, 0.0)}}, (0.0, 0.0)),
     ],
 )
-def test_contacts_cost_nothing_beyond_a_reward_of_ones_own(told, cost, own_task):
-    training = Training(**told)
+def test_collisions_cost_nothing_beyond_a_reward_of_ones_own(fields, cost, own_task):
+    training = Training(**fields)
     assert training.ppo.collision_cost == cost
     assert Training(**json.loads(training.model_dump_json())) == training
     assert ("collision costs" in objective(training)) == (cost[1] > 0.0)
@@ -430,17 +431,17 @@ def test_rows_act_as_the_policy_will(beside, tmp_path):
 
 
 @pytest.mark.parametrize("beside", [{}, {"filter": True}, RUDDER], ids=["alone", "filter", "rudder"])
-def test_a_teacher_is_told_what_was_done_and_acts_as_it_would_alone(beside):
-    """It says what it would do; where it teaches, that is done; its memory is that of one who did what was done."""
+def test_an_expert_records_the_executed_action_and_acts_as_it_would_alone(beside):
+    """Its actions are executed in its own worlds, and its memory follows the executed ones in all."""
     brief = {"time_limit.factor": 0.001, "time_limit.extra_s": 3.0}
-    told = {"scenario": "starter", **beside, "expert": "scout"}
-    training = Training(sizes=[(4, 2)], ppo=TINY, **{**told, "overrides": told.get("overrides", {}) | brief})
-    seeds, taken = itertools.count(100_000), []
+    fields = {"scenario": "starter", **beside, "expert": "scout"}
+    training = Training(sizes=[(4, 2)], ppo=TINY, **{**fields, "overrides": fields.get("overrides", {}) | brief})
+    seeds, executed = itertools.count(100_000), []
     env = Rows(training, lambda num: [next(seeds) for _ in range(num)])
     group = env.groups[0]
     alone = make("scout", group.env.swarm.scenario, 2)
     step = group.env.step
-    group.env.step = lambda action: taken.append(action) or step(action)
+    group.env.step = lambda action: executed.append(action) or step(action)
     for _ in range(16):
         group._expert_acts[:] = True, False
         expected = alone.act(group.env.swarm.percept).copy()
@@ -448,13 +449,13 @@ def test_a_teacher_is_told_what_was_done_and_acts_as_it_would_alone(beside):
         np.testing.assert_array_equal(said, expected.reshape(-1, 2))
         np.testing.assert_array_equal(done, [*said[:4], *np.full((4, 2), np.float32(0.3))])
         env.step(done)
-        alone.taken(taken[-1])
+        alone.record_action(executed[-1])
     assert next(seeds) > 100_004  # new worlds have begun
-    assert np.abs(taken[-1][0] - expected[0]).max() < 1e-6 or beside.get("filter")
-    assert np.abs(taken[-1][1] - expected[1]).max() > 1e-3
+    assert np.abs(executed[-1][0] - expected[0]).max() < 1e-6 or beside.get("filter")
+    assert np.abs(executed[-1][1] - expected[1]).max() > 1e-3
 
 
-def test_a_teacher_that_lacks_what_it_needs_is_named(tmp_path):
+def test_an_expert_without_its_requirements_is_named(tmp_path):
     for expert, scenario, why in [
         ("scoot", "starter", "unknown; did you mean 'scout'"),
         ("orca_informed", "starter", "link"),
@@ -464,12 +465,12 @@ def test_a_teacher_that_lacks_what_it_needs_is_named(tmp_path):
         assert not (tmp_path / "a" / "config.json").exists()
 
 
-def test_fewer_and_fewer_worlds_are_the_teachers():
+def test_fewer_and_fewer_worlds_are_the_experts():
     training = Training(scenario="starter", sizes=[(1, 400)], expert="random", overrides={"time_limit.factor": 0.001})
     drawn = np.random.default_rng(0)
     env = Rows(training, lambda num: drawn.integers(*TRAINING_SEEDS, num))
     for share in (1.0, 0.6, 0.0, -0.3):
-        env.set_imitation(share)
+        env.set_expert_share(share)
         ended = np.zeros(env.rows, np.bool_)
         while not ended.all():
             env.query_expert(np.zeros((env.rows, 2), np.float32))
@@ -478,8 +479,8 @@ def test_fewer_and_fewer_worlds_are_the_teachers():
         assert abs(env.groups[0]._expert_acts.mean() - max(share, 0.0)) < 0.1
 
 
-def test_rewards_count_after_the_lesson(tmp_path, no_validation):
-    """In a lesson of nine tenths the network is far from who acts, the teacher; then PPO is near itself."""
+def test_rewards_count_after_the_imitation(tmp_path, no_validation):
+    """During imitation the network is far from the expert that acts; then PPO is near itself."""
     fields = {"scenario": "starter", "sizes": [(4, 2)], "steps": 20 * 64, "imitation_share": 0.9, "expert": "scout"}
     records = list(train(tmp_path, Training(ppo=TINY, **fields)))
     assert len(records) == 20
@@ -487,8 +488,8 @@ def test_rewards_count_after_the_lesson(tmp_path, no_validation):
     assert 1e-6 < min(after) <= max(after) < 0.1 < min(record.kl for record in records[:18])
 
 
-def test_after_the_lesson_the_network_acts_and_is_told_what_the_teacher_would_do():
-    """In worlds that began while the teacher acted, too."""
+def test_after_the_imitation_the_network_acts_and_the_expert_is_queried():
+    """Also in worlds that started while the expert acted."""
     trainer = Trainer(
         Training(
             scenario="starter", sizes=[(4, 2)], ppo=TINY, expert="scout", imitation_share=0.0, imitation_weight=2.0
@@ -497,7 +498,7 @@ def test_after_the_lesson_the_network_acts_and_is_told_what_the_teacher_would_do
     trainer.learner.set_imitation(imitating=False, imitation_weight=2.0)
     batch, _ = trainer.learner.sample(trainer.rows, 1e-3)
     assert (batch.action - batch.mean).abs().max() < 0.01
-    assert (batch.action - batch.told).abs().mean() > 0.1
+    assert (batch.action - batch.expert_action).abs().mean() > 0.1
 
 
 def test_training_worlds_are_not_those_of_validation():
@@ -538,7 +539,7 @@ def small(**changes):
 @pytest.fixture
 def no_validation(monkeypatch):
     verdicts = itertools.cycle([0.2, 0.5, 0.4])
-    monkeypatch.setattr(trainings, "validate", lambda *_: GOOD._replace(whole=next(verdicts)))
+    monkeypatch.setattr(trainings, "validate", lambda *_: GOOD._replace(swarm_success=next(verdicts)))
 
 
 def begun(folder, iterations, **changes):
@@ -648,7 +649,7 @@ def test_the_starter_scenario_is_learned_in_seconds(tmp_path):
 def test_the_best_policy_is_kept_with_its_worst_episode(tmp_path, monkeypatch):
     scores = iter([0.2, 0.5, 0.4, 0.5])
     seen = iter([900_001, 900_002, 900_003, 900_004])
-    judge = lambda *_: GOOD._replace(whole=next(scores), share=0.5, worst=Worst("starter", 6, next(seen)))  # noqa: E731
+    judge = lambda *_: GOOD._replace(swarm_success=next(scores), share=0.5, worst=Worst("starter", 6, next(seen)))  # noqa: E731
     monkeypatch.setattr(trainings, "validate", judge)
     records = list(train(tmp_path / "a", small(validations=4, steps=4 * 168)))
     assert [record.best for record in records] == [0.35, 0.5, 0.5, 0.5]
@@ -721,7 +722,7 @@ def test_a_folder_that_is_used_or_empty_or_of_another_scenario_is_refused(tmp_pa
         next(resume(tmp_path / "b"))
 
 
-def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
+def test_an_expert_whose_file_has_changed_is_refused(tmp_path, no_validation):
     """Behind a prefix of its name, too; a folder from before files were noted goes on."""
     expert = tmp_path / "expert"
     card = card_for(small().loaded)
