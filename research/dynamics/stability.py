@@ -106,10 +106,7 @@ def rates(values: Complex128) -> Rates:
     """What a spectrum [1/s] says, every mode counted."""
     real = values.real
     fast = real[np.abs(values.imag) > WEAVING_RAD_PER_S]
-    return Rates(
-        growth=float(real.max()),
-        weaving=float(fast.max()) if fast.size else np.nan,
-    )
+    return Rates(growth=float(real.max()), weaving=float(fast.max()) if fast.size else np.nan)
 
 
 def tables(_suite: Suite, report: Share) -> Tables:

@@ -201,10 +201,7 @@ _KINDS = {
     "number": ("Numbers", "section, quantity, unit, paper, ours, worst, difference, verdict"),
     "claim": ("Claims", "no., section, the paper says, holds, ours, worst, verdict"),
     "given": ("Values that the paper gives", "section, quantity, unit, paper, ours, verdict"),
-    "assumption": (
-        "Assumptions",
-        "quantity, our choice, the paper's numbers that were known",
-    ),
+    "assumption": ("Assumptions", "quantity, our choice, the paper's numbers that were known"),
 }
 """Title and headers of each kind's table."""
 

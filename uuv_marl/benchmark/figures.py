@@ -138,10 +138,7 @@ def _outcome(metrics: Mapping[str, Any]) -> str:
 def _collisions_of(trace: Trace, hull_m: float) -> Float32:
     """Places where collisions begin, shape (collision, 2): the vehicle nearest to another or to an obstacle."""
     points: list[Float32] = []
-    for distance, limit, of_pair in (
-        (trace["min_spacing_m"], 2.0 * hull_m, True),
-        (_nearest(trace), hull_m, False),
-    ):
+    for distance, limit, of_pair in ((trace["min_spacing_m"], 2.0 * hull_m, True), (_nearest(trace), hull_m, False)):
         below = distance < limit
         for time in trace["time_s"][below & ~np.append(np.False_, below[:-1])]:
             place = trace["route_position"][np.argmin(np.abs(trace["route_time_s"] - time))]

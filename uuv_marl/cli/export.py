@@ -10,8 +10,7 @@ from uuv_marl.cli.console import explained, extra, path_argument, say
 
 def export(
     policy: Annotated[
-        str,
-        typer.Argument(help="Name of a network, or checkpoint without filter and base controller, file or folder."),
+        str, typer.Argument(help="Name of a network, or checkpoint without filter and base controller, file or folder.")
     ],
     output: Annotated[Path, path_argument("ONNX file.")],
     scenario: Annotated[
