@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
+from uuv_marl.baselines import make_policy
 from uuv_marl.sim.disturbances.actuation import followed, victims
 from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.disturbances.disturbances import DISTURBANCE_CHANNELS, disturbance_tables
@@ -141,7 +141,7 @@ def test_a_policy_that_follows_a_drifting_point_swims_as_in_still_water():
         start = swarm.snapshot() if start is None else start
         swarm.state.eta[:], swarm.state.nu[:] = start["eta"], start["nu"]
         swarm.observe()
-        policy = make("bio_inspired", swarm.scenario, 1)
+        policy = make_policy("bio_inspired", swarm.scenario, 1)
         policy.reset(0)
         for _ in range(100):
             swarm.step(policy.act(swarm.percept))

@@ -7,9 +7,10 @@ import pytest
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, make, with_policy_requirements
+from uuv_marl.baselines import Policy, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
 from uuv_marl.baselines.learned.layers import shapes
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -93,7 +94,7 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
     for scenario in (linked, messaged):
         swarm = Swarm(scenario)
         swarm.reset(0)
-        actor = make(policy, scenario)
+        actor = make_policy(policy, scenario)
         actor.reset(0)
         for _ in range(30):
             swarm.step(actor.act(swarm.percept))
@@ -117,4 +118,4 @@ def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
 class Both(Policy):
     """Compares messages with true values."""
 
-    channels = ("link", "modem")
+    requirements = PolicyRequirements(("link", "modem"))

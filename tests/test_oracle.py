@@ -18,7 +18,7 @@ from tests.conftest import COUPLED, LIFT, RUDDER
 from tests.golden import STARTER
 from tests.oracle import motion, sonar
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
+from uuv_marl.baselines import make_policy
 from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin, rotated
@@ -37,7 +37,7 @@ import json, sys
 import numpy as np
 from uuv_marl import load_scenario
 from tests.nets import ANYWHERE
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.sim.swarm import Swarm
 scenario = load_scenario("starter", overrides=json.loads(sys.argv[1]))
 swarm = Swarm(scenario, 2)
@@ -48,7 +48,7 @@ bits = {name: array.tobytes().hex() for name, array in swarm.snapshot().items()}
 actions = []
 for name in () if scenario.current.flows else ANYWHERE:
     own = with_policy_requirements(name, scenario)
-    swarm, policy = Swarm(own), make(name, own)
+    swarm, policy = Swarm(own), make_policy(name, own)
     policy.reset(0)
     actions.append(policy.act(swarm.reset(0)).tolist())
 print(json.dumps([bits, actions]))
@@ -509,7 +509,7 @@ def check_percept(swarm):
 def test_an_episode_s_facts_and_percepts_are_those_of_the_oracle(name):
     scenario, change = EPISODES[name]
     scenario = load_scenario(scenario, **change)
-    swarm, actor, rng = Swarm(scenario), make("bio_inspired", scenario), np.random.default_rng(0)
+    swarm, actor, rng = Swarm(scenario), make_policy("bio_inspired", scenario), np.random.default_rng(0)
     swarm.reset(1)
     actor.reset(1)
     happened = set()

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.sim import engine as engine_module
 from uuv_marl.sim.field import sample_field
 from uuv_marl.sim.swarm import Swarm
@@ -24,7 +24,7 @@ from uuv_marl.sim.threads import on_threads
 def play(scenario, seeds, steps, policy="bio_inspired"):
     """Final states and percepts, world by world, of a few steps in one batch."""
     scenario = with_policy_requirements(policy, scenario)
-    swarm, actor = Swarm(scenario, len(seeds)), make(policy, scenario, len(seeds))
+    swarm, actor = Swarm(scenario, len(seeds)), make_policy(policy, scenario, len(seeds))
     percept = swarm.reset(list(seeds))
     actor.reset(list(seeds))
     for _ in range(steps):

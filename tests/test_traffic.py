@@ -248,7 +248,7 @@ def test_errors_name_field_value_and_remedy(name, changes, message):
 
 def test_headers_name_it_and_it_needs_no_disturbances():
     made = swarm(share=0.5)
-    assert conditions(made.scenario) == "0.5 of obstacles move at 2 m/s, 8 m to and fro"
+    assert conditions(made.scenario) == "0.5 of obstacles move at 2 m/s, amplitude 8 m"
     assert made.currents is None
 
 
