@@ -53,7 +53,7 @@ def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
     return swarm
 
 
-# --- Off is as before ---
+# --- Without disturbances ---
 
 
 @pytest.mark.parametrize("channel", DISTURBANCE_CHANNELS)
