@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uuv_marl.baselines import Policy, make
+from uuv_marl.baselines import Policy, make_policy
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -27,7 +27,7 @@ class Blind(Policy):
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: str) -> None:
         super().__init__(scenario, num_worlds)
-        self._inner = make(inner, scenario, num_worlds)
+        self._inner = make_policy(inner, scenario, num_worlds)
         masks = [np.full(field.size, not field.name.startswith("echo")) for field in self.layout.table]
         self._mask = np.concatenate(masks).astype(np.float32)
 

@@ -7,5 +7,5 @@ SECOND = {file.stem: str(file) for file in sorted(Path(__file__).parent.glob("ve
 
 
 def runnable(policy: str) -> str:
-    """What ``make`` takes for a policy's name in a table: a second training's path, any other name as it is."""
+    """What ``make_policy`` takes for a policy's name in a table: a second training's path, any other name as it is."""
     return SECOND.get(policy, policy)

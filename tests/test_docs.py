@@ -16,7 +16,7 @@ from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
 from uuv_marl.scenario import Scenario
 from uuv_marl.tasks import TASKS
-from uuv_marl.tasks.maps import KINDS
+from uuv_marl.tasks.maps.kinds import KINDS
 
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent

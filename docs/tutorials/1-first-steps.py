@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 1. First steps
 #
-# A swarm of five vehicles passes an obstacle. You will see what one vehicle hears, how the episode ends, a replay, and
-# how to make a scenario of your own.
+# A swarm of five vehicles passes an obstacle. You will see what one vehicle observes, how the episode ends, a replay,
+# and how to make a scenario of your own.
 #
 # - **Time**: about 2 minutes on two cores, of which 60 s are compiling at the first run.
 # - **Needs**: the extras `analysis` and `render`; the first cell installs uuv_marl where it is missing.
@@ -10,32 +10,31 @@
 # ## A swarm and its controller
 #
 # A scenario holds every number of a simulation. `starter` is the smallest that ships: five vehicles, one obstacle, half
-# a minute. `granted` adds what a policy needs beyond its sonar. Look at what `bio_inspired_plus` needs.
+# a minute. `for_policy` adds the observations and control loops that a policy requires. Look at those of
+# `bio_inspired_plus`.
 
 # %%
 import uuv_marl
-from uuv_marl import baselines
 
-scenario = baselines.with_policy_requirements("bio_inspired_plus", uuv_marl.load_scenario("starter"))
-print(scenario.title)
-print("yaw damping:", scenario.actuators.yaw_damping_nms, "N m s")
+env = uuv_marl.parallel_env("starter", for_policy="bio_inspired_plus")
+print(env.scenario.title)
+print("yaw damping:", env.scenario.actuators.yaw_damping_nms, "N m s")
 
 # %% [markdown]
-# The policy gets yaw damping, an inner loop that brakes turns, but no compass and no messages.
-# [Policies](../policies.md) lists what each policy gets.
+# The policy requires yaw damping, an inner loop that brakes turns, but no compass and no messages.
+# [Policies](../policies.md) lists the requirements of each policy.
 #
 # The environment is a PettingZoo `ParallelEnv`. `reset` gives one observation per vehicle. Look at the length of an
 # observation.
 
 # %%
-env = uuv_marl.parallel_env(scenario)
-policy = baselines.make("bio_inspired_plus", env)
+policy = uuv_marl.make_policy("bio_inspired_plus", env)
 observations, infos = env.reset(seed=0)
 print(env.agents)
 print("one observation:", observations["uuv_0"].shape, observations["uuv_0"].dtype)
 
 # %% [markdown]
-# ## What one vehicle hears
+# ## What one vehicle observes
 #
 # An observation is a row of 98 numbers, each divided by a scale. `Percept.from_observation` turns the row back into
 # fields in physical units. Look at the fields' names: they are also in [the observation's
@@ -46,17 +45,17 @@ import pandas as pd
 
 from uuv_marl.percept import Percept, PerceptLayout
 
-layout = PerceptLayout.of(scenario)
+layout = PerceptLayout.of(env.scenario)
 percept = Percept.from_observation(observations["uuv_0"], layout)
-rows = [(layout.starts[f.name], f.size, f.kind.unit, f.kind.scale) for f in layout.table]
+rows = [(layout.starts[f.name], f.size, f.quantity.unit, f.quantity.scale) for f in layout.table]
 pd.DataFrame(rows, index=list(percept.names), columns=["first entry", "entries", "unit", "scale"])
 
 # %% [markdown]
 # All positions are relative to the vehicle: the first number is the distance ahead, the second the distance to
 # starboard, the vehicle's right-hand side.
 #
-# Each of the 21 sub-sectors of the sonar hears the nearest vehicle in the sub-sector, or none. Look at how many
-# vehicles are heard, and how far away they are.
+# Each of the 21 sub-sectors of the sonar detects its nearest vehicle, or none. Look at how many vehicles are detected,
+# and how far away they are.
 
 # %%
 import numpy as np
@@ -68,8 +67,8 @@ neighbours["distance [m]"] = np.hypot(ahead, starboard)
 neighbours.round(1)
 
 # %% [markdown]
-# Every row is a sub-sector with a vehicle that `uuv_0` hears. The row has no name, because `uuv_0` can't know which
-# vehicle it hears. A vehicle behind another in the same sub-sector is not heard.
+# Every row is a sub-sector in which `uuv_0` detects a vehicle. The row has no name, because sonar does not identify
+# vehicles. A vehicle behind another in the same sub-sector is not detected.
 #
 # ## Run the episode
 #
@@ -82,14 +81,13 @@ while env.agents:
 infos["uuv_0"]
 
 # %% [markdown]
-# The swarm arrived, and no vehicle touched anything. The policy follows l(t), a point that moves for 30 s, so no swarm
-# can arrive earlier. `time_s` also includes the 2 s for which the swarm must stay at the end.
+# The swarm arrived without a collision. The policy follows l(t), a point that moves for 30 s, so no swarm can arrive
+# earlier. `time_s` also includes the 2 s for which the swarm must stay at the end.
 #
 # ## Watch it
 #
-# `record` runs an episode as the benchmark does and keeps all of it. `inspect` names vehicles whose sonar is kept, too.
-# `Replay` shows the recording in a notebook. Press the space bar, and click on vehicle 0 to see which vehicles it
-# hears.
+# `record` runs an episode as the benchmark does and keeps all of it. `inspect` lists the vehicles to record the sonar
+# of. `Replay` shows the recording in a notebook. Press the space bar, and click on vehicle 0 to see its detections.
 
 # %%
 from uuv_marl.replay.page import Replay
@@ -104,8 +102,8 @@ Replay([recording])
 #
 # ## Your own scenario
 #
-# A scenario of your own is a TOML file that says what differs from another scenario. Everything that the file leaves
-# out is as in `starter`. Look at what was loaded, and at the error for a misspelt field.
+# A scenario of your own is a TOML file with the differences from another scenario. All other fields are those of
+# `starter`. Look at the loaded values, and at the error for a misspelt field.
 
 # %%
 from pathlib import Path

@@ -1,19 +1,18 @@
 # %% [markdown]
 # # 2. Your own policy
 #
-# A law of a dozen lines brings five vehicles past an obstacle as early as any policy can, and touches nothing. On
-# harder courses it touches obstacles. With the safety filter that ships it touches nothing there, either.
+# A controller of a dozen lines brings five vehicles past an obstacle as early as possible, without a collision. In
+# harder scenarios it collides with obstacles, except with the safety filter that ships.
 #
 # - **Time**: about 2 minutes on two cores, of which 60 s are compiling at the first run.
 # - **Needs**: nothing but uuv_marl; the first cell installs it where it is missing. [First steps](1-first-steps.ipynb)
-#   explains what a vehicle hears.
+#   explains the observation.
 #
-# ## The law
+# ## The controller
 #
-# A policy is a class with a method `decide`. It gets the percept, what all vehicles know, and returns a thrust and a
-# turn for each of them, as shares of full force and torque. All arrays begin with the axes world and vehicle, so the
-# law of one vehicle is written once and acts for all. The cell saves the class in a file, because the benchmark reads
-# it from there.
+# A policy is a class with a method `decide`. It gets the percept, the observations of all vehicles, and returns a
+# thrust and a turn for each vehicle, as shares of full force and torque. All arrays begin with the axes world and
+# vehicle, so code for one vehicle acts for all. The cell saves the class in a file for the benchmark.
 
 # %%
 # %%writefile mine.py
@@ -23,7 +22,7 @@ from uuv_marl import baselines
 
 
 class Careful(baselines.Policy):
-    """Goes to l(t), and away from every vehicle and every obstacle that it hears."""
+    """Move to l(t), and away from every detected vehicle and obstacle."""
 
     requirements = baselines.PolicyRequirements(yaw_damping_nms=600.0)  # an inner loop that brakes turns
 
@@ -39,9 +38,9 @@ class Careful(baselines.Policy):
 
 
 # %% [markdown]
-# `wish` has three parts: the velocity of l(t), the point that the swarm follows; a pull to l(t); and a push away from
-# all that is heard, which halves when the distance doubles. [The observation's table](../environment.md#observation)
-# lists the fields that a law can use.
+# `desired` has three parts: the velocity of l(t), the point that the swarm follows; an attraction to l(t); and a
+# repulsion from every detection, which halves when the distance doubles. [The observation's
+# table](../environment.md#observation) lists the fields that a controller can use.
 #
 # ## In a table
 #
@@ -53,10 +52,10 @@ class Careful(baselines.Policy):
 #     --policy mine:Careful --policy bio_inspired_plus --policy scout
 
 # %% [markdown]
-# `Careful` arrives after 30 s, when l(t) comes to rest, so no policy can be faster. It touches nothing, but comes
+# `Careful` arrives after 30 s, when l(t) comes to rest, so no policy can be faster. It has no collision, but comes
 # within some 2 m of the obstacle. `scout` is about as fast and keeps much more distance.
 #
-# The benchmark also writes pictures. Each panel shows the routes of a policy with one seed.
+# The benchmark also writes figures. Each panel shows the paths of a policy with one seed.
 
 # %%
 from IPython.display import Image
@@ -64,24 +63,24 @@ from IPython.display import Image
 Image("results/starter/figures/starter_routes.png", width=700)
 
 # %% [markdown]
-# ## On harder courses
+# ## In a harder scenario
 #
-# `random_field` draws another course and other obstacles for each seed. `guarded:` in front of a policy's name puts the
-# policy inside [the safety filter](../policies.md#the-filter), which changes an action only if it is not safe. Look at
-# the collisions.
+# `random_field` has another trajectory and other obstacles for each seed. `safety_filter=true` after a policy's name
+# puts the policy inside [the safety filter](../policies.md#the-safety-filter), which changes only unsafe actions. Look
+# at the collisions.
 
 # %% language="bash"
 # uuv-marl benchmark --scenario random_field --set swarm.num_vehicles=10 --seeds 10 --output results/fields \
-#     --policy mine:Careful --policy guarded:mine:Careful --policy scout
+#     --policy mine:Careful --policy mine:Careful,safety_filter=true --policy scout
 
 # %% [markdown]
-# `Careful` touches obstacles with every seed; a negative distance means inside the disc. Its push depends on the
-# distance to the obstacle's centre, which the sonar gives, and large obstacles begin far from their centre. Inside the
-# filter it touches nothing and arrives as early.
+# `Careful` collides with obstacles in every seed; a negative distance means inside the disc. Its repulsion depends on
+# the distance to the obstacle's centre, which the sonar gives, and the surface of a large obstacle is far from its
+# centre. Inside the filter it has no collision and arrives as early.
 #
-# To improve the law, use `percept["echo_range"]`, the distance to the surface. After each change of `mine.py` add
-# `--restart` to the command: it runs your policy again and keeps the runs of the others. Your policy can also have [a
-# memory](../policies.md#a-policy-that-remembers).
+# To improve the controller, use `percept["echo_range"]`, the distance to the surface. After each change of `mine.py`
+# add `--restart` to the command: it runs your policy again and keeps the runs of the others. Your policy can also have
+# [a memory](../policies.md#policies-with-memory).
 #
 # Next: [a task of your own](3-your-own-task.ipynb).
 

@@ -1,18 +1,18 @@
 # %% [markdown]
 # # 3. Your own task
 #
-# You write a task: vehicles that know of no place to go meet each other, by sonar alone. A simple law does it in most
+# You write a task, rendezvous: vehicles without a goal gather by sonar alone. A simple controller succeeds in most
 # episodes, and a film shows how.
 #
 # - **Time**: about 2 minutes on two cores, of which 60 s are compiling at the first run.
 # - **Needs**: the extra `render`; the first cell installs uuv_marl where it is missing. [Your own
-#   policy](2-your-own-policy.ipynb) explains the law.
+#   policy](2-your-own-policy.ipynb) explains the controller.
 #
 # ## The task
 #
-# A task is a class whose methods say what is drawn at the start, who is where it should be, when the episode is done,
-# and what a learner is paid. `self.swarm` is the simulation: `state` holds positions and velocities, `facts` distances
-# and contacts. All but `there` has a default. Look at `there`: it decides which vehicles succeed.
+# A task is a class whose methods give the start of an episode, the vehicles at their goal, the end of the episode, and
+# the reward. `self.swarm` is the simulation: `state` holds positions and velocities, `facts` distances and collisions.
+# All methods but `at_goal` have a default. Look at `at_goal`: it decides which vehicles succeed.
 
 # %%
 # %%writefile meet.py
@@ -24,12 +24,12 @@ from uuv_marl.tasks import Task
 
 
 class Rendezvous(Task):
-    """Come within near_m of the swarm's centre, all of you."""
+    """Gather within near_m of the swarm's centre."""
 
     class Numbers(Section):
         near_m: Positive = 10.0
 
-    def draw(self, world, rng):  # no vehicle perceives l(t), and there are no obstacles
+    def draw(self, world, rng):  # no vehicle observes l(t), and there are no obstacles
         drawn = super().draw(world, rng)
         return drawn._replace(informed=np.zeros_like(drawn.informed), obstacles=np.zeros((0, 3)))
 
@@ -37,7 +37,7 @@ class Rendezvous(Task):
         offset = self.swarm.state.eta[:, :, :2] - self.swarm.facts.centre[:, None]
         return np.linalg.norm(offset, axis=-1)
 
-    def at_goal(self):  # which vehicles are where they should be, shape (world, vehicle)
+    def at_goal(self):  # which vehicles are at their goal, shape (world, vehicle)
         return self.away() <= self.numbers.near_m
 
     def done(self):  # in which worlds the episode ends, shape (world,)
@@ -46,12 +46,12 @@ class Rendezvous(Task):
     def reward(self, running):  # the terms of the reward, shape (world, vehicle)
         return {"away": -0.01 * self.away(), "collision": -10.0 * self.swarm.facts.vehicle_collisions}
 
-    def marks(self, world):  # circles that a film shows: north, east and radius
+    def marks(self, world):  # circles to draw: north, east and radius
         return np.array([[*self.swarm.facts.centre[world], self.numbers.near_m]])
 
 
 class Join(baselines.Policy):
-    """Goes slowly to the vehicles that it hears, and away from those that are near."""
+    """Move slowly towards detected vehicles, and away from near ones."""
 
     def decide(self, percept):
         detected, position = percept["detected"][..., None], percept["neighbour"]
@@ -63,13 +63,13 @@ class Join(baselines.Policy):
 
 
 # %% [markdown]
-# `near_m` is a number that a scenario may change. `draw` takes away l(t), which tells vehicles of other tasks where to
-# go, and the obstacles. [The table of all methods](../tasks.md#your-own-task) says when each one is called.
+# `near_m` is a number that a scenario may change. `draw` removes the obstacles and l(t), the reference of other tasks.
+# [The table of all methods](../tasks.md#write-a-task) says when each one is called.
 #
 # ## An episode
 #
-# A scenario takes a task as `module:Class`. From then on every environment has it. Look at the number of vehicles that
-# are there at the start and at the end.
+# Every environment takes a task as `module:Class`. Look at the number of vehicles at their goal at the start and at the
+# end.
 
 # %%
 from meet import Join
@@ -79,29 +79,28 @@ import uuv_marl
 env = uuv_marl.parallel_env("starter", task="meet:Rendezvous")
 policy = Join(env.scenario)
 percept = env.swarm.reset(seed=1)
-print("there at the start:", env.swarm.task.at_goal().sum(), "of", env.scenario.swarm.num_vehicles)
+print("at the goal at the start:", env.swarm.task.at_goal().sum(), "of", env.scenario.swarm.num_vehicles)
 while not env.swarm.task.done()[0]:
     percept = env.swarm.step(policy.act(percept))
-print("there after", env.swarm.facts.time_s[0], "s:", env.swarm.task.at_goal().sum())
+print("at the goal after", env.swarm.facts.time_s[0], "s:", env.swarm.task.at_goal().sum())
 
 # %% [markdown]
 # ## In a table
 #
-# The benchmark measures a task of yours as it measures those that ship. `idle` does nothing. Look at the column *whole
-# swarms*.
+# The benchmark measures your task like those that ship. `idle` does nothing. Look at the column *swarm success*.
 
 # %% language="bash"
 # uuv-marl benchmark --scenario starter --set task=meet:Rendezvous --seeds 10 --output results/meet \
 #     --policy meet:Join --policy idle
 
 # %% [markdown]
-# A swarm is whole if every vehicle is there and has touched nothing. `Join` brings most swarms together, but in some
-# of them two vehicles touch each other. The starts are too far apart for a swarm that does nothing.
+# A swarm succeeds if every vehicle is at its goal and has had no collision. `Join` succeeds in most episodes; in the
+# others two vehicles collide. `idle` never succeeds, because the vehicles start too far apart.
 #
 # ## A film
 #
-# `uuv-marl replay` draws any episode. The circle is the mark of the task. The film also shows l(t), which no vehicle
-# perceives.
+# `uuv-marl replay` draws any episode. The circle is the task's mark. The film also shows l(t), which no vehicle
+# observes.
 
 # %% language="bash"
 # uuv-marl replay --scenario starter --set task=meet:Rendezvous --policy meet:Join --seed 1 --output meet.gif
@@ -112,8 +111,8 @@ from IPython.display import Image
 Image("meet.gif", width=400)
 
 # %% [markdown]
-# [`examples/extending/task.py`](../../examples/extending/task.py) is the same task with an entry of its own in the
-# observation and a column of its own in the table. To train a network on your task, add `--set task=meet:Rendezvous`
+# [`examples/extending/task.py`](../../examples/extending/task.py) is the same task with an additional entry in the
+# observation and an additional column in the table. To train a network on your task, add `--set task=meet:Rendezvous`
 # to the command of the next tutorial.
 #
 # Next: [train a policy](4-train-and-watch.ipynb) instead of writing one.
@@ -122,8 +121,8 @@ Image("meet.gif", width=400)
 import uuv_marl.benchmark
 
 runs = uuv_marl.benchmark.load("results/meet").set_index("policy")
-whole = runs["swarm_success"]
-assert 6 <= whole["meet:Join"].sum() < 10
+success = runs["swarm_success"]
+assert 6 <= success["meet:Join"].sum() < 10
 assert runs.loc["meet:Join", "collisions"].sum() > 0
-assert whole["idle"].sum() == 0
+assert success["idle"].sum() == 0
 assert env.swarm.task.at_goal().sum() == 5

@@ -2,27 +2,27 @@
 # # 4. Train and watch
 #
 # One minute of training gives a policy that brings five vehicles past an obstacle. You see how it learns, watch it, and
-# compare it with a law.
+# compare it with a controller.
 #
 # - **Time**: about 3 minutes on two cores, of which 60 s are compiling at the first run.
 # - **Needs**: the extras `analysis`, `render` and `train`; the first cell installs uuv_marl where it is missing.
 #
 # ## Train
 #
-# One command trains one network with MAPPO, on 128 worlds at once. All vehicles share the network. Look at how the last
-# column falls.
+# One command trains a network, which all vehicles share, with MAPPO on 128 worlds at once. Look at how the last column
+# falls.
 
 # %% language="bash"
 # uuv-marl train starter --minutes 1 --output runs/starter
 
 # %% [markdown]
-# Each line is a validation: in how many of 16 episodes the whole swarm arrived and touched nothing, how many contacts
-# there were, and when it arrived. Your numbers differ a little from ours, because a training by time depends on the
-# processor. With `--steps` in place of `--minutes` the same machine gives the same training again.
+# Each line is a validation: the swarm success over 16 episodes (all vehicles arrived without a collision), the number
+# of collisions, and the time of arrival. Your numbers differ a little from ours, because a training by time depends on
+# the processor. With `--steps` in place of `--minutes` the same machine gives the same training again.
 #
 # ## How it learned
 #
-# The folder holds `progress.csv`, with a row for each iteration, and `curve.png`, which draws it. Look at the reward.
+# The folder holds `progress.csv`, with a row for each iteration, and its plot, `curve.png`. Look at the reward.
 
 # %%
 from IPython.display import Image
@@ -30,13 +30,13 @@ from IPython.display import Image
 Image("runs/starter/curve.png", width=700)
 
 # %% [markdown]
-# The reward rises in the first 20 seconds. It still goes up and down then, because an iteration is 32 s of each world,
-# and so holds other parts of the episodes than the one before.
+# The reward rises in the first 20 seconds. It then fluctuates, because an iteration is 32 s of each world and covers
+# other parts of the episodes than the one before.
 #
 # ## Watch it
 #
-# `best` is the policy of the best validation. A checkpoint is a policy like any other: give its path in place of a
-# policy's name. The seeds from 900,000 on are those of validations. Look at how near the vehicles come to each other.
+# `best` is the policy of the best validation. A checkpoint's path can stand in place of any policy's name. Validations
+# use the seeds from 900,000 on. Look at how near the vehicles come to each other.
 
 # %% language="bash"
 # uuv-marl replay --scenario starter --policy runs/starter/best --seed 900003 --output episode.png
@@ -57,8 +57,8 @@ Image("episode.png", width=700)
 #     --policy bio_inspired_plus --policy runs/starter/best
 
 # %% [markdown]
-# Your policy takes about as long as the tuned law, `bio_inspired_plus`. It keeps less distance between vehicles,
-# because its reward asks for only 5 m. It has neither a law nor a filter beside it.
+# Your policy takes about as long as the tuned controller, `bio_inspired_plus`. It keeps less distance between vehicles,
+# because its reward asks for only 5 m. It acts end to end, without a controller or a filter.
 #
 # `uuv-marl train --resume --output runs/starter --minutes 2` continues the training. [Train a policy](../training.md)
 # has harder problems, rewards of your own, and ONNX.

@@ -1,4 +1,4 @@
-"""``python -m research.paper``: the paper's figures 7 to 15 and Table 2 again, and a ledger of what matches."""
+"""``python -m research.paper``: reproduce the paper's figures 7 to 15 and Table 2, with a ledger."""
 
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +23,7 @@ def main(
     seeds: Annotated[int, typer.Option(min=1, max=10_000, help="Number of seeds; they count from 0.")] = 20,
     output: Annotated[Path, path_option("Folder for figures, ledger and page.")] = Path("results/reproduce"),
 ) -> None:
-    """Make the paper's figures 7 to 15 and Table 2 again, and a ledger of what matches.
+    """Reproduce the paper's figures 7 to 15 and Table 2, with a ledger of what is reproduced.
 
     It writes pictures (folder figures), the data behind each (folder data), the ledger (ledger.json, ledger.md) and a
     summary (paper.md). It also studies what the paper does not: readings that fail, sensitivities,

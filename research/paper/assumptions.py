@@ -1,4 +1,4 @@
-"""What the paper leaves open, as ``assumptions.toml`` lists it."""
+"""Parameters that the paper does not give, from ``assumptions.toml``."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
@@ -11,12 +11,12 @@ _ALL = tuple(case.scenario for case in SCENARIOS)
 
 
 class Assumption(NamedTuple):
-    """One thing the paper does not say."""
+    """A parameter that the paper does not give."""
 
     name: str
     taken: str
     in_view: str
-    """Numbers of the paper that were known and looked at when it was chosen."""
+    """Numbers of the paper that were known when it was chosen."""
     alternatives: list[dict[str, Any]]
     """Other readings, as ``_cases`` takes them."""
 
@@ -44,4 +44,4 @@ ASSUMPTIONS = tuple(Assumption(**table) for table in read_toml("paper", "assumpt
 READINGS = {("as taken", ""): {case.scenario: case for case in SCENARIOS}} | {
     (one.name, other["label"]): _cases(one.name, **other) for one in ASSUMPTIONS for other in one.alternatives
 }
-"""By assumption and alternative: a case for each scenario where that applies; first how we take it."""
+"""By assumption and alternative: a case for each scenario where it applies; first our choice."""

@@ -1,4 +1,4 @@
-"""What sections 5.1-5.3 say in words, each with a measure that can fail: the sentences of ``stated.toml``."""
+"""Claims of sections 5.1-5.3, each with a measure that can fail, from ``stated.toml``."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -20,31 +20,31 @@ def stated(kind: str) -> list[dict[str, Any]]:
 
 
 class Claim(NamedTuple):
-    """A sentence of the paper, and what is measured in its stead."""
+    """A claim of the paper, with its measure."""
 
     section: str
     says: str
     """The claim in our words."""
     measured: str
-    """What is measured, in words."""
+    """The measure, in words."""
     unit: str
     cases: Sequence[str]
-    """Names of the cases it is measured on."""
+    """Names of the cases of the measure."""
     metric: str = ""
     measure: str = ""
-    """Where it is no metric: a function of ``measures``, of each trace and of what is ``given``."""
+    """If not a metric: a function of ``measures`` of each trace, with ``constants`` as further arguments."""
     constants: Mapping[str, object] = NOTHING
     combined: str = ""
-    """Of several cases: ``ratio`` of the first to the second, or the smallest ``gain`` from each to the next."""
+    """For several cases: ``ratio`` of the first to the second, or the smallest ``gain`` from each to the next."""
     least: float = -np.inf
-    """The claim holds from here ..."""
+    """The claim holds from this value ..."""
     most: float = np.inf
-    """... to here."""
+    """... to this."""
     why: str = ""
     """Why it does not hold."""
 
     def values(self, suite: Suite) -> Float64:
-        """What is measured, by seed."""
+        """The measure, by seed."""
         values = [self._of(suite, BY_NAME[name]) for name in self.cases]
         if self.combined == "gain":
             return np.diff(values, axis=0).min(axis=0)

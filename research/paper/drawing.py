@@ -1,4 +1,4 @@
-"""What the paper's figures share: plan views in its coordinates, routes, and series over time."""
+"""Shared by the paper's figures: plan views in its coordinates, paths, and series over time."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.

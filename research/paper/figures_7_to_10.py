@@ -66,7 +66,7 @@ def figure_8(suite: Suite, _report: Share) -> Tables:
 
 
 def draw_8(computed: Tables) -> Figure:
-    """Routes, and the centre's route over the trajectory."""
+    """Paths of the vehicles, and the centre's path over the trajectory."""
     figure, (left, right) = panels(2)
     drawing.draw_routes(left, computed["figure-8a"], TRACKING, "(a) every vehicle")
     drawing.plan(right, TRACKING, "(b) centre of the swarm")

@@ -1,4 +1,4 @@
-"""The ledger: every number and sentence of sections 5.1-5.3, ours beside it, and how far they agree."""
+"""The ledger: every number and claim of sections 5.1-5.3, with ours and their difference."""
 
 import json
 from collections.abc import Sequence
@@ -12,9 +12,10 @@ from research.paper.cases import BY_NAME, SCENARIOS
 from research.paper.claims import CLAIMS, Claim, stated
 from uuv_marl.atomic import write_text
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
+from uuv_marl.benchmark.estimates import Estimate, estimate
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.suite import Case, Suite
-from uuv_marl.benchmark.tables import Estimate, estimate, markdown_table
+from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.types import Float64
 
 CLOSE, NEAR = 0.05, 0.15
@@ -30,7 +31,7 @@ class Number(NamedTuple):
     metric: str
     """Ends in its unit."""
     why: str = ""
-    """Why ours differs."""
+    """The reason for a difference."""
 
     @property
     def unit(self) -> str:
@@ -39,7 +40,7 @@ class Number(NamedTuple):
 
     @property
     def paper(self) -> tuple[float, ...]:
-        """The paper's value; two where the paper gives two for the same case, and anything between them matches."""
+        """The paper's value; two where the paper gives two for the same case, with a match between them."""
         return PAPER[self.case.scenario, self.case.policy].values(self.metric)
 
 
@@ -52,7 +53,7 @@ class Entry(NamedTuple):
 
     section: str
     kind: str
-    """``number``, ``claim``, ``given`` (what the paper sets) or ``assumption`` (what it leaves open)."""
+    """``number``, ``claim``, ``given`` (values of the paper) or ``assumption`` (values that it does not give)."""
     quantity: str
     unit: str
     paper: str
@@ -95,9 +96,9 @@ def number_entry(number: Number, values: Float64) -> Entry:
     )
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return row._replace(verdict="differs", why="no seed gives one")
+        return row._replace(verdict="differs", why="no seed has a value")
     e = estimate(finite.tolist())
-    relative, worst = difference(e.iqm, number.paper), finite.max() if number.unit == "s" else finite.min()
+    relative, worst = difference(e.value, number.paper), finite.max() if number.unit == "s" else finite.min()
     why = "" if abs(relative) <= CLOSE else number.why
     if finite.size < values.size:
         why = f"{values.size - finite.size} of {values.size} seeds never arrive; {why}"
@@ -116,7 +117,7 @@ def claim_entry(claim: Claim, values: Float64) -> Entry:
     if not finite.size:
         return row
     e, worst = estimate(finite.tolist()), finite[np.argmin(np.minimum(finite - claim.least, claim.most - finite))]
-    return row._replace(ours=e.iqm, low=e.low, high=e.high, worst=float(worst))
+    return row._replace(ours=e.value, low=e.low, high=e.high, worst=float(worst))
 
 
 def _limits(claim: Claim) -> str:
@@ -128,7 +129,7 @@ def _limits(claim: Claim) -> str:
 
 
 def stated_entries() -> list[Entry]:
-    """What the paper sets, against the scenarios and gains that are run."""
+    """Values that the paper gives, compared with the scenarios and gains that are run."""
     tracking, single, multi = (case.load() for case in SCENARIOS)
     arrays = {array.kind: array for array in tracking.sonar.arrays}
     start, gains = tracking.start, BioInspiredGains()
@@ -165,21 +166,19 @@ def stated_entries() -> list[Entry]:
 
 
 def assumption_entries() -> list[Entry]:
-    """What the paper leaves open, with the numbers of the paper that were in view when it was chosen."""
+    """Assumptions, with the numbers of the paper that were known when they were chosen."""
     searched = "5.1 both, 5.2.1, Table 2"
     rows = [
         *((one.name, one.taken, one.in_view) for one in ASSUMPTIONS),
         ("the identified parameters, beside these", "research/dynamics/identified", searched),
-        ("the hypothesis post hoc, beside these", "obstacles heard from 190 m, 45 vehicles in 5.1",
-         "5.1 both, 5.2.1, 5.2.2 both, Table 2"),
-    ]  # fmt: skip
+    ]
     return [
         Entry("", "assumption", what, "", "silent", taken, verdict=f"in view: {seen}") for what, taken, seen in rows
     ]
 
 
 def ledger(suite: Suite) -> list[Entry]:
-    """All rows, from the runs of a suite: numbers, claims, what is given, what is assumed."""
+    """All rows, from the runs of a suite: numbers, claims, given values, assumptions."""
     return [
         *(number_entry(number, suite.metric(number.case, number.metric)) for number in NUMBERS),
         *(claim_entry(claim, claim.values(suite)) for claim in CLAIMS),
@@ -200,39 +199,35 @@ def write_ledger(folder: Path, entries: Sequence[Entry], seeds: int) -> list[Pat
 
 _KINDS = {
     "number": ("Numbers", "section, quantity, unit, paper, ours, worst, difference, verdict"),
-    "claim": ("Sentences", "no., section, the paper says, holds, ours, worst, verdict"),
-    "given": ("What the paper sets", "section, quantity, unit, paper, ours, verdict"),
-    "assumption": (
-        "What we assume where the paper is silent",
-        "what, taken, the paper's numbers in view when it was chosen",
-    ),
+    "claim": ("Claims", "no., section, the paper says, holds, ours, worst, verdict"),
+    "given": ("Values that the paper gives", "section, quantity, unit, paper, ours, verdict"),
+    "assumption": ("Assumptions", "quantity, our choice, the paper's numbers that were known"),
 }
 """Title and headers of each kind's table."""
 
 
 def _cells(k: int, e: Entry) -> dict[str, str]:
-    """What may stand under each header."""
+    """The cells of a row by header."""
     without = "–" if e.ours is None else ""
     return {
         "no.": f"{k}",
         "section": e.section,
         "quantity": e.quantity,
         "the paper says": e.quantity.rpartition(": ")[0],
-        "what": e.quantity,
         "unit": e.unit,
         "paper": e.paper,
         "holds": e.paper.removeprefix("holds "),
         "ours": e.estimate,
-        "taken": e.estimate,
+        "our choice": e.estimate,
         "worst": "–" if e.worst is None else f"{e.worst:.4g}",
         "difference": without if e.relative_difference is None else f"{e.relative_difference:+.1%}",
         "verdict": e.verdict,
-        "the paper's numbers in view when it was chosen": e.verdict.removeprefix("in view: "),
+        "the paper's numbers that were known": e.verdict.removeprefix("in view: "),
     }
 
 
 def markdown(entries: Sequence[Entry]) -> list[str]:
-    """A table for each kind of row; what is too long for a cell follows as a list."""
+    """A table for each kind of row, with notes as a list below."""
     lines: list[str] = []
     for kind, (title, words) in _KINDS.items():
         chosen, headers = [entry for entry in entries if entry.kind == kind], words.split(", ")
@@ -242,7 +237,7 @@ def markdown(entries: Sequence[Entry]) -> list[str]:
 
 
 def _notes(kind: str, entries: Sequence[Entry]) -> list[str]:
-    """How each claim is measured, and why ours differs."""
+    """The measure of each claim, and the reasons for differences."""
     if kind == "claim":
         notes = [
             f"{k}. Measured: {e.quantity.rpartition(': ')[2]} [{e.unit}]." + (f" *Reason*: {e.why}." if e.why else "")

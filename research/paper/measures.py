@@ -129,24 +129,24 @@ def spacing_change_at_corners(trace: Trace) -> float:
 
 
 def extent_before(trace: Trace) -> float:
-    """Largest spacing [m] when the swarm has gathered, 10 s before its first vehicle hears an obstacle at 100 m."""
+    """Largest spacing [m] when the swarm has gathered, 10 s before its first vehicle detects an obstacle at 100 m."""
     nearest = trace["obstacle_distance_m"].min(axis=1)
     heard = trace["time_s"][np.argmax(nearest < 100.0)]
     return float(between(trace, "max_spacing_m", heard - 10.0, heard).mean())
 
 
 def dispersal(trace: Trace) -> float:
-    """Largest spacing over that before the obstacle is heard."""
+    """Largest spacing over that before the obstacle is detected."""
     return float(between(trace, "max_spacing_m", SETTLED_S, np.inf).max()) / extent_before(trace)
 
 
 def regathered(trace: Trace) -> float:
-    """Largest spacing at the end over that before the obstacle is heard."""
+    """Largest spacing at the end over that before the obstacle is detected."""
     return float(trace["max_spacing_m"][-1]) / extent_before(trace)
 
 
 def sides(trace: Trace) -> float:
-    """Over the obstacles, the most even split; 0 around one that somebody passes through."""
+    """Over the obstacles, the most even split; 0 around one that a vehicle passes through."""
     avoided = trace["obstacle_distance_m"].min(axis=0) > 0.0
     shares = [smaller_side(trace["route_position"], obstacle) for obstacle in trace["obstacles"]]
     return float(np.max(np.where(avoided, shares, 0.0)))

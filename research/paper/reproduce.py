@@ -32,9 +32,9 @@ PARTS: tuple[Part, ...] = (
 )
 """All parts in the order of the page."""
 NAMES = (*(part.name for part in PARTS), LEDGER)
-"""What ``--only`` knows."""
+"""Names that ``--only`` accepts."""
 _COMPUTED = 20
-"""About as many cases does the work for tables compare to that are computed by themselves."""
+"""Work for tables that need no runs, in cases."""
 
 
 def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> list[Path]:

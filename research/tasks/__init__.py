@@ -1,1 +1,1 @@
-"""Tasks beyond the paper: what laws and networks reach, scenario by scenario and map by map."""
+"""Tasks beyond the paper: results of controllers and networks by scenario and kind of map."""

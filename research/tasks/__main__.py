@@ -1,4 +1,4 @@
-"""``python -m research.tasks``: every policy on a task that is not the paper's, and the task's page."""
+"""``python -m research.tasks``: run every policy on a task other than the paper's, and write the task's page."""
 
 from pathlib import Path
 from typing import Annotated

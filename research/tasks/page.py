@@ -6,7 +6,7 @@ from string import Template
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, measured, short
+from research.episodes import Row, grouped, measured, short
 from research.second import runnable
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.making import policy_requirements
@@ -15,23 +15,23 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.types import Float64
 
-Found = Mapping[tuple[str, str], Sequence[Row]]
+Groups = Mapping[tuple[str, ...], Sequence[Row]]
 """Rows by policy and set."""
 Columns = Mapping[str, Sequence[str]]
-"""Sets by the head of their column."""
+"""Sets by the header of their column."""
 _RESAMPLES = 2000
 _NOT_CONTROLLERS = ("oracle", "carrot_informed", "random", "idle", "research.blind")
 _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
     "found_share": ("found", lambda values, _: short(float(np.mean(values)))),
     "found_s": ("time until held", lambda values, _: f"{np.mean(values):.0f} s"),
-    "success_share": ("untouched", lambda values, _: short(float(np.mean(values)))),
+    "success_share": ("vehicle success", lambda values, _: short(float(np.mean(values)))),
     "collisions": ("collisions", lambda values, n: f"{np.mean(values) / n:.2f}"),
     "time_ratio": ("time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
-    "swarm_time_ratio": ("time of the last", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
-    "min_obstacle_distance_m": ("to obstacles", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
-    "min_spacing_m": ("to others", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
+    "swarm_time_ratio": ("swarm time", lambda values, _: f"{np.mean(values):.2f}" if values else "–"),
+    "min_obstacle_distance_m": ("obstacle distance", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
+    "min_spacing_m": ("spacing", lambda values, _: f"{np.mean(values):.1f} m" if values else "–"),
 }
-"""Heads and cells of measures, from an episode's values and the number of vehicles."""
+"""Header and cell of each measure, from its values by episode and the number of vehicles."""
 
 
 def report(task: str, rows: Sequence[Row]) -> str:
@@ -41,51 +41,47 @@ def report(task: str, rows: Sequence[Row]) -> str:
         task: a name of ``STUDIES``.
         rows: episodes, as ``TASK.csv.gz`` holds them.
     """
-    rows_by_set: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        rows_by_set.setdefault((row["policy"], row["set"]), []).append(row)
+    groups = grouped(rows, "policy", "set")
     study = STUDIES[task]
     kinds = {name.split("-")[1]: [name] for name in study.own if "-" in name}
     return Template(read_text("tasks", "stories", f"{task}.md")).substitute(
         episodes=f"{sum(row['set'] not in study.final.values() for row in rows):,}",
-        tiers=_shares(rows_by_set, study, _tiers(task)),
-        kinds=_measures(rows_by_set, study, kinds),
-        measures=_measures(rows_by_set, study, {}),
+        tiers=_shares(groups, study, _tiers(task)),
+        kinds=_measures(groups, study, kinds),
+        measures=_measures(groups, study, {}),
         many=_measures(
-            rows_by_set, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
+            groups, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
-        final=_final(rows_by_set, study),
-        informed=_shares(
-            rows_by_set, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "success_share"
-        ),
+        final=_final(groups, study),
+        informed=_shares(groups, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "success_share"),
     )
 
 
 def _tiers(task: str) -> Columns:
-    """The sets of each scenario: those of the kinds of map that it draws by itself."""
+    """The sets of each scenario: those of the kinds of map in its file."""
     return {
         name: [set_name(name, kind) for kind in getattr(load_scenario(name).task_numbers, "kinds", [""])]
         for name in (f"{task}_easy", task, f"{task}_hard")
     }
 
 
-def _shares(rows_by_set: Found, study: Study, columns: Columns, share: str = "") -> str:
-    """The headline, or another ``share``, with its interval, and whole swarms, for policies that ran on all sets."""
+def _shares(groups: Groups, study: Study, columns: Columns, share: str = "") -> str:
+    """The headline, or another ``share``, with its interval, and swarm success, for policies that ran on all sets."""
     share = share or study.headline
     table = [
         (named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'swarm_success')}" for mine in cells))
-        for policy in _policies(rows_by_set)
-        if (cells := _cells(rows_by_set, policy, columns))
+        for policy in _policies(groups)
+        if (cells := _cells(groups, policy, columns))
     ]
     return markdown_table(("policy", *columns), table)
 
 
-def _measures(rows_by_set: Found, study: Study, columns: Columns) -> str:
-    """The headline and the share of whole swarms in each column, or of the medium tier, and other measures."""
+def _measures(groups: Groups, study: Study, columns: Columns) -> str:
+    """The headline and the swarm success in each column, or of the medium tier, and other measures."""
     table: list[tuple[str, ...]] = []
-    for policy in _policies(rows_by_set):
+    for policy in _policies(groups):
         cells = [
-            rows_by_set.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names
+            groups.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names
         ]
         if every := [row for rows in cells for row in rows]:
             shares = [
@@ -94,7 +90,7 @@ def _measures(rows_by_set: Found, study: Study, columns: Columns) -> str:
             own = [", ".join(two) for two in shares] if columns else shares[0]
             rest = (_MEASURES[name][1](measured(every, name), _size(every[0])) for name in _shown(study))
             table.append((named(policy), *own, *rest))
-    heads = (*columns,) if columns else (study.headline.replace("_", " "), "swarm_success")
+    heads = (*columns,) if columns else (study.headline.replace("_", " "), "swarm success")
     return markdown_table(("policy", *heads, *(_MEASURES[name][0] for name in _shown(study))), table)
 
 
@@ -104,24 +100,24 @@ def _shown(study: Study) -> list[str]:
 
 
 def _size(row: Row) -> int:
-    """How many vehicles there were."""
+    """Number of vehicles."""
     scenario, _, rest = row["set"].partition("-")
     last = rest.split("-")[-1]
     return int(last) if last.isdigit() else load_scenario(scenario).swarm.num_vehicles
 
 
-def _final(rows_by_set: Found, study: Study) -> str:
-    """The headline and whole swarms on the final seeds, and by how much a network is above the best law there."""
+def _final(groups: Groups, study: Study) -> str:
+    """The headline and the swarm success on the final seeds, and a network's gain over the best controller there."""
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
-        mine = {policy: rows for (policy, where), rows in rows_by_set.items() if where == name}
+        mine = {policy: rows for (policy, where), rows in groups.items() if where == name}
         shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
         controllers = [
             policy for policy in mine
             if not (is_trained(policy) or policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy)
         ]  # fmt: skip
         best = max(controllers, key=lambda controller: shares[controller].mean())
-        heads += [scenario, "above the best law"]
+        heads += [scenario, "gain over the best controller"]
         for policy, rows in mine.items():
             gain = _with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
             score_text = f"{_with_interval([shares[policy]])}, {_mean([rows], 'swarm_success')}"
@@ -130,24 +126,24 @@ def _final(rows_by_set: Found, study: Study) -> str:
 
 
 def named(policy: str) -> str:
-    """A policy with what it gets beyond sonar."""
+    """A policy with its extra observations."""
     required = policy_requirements(runnable(policy))
     beyond = [*required.channels, *(["identity"] if required.identity else [])]
     return f"{policy} with {', '.join(beyond)}" if beyond else policy
 
 
-def _policies(rows_by_set: Found) -> list[str]:
-    return list(dict.fromkeys(policy for policy, _ in rows_by_set))
+def _policies(groups: Groups) -> list[str]:
+    return list(dict.fromkeys(policy for policy, _ in groups))
 
 
-def _cells(rows_by_set: Found, policy: str, columns: Columns) -> list[list[Sequence[Row]]]:
+def _cells(groups: Groups, policy: str, columns: Columns) -> list[list[Sequence[Row]]]:
     """The rows of a policy in each set of each column; nothing if some are missing."""
-    cells = [[rows_by_set.get((policy, name), ()) for name in names] for names in columns.values()]
+    cells = [[groups.get((policy, name), ()) for name in names] for names in columns.values()]
     return cells if all(rows for mine in cells for rows in mine) else []
 
 
 def _values(mine: Sequence[Sequence[Row]], name: str) -> list[Float64]:
-    """Of each set, shape (episode,)."""
+    """A metric's values in each set, shape (episode,)."""
     return [np.array(measured(rows, name)) for rows in mine]
 
 

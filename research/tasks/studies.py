@@ -10,7 +10,7 @@ _DATA: dict[str, Any] = read_toml("tasks", "studies.toml")
 SEEDS: int = _DATA["seeds"]
 """Episodes of each policy on each set, from seed 0 on."""
 FINAL = range(*_DATA["final"])
-"""Seeds of the final sets, on which nothing is run before its weights are frozen."""
+"""Seeds of the final sets; a policy runs on them only after its weights are frozen."""
 _FINAL = "final"
 SIZE, INFORMED = "swarm.num_vehicles", "task.informed"
 
@@ -19,17 +19,17 @@ class Study(NamedTuple):
     """What is run for a task."""
 
     sets: Mapping[str, EpisodeSet]
-    """By name."""
+    """Sets by name."""
     medium: str
     """The scenario of the medium tier."""
     own: tuple[str, ...]
-    """Names of its sets, which are the scenario's own in all but the kind of map."""
+    """Names of the sets that differ from their scenario in the kind of map only."""
     metrics: tuple[str, ...]
-    """What is kept of an episode."""
+    """The metrics that a row of an episode holds."""
 
     @property
     def headline(self) -> str:
-        """What policies are compared by."""
+        """The metric by which policies are compared."""
         return self.metrics[0]
 
     @property
@@ -64,8 +64,8 @@ def _study(task: str, table: dict[str, Any]) -> Study:
 
 
 STUDIES = {name: _study(name, _DATA[name]) for name in ("hard_water", "two_swarms", "few_informed", "silent_targets")}
-"""By task."""
+"""Studies by task."""
 SETS = tuple(each for study in STUDIES.values() for each in study.sets.values())
-"""All of them."""
+"""All sets."""
 METRICS = frozenset(name for study in STUDIES.values() for name in study.metrics)
-"""All that are kept of some of them."""
+"""All metrics of all tasks."""

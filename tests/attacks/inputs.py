@@ -19,8 +19,9 @@ from typer.testing import CliRunner
 
 import uuv_marl
 from tests.nets import ANYWHERE
+from tests.players import CYCLES, PLAYERS, compare, suited
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
@@ -121,7 +122,7 @@ def scenarios_that_run(rng, folder):
     name = pick(rng, ("bio_inspired", "sff", "sdc", "mappo"))
     try:
         suited = with_policy_requirements(name, scenario)
-        policy = make(name, suited)
+        policy = make_policy(name, suited)
     except (PolicyError, ScenarioError):
         return
     swarm = Swarm(suited)
@@ -193,9 +194,9 @@ def odd_arguments(rng, folder):
         lambda: uuv_marl.vector_env(2, "starter").reset(seed=thing),
         lambda: Swarm(load_scenario("starter"), thing),
         lambda: Swarm(load_scenario("starter"), 2).reset(thing),
-        lambda: make("random", load_scenario("starter"), 2).reset(thing),
-        lambda: make(thing, load_scenario("starter")),
-        lambda: make("idle", thing),
+        lambda: make_policy("random", load_scenario("starter"), 2).reset(thing),
+        lambda: make_policy(thing, load_scenario("starter")),
+        lambda: make_policy("idle", thing),
     )
     if isinstance(thing, int | float) and not isinstance(thing, bool) and not math.isnan(thing) and abs(thing) > 1e4:
         calls = calls[:6]  # a swarm of 2^31 worlds is a wish, and no mistake
@@ -287,7 +288,7 @@ def foreign_percepts(rng, folder):
     name = pick(rng, ANYWHERE)
     n, worlds = int(rng.integers(1, 7)), int(rng.integers(1, 4))
     scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=n))
-    policy = make(name, scenario, worlds)
+    policy = make_policy(name, scenario, worlds)
     policy.reset(0)
     other = with_policy_requirements(
         pick(rng, (name, "sdc", "idle")), load_scenario("single_obstacle", num_vehicles=int(rng.integers(1, 7)))
@@ -378,7 +379,7 @@ def checkpoints(rng, folder):
     path = folder / "policy.safetensors"
     path.write_bytes(bytes(data))
     scenario = with_policy_requirements(str(folder), load_scenario("random_field", num_vehicles=4))
-    policy, swarm = make(str(folder), scenario), Swarm(scenario)
+    policy, swarm = make_policy(str(folder), scenario), Swarm(scenario)
     finite(policy.act(swarm.reset(0)))
 
 
@@ -431,12 +432,28 @@ def prepare(folder):
     )
     assert done.exit_code == 0, done.output
     for name in ANYWHERE:
-        scenario = granted(name, load_scenario("single_obstacle"))
-        make(name, scenario).act(Swarm(scenario).reset(0))
+        scenario = with_policy_requirements(name, load_scenario("single_obstacle"))
+        make_policy(name, scenario).act(Swarm(scenario).reset(0))
     for name in scenario_names():
         env = uuv_marl.parallel_env(load_scenario(name, overrides={"current.speed_mps": 0.1}))  # what the sea does, too
         env.reset(seed=0)
         env.step({agent: [0.0, 0.0] for agent in env.agents})
+
+
+TASKS_OF = {
+    "oracle": "hard_water", "carrot_informed": "hard_water", "nearest_target": "silent_targets",
+    "mappo_silent_targets": "silent_targets", "mappo_few_informed": "few_informed",
+}  # fmt: skip
+
+
+def interfaces(rng, folder):
+    """Every policy, over several episodes, through an interface drawn for it: the actions must be the same bits."""
+    for name in POLICIES:
+        scenario = suited(name, TASKS_OF.get(name, "starter"), **{"swarm.num_vehicles": 5})
+        try:
+            compare(pick(rng, PLAYERS), name, scenario, int(rng.integers(2**40)), CYCLES + 3, rng)
+        except AssertionError as error:
+            raise WrongError(f"{name}: {error}") from None
 
 
 def command_line(rng, folder):
@@ -474,5 +491,6 @@ COUNTS = {
     checkpoints: 400,
     results_folders: 200,
     command_line: 150,
+    interfaces: 28,
 }
 """Kinds of inputs, and how many cases of each the campaign has."""

@@ -1,4 +1,4 @@
-"""Policies: percepts in, actions out. ``make(name, scenario_or_env)`` makes one; ``POLICIES`` lists them.
+"""Policies: percepts in, actions out. ``make_policy(name, scenario_or_env)`` makes one; ``POLICIES`` lists them.
 
 Arguments of compiled functions have the same names everywhere, beside those of ``uuv_marl.sim``:
 
@@ -22,9 +22,9 @@ Arguments of compiled functions have the same names everywhere, beside those of 
 """
 
 from uuv_marl.baselines.env_policy import EnvPolicy
-from uuv_marl.baselines.making import make, with_policy_requirements
+from uuv_marl.baselines.making import make_policy, with_policy_requirements
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES
 from uuv_marl.baselines.requirements import PolicyRequirements
 
-__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "PolicyRequirements", "make", "with_policy_requirements"]
+__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "PolicyRequirements", "make_policy", "with_policy_requirements"]

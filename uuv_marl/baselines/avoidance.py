@@ -3,8 +3,8 @@
 import math
 
 from uuv_marl.baselines.policy import Limits, surge_resistance
+from uuv_marl.percept import Fields
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields
 
 
 @compiled

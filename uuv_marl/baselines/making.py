@@ -1,4 +1,4 @@
-"""``make``: policies with parameters, base controller and safety filter, for a scenario or an environment."""
+"""``make_policy``: policies with parameters, base controller and safety filter, for a scenario or an environment."""
 
 import inspect
 import math
@@ -61,10 +61,12 @@ def with_requirements(name: str, required: PolicyRequirements, scenario: Scenari
 
 
 @overload
-def make(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
+def make_policy(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
 @overload
-def make(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
-def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object) -> Policy | EnvPolicy:
+def make_policy(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
+def make_policy(
+    name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object
+) -> Policy | EnvPolicy:
     """Make a policy by name.
 
     Args:
@@ -94,7 +96,7 @@ def _made(name: str, scenario: Scenario, num_worlds: int, parameters: Mapping[st
     if not isinstance(barrier, Barrier):
         raise PolicyError(
             f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
-            "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
+            "give it to make_policy(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
         )
     policy = _with_parameters(name, policy_type, scenario, num_worlds, values)
     if isinstance(policy_type, Trained):

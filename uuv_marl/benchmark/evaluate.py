@@ -1,14 +1,15 @@
 """Run a policy on a scenario over seeds."""
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
-from uuv_marl.baselines import POLICIES, make
+from uuv_marl.baselines import POLICIES, make_policy
 from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
+from uuv_marl.envs.changes import Changes, ScenarioLike, changed
 from uuv_marl.errors import DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import whole_number
@@ -16,15 +17,15 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
 
 BATCH = 8
-"""Seeds stepped together: enough for all cores, and few to repeat after a benchmark was stopped."""
+"""Seeds stepped together: enough for all cores, and few to repeat after a benchmark is stopped."""
 ROUTE_PERIOD_S = 0.5
-"""Time between two samples of the routes [s]."""
+"""Time between two samples of the trajectories [s]."""
 MOST_SAMPLES = 1_500_000
-"""Most samples (times x vehicles) of a run's routes; longer or larger runs are sampled less often."""
+"""Most samples (times x vehicles) of a run's trajectories; larger runs are sampled less often."""
 
 
 class Routes(NamedTuple):
-    """Positions of all vehicles, from start to end; NaN once a vehicle is lost. The frame is north, east."""
+    """Trajectories of all vehicles, from start to end, in the frame north, east; NaN once a vehicle is lost."""
 
     time_s: Float32
     """Shape (time,): every ``ROUTE_PERIOD_S`` (see ``MOST_SAMPLES``), and the end."""
@@ -44,26 +45,26 @@ class Run(NamedTuple):
     series: dict[str, Float32]
     """Samples over time, see ``MetricsRecorder.series``."""
     routes: Routes
-    """Routes of all vehicles, sampled in time."""
+    """Trajectories of all vehicles."""
     obstacles: Float32
-    """Centre north, east and radius [m], at the end, shape (obstacle, 3)."""
+    """Centre north, east and radius at the end [m], shape (obstacle, 3)."""
     waypoints: Float32
-    """Corners of the trajectory [m], shape (point, 2)."""
+    """Corners of the reference trajectory [m], shape (point, 2)."""
 
 
 class Progress(NamedTuple):
     """The progress of an evaluation."""
 
     share: float
-    """Share of the simulated time that all seeds need at most."""
+    """Share of the largest possible simulated time of all seeds."""
 
 
 Watch = Callable[[Swarm, Float32 | None], None]
-"""Called with the swarm after its reset and after every step, and with the actions that led there, shape
-(world, vehicle, 2), None after the reset. It may only look, and must copy what it keeps."""
+"""Called with the swarm after its reset and after every step, and with the preceding actions (world, vehicle, 2), None
+after the reset. It must not change the arrays, and must copy those that it keeps."""
 
 
-def evaluate(
+def episodes(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None = None, /, **parameters: object
 ) -> Iterator[Run | Progress]:
     """Run a policy on a scenario; yields each episode as soon as it ends, with progress in between.
@@ -71,8 +72,8 @@ def evaluate(
     A run depends on its seed alone, not on the other seeds.
 
     Args:
-        scenario: must have the channels and the inner loop of the policy (``uuv_marl.baselines.granted``).
-        policy: the policy's name, see ``uuv_marl.baselines.make``.
+        scenario: must have what the policy requires (``uuv_marl.with_policy_requirements``).
+        policy: the policy's name, see ``uuv_marl.baselines.make_policy``.
         seeds: one seed for each episode.
         watch: called after the reset and after every step.
         parameters: keyword arguments of the policy.
@@ -91,9 +92,36 @@ def evaluate(
                 yield event
 
 
+def evaluate(
+    policy: str,
+    scenario: ScenarioLike = "single_obstacle",
+    seeds: Iterable[int] = range(20),
+    **changes: Unpack[Changes],
+) -> list[dict[str, Any]]:
+    """Run a policy on a scenario with the policy's requirements; the metrics of every episode.
+
+    Args:
+        policy: a name, the path of a checkpoint or ``module:Class``, see ``uuv_marl.make_policy``.
+        scenario: a name, a TOML file or a ``Scenario``.
+        seeds: one seed for each episode.
+        changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, as for ``uuv_marl.parallel_env``.
+
+    Returns:
+        A dictionary for each seed, in their order: ``seed`` and the metrics that docs/benchmark.md defines.
+
+    Raises:
+        ScenarioError: a change contradicts a requirement of the policy.
+        DivergenceError: the integration step is too long for a vehicle.
+    """
+    given = [*seeds]
+    with blaming(policy):
+        runs = [run for run in episodes(changed(scenario, policy, **changes), policy, given) if isinstance(run, Run)]
+    return [{"seed": run.seed, **run.metrics} for run in sorted(runs, key=lambda run: given.index(run.seed))]
+
+
 @contextmanager
 def blaming(policy: str) -> Generator[None]:
-    """Turn what a user's own policy makes ``evaluate`` raise into a PolicyError that names it."""
+    """Turn an error caused by a user's own policy into a PolicyError that names it."""
     try:
         yield
     except (TypeError, ValueError) as error:
@@ -109,9 +137,9 @@ def _look_away(swarm: Swarm, action: Float32 | None) -> None:
 def _batch(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch, parameters: dict[str, object]
 ) -> Iterator[Run | Progress]:
-    """The episodes of seeds that are stepped together."""
+    """Episodes of seeds that are stepped together."""
     swarm = Swarm(scenario, len(seeds))
-    actor = make(policy, scenario, len(seeds), **parameters)
+    actor = make_policy(policy, scenario, len(seeds), **parameters)
     percept = swarm.reset(list(seeds))
     actor.reset(list(seeds))
     recorder = MetricsRecorder(swarm)
@@ -156,7 +184,7 @@ def _batch(
 
 
 def _sample(swarm: Swarm) -> tuple[Float32, Float32]:
-    """Time (world,) and position, heading and velocity of everybody (world, vehicle, 5)."""
+    """Time (world,), and position, heading and velocity of all vehicles (world, vehicle, 5)."""
     eta, (u, v) = swarm.state.eta, np.moveaxis(swarm.velocity, -1, 0)
     cos, sin = np.moveaxis(swarm.heading, -1, 0)
     motion = np.stack([eta[:, :, 0], eta[:, :, 1], eta[:, :, 2], cos * u - sin * v, sin * u + cos * v], axis=2)
@@ -165,7 +193,7 @@ def _sample(swarm: Swarm) -> tuple[Float32, Float32]:
 
 
 def _routes(swarm: Swarm, samples: Sequence[tuple[Float32, Float32]], w: int) -> Routes:
-    """The routes of a world that ends now."""
+    """The trajectories of a world that ends now."""
     time, motion = zip(*((t[w], m[w]) for t, m in [*samples, _sample(swarm)]), strict=True)
     moved = np.array(motion, np.float32)
     return Routes(np.array(time, np.float32), moved[:, :, :2], moved[:, :, 2], moved[:, :, 3:])

@@ -1,4 +1,4 @@
-"""``uuv-marl list``: the scenarios, vehicles and policies that there are."""
+"""``uuv-marl list``: all scenarios, vehicles and policies."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -11,7 +11,7 @@ from uuv_marl.cli.console import console, explained
 
 
 class ListKind(StrEnum):
-    """What can be listed."""
+    """Kinds of lists."""
 
     SCENARIOS = "scenarios"
     VEHICLES = "vehicles"
@@ -24,7 +24,7 @@ def show_list(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Print this scenario's or vehicle's file, with the source of every number: lauv, remus100+munk_on.",
+            help="Print the file of this scenario or vehicle, such as lauv or remus100+munk_on, with all sources.",
         ),
     ] = None,
 ) -> None:

@@ -16,10 +16,10 @@ from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Int64
 
 

@@ -20,10 +20,10 @@ from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32
 
 EPSILON = 0.1  # parameter of the sigma-norm, as in the source's simulations [1]

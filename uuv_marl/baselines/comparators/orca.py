@@ -17,10 +17,10 @@ from uuv_marl.baselines.policy import Limits, Policy, tuned
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Float64
 
 _SHARE = 0.5  # share of a change that a vehicle makes; its neighbour makes the other half. Definition of ORCA^tau_A|B.

@@ -101,7 +101,7 @@ def check_same_training(policy: Policy, card: Card, any_vehicle: bool) -> None:
         ("percept", then, now, "use a scenario with the sonar suite of its training")
     ]
     if not any_vehicle:
-        remedy = "use another policy, allow this vehicle with make(..., any_vehicle=True)"
+        remedy = "use another policy, allow this vehicle with make_policy(..., any_vehicle=True)"
         pairs.append(("vehicle", card.vehicle, vehicle_of(scenario), remedy))
     for what, old, new, remedy in pairs:
         other = next((field for field in {**old, **new} if old.get(field) != new.get(field)), None)

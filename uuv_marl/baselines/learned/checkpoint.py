@@ -112,7 +112,7 @@ class Checkpoint(NamedTuple):
 def card_rows(scenario: Scenario) -> tuple[Row, ...]:
     """Rows of a network's input in a scenario, as in ``Card.percept``."""
     table = observation_layout(scenario, "closeness").table
-    return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in table)
+    return tuple((field.name, field.size, field.quantity.unit, field.quantity.scale) for field in table)
 
 
 def card_of(scenario: Scenario, **more: Any) -> Card:

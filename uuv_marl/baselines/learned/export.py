@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.actor import Actor, in_disc
 from uuv_marl.baselines.learned.layers import Network
 from uuv_marl.baselines.policy import PolicyError
@@ -45,12 +45,12 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
         ResultsError: the file can't be written.
     """
     path = user_path(path)
-    actor = make(policy, with_policy_requirements(policy, scenario))
+    actor = make_policy(policy, with_policy_requirements(policy, scenario))
     if not isinstance(actor, Actor):
         raise PolicyError(
             f"policy {policy!r} can't be exported: ONNX holds networks end to end, not controllers, safety filters or "
             "residual networks. Export a checkpoint of a training without filter and base controller; run this "
-            "policy with uuv_marl.baselines.make"
+            "policy with uuv_marl.baselines.make_policy"
         )
     graph = Graph()
     network = Network(actor.checkpoint.card.network, actor.checkpoint.card.sizes, actor.checkpoint.tensors, graph)
@@ -70,7 +70,7 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
 def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
     """The model with its documentation; metadata hold the vehicle's limits, the card, and the digest of the weights."""
     layout, checkpoint = observation_layout(policy.scenario, "closeness"), policy.checkpoint
-    units = [f"{row.kind.scale:g} {row.kind.unit}".removesuffix(" 1") for row in layout.table]
+    units = [f"{row.quantity.scale:g} {row.quantity.unit}".removesuffix(" 1") for row in layout.table]
     fields = ", ".join(f"{row.name} {row.size} [{unit}]" for row, unit in zip(layout.table, units, strict=True))
     sees = f"As closeness, body frame; name, size and unit of each part: {fields}."
     acts = "Surge force and yaw torque [full force, full torque], within the unit disc."

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from uuv_marl.baselines.memory.pose import to_body, to_map, to_map_axes
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.sonar import cross, suite
-from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float64
 
 NOISE_M, NOISE_SHARE = 0.05, 0.03

@@ -4,8 +4,8 @@ import math
 
 from uuv_marl.baselines.memory.pose import to_map
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Fields
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields
 
 GATE_M, GATE_SHARE = 2.0, 0.1
 """Distance from a predicted position within which a reading is associated [m], plus a share of its range. Assumed."""

@@ -12,11 +12,11 @@ import numpy as np
 from uuv_marl.baselines.memory.actuators import identify
 from uuv_marl.baselines.memory.response import follow
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Fields
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, held, plant
-from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float32, Float64
 
 _MOVES_MPS = 0.005  # speed above which l(t) counts as moving; scenarios allow no speed below 0.01 m/s

@@ -8,10 +8,10 @@ import numpy as np
 from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Int64
 
 FEED_FORWARD = 1.2  # feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference

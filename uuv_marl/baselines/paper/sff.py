@@ -13,11 +13,11 @@ import numpy as np
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32, Float64
 
 HORIZON_S = 1.0  # time ahead for which neighbours are predicted [s]

@@ -20,7 +20,7 @@ _GROUPS = [*(group for group in GROUPS if group != "X"), EVERY, "X"]
 
 
 def write_robustness_report(folder: Path) -> list[Path]:
-    """The page and its pictures from the folder's ``EPISODES``; the paths, that of the page first."""
+    """Write the page and its pictures from the folder's ``EPISODES``; return the paths, first the page's."""
     episodes = read_episodes(folder / EPISODES)
     page = folder / "robustness.md"
     write_text(page, report(episodes))
@@ -42,18 +42,18 @@ def report(episodes: Any) -> str:
 
 
 def _picture(scenario: str) -> str:
-    """Where a scenario's picture is, seen from the page."""
+    """Path of a scenario's picture, relative to the page."""
     return f"figures/robustness_{scenario}.png"
 
 
 def _calm(scenarios: list[str]) -> str:
-    """What is on at level 0."""
+    """Conditions at level 0."""
     phrases = [conditions(load_scenario(name, overrides=BASE)) for name in scenarios if name in scenario_names()]
     return "; ".join(dict.fromkeys(phrases)) or f"{IDEAL}, unless the scenario says otherwise"
 
 
 def _main(table: Any) -> Any:
-    """The rows of the policies that have the most seeds."""
+    """The rows of the policies with the most seeds."""
     seeds = table.groupby(level="policy").size()
     return table[table.index.get_level_values("policy").isin(seeds[seeds == seeds.max()].index)]
 
@@ -82,10 +82,10 @@ def _axes(table: Any) -> str:
     policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
     rows = [(name, AXES[name].title, *_successes(policies, name)) for name in AXES]
     shown = [row for row in rows if any(cell != _NOTHING for cell in row[2:])]
-    return markdown_table(("axis", "what", *policies), shown)
+    return markdown_table(("axis", "disturbance", *policies), shown)
 
 
 def _successes(policies: dict[str, Any], axis: str) -> Iterator[str]:
     for own in policies.values():
         score = axis_score(own, axis)
-        yield f"{score.success.value:.2f}" if score else _NOTHING
+        yield f"{score.value:.2f}" if score else _NOTHING
