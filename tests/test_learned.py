@@ -71,7 +71,7 @@ def test_an_encoder_reads_sub_sectors_in_any_order_with_their_places():
             t[name] = rng.standard_normal(shape).astype(np.float32)
         x, order = rng.standard_normal((4, 8 + 3 * num)).astype(np.float32), rng.permutation(num)
         turned = x.copy()
-        turned[:, sectors["detected"].ravel()] = x[:, sectors["detected"][order].ravel()]
+        turned[:, sectors["heard"].ravel()] = x[:, sectors["heard"][order].ravel()]
         seen = Network(made, sizes, t, NumpyOps).features(x)
         again = Network(made, sizes, {**t, "heard.place": t["heard.place"][order]}, NumpyOps).features(turned)
         np.testing.assert_allclose(seen, again, atol=1e-6)
