@@ -23,8 +23,8 @@ HOLD_S, N = 0.1, 3
 FINE = {"timing.decision_period_s": HOLD_S, "swarm.num_vehicles": N}
 
 
-def scenario(name="starter", speed_mps=2.0, way_m=8.0, share=1.0, **changes):
-    traffic = {"traffic.speed_mps": speed_mps, "traffic.amplitude_m": way_m, "traffic.share": share}
+def scenario(name="starter", speed_mps=2.0, amplitude_m=8.0, share=1.0, **changes):
+    traffic = {"traffic.speed_mps": speed_mps, "traffic.amplitude_m": amplitude_m, "traffic.share": share}
     return load_scenario(name, overrides={**FINE, **traffic, **changes})
 
 
