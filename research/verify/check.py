@@ -15,7 +15,7 @@ from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.names import parse_name
 from uuv_marl.benchmark.evaluate import Run, blaming, episodes
 from uuv_marl.benchmark.results import FILE
-from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
+from uuv_marl.errors import USER_ERRORS, DivergenceError, PolicyError, ResultsError
 
 _HOME = "heldout.csv.gz"
 
@@ -118,7 +118,7 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
         run = _rerun(row, report)
     except DivergenceError as error:
         return Verdict(row, [Difference("episode", "ended", f"diverged: {error}")])
-    except (*MENDABLE, ModuleNotFoundError) as error:
+    except (*USER_ERRORS, ModuleNotFoundError) as error:
         return Verdict(row, reason=str(error))
     now = dict(zip(row.kind.measured, row.kind.written(row.cells, run.metrics), strict=True))
     return Verdict(row, [Difference(f, row.cells[f], now[f]) for f in row.kind.measured if row.cells[f] != now[f]])
