@@ -93,7 +93,7 @@ def test_observations_are_within_finite_bounds_and_lose_nothing():
 def test_bad_input_names_the_agent_and_the_remedy():
     env = uuv_marl.parallel_env(num_vehicles=3)
     for call in (env.state, uuv_marl.parallel_env(render_mode="rgb_array").render):
-        with pytest.raises(RuntimeError, match="came before reset"):
+        with pytest.raises(RuntimeError, match="was called before reset"):
             call()
     env.reset(seed=0)
     good = dict.fromkeys(env.agents, np.zeros(2, np.float32))
@@ -120,7 +120,7 @@ def test_bad_input_names_the_agent_and_the_remedy():
 def test_stepping_nobody_after_the_end_gives_nothing():
     """As PettingZoo's own environments do, and SuperSuit's black_death needs; but never before the first reset."""
     env = uuv_marl.parallel_env(num_vehicles=2, max_cycles=1)
-    with pytest.raises(RuntimeError, match="step came before reset; call reset"):
+    with pytest.raises(RuntimeError, match="step was called before reset; call reset"):
         env.step({})
     env.reset(seed=0)
     with pytest.raises(ValueError, match="the action of uuv_0 is missing"):
@@ -170,7 +170,7 @@ def test_what_is_no_action_is_refused_by_name(action, message):
         alone.step(action)
     with pytest.raises(TypeError, match="actions must be a dictionary"):
         env.step(np.zeros((3, 2)))
-    with pytest.raises(ValueError, match="there is no agent 5"):
+    with pytest.raises(ValueError, match="agent 5 is unknown"):
         env.step({**good, 5: np.zeros(2)})
 
 

@@ -914,10 +914,10 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
             {"imitation_weight": 2.0},
             "pull = 2 is to a teacher, and none is given; name one, or leave pull out",
         ),
-        ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
+        ({"scenario": "lossy"}, "training can't represent the loss of a vehicle"),
         ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
         ({"sizes": [[5, -1]]}, "sizes.0.1 should be greater than or equal to 0, got -1"),
-        ({"extra_scenarios": ["lossy"]}, "training can't show that a vehicle is lost"),
+        ({"extra_scenarios": ["lossy"]}, "training can't represent the loss of a vehicle"),
         (
             {"extra_scenarios": ["few_informed"]},
             "also = 'few_informed' has another percept than 'starter', and one network",

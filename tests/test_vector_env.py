@@ -168,7 +168,7 @@ def test_what_cannot_be_done_is_named():
     with pytest.raises(RuntimeError, match="call reset"):
         env.step(np.zeros((3, 5, 2)))
     for early in (env.render, env.state, SoloEnv(render_mode="rgb_array").render):
-        with pytest.raises(RuntimeError, match="came before reset"):
+        with pytest.raises(RuntimeError, match="was called before reset"):
             early()
     env.reset(seed=0)
     assert [picture.shape for picture in env.render()] == [(800, 800, 3)] * 3

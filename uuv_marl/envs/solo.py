@@ -24,16 +24,14 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     """The learner is vehicle 0 and acts by ``step``; all others run the policy ``others``.
 
     Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the swarm
-    arrives or the learner is lost, and is truncated by the time limit; others may be lost on the way. Every info
-    tells how the episode stands, so that a wrapper may end it: ``is_success``, ``ending`` (``running`` until it ends),
-    ``arrived``, ``time_s``, ``collisions`` (``uuv_marl.envs.ending.ending``).
+    arrives or the learner is lost, and is truncated by the time limit; others may be lost before. Every info holds the
+    state of the episode (``uuv_marl.envs.ending.ending``), so that a wrapper may end it.
 
     Args:
         others: name of a policy, or ``module:Class``. The scenario gets its requirements
             (``uuv_marl.with_policy_requirements``), also for the learner: ``sdc`` makes observations longer.
         render_mode: ``human``, ``rgb_array`` or None.
-        render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
-            otherwise.
+        render_options: as for ``uuv_marl.parallel_env``; ``sonar_of`` is the learner by default.
         info_terms: whether the info holds the reward's terms.
         scenario, max_cycles, reward, observe: as for ``uuv_marl.parallel_env``.
         changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, likewise.
@@ -76,7 +74,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Float32, dict[str, Any]]:
-        """Start an episode: with a seed, the episode of ``parallel_env``; without one, the random stream goes on."""
+        """Start an episode: with a seed that of ``parallel_env``, without one the random stream continues."""
         (own,) = world_seeds(seed, [0])
         super().reset(seed=own, options=options)
         observation = self._batch.reset(own)
@@ -87,7 +85,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     def step(self, action: ArrayLike) -> tuple[Float32, float, bool, bool, dict[str, Any]]:
         """One decision of the learner and of all others. Raises RuntimeError before a reset and after the end."""
         if not self._running:
-            raise RuntimeError("there is no episode to step; call reset() to start one")
+            raise RuntimeError("no episode is running; call reset() to start one")
         own = action_array(action, (2,), "the action")
         if not np.isfinite(own).all():
             raise ValueError(f"the action must be finite, got {own.tolist()}")

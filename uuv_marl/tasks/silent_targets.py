@@ -80,8 +80,8 @@ class SilentTargetsMemory(NamedTuple):
 
 @compiled
 def walk(
-    worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64, memory: SilentTargetsMemory,
-    velocity: Float64,
+    worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64,
+    memory: SilentTargetsMemory, velocity: Float64,
 ) -> None:  # fmt: skip
     """Fill the targets' velocities for the coming step; one that would leave the box is reflected at its edge.
 
