@@ -97,7 +97,7 @@ def test_bad_input_names_the_agent_and_the_remedy():
             call()
     env.reset(seed=0)
     good = dict.fromkeys(env.agents, np.zeros(2, np.float32))
-    for actions, message in (({"uuv_0": good["uuv_0"]}, "of uuv_1 is missing"), ({**good, "x": 0}, "no agent 'x'")):
+    for actions, message in (({"uuv_0": good["uuv_0"]}, "of uuv_1 is missing"), ({**good, "x": 0}, "agent 'x' is unknown")):
         with pytest.raises(ValueError, match=message):
             env.step(actions)
     for told, message in (
