@@ -53,29 +53,16 @@ class StepResult(NamedTuple):
 
 
 class BatchedEnv:
-    """A swarm with the reward and the endings of the environment's contract.
+    """A swarm of ``num_worlds`` with the reward and the endings of every environment.
 
-    Args:
-        scenario: what to simulate.
-        num_worlds: worlds stepped together.
-        reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress) and
-            ``geodesic`` (progress along the shortest collision-free path) and ``leader`` (informed vehicles get the
-            mean) where the task has them, ``team`` (every vehicle gets the mean of ``dense``; a lost vehicle also its
-            own loss), or a function from the swarm to an array (world, vehicle).
-        max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
-        observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
-        keep_terms: whether steps return the reward's terms, which takes time in large batches.
+    Arguments are explained by ``uuv_marl.parallel_env``; without ``keep_terms`` steps omit the reward's terms, which
+    saves time in large batches.
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        num_worlds: int = 1,
-        reward: Reward = "dense",
-        max_cycles: int | None = None,
-        observe: Observe = "positions",
-        keep_terms: bool = True,
-    ) -> None:
+        self, scenario: Scenario, num_worlds: int = 1, reward: Reward = "dense", max_cycles: int | None = None,
+        observe: Observe = "positions", keep_terms: bool = True,
+    ) -> None:  # fmt: skip
         self.swarm = Swarm(scenario, num_worlds)
         self.layout = observation_layout(scenario, observe)
         """The fields of an observation."""

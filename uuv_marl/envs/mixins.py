@@ -26,7 +26,7 @@ class EnvMixin:
         self, batch: BatchedEnv, render_mode: str | None, options: RenderOptions | None = None,
         sonar_of: int | None = None,
     ) -> None:  # fmt: skip
-        """Wrap these worlds; ``sonar_of``: vehicle whose sonar is drawn if the options name none."""
+        """Wrap these worlds; ``sonar_of``: index of the inspected vehicle if the options name none."""
         self._batch = batch
         self._renderer = Renderer(batch, render_mode, self.metadata["render_modes"], options, sonar_of)
         self.render_mode = render_mode

@@ -146,7 +146,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         return array
 
     def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
-        """Every agent's action. Raises ValueError with the first agent whose action can't be used."""
+        """Every agent's action. Raises ValueError for the first one that can't be used."""
         if not isinstance(actions, Mapping):
             raise TypeError(f"actions must be a dictionary with an action for each agent, got {type(actions).__name__}")
         rows: list[Float32] = []
@@ -186,7 +186,7 @@ def parallel_env(
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: a dictionary with any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or ``map``) and
-            ``sonar_of`` (index of the vehicle whose sonar is shown).
+            ``sonar_of`` (index of a vehicle, to show its sonar).
         reward: ``dense`` (progress, costs and arrival), ``sparse`` (without progress; ``follow`` alone), ``geodesic``
             (progress along the collision-free path; ``hard_water`` alone), ``leader`` (informed vehicles get the mean;
             ``few_informed`` alone), ``team`` (all get the mean of ``dense``) or a function from the swarm to an array
@@ -199,8 +199,8 @@ def parallel_env(
         decision_period: time between decisions [s], a multiple of the control step; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
-        for_policy: name of a policy whose requirements the scenario gets after all other changes: its channels, yaw
-            damping and decision period (``uuv_marl.with_policy_requirements``).
+        for_policy: name of a policy; the scenario gets its channels, yaw damping and decision period after all other
+            changes (``uuv_marl.with_policy_requirements``).
     """
     batch = make_batched_env(
         scenario, order=("scenario", "num_vehicles"), max_cycles=max_cycles, reward=reward, observe=observe,

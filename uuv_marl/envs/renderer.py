@@ -19,7 +19,7 @@ class Renderer:
         render_mode: one of ``modes``, or None.
         modes: ``rgb_array``, and ``human`` if the environment can show a window.
         options: see ``RenderOptions``.
-        sonar_of: vehicle whose sonar is drawn if the options name none.
+        sonar_of: index of the inspected vehicle if the options name none.
     """
 
     def __init__(

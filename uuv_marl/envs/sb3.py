@@ -40,8 +40,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         num_worlds: worlds stepped together.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
         render_options: as for ``uuv_marl.parallel_env``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
-            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``.
+        options: the other arguments of ``uuv_marl.parallel_env``, such as ``reward`` and ``for_policy``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - SB3's own form

@@ -8,13 +8,12 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import make_policy
-from uuv_marl.envs.changes import Changes, Reward, ScenarioLike
+from uuv_marl.envs.changes import EnvOptions, ScenarioLike
 from uuv_marl.envs.core import StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
-from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32
 
 
@@ -33,8 +32,8 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: as for ``uuv_marl.parallel_env``; ``sonar_of`` is the learner by default.
         info_terms: whether the info holds the reward's terms.
-        scenario, max_cycles, reward, observe: as for ``uuv_marl.parallel_env``.
-        changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, likewise.
+        scenario: a name, a TOML file or a ``Scenario``.
+        options: the other arguments of ``uuv_marl.parallel_env`` but ``for_policy``.
 
     Raises:
         ScenarioError: a change contradicts a requirement of ``others``.
@@ -50,19 +49,14 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         render_mode: str | None = None,
         render_options: RenderOptions | None = None,
         info_terms: bool = False,
-        max_cycles: int | None = None,
-        reward: Reward = "dense",
-        observe: Observe = "positions",
-        **changes: Unpack[Changes],
+        **options: Unpack[EnvOptions],
     ) -> None:
         if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
-        if "for_policy" in changes:
+        if "for_policy" in options:
             raise TypeError(f"SoloEnv takes no for_policy: the scenario suits others={others!r}; leave it out")
-        batch = make_batched_env(
-            scenario, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms, for_policy=others,
-            **changes,
-        )  # fmt: skip
+        options["for_policy"] = others
+        batch = make_batched_env(scenario, keep_terms=info_terms, **options)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make_policy(others, self.scenario)
         self._info_terms = info_terms

@@ -37,8 +37,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         scenario: a name, a TOML file or a ``Scenario``.
         seed: of the first reset, ``seed + w`` for world w; as ``set_seed``.
         device: of the tensors; the simulation runs on the CPU.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
-            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``.
+        options: the other arguments of ``uuv_marl.parallel_env``, such as ``reward`` and ``for_policy``.
     """
 
     def __init__(

@@ -189,9 +189,8 @@ def vector_env(
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its name; see
             ``SwarmVectorEnv``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
-            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this
-            ``reward`` for each vehicle; the reward of a row is the mean over all vehicles, with ``team`` of ``dense``.
+        options: the other arguments of ``uuv_marl.parallel_env``, such as ``for_policy``. ``infos["agent_reward"]`` is
+            the ``reward`` of each vehicle; a row's is the mean over all vehicles, with ``team`` that of ``dense``.
     """
     batch = make_batched_env(scenario, num_envs, order=("num_envs", "scenario"), keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)
