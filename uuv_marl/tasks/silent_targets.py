@@ -83,7 +83,7 @@ def walk(
     worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64,
     memory: SilentTargetsMemory, velocity: Float64,
 ) -> None:  # fmt: skip
-    """Fill the targets' velocities for the coming step; one that would leave the box is reflected at its edge.
+    """Fill the targets' velocities for the coming step; one that would leave the box is reflected.
 
     ``worlds`` are stepped, ``time_s`` is since the reset, shape (world,) both; ``period`` of a step [s], ``half`` of the
     box's side [m], turn ``rate`` [rad/s]; ``places`` [m] and ``velocity`` [m/s], north and east, shape (world,
